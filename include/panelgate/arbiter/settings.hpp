@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+/// How one station is asked. The defaults are those of the line (contract 3).
+struct StationSettings {
+    std::uint8_t id = 1;  ///< 1..247
+    /// From the end of the request on the wire to the start of the reply.
+    Duration response_timeout = 500ms;
+    /// Silence before a request to this station and after its reply; never less than t3.5.
+    Duration frame_gap = 1750us;
+    int retries = 1;  ///< of reads; 0..10
+    bool retry_writes = false;
+};
+
+struct QueueSettings {
+    std::size_t limit = 256;      ///< requests that wait on this line
+    std::size_t per_client = 32;  ///< of one client
+    Duration deadline = 2s;       ///< of a request, from its arrival to its answer
+};
+
+struct Settings {
+    SerialFormat serial;
+    /// For stations without an entry in `stations`; its id is not used.
+    StationSettings unlisted;
+    std::vector<StationSettings> stations;
+    Duration broadcast_turnaround = 100ms;  ///< serial line V1.02, 2.4.1: 100..200 ms
+    /// Silence that ends a reply whose length nothing tells (FRM-11); counted from its last byte.
+    Duration end_of_frame = 20ms;
+    QueueSettings queue;
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace panelgate {
+
+using Bytes = std::vector<std::uint8_t>;
+using ByteView = std::span<const std::uint8_t>;
+
+/// Reads big-endian fields from bytes it does not own. Reading past the end yields 0 and makes the
+/// failure stick: ask once, at the end, with finished() or ok().
+class Reader {
+  public:
+    explicit Reader(ByteView bytes) : bytes_(bytes) {}
+
+    std::uint8_t u8();
+    std::uint16_t u16();
+    /// The next n bytes; empty on failure.
+    ByteView take(std::size_t n);
+
+    std::size_t left() const { return bytes_.size() - at_; }
+    bool ok() const { return ok_; }
+    /// Everything was read, and nothing more than there was.
+    bool finished() const { return ok_ && left() == 0; }
+
+  private:
+    ByteView bytes_;
+    std::size_t at_ = 0;
+    bool ok_ = true;
+};
+
+/// Appends big-endian fields.
+class Writer {
+  public:
+    Writer& u8(unsigned value);
+    Writer& u16(unsigned value);
+    Writer& raw(ByteView bytes);
+    Bytes take() { return std::move(bytes_); }
+
+  private:
+    Bytes bytes_;
+};
+
+/// "1f 03 00"; an empty separator gives "1f0300".
+std::string to_hex(ByteView bytes, std::string_view separator = " ");
+/// Pairs of hex digits, blanks between pairs allowed; nothing on anything else.
+std::optional<Bytes> from_hex(std::string_view text);
+
+}  // namespace panelgate

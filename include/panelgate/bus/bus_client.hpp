@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
+
+namespace panelgate::bus {
+
+/// Who asks: one number a TCP connection, HTTP session or internal task. 0 is nobody's.
+using ClientId = std::uint64_t;
+ClientId next_client_id();
+
+/// One request to one station; station 0 is a broadcast.
+struct Request {
+    std::uint8_t station = 0;  ///< 0..247
+    Bytes pdu;
+    ClientId client = 0;
+    arbiter::PriorityClass priority = arbiter::PriorityClass::read;
+    modbus::QuantityCheck quantity = modbus::QuantityCheck::fit;
+};
+
+enum class Source : std::uint8_t { bus, cache };
+
+/// The one answer to a request: a reply PDU (normal or the panel's exception), or a fault.
+/// For a broadcast the PDU is the function's normal reply, forged when the frame has left.
+struct Answer {
+    Result<Bytes> pdu = Fault::cancelled;
+    bool transmitted = false;  ///< the request was (at least partly) on the wire at least once
+    Source source = Source::bus;
+    Duration age{};  ///< of the value, when source is cache
+};
+using AnswerHandler = std::function<void(Answer)>;
+
+/// A frame on the wire, for traces.
+struct TraceFrame {
+    enum class Direction : std::uint8_t { sent, received, discarded };
+    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    TimePoint at;                ///< first bit out; last byte in
+    Direction direction = Direction::sent;
+    Bytes bytes;
+    std::string note;  ///< "reply", "late", "damaged", "broadcast"…; never empty
+};
+
+struct LineStatus {
+    std::string name;
+    std::string device;
+    bool up = false;
+    std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
+    std::size_t queue_depth = 0;
+    double load_percent = 0;  ///< busy share of the last seconds
+};
+
+struct StationStatus {
+    std::string state;                     ///< "unknown" before the first try, "online", "silent"
+    std::optional<Duration> last_success;  ///< how long ago
+};
+
+/// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long as
+/// the program's io_context runs; it outlives its clients.
+class BusClient {
+  public:
+    virtual ~BusClient() = default;
+
+    /// Hands in a request. The handler is called exactly once, never from inside transact(), at the
+    /// latest at the deadline of the line's queue settings. Checks the PDU (Fault::malformed,
+    /// Fault::denied) and the queue (Fault::busy) itself.
+    virtual void transact(Request request, AnswerHandler handler) = 0;
+    /// Forgets a client: its waiting requests are answered Fault::cancelled and never transmitted;
+    /// one on the wire is completed and then answered normally.
+    virtual void cancel(ClientId client) = 0;
+
+    virtual LineStatus status() const = 0;
+    virtual StationStatus station_status(std::uint8_t station) const = 0;
+    /// The last frames, oldest first, at most `last`.
+    virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;
+};
+
+}  // namespace panelgate::bus

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/line/settings.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "panelgate/tcp_server/settings.hpp"
+#include "panelgate/web/settings.hpp"
+#include "panelgate/yaml/document.hpp"
+
+namespace panelgate::config {
+
+struct Station {
+    std::uint8_t id = 1;
+    std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
+    const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
+    bool read_only = false;
+};
+
+struct Line {
+    enum class Kind : std::uint8_t { serial, simulated };
+    std::string name;
+    Kind kind = Kind::serial;
+    line::Settings device;
+    arbiter::Settings arbiter;  ///< every station's timing resolved
+    bool refuse_unlisted = false;
+    std::vector<Station> stations;
+};
+
+struct Log {
+    enum class Level : std::uint8_t { error, warn, info, debug, trace };
+    enum class Format : std::uint8_t { text, json };
+    Level level = Level::info;
+    Format format = Format::text;
+};
+
+/// A valid configuration (contract 3): every default filled in, every reference resolved.
+struct Config {
+    std::shared_ptr<const profile::Catalogue> profiles;
+    std::vector<Line> lines;
+    std::vector<tcp_server::Settings> modbus_tcp;
+    std::optional<web::Settings> http;
+    Log log;
+    /// Things that are legal but worth a word ("8N1 is outside the standard"), FILE:LINE:COLUMN text.
+    std::vector<std::string> warnings;
+};
+
+/// Reads a file's content; nothing when it cannot be read. For profiles_dir and token files.
+struct Files {
+    virtual ~Files() = default;
+    virtual std::optional<std::string> read(const std::string& path) const = 0;
+    /// Paths of the *.yaml files in a directory, sorted; nothing when it cannot be listed.
+    virtual std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const = 0;
+};
+
+/// Text -> Config. Nothing is returned when `problems` got any entry.
+std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems);
+
+}  // namespace panelgate::config

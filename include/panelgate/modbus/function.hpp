@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace panelgate::modbus {
+
+/// Function codes of the Application Protocol V1.1b3, section 6.
+enum Function : std::uint8_t {
+    kReadCoils = 0x01,
+    kReadDiscreteInputs = 0x02,
+    kReadHoldingRegisters = 0x03,
+    kReadInputRegisters = 0x04,
+    kWriteSingleCoil = 0x05,
+    kWriteSingleRegister = 0x06,
+    kReadExceptionStatus = 0x07,
+    kDiagnostics = 0x08,
+    kGetCommEventCounter = 0x0B,
+    kGetCommEventLog = 0x0C,
+    kWriteMultipleCoils = 0x0F,
+    kWriteMultipleRegisters = 0x10,
+    kReportServerId = 0x11,
+    kReadFileRecord = 0x14,
+    kWriteFileRecord = 0x15,
+    kMaskWriteRegister = 0x16,
+    kReadWriteMultipleRegisters = 0x17,
+    kReadFifoQueue = 0x18,
+    kEncapsulatedInterface = 0x2B,
+};
+inline constexpr std::uint8_t kExceptionBit = 0x80;
+inline constexpr std::uint8_t kMeiDeviceIdentification = 0x0E;
+
+inline constexpr std::size_t kMaxPdu = 253;     ///< AP 4.1
+inline constexpr std::size_t kMaxRtuAdu = 256;  ///< AP 4.1: address + PDU + CRC
+/// What the Panasonic GT may answer: one byte of byte count, so 255 data bytes (ARCT1F501E, 1.3.1).
+inline constexpr std::size_t kMaxLongRtuAdu = 260;
+inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
+
+/// The four tables of the data model (AP 4.3).
+enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
+/// "holding-registers", the word of the REST path (contract 5).
+std::string_view label(Table table);
+inline constexpr bool is_bit_table(Table table) {
+    return table == Table::coils || table == Table::discrete_inputs;
+}
+Function read_function(Table table);
+
+/// Only reads, surely: may be asked again without harm (RTY-02: 01..04, 07, 0B, 0C, 11, 14, 18).
+/// 2B is one only with MEI type 0E; see is_pure_read(pdu) in request.hpp.
+bool is_read(std::uint8_t function);
+/// 05, 06, 0F, 10: what may be broadcast (BC-02).
+bool is_broadcastable(std::uint8_t function);
+
+}  // namespace panelgate::modbus

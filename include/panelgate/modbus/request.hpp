@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::modbus {
+
+/// Items [address, address + count) of one table, 0-based as on the wire.
+struct Range {
+    Table table = Table::holding_registers;
+    std::uint16_t address = 0;
+    std::uint16_t count = 0;
+    friend bool operator==(const Range&, const Range&) = default;
+};
+
+/// What a request reads and writes; nothing for functions without addresses.
+struct Access {
+    std::optional<Range> read;
+    std::optional<Range> write;
+};
+
+/// How strictly quantities are judged before transmission (PDU-08).
+enum class QuantityCheck {
+    fit,   ///< the reply must fit a 253-byte PDU: what a TCP client can be given
+    wide,  ///< REST and polls: up to 255 data bytes, the GT's larger frames
+};
+
+/// Is this PDU one that may be transmitted? Function 0 or 128..255: Fault::denied. A length that
+/// contradicts the function (PDU-07, Table A) or a reply that cannot fit: Fault::malformed.
+/// Unknown functions have no length rule and pass. An empty PDU is malformed.
+Result<void> check_request(ByteView pdu, QuantityCheck check = QuantityCheck::fit);
+
+/// Which items a checked request touches.
+Access access_of(ByteView pdu);
+/// Repeating it cannot change anything (RTY-02): the reads, and 2B/0E.
+bool is_pure_read(ByteView pdu);
+/// 08/0004 Force Listen Only Mode: a unicast request that is never answered (DIA-01).
+bool is_never_answered(ByteView pdu);
+
+/// Lq of Table B: length of the normal RTU reply (address to CRC) when the request tells it;
+/// 0 for 08/0004; nothing when only the reply tells.
+std::optional<std::size_t> reply_length_from_request(ByteView pdu);
+
+Bytes encode_read(Table table, std::uint16_t address, std::uint16_t count);
+Bytes encode_write_coil(std::uint16_t address, bool value);
+Bytes encode_write_register(std::uint16_t address, std::uint16_t value);
+/// At most 2040 coils (255 data bytes); more breaks the caller's contract.
+Bytes encode_write_coils(std::uint16_t address, const std::vector<bool>& values);
+/// At most 127 registers.
+Bytes encode_write_registers(std::uint16_t address, const std::vector<std::uint16_t>& values);
+
+/// Bits packed least significant first, unused high bits zero (PDU-06).
+Bytes pack_bits(const std::vector<bool>& values);
+
+}  // namespace panelgate::modbus

@@ -1,0 +1,127 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::profile {
+
+/// How the bit part of a notation is written.
+enum class BitDigits : std::uint8_t {
+    none,      ///< the number is the item: UW100, GDT108, 400001
+    hex,       ///< decimal word, one hex digit for the bit: UB180 = word 18 bit 0, GR12F
+    decimal,   ///< decimal word, '.', two decimal digits: W127.15
+};
+
+/// The grammar of one area's notation: PREFIX NUMBER [BIT].
+struct Notation {
+    std::string prefix;  ///< "UW", "GR", "4"; matched without regard to case
+    BitDigits bit = BitDigits::none;
+    /// What the first item is called: 0 for all but reference numbers (400001 is item 0).
+    unsigned base = 0;
+    /// When not 0, the number has exactly this many digits, leading zeros included (400001: 5);
+    /// otherwise leading zeros are padding (UB00180 = UB180).
+    unsigned digits = 0;
+    /// A shorter spelling that is also understood (41029 for 401029: 4), 0 = none.
+    unsigned short_digits = 0;
+};
+
+/// Item addresses [first, last], 0-based as on the wire.
+struct AddressRange {
+    std::uint32_t first = 0;
+    std::uint32_t last = 0;
+    bool contains(std::uint32_t address, std::uint32_t count = 1) const {
+        return address >= first && count <= last + 1 - address && address <= last;
+    }
+};
+
+/// A piece of a panel's memory as the manual names it.
+struct Area {
+    std::string name;  ///< "UW"; unique in the profile
+    std::string description;
+    Notation notation;
+    modbus::Table table = modbus::Table::holding_registers;
+    /// Further tables whose functions reach the same memory (GT: GDT also by function 04).
+    std::vector<modbus::Table> also;
+    AddressRange readable;
+    std::optional<AddressRange> writable;
+    /// Name of the word area whose bits these are (UB: "UW"): bit n is bit n%16 of word n/16.
+    std::string view_of;
+    std::string source;  ///< manual and page
+};
+
+struct FunctionRule {
+    std::uint8_t code = 0;
+    unsigned max_count = 0;  ///< items in one request; 0 = the standard's limit
+    bool broadcast = false;
+    std::string source;
+};
+
+struct Serial {
+    std::vector<int> baud;  ///< allowed
+    std::vector<Parity> parity;
+    std::vector<int> stop_bits;
+    SerialFormat default_format;
+    std::string source;
+};
+
+struct Timing {
+    double frame_gap_characters = 3.5;  ///< GT: 4
+    unsigned max_gap_bits = 0;          ///< the panel ignores a request with a longer pause inside; 0 = not given
+    std::string source;
+};
+
+struct ExceptionMeaning {
+    std::uint8_t code = 0;
+    std::string meaning;  ///< as the manual words it
+};
+
+/// Values a simulated panel starts with, and which of them move.
+struct Simulation {
+    struct Cell {
+        std::string area;
+        std::uint32_t address = 0;
+        std::vector<std::uint16_t> values;  ///< consecutive; bits are 0 or 1
+    };
+    struct Motion {
+        enum class Kind : std::uint8_t { ramp, sine, toggle, clock };
+        std::string area;
+        std::uint32_t address = 0;
+        Kind kind = Kind::ramp;
+        double low = 0;
+        double high = 100;
+        Duration period = 60s;
+    };
+    std::vector<Cell> memory;
+    std::vector<Motion> motion;
+    /// What a write into a protected part of a readable area is answered: the GP manuals allow both.
+    std::uint8_t protected_exception = 3;
+};
+
+/// What the manual of one panel family says. Data only: config/profiles/NAME.yaml.
+struct PanelProfile {
+    std::string name;         ///< file name without ending: "autonics-gplp-s"
+    std::string description;
+    std::string manual;
+    std::uint8_t first_station = 1;
+    std::uint8_t last_station = modbus::kMaxStation;
+    Serial serial;
+    std::vector<FunctionRule> functions;
+    std::vector<Area> areas;
+    Timing timing;
+    std::vector<ExceptionMeaning> exceptions;
+    Simulation simulation;
+
+    const FunctionRule* find_function(std::uint8_t code) const;
+    const Area* find_area(std::string_view name) const;
+    /// The first area that reaches this item through `table`, or nullptr.
+    const Area* find_area(modbus::Table table, std::uint32_t address) const;
+    /// Items that one request with this function may carry: the profile's or the standard's limit.
+    unsigned max_count(std::uint8_t function) const;
+};
+
+}  // namespace panelgate::profile

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace panelgate::yaml {
+
+/// A place in a file, 1-based, as editors count.
+struct Mark {
+    int line = 1;
+    int column = 1;
+};
+
+/// One thing that is wrong with a file, and what would be right.
+struct Problem {
+    std::string file;
+    Mark mark;
+    std::string message;
+};
+/// "FILE:LINE:COLUMN: message" (contract 2).
+std::string format(const Problem& problem);
+
+/// Collects every problem of one file, in the order found.
+class Problems {
+  public:
+    explicit Problems(std::string file) : file_(std::move(file)) {}
+    void add(Mark mark, std::string message) { list_.push_back({file_, mark, std::move(message)}); }
+    bool empty() const { return list_.empty(); }
+    const std::vector<Problem>& list() const { return list_; }
+    const std::string& file() const { return file_; }
+    /// Sorted by line and column, one line each, each ended by '\n'.
+    std::string text() const;
+
+  private:
+    std::string file_;
+    std::vector<Problem> list_;
+};
+
+struct Entry;
+
+/// A parsed YAML value. Scalars stay text: what "010" or "yes" means is decided by who reads them
+/// (yaml-cpp would make 010 an 8). Maps keep the order of the file; keys are unique.
+struct Node {
+    enum class Kind { null, scalar, sequence, map };
+
+    Kind kind = Kind::null;
+    Mark mark;             ///< of a null in a map: its key's mark
+    std::string scalar;    ///< Kind::scalar
+    bool quoted = false;   ///< the scalar stood in quotes: it is text, never a number
+    std::vector<Node> items;     ///< Kind::sequence
+    std::vector<Entry> entries;  ///< Kind::map
+};
+
+struct Entry {
+    std::string key;
+    Mark mark;  ///< of the key
+    Node value;
+};
+
+/// Parses one YAML document. Syntax errors, duplicate keys, non-scalar keys, more than one document,
+/// aliases that grow beyond 100000 nodes and nesting deeper than 64 are added to `problems`; the
+/// result is then whatever could be read (a null node if nothing).
+Node parse(std::string_view text, Problems& problems);
+
+}  // namespace panelgate::yaml

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/yaml/document.hpp"
+
+namespace panelgate::yaml {
+
+/// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key is
+/// absent and when its value is wrong; a wrong value has then been added to the problems with its
+/// place and what would be right. finish() reports the keys nobody asked for, each with the nearest
+/// known one, so ask for every key you know before it. Does not own the node or the problems.
+class MapReader {
+  public:
+    /// `what` names the map in messages: "a line", "serial". A node that is not a map is a problem.
+    MapReader(const Node& node, Problems& problems, std::string what);
+    ~MapReader() = default;
+    MapReader(const MapReader&) = delete;
+    MapReader& operator=(const MapReader&) = delete;
+
+    bool has(std::string_view key);
+    /// Any scalar as it was written, quoted or not; an empty one is a problem.
+    std::optional<std::string> text(std::string_view key);
+    /// As text(), and its absence is a problem.
+    std::optional<std::string> required_text(std::string_view key);
+    /// A decimal integer without leading zeros, inside [min, max].
+    std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max);
+    std::optional<std::int64_t> required_integer(std::string_view key, std::int64_t min,
+                                                 std::int64_t max);
+    std::optional<double> number(std::string_view key);
+    /// `true` or `false`, nothing else (no yes, no on).
+    std::optional<bool> boolean(std::string_view key);
+    /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a unit.
+    std::optional<Duration> duration(std::string_view key, Duration min, Duration max);
+    /// One of the words; anything else is a problem that lists them (and the nearest).
+    template <class T>
+    std::optional<T> choice(std::string_view key,
+                            std::span<const std::pair<std::string_view, T>> words) {
+        std::vector<std::string_view> names;
+        for (const auto& [name, value] : words) names.push_back(name);
+        const std::optional<std::size_t> i = choice_index(key, names);
+        if (!i) return std::nullopt;
+        return words[*i].second;
+    }
+    std::optional<std::size_t> choice_index(std::string_view key,
+                                            std::span<const std::string_view> words);
+
+    /// The value itself, of any kind but null; nullptr when absent or null.
+    const Node* child(std::string_view key);
+    /// As child(), and another kind is a problem.
+    const Node* map(std::string_view key);
+    const Node* sequence(std::string_view key);
+
+    /// Where the key's value stands (the map itself when the key is absent), for later problems.
+    Mark mark(std::string_view key) const;
+    Mark mark() const { return node_->mark; }
+    void problem(std::string_view key, std::string message);
+    Problems& problems() { return *problems_; }
+
+    /// Reports unknown keys. Call once, last.
+    void finish();
+
+  private:
+    const Node* find(std::string_view key);
+    const Node* scalar(std::string_view key, std::string_view wanted);
+
+    const Node* node_;
+    Problems* problems_;
+    std::string what_;
+    std::vector<std::string> known_;
+};
+
+/// The text forms above, for scalars that are not map values. Nothing when the text is not one.
+std::optional<Duration> parse_duration(std::string_view text);
+std::optional<std::int64_t> parse_integer(std::string_view text);
+/// The shortest exact form: 1500ms, 2s, 250us.
+std::string format_duration(Duration duration);
+
+}  // namespace panelgate::yaml

@@ -1,0 +1,24 @@
+#include "panelgate/base/serial_format.hpp"
+
+namespace panelgate {
+
+std::string to_string(const SerialFormat& format) {
+    const char parity = format.parity == Parity::none ? 'N' : format.parity == Parity::even ? 'E' : 'O';
+    return std::to_string(format.baud) + ' ' + std::to_string(format.data_bits) + parity +
+           std::to_string(format.stop_bits);
+}
+
+Duration character_time(const SerialFormat& format) { return wire_time(format, 1); }
+
+Duration wire_time(const SerialFormat& format, std::size_t characters) {
+    const auto bits = static_cast<std::int64_t>(characters) * format.bits_per_character();
+    return Duration(bits * 1'000'000'000 / format.baud);
+}
+
+Duration silent_interval(const SerialFormat& format) {
+    constexpr int kFixedAbove = 19200;
+    if (format.baud > kFixedAbove) return 1750us;
+    return Duration(std::int64_t{35} * format.bits_per_character() * 100'000'000 / format.baud);
+}
+
+}  // namespace panelgate
