@@ -35,6 +35,9 @@ inline constexpr std::size_t kMaxPdu = 253;     ///< AP 4.1
 inline constexpr std::size_t kMaxRtuAdu = 256;  ///< AP 4.1: address + PDU + CRC
 /// What the Panasonic GT may answer: one byte of byte count, so 255 data bytes (ARCT1F501E, 1.3.1).
 inline constexpr std::size_t kMaxLongRtuAdu = 260;
+/// What may be written to it (ARCT1F501E gives no limit, the byte count does): 0F with 255 data
+/// bytes.
+inline constexpr std::size_t kMaxLongRequestPdu = 261;
 inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 
 /// The four tables of the data model (AP 4.3).
@@ -51,5 +54,9 @@ Function read_function(Table table);
 bool is_read(std::uint8_t function);
 /// 05, 06, 0F, 10: what may be broadcast (BC-02).
 bool is_broadcastable(std::uint8_t function);
+/// "read coils"; "" for a function that the standard does not define.
+std::string_view function_name(std::uint8_t function);
+/// Defined by the standard (AP section 6): keeps vendors' own codes out of metric labels.
+bool is_known(std::uint8_t function);
 
 }  // namespace panelgate::modbus

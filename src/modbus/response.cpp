@@ -1,0 +1,134 @@
+#include "panelgate/modbus/response.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+#include "panelgate/modbus/exception.hpp"
+
+namespace panelgate::modbus {
+namespace {
+
+constexpr std::size_t kAddressAndCount = 5;  // function, address, quantity
+
+/// Function, byte count, then exactly as many bytes.
+bool counts_itself(ByteView reply) { return reply.size() >= 2 && reply.size() == 2u + reply[1]; }
+
+/// The first `size` bytes of the request, and nothing else.
+bool repeats(ByteView request, ByteView reply, std::size_t size) {
+    return request.size() >= size && reply.size() == size &&
+           std::equal(reply.begin(), reply.end(), request.begin());
+}
+
+/// As large as the request lets expect: address, PDU and CRC are Lq bytes.
+bool has_expected_size(ByteView request, ByteView reply) {
+    return reply_length_from_request(request) == reply.size() + 3;
+}
+
+/// 08: the sub-function comes back; 0000 returns the whole request.
+bool answers_diagnostics(ByteView request, ByteView reply) {
+    if (request.size() < 3 || !has_expected_size(request, reply)) return false;
+    const bool loopback = request[1] == 0 && request[2] == 0;
+    const std::size_t same = loopback ? request.size() : 3;
+    return reply.size() >= same &&
+           std::equal(reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(same),
+                      request.begin());
+}
+
+/// 14h: each group has the length and the reference type that its sub-request asked for.
+bool answers_file_read(ByteView request, ByteView reply) {
+    if (!counts_itself(reply) || !has_expected_size(request, reply)) return false;
+    Reader asked(request.subspan(2));
+    Reader given(reply.subspan(2));
+    while (asked.ok() && asked.left() > 0) {
+        const std::uint8_t type = asked.u8();
+        asked.take(4);  // file and record
+        const std::size_t data = std::size_t{2} * asked.u16();
+        if (given.u8() != data + 1 || given.u8() != type) return false;
+        given.take(data);
+    }
+    return asked.finished() && given.finished();
+}
+
+/// 18h: a byte count of two bytes, which counts the value count and the values.
+bool is_fifo_reply(ByteView reply) {
+    Reader in(reply);
+    in.u8();
+    const std::size_t byte_count = in.u16();
+    const std::size_t values = in.u16();
+    in.take(2 * values);
+    return in.finished() && byte_count == 2 + 2 * values;
+}
+
+/// 2B: the MEI type comes back; with 0E also the code, in a header of 7 bytes. The objects are not
+/// walked: panels miscount them (FRM-10).
+bool answers_encapsulated(ByteView request, ByteView reply) {
+    if (request.size() < 2 || reply.size() < 2 || reply[1] != request[1]) return false;
+    if (request[1] != kMeiDeviceIdentification) return true;
+    return reply.size() >= 7 && request.size() >= 3 && reply[2] == request[2];
+}
+
+}  // namespace
+
+bool answers(ByteView request, ByteView reply) {
+    if (request.empty() || reply.empty()) return false;
+    if (reply[0] == (request[0] | kExceptionBit)) return exception_of(reply).has_value();
+    if (reply[0] != request[0]) return false;
+    switch (request[0]) {
+        case kReadCoils:
+        case kReadDiscreteInputs:
+        case kReadHoldingRegisters:
+        case kReadInputRegisters:
+        case kReadWriteMultipleRegisters:
+            return counts_itself(reply) && has_expected_size(request, reply);
+        case kWriteSingleCoil:
+        case kWriteSingleRegister:
+        case kWriteFileRecord:
+        case kMaskWriteRegister:
+            return repeats(request, reply, request.size());
+        case kWriteMultipleCoils:
+        case kWriteMultipleRegisters:
+            return repeats(request, reply, kAddressAndCount);
+        case kReadExceptionStatus:
+        case kGetCommEventCounter:
+            return has_expected_size(request, reply);
+        case kDiagnostics:
+            return answers_diagnostics(request, reply);
+        case kGetCommEventLog:
+        case kReportServerId:
+            return counts_itself(reply);
+        case kReadFileRecord:
+            return answers_file_read(request, reply);
+        case kReadFifoQueue:
+            return is_fifo_reply(reply);
+        case kEncapsulatedInterface:
+            return answers_encapsulated(request, reply);
+        default:
+            return true;
+    }
+}
+
+Bytes normal_write_reply(ByteView request) {
+    assert(!request.empty() && is_broadcastable(request[0]) && request.size() >= kAddressAndCount);
+    const ByteView reply = request.first(std::min(request.size(), kAddressAndCount));
+    return Bytes(reply.begin(), reply.end());
+}
+
+std::vector<std::uint16_t> registers_of(ByteView reply) {
+    Reader in(reply);
+    in.take(2);  // function and byte count
+    std::vector<std::uint16_t> registers;
+    registers.reserve(in.left() / 2);
+    while (in.left() >= 2) registers.push_back(in.u16());
+    return registers;
+}
+
+std::vector<bool> bits_of(ByteView reply, std::size_t count) {
+    constexpr std::size_t kHeader = 2;  // function and byte count
+    std::vector<bool> bits(count);
+    for (std::size_t i = 0; i < count && kHeader + i / 8 < reply.size(); ++i) {
+        bits[i] = (reply[kHeader + i / 8] >> (i % 8) & 1) != 0;
+    }
+    return bits;
+}
+
+}  // namespace panelgate::modbus
