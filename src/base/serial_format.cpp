@@ -3,7 +3,9 @@
 namespace panelgate {
 
 std::string to_string(const SerialFormat& format) {
-    const char parity = format.parity == Parity::none ? 'N' : format.parity == Parity::even ? 'E' : 'O';
+    const char parity = format.parity == Parity::none   ? 'N'
+                        : format.parity == Parity::even ? 'E'
+                                                        : 'O';
     return std::to_string(format.baud) + ' ' + std::to_string(format.data_bits) + parity +
            std::to_string(format.stop_bits);
 }

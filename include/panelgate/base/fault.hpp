@@ -9,8 +9,8 @@ namespace panelgate {
 /// Why a request has no reply from its station. A station's own exception is not a fault: it is an
 /// answer. The Modbus code of each is in modbus/exception.
 enum class Fault : std::uint8_t {
-    denied,      ///< policy, or a function that no request may carry; never transmitted
-    malformed,   ///< the PDU contradicts its function, or its reply could not fit; never transmitted
+    denied,     ///< policy, or a function that no request may carry; never transmitted
+    malformed,  ///< the PDU contradicts its function, or its reply could not fit; never transmitted
     not_routed,  ///< nobody has this unit or station; never transmitted
     busy,        ///< a queue is full; never transmitted
     expired,     ///< the deadline passed (or could not be met) before transmission
@@ -21,10 +21,10 @@ enum class Fault : std::uint8_t {
     offline,     ///< the station is known to be silent; never transmitted
     cancelled,   ///< the client went away, or the gateway is stopping
 };
-inline constexpr Fault kAllFaults[] = {
-    Fault::denied,    Fault::malformed, Fault::not_routed, Fault::busy,    Fault::expired,
-    Fault::line_down, Fault::line_lost, Fault::timeout,    Fault::damaged, Fault::offline,
-    Fault::cancelled};
+inline constexpr Fault kAllFaults[] = {Fault::denied,    Fault::malformed, Fault::not_routed,
+                                       Fault::busy,      Fault::expired,   Fault::line_down,
+                                       Fault::line_lost, Fault::timeout,   Fault::damaged,
+                                       Fault::offline,   Fault::cancelled};
 
 /// The word for logs and REST: "line_down".
 std::string_view label(Fault fault);
@@ -34,7 +34,8 @@ std::string_view outcome_label(Fault fault);
 template <class T>
 using Result = boost::system::result<T, Fault>;
 
-/// Called by Result::value() on a fault: asking for a value that is not there is a broken invariant.
+/// Called by Result::value() on a fault: asking for a value that is not there is a broken
+/// invariant.
 [[noreturn]] void throw_exception_from_error(Fault fault, const boost::source_location& where);
 
 }  // namespace panelgate

@@ -9,7 +9,8 @@ namespace panelgate {
 
 enum class Parity : std::uint8_t { none, even, odd };
 
-/// How characters look on a line. The default is the standard's: 19200 8E1 (serial line V1.02, 2.5.1).
+/// How characters look on a line. The default is the standard's: 19200 8E1 (serial line
+/// V1.02, 2.5.1).
 struct SerialFormat {
     int baud = 19200;  ///< bit/s, above 0
     int data_bits = 8;
@@ -17,7 +18,9 @@ struct SerialFormat {
     int stop_bits = 1;
 
     /// Start, data, parity and stop bits: 10 or 11 for what RTU allows.
-    int bits_per_character() const { return 1 + data_bits + (parity == Parity::none ? 0 : 1) + stop_bits; }
+    int bits_per_character() const {
+        return 1 + data_bits + (parity == Parity::none ? 0 : 1) + stop_bits;
+    }
     friend bool operator==(const SerialFormat&, const SerialFormat&) = default;
 };
 

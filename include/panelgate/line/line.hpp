@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/line/counters.hpp"
+
+namespace panelgate::line {
+
+/// A stream of bytes to a serial line: the byte seam. It opens by itself after start(), says when
+/// it is up or down, and keeps trying to open while it is down. One thread. Events may come from
+/// inside poll_input() and write(); after stop() none come.
+class Line {
+  public:
+    /// Who listens; it outlives the line.
+    class Events {
+      public:
+        virtual ~Events() = default;
+        virtual void on_up() = 0;
+        /// `why` is for people: "cannot open /dev/ttyUSB0: No such file or directory".
+        virtual void on_down(const std::string& why) = 0;
+        virtual void on_bytes(ByteView bytes) = 0;
+    };
+
+    virtual ~Line() = default;
+    virtual void start(Events& events) = 0;
+    virtual void stop() = 0;
+    /// Hands all bytes that have arrived already to on_bytes, now.
+    virtual void poll_input() = 0;
+    /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
+    virtual void write(ByteView bytes) = 0;
+    virtual const Counters& counters() const = 0;
+};
+
+}  // namespace panelgate::line

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <memory>
+
+#include "panelgate/line/line.hpp"
+#include "panelgate/line/settings.hpp"
+
+namespace panelgate::line {
+
+/// A serial device (or pty) through termios on a non-blocking descriptor. Read 0, EIO, ENODEV,
+/// ENXIO and a hang-up all mean the device has gone: it is closed at once and opened again with
+/// back-off, every setting applied anew.
+std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings);
+
+}  // namespace panelgate::line

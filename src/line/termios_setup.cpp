@@ -1,0 +1,69 @@
+#include "panelgate/line/termios_setup.hpp"
+
+// <asm/termbits.h> has termios2 and clashes with <termios.h>: this file is the only one to use it.
+#include <asm/termbits.h>
+#include <sys/ioctl.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+
+namespace panelgate::line {
+namespace {
+
+termios2 raw(const termios2& before, const SerialFormat& format) {
+    termios2 t = before;
+    t.c_iflag = IGNBRK;  // a break is no byte; parity errors pass and the CRC judges
+    t.c_oflag = 0;
+    t.c_lflag = 0;
+    t.c_cflag &=
+        ~static_cast<tcflag_t>(CSIZE | PARENB | PARODD | CMSPAR | CSTOPB | CRTSCTS | CBAUD);
+    t.c_cflag |= CS8 | CREAD | CLOCAL | BOTHER;
+    if (format.parity != Parity::none) {
+        t.c_cflag |= PARENB;
+        t.c_iflag |= INPCK;
+    }
+    if (format.parity == Parity::odd) t.c_cflag |= PARODD;
+    if (format.stop_bits == 2) t.c_cflag |= CSTOPB;
+    t.c_ispeed = static_cast<speed_t>(format.baud);
+    t.c_ospeed = static_cast<speed_t>(format.baud);
+    t.c_cc[VMIN] = 1;  // read() of 0 bytes then means a hang-up
+    t.c_cc[VTIME] = 0;
+    return t;
+}
+
+std::string difference(const termios2& wanted, const termios2& got, const SerialFormat& format) {
+    std::string text;
+    const auto differs = [&](tcflag_t mask) {
+        return ((wanted.c_cflag ^ got.c_cflag) & mask) != 0;
+    };
+    if (differs(CSIZE)) text += "data bits were not taken; ";
+    if (differs(PARENB | PARODD)) text += "parity was not taken; ";
+    if (differs(CSTOPB)) text += "stop bits were not taken; ";
+    const double off = std::abs(static_cast<double>(got.c_ospeed) - format.baud) / format.baud;
+    if (off > 0.02) {  // what a receiver tolerates (serial line V1.02, 3.2)
+        text += "the driver made " + std::to_string(got.c_ospeed) + " bit/s of " +
+                std::to_string(format.baud) + "; ";
+    }
+    if (!text.empty()) text.resize(text.size() - 2);
+    return text;
+}
+
+}  // namespace
+
+SetUp set_up_tty(int descriptor, const SerialFormat& format) {
+    const auto failed = [](const char* what) {
+        return SetUp{std::string(what) + ": " + std::strerror(errno), {}};
+    };
+    termios2 before{};
+    if (ioctl(descriptor, TCGETS2, &before) != 0) return failed("not a serial device");
+    const termios2 wanted = raw(before, format);
+    if (ioctl(descriptor, TCSETS2, &wanted) != 0)
+        return failed("the driver refuses these settings");
+    termios2 got{};
+    if (ioctl(descriptor, TCGETS2, &got) != 0) return failed("cannot read the settings back");
+    ioctl(descriptor, TCFLSH, TCIOFLUSH);  // what an earlier user left behind
+    return SetUp{{}, difference(wanted, got, format)};
+}
+
+}  // namespace panelgate::line

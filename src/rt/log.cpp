@@ -1,0 +1,91 @@
+#include "panelgate/rt/log.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <memory>
+
+namespace panelgate::rt {
+namespace {
+
+LogFormat g_format = LogFormat::text;
+
+spdlog::level::level_enum level_of(LogLevel level) {
+    switch (level) {
+        case LogLevel::error:
+            return spdlog::level::err;
+        case LogLevel::warn:
+            return spdlog::level::warn;
+        case LogLevel::info:
+            return spdlog::level::info;
+        case LogLevel::debug:
+            return spdlog::level::debug;
+        case LogLevel::trace:
+            return spdlog::level::trace;
+    }
+    return spdlog::level::err;
+}
+
+spdlog::logger& logger() {
+    static const std::shared_ptr<spdlog::logger> instance = [] {
+        auto sink = std::make_shared<spdlog::sinks::stderr_sink_st>();
+        auto made = std::make_shared<spdlog::logger>("panelgate", std::move(sink));
+        made->flush_on(spdlog::level::trace);
+        return made;
+    }();
+    return *instance;
+}
+
+/// JSON string escapes; good for text too.
+std::string escaped(std::string_view text) {
+    std::string out;
+    for (const char c : text) {
+        const auto u = static_cast<unsigned char>(c);
+        if (c == '"' || c == '\\') {
+            out += '\\';
+            out += c;
+        } else if (u < 0x20 || u == 0x7f) {
+            out += fmt::format("\\u{:04x}", u);
+        } else {
+            out += c;
+        }
+    }
+    return out;
+}
+
+std::string text_value(const std::string& value) {
+    const bool plain = !value.empty() && value.find_first_of(" \"\\=\n\t\r") == std::string::npos;
+    return plain ? value : '"' + escaped(value) + '"';
+}
+
+}  // namespace
+
+void set_up_log(LogLevel level, LogFormat format) {
+    g_format = format;
+    logger().set_level(level_of(level));
+    const bool json = format == LogFormat::json;
+    logger().set_formatter(std::make_unique<spdlog::pattern_formatter>(
+        json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})"
+             : "%Y-%m-%dT%H:%M:%S.%eZ %l %v",
+        spdlog::pattern_time_type::utc));
+}
+
+bool log_enabled(LogLevel level) { return logger().should_log(level_of(level)); }
+
+void log(LogLevel level, std::string_view event, LogFields fields) {
+    if (!log_enabled(level)) return;
+    std::string line;
+    if (g_format == LogFormat::json) {
+        line = fmt::format("\"event\":\"{}\"", escaped(event));
+        for (const auto& [key, value] : fields)
+            line += fmt::format(",\"{}\":\"{}\"", key, escaped(value));
+    } else {
+        line = std::string(event);
+        for (const auto& [key, value] : fields)
+            line += fmt::format(" {}={}", key, text_value(value));
+    }
+    logger().log(level_of(level), line);
+}
+
+}  // namespace panelgate::rt
