@@ -1,0 +1,258 @@
+#include "panelgate/metrics/exposition.hpp"
+
+#include <prometheus/text_serializer.h>
+
+#include <array>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "families.hpp"
+#include "panelgate/base/fault.hpp"
+
+namespace panelgate::metrics {
+namespace {
+
+using bus::LineReport;
+using bus::StationReport;
+
+Labels of_line(const LineReport& line) { return {{"line", line.line}}; }
+
+Labels of_station(const LineReport& line, const StationReport& station) {
+    return {{"line", line.line}, {"station", station.station}};
+}
+
+Labels with(Labels labels, std::string name, std::string value) {
+    labels.push_back({std::move(name), std::move(value)});
+    return labels;
+}
+
+template <class Add>
+void each_station(const Snapshot& snapshot, Add add) {
+    for (const LineReport& line : snapshot.lines) {
+        for (const StationReport& station : line.stations) add(line, station);
+    }
+}
+
+/// All words of {outcome}: those of the faults and those of requests that were answered.
+std::set<std::string> all_outcomes() {
+    std::set<std::string> words{"ok", "exception", "cached", "shared"};
+    for (const Fault fault : kAllFaults) words.emplace(outcome_label(fault));
+    return words;
+}
+
+std::map<std::pair<std::string, std::string>, std::uint64_t> requests_from_start(
+    const StationReport& station) {
+    static const std::set<std::string> kOutcomes = all_outcomes();
+    auto requests = station.requests;
+    for (const char* function : {"1", "2", "3", "4", "5", "6", "15", "16"}) {
+        for (const char* outcome : {"ok", "exception", "timeout", "damaged"}) {
+            requests.try_emplace({function, outcome}, 0);
+        }
+    }
+    for (const auto& [key, count] : station.requests) {
+        for (const std::string& outcome : kOutcomes) requests.try_emplace({key.first, outcome}, 0);
+    }
+    return requests;
+}
+
+void add_requests(Families& out, const Snapshot& snapshot) {
+    Family requests = make_counter("panelgate_requests_total",
+                                   "Requests answered, by function code and outcome.");
+    Family duration = make_histogram("panelgate_request_duration_seconds",
+                                     "Time from the arrival of a request to its answer.");
+    each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+        for (const auto& [key, count] : requests_from_start(station)) {
+            Labels labels = with(of_station(line, station), "function", key.first);
+            requests.counter(with(std::move(labels), "outcome", key.second), count);
+        }
+        duration.histogram(of_station(line, station), station.request_duration);
+    });
+    out.push_back(requests.take());
+    out.push_back(duration.take());
+}
+
+void add_wire_times(Families& out, const Snapshot& snapshot) {
+    Family transaction = make_histogram("panelgate_bus_transaction_seconds",
+                                        "Time from the first bit out to the last bit in.");
+    Family turnaround = make_histogram("panelgate_turnaround_seconds",
+                                       "Time a panel takes from a request to its reply.");
+    each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+        transaction.histogram(of_station(line, station), station.wire.bus_transaction);
+        turnaround.histogram(of_station(line, station), station.wire.turnaround);
+    });
+    out.push_back(transaction.take());
+    out.push_back(turnaround.take());
+}
+
+struct WireCounter {
+    const char* name;
+    const char* help;
+    std::uint64_t arbiter::StationCounters::* field;
+};
+constexpr std::array kWireCounters = {
+    WireCounter{"panelgate_retries_total", "Reads sent once more after a silent or damaged reply.",
+                &arbiter::StationCounters::retries},
+    WireCounter{"panelgate_late_frames_total",
+                "Good frames that answer a request already given up; thrown away.",
+                &arbiter::StationCounters::late_frames},
+    WireCounter{"panelgate_foreign_frames_total",
+                "Good frames of another station or nobody's reply; thrown away.",
+                &arbiter::StationCounters::foreign_frames},
+    WireCounter{"panelgate_damaged_frames_total",
+                "Bytes that never became a good frame, counted once a frame.",
+                &arbiter::StationCounters::damaged_frames},
+    WireCounter{"panelgate_discarded_bytes_total", "Bytes received and thrown away.",
+                &arbiter::StationCounters::discarded_bytes},
+};
+
+void add_wire_counters(Families& out, const Snapshot& snapshot) {
+    for (const WireCounter& counter : kWireCounters) {
+        Family family = make_counter(counter.name, counter.help);
+        each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+            family.counter(of_station(line, station), station.wire.*counter.field);
+        });
+        out.push_back(family.take());
+    }
+}
+
+void add_exceptions(Families& out, const Snapshot& snapshot) {
+    Family family =
+        make_counter("panelgate_exceptions_total", "Modbus exceptions that panels answered.");
+    each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+        auto exceptions = station.wire.exceptions;
+        for (std::uint8_t code = 1; code <= 4; ++code) exceptions.try_emplace(code, 0);
+        for (const auto& [code, count] : exceptions) {
+            family.counter(with(of_station(line, station), "code", std::to_string(code)), count);
+        }
+    });
+    out.push_back(family.take());
+}
+
+std::string label(arbiter::PriorityClass priority) {
+    switch (priority) {
+        case arbiter::PriorityClass::write:
+            return "write";
+        case arbiter::PriorityClass::read:
+            return "read";
+        case arbiter::PriorityClass::poll:
+            return "poll";
+        case arbiter::PriorityClass::probe:
+            return "probe";
+    }
+    std::abort();
+}
+
+void add_line_counters(Families& out, const Snapshot& snapshot) {
+    Family broadcasts = make_counter("panelgate_broadcasts_total", "Broadcasts sent.");
+    Family reopens = make_counter("panelgate_line_reopens_total",
+                                  "Successful opens of the line's device after the first.");
+    Family busy = make_counter("panelgate_bus_busy_seconds_total",
+                               "Time nobody else could use: request, gaps, think time and reply.");
+    for (const LineReport& line : snapshot.lines) {
+        broadcasts.counter(of_line(line), line.wire.broadcasts);
+        reopens.counter(of_line(line), line.device.reopens);
+        busy.counter(of_line(line), to_seconds(line.wire.busy));
+    }
+    out.push_back(broadcasts.take());
+    out.push_back(reopens.take());
+    out.push_back(busy.take());
+}
+
+void add_line_state(Families& out, const Snapshot& snapshot) {
+    Family up = make_gauge("panelgate_line_up", "1 while the line's device is open.");
+    Family depth = make_gauge("panelgate_queue_depth", "Requests that wait for the line.");
+    Family wait = make_histogram("panelgate_queue_wait_seconds",
+                                 "Time a request waits before its transmission.");
+    for (const LineReport& line : snapshot.lines) {
+        up.gauge(of_line(line), line.up ? 1 : 0);
+        depth.gauge(of_line(line), static_cast<double>(line.queue_depth));
+        for (std::size_t i = 0; i < arbiter::kPriorityClasses; ++i) {
+            const std::string name = label(static_cast<arbiter::PriorityClass>(i));
+            wait.histogram(with(of_line(line), "class", name), line.wire.queue_wait[i]);
+        }
+    }
+    out.push_back(up.take());
+    out.push_back(depth.take());
+    out.push_back(wait.take());
+}
+
+void add_station_state(Families& out, const Snapshot& snapshot) {
+    Family up = make_gauge("panelgate_station_up", "1 while a configured station answers.");
+    Family success =
+        make_gauge("panelgate_station_last_success_timestamp_seconds",
+                   "When a configured station last answered; absent while it never did.");
+    each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+        if (!station.configured) return;
+        up.gauge(of_station(line, station), station.up ? 1 : 0);
+        if (station.last_success_unix > 0) {
+            success.gauge(of_station(line, station), station.last_success_unix);
+        }
+    });
+    out.push_back(up.take());
+    out.push_back(success.take());
+}
+
+void add_listeners(Families& out, const Snapshot& snapshot) {
+    Family open = make_gauge("panelgate_tcp_connections", "Modbus/TCP connections open now.");
+    Family total =
+        make_counter("panelgate_tcp_connections_total", "Modbus/TCP connections accepted.");
+    Family errors = make_counter("panelgate_tcp_protocol_errors_total",
+                                 "Modbus/TCP frames that broke the protocol.");
+    for (const tcp_server::Counters& listener : snapshot.listeners) {
+        const Labels labels{{"listener", listener.listener}};
+        open.gauge(labels, static_cast<double>(listener.connections));
+        total.counter(labels, listener.connections_total);
+        errors.counter(labels, listener.protocol_errors);
+    }
+    out.push_back(open.take());
+    out.push_back(total.take());
+    out.push_back(errors.take());
+}
+
+void add_process(Families& out, const Snapshot& snapshot) {
+    Family build = make_gauge("panelgate_build_info", "1, with the version as a label.");
+    build.gauge({{"version", snapshot.version}}, 1);
+    out.push_back(build.take());
+
+    const ProcessFacts& process = snapshot.process;
+    if (process.cpu_seconds) {
+        Family cpu = make_counter("process_cpu_seconds_total",
+                                  "Total user and system CPU time spent in seconds.");
+        cpu.counter({}, *process.cpu_seconds);
+        out.push_back(cpu.take());
+    }
+    const auto gauge = [&](const char* name, const char* help, std::optional<double> value) {
+        if (!value) return;
+        Family family = make_gauge(name, help);
+        family.gauge({}, *value);
+        out.push_back(family.take());
+    };
+    gauge("process_resident_memory_bytes", "Resident memory size in bytes.",
+          process.resident_bytes);
+    gauge("process_virtual_memory_bytes", "Virtual memory size in bytes.", process.virtual_bytes);
+    gauge("process_open_fds", "Number of open file descriptors.", process.open_fds);
+    gauge("process_max_fds", "Maximum number of open file descriptors.", process.max_fds);
+    gauge("process_start_time_seconds", "Start time of the process since unix epoch in seconds.",
+          process.start_time_unix);
+}
+
+}  // namespace
+
+std::string exposition(const Snapshot& snapshot) {
+    Families families;
+    add_requests(families, snapshot);
+    add_wire_times(families, snapshot);
+    add_wire_counters(families, snapshot);
+    add_exceptions(families, snapshot);
+    add_line_counters(families, snapshot);
+    add_line_state(families, snapshot);
+    add_station_state(families, snapshot);
+    add_listeners(families, snapshot);
+    add_process(families, snapshot);
+    std::erase_if(families, [](const auto& family) { return family.metric.empty(); });
+    return prometheus::TextSerializer{}.Serialize(families);
+}
+
+}  // namespace panelgate::metrics

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <prometheus/metric_family.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/histogram.hpp"
+
+namespace panelgate::metrics {
+
+using Labels = std::vector<prometheus::ClientMetric::Label>;
+using Families = std::vector<prometheus::MetricFamily>;
+
+/// A family under construction. `help` must not contain backslashes or newlines: the serializer of
+/// prometheus-cpp 1.0 does not escape them.
+class Family {
+  public:
+    Family(std::string name, std::string help, prometheus::MetricType type);
+
+    void counter(Labels labels, double value);
+    void counter(Labels labels, std::uint64_t value) {
+        counter(std::move(labels), static_cast<double>(value));
+    }
+    void gauge(Labels labels, double value);
+    void histogram(Labels labels, const Histogram& histogram);
+
+    prometheus::MetricFamily take() { return std::move(family_); }
+
+  private:
+    prometheus::ClientMetric& add(Labels labels);
+    prometheus::MetricFamily family_;
+};
+
+Family make_counter(std::string name, std::string help);
+Family make_gauge(std::string name, std::string help);
+Family make_histogram(std::string name, std::string help);
+
+}  // namespace panelgate::metrics
