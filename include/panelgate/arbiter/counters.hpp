@@ -16,8 +16,8 @@ struct StationCounters {
     std::uint64_t damaged_frames = 0;  ///< bytes that never became a good frame
     std::uint64_t discarded_bytes = 0;
     std::map<std::uint8_t, std::uint64_t> exceptions;  ///< by code: at most 256
-    Histogram bus_transaction;  ///< first bit out to last bit in
-    Histogram turnaround;       ///< the panel's own think time
+    Histogram bus_transaction;                         ///< first bit out to last bit in
+    Histogram turnaround;                              ///< the panel's own think time
 };
 
 enum class PriorityClass : std::uint8_t { write, read, poll, probe };

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+/// Names one accepted job; never reused.
+using Ticket = std::uint64_t;
+using Client = std::uint64_t;
+
+/// One request on its way. The PDU has passed modbus::check_request.
+struct Job {
+    Ticket ticket = 0;         ///< given by the arbiter
+    std::uint8_t station = 0;  ///< 0: broadcast
+    Bytes pdu;
+    Client client = 0;
+    PriorityClass priority = PriorityClass::read;
+    TimePoint arrived;
+    TimePoint deadline;
+    TimePoint start_by;           ///< the last moment at which starting it makes sense
+    int attempts = 0;             ///< transmissions so far
+    Fault last = Fault::timeout;  ///< how the last attempt failed
+};
+
+}  // namespace panelgate::arbiter

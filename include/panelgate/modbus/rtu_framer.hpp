@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <vector>
+
+#include "panelgate/base/bytes.hpp"
+
+namespace panelgate::modbus {
+
+/// How long an RTU reply is, as far as its own first bytes tell (Lr of Table B).
+struct ReplyLength {
+    enum class Kind : std::uint8_t {
+        known,      ///< `length` bytes, address to CRC
+        need_more,  ///< ask again with more bytes
+        by_silence  ///< only silence ends this frame (FRM-11)
+    };
+    Kind kind = Kind::need_more;
+    std::size_t length = 0;
+};
+/// `frame` starts at the address byte. The exception bit is looked at before any byte count
+/// (FRM-02).
+ReplyLength reply_length(ByteView frame);
+
+/// Bytes that were heard but belong to no accepted reply.
+struct Unused {
+    enum class Kind : std::uint8_t {
+        own,      ///< a good frame of the station that was asked: not this request's answer
+        foreign,  ///< a good frame of another station
+        damaged,  ///< never became a good frame
+    };
+    Kind kind = Kind::damaged;
+    std::uint8_t station = 0;  ///< of a good frame
+    Bytes bytes;
+};
+
+/// Finds the reply to one request in what is heard after it. Lives for one attempt. The length
+/// comes from the function and the header, the CRC is the judge, and silence only ends waiting
+/// (pains 5, 16): bytes may come in any pieces with any pauses. Noise before the reply and good
+/// frames of other stations are stepped over; a frame is accepted only if station, function, byte
+/// count and echoed fields answer the request (FRM-04, P1). Work is linear in the bytes heard,
+/// memory bounded.
+class ReplyFramer {
+  public:
+    /// Heard bytes that are kept at most; older ones become Unused.
+    static constexpr std::size_t kMaxHeard = 1024;
+
+    ReplyFramer(std::uint8_t station, Bytes request_pdu);
+
+    /// Takes bytes; gives the reply PDU as soon as its last byte is there.
+    std::optional<Bytes> feed(ByteView bytes);
+    /// The line has been silent for the end-of-frame time. Gives a reply that only silence could
+    /// end (or that stood behind noise that looked like the start of a frame); forgets the rest.
+    std::optional<Bytes> on_silence();
+
+    /// Bytes wait for more, or for the silence that judges them.
+    bool has_pending() const { return !heard_.empty(); }
+    /// Bytes were given up that held the address and function of the reply but no good frame: the
+    /// reply came damaged, which is not silence.
+    bool was_damaged() const { return damaged_; }
+    /// What was stepped over so far. Call after a reply was found, or at the end.
+    std::vector<Unused> take_unused();
+
+  private:
+    std::optional<Bytes> scan(bool silence);
+    std::size_t frame_size(ByteView rest, bool silence) const;
+    std::optional<Bytes> judge(std::size_t start, bool silence, bool& open) const;
+    bool is_start(std::uint8_t address, std::uint8_t function) const;
+    bool holds_start(ByteView bytes) const;
+    void collect_starts();
+    std::optional<Bytes> accept(std::size_t start, Bytes pdu);
+    void discard(std::size_t count);
+    void classify(ByteView bytes);
+
+    std::uint8_t station_;
+    Bytes request_;
+    std::optional<std::size_t> expected_;  ///< Lq
+    Bytes heard_;
+    std::size_t looked_ = 0;          ///< offsets below were tried as a start
+    std::deque<std::size_t> starts_;  ///< offsets with the right address and function, unjudged
+    bool damaged_ = false;
+    std::vector<Unused> unused_;
+};
+
+/// Cuts bytes into good frames (any station) and the rest, for counters: linear time.
+std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station);
+
+}  // namespace panelgate::modbus

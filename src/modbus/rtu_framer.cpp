@@ -1,0 +1,218 @@
+#include "panelgate/modbus/rtu_framer.hpp"
+
+#include <algorithm>
+
+#include "panelgate/modbus/crc16.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::modbus {
+namespace {
+
+constexpr std::size_t kExceptionAdu = 5;  // address, function, code, CRC
+constexpr std::size_t kMinAdu = 4;        // address, function, CRC
+constexpr std::size_t kCrc = 2;
+
+ReplyLength known(std::size_t length) { return {ReplyLength::Kind::known, length}; }
+ReplyLength need_more() { return {ReplyLength::Kind::need_more, 0}; }
+ReplyLength by_silence() { return {ReplyLength::Kind::by_silence, 0}; }
+
+/// 2B/0E: address, 2B, 0E, code, conformity, more, next id, n, then n objects of id, length, value.
+ReplyLength device_identification_length(ByteView b) {
+    constexpr std::size_t kHeader = 8;
+    if (b.size() < 3) return need_more();
+    if (b[2] != kMeiDeviceIdentification) return by_silence();
+    if (b.size() < kHeader) return need_more();
+    std::size_t at = kHeader;
+    for (unsigned object = 0; object < b[7]; ++object) {
+        if (b.size() < at + 2) return need_more();
+        at += 2u + b[at + 1];
+        if (at + kCrc > kMaxRtuAdu) return by_silence();  // count and bytes disagree (FRM-10)
+    }
+    return known(at + kCrc);
+}
+
+ReplyLength by_count(ByteView b) { return b.size() < 3 ? need_more() : known(5u + b[2]); }
+
+}  // namespace
+
+ReplyLength reply_length(ByteView b) {
+    if (b.size() < 2) return need_more();
+    if ((b[1] & kExceptionBit) != 0) return known(kExceptionAdu);
+    switch (b[1]) {
+        case kReadCoils:
+        case kReadDiscreteInputs:
+        case kReadHoldingRegisters:
+        case kReadInputRegisters:
+        case kGetCommEventLog:
+        case kReportServerId:
+        case kReadFileRecord:
+        case kWriteFileRecord:
+        case kReadWriteMultipleRegisters:
+            return by_count(b);
+        case kWriteSingleCoil:
+        case kWriteSingleRegister:
+        case kGetCommEventCounter:
+        case kWriteMultipleCoils:
+        case kWriteMultipleRegisters:
+            return known(8);
+        case kReadExceptionStatus:
+            return known(5);
+        case kDiagnostics:
+            if (b.size() < 4) return need_more();
+            return b[2] == 0 && b[3] == 0 ? by_silence() : known(8);
+        case kMaskWriteRegister:
+            return known(10);
+        case kReadFifoQueue:
+            return b.size() < 4 ? need_more() : known(6u + b[2] * 256u + b[3]);
+        case kEncapsulatedInterface:
+            return device_identification_length(b);
+        default:
+            return by_silence();
+    }
+}
+
+ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu)
+    : station_(station),
+      request_(std::move(request_pdu)),
+      expected_(reply_length_from_request(request_)) {}
+
+std::optional<Bytes> ReplyFramer::feed(ByteView bytes) {
+    heard_.insert(heard_.end(), bytes.begin(), bytes.end());
+    if (auto reply = scan(false)) return reply;
+    if (heard_.size() > kMaxHeard) discard(heard_.size() - kMaxHeard / 2);
+    return std::nullopt;
+}
+
+std::optional<Bytes> ReplyFramer::on_silence() {
+    auto reply = scan(true);
+    if (!reply) discard(heard_.size());
+    return reply;
+}
+
+std::vector<Unused> ReplyFramer::take_unused() {
+    std::vector<Unused> unused = std::exchange(unused_, {});
+    return unused;
+}
+
+/// Judges the possible starts from the first on. One that still waits for bytes holds up the later
+/// ones: bytes inside a reply must not pass for a reply.
+std::optional<Bytes> ReplyFramer::scan(bool silence) {
+    collect_starts();
+    while (!starts_.empty()) {
+        bool open = false;
+        const std::size_t start = starts_.front();
+        if (auto pdu = judge(start, silence, open)) return accept(start, std::move(*pdu));
+        if (open) return std::nullopt;
+        starts_.pop_front();
+    }
+    return std::nullopt;
+}
+
+bool ReplyFramer::is_start(std::uint8_t address, std::uint8_t function) const {
+    return address == station_ && (function & ~kExceptionBit) == request_[0];
+}
+
+bool ReplyFramer::holds_start(ByteView bytes) const {
+    for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
+        if (is_start(bytes[i], bytes[i + 1])) return true;
+    }
+    return false;
+}
+
+void ReplyFramer::collect_starts() {
+    for (; looked_ + 1 < heard_.size(); ++looked_) {
+        if (is_start(heard_[looked_], heard_[looked_ + 1])) starts_.push_back(looked_);
+    }
+}
+
+/// How many bytes the frame at the front of `rest` has: 0 = none can be there; more than there are
+/// = wait for them.
+std::size_t ReplyFramer::frame_size(ByteView rest, bool silence) const {
+    ReplyLength want = reply_length(rest);
+    const bool exception = (rest[1] & kExceptionBit) != 0;
+    if (exception) return want.length;
+    if (want.kind == ReplyLength::Kind::by_silence && expected_) want = known(*expected_);
+    // An object count that disagrees with the bytes leaves it to silence and the CRC (FRM-10).
+    const bool walked = rest[1] == kEncapsulatedInterface;
+    const bool incomplete = want.kind != ReplyLength::Kind::known || want.length > rest.size();
+    if (silence && incomplete && (walked || want.kind == ReplyLength::Kind::by_silence))
+        return rest.size();
+    if (want.kind != ReplyLength::Kind::known) return std::max(rest.size() + 1, kMinAdu);
+    if (expected_ && want.length != *expected_) return 0;
+    return want.length;
+}
+
+/// The reply PDU, if a good answer starts at `start`. `open` says that more bytes could still make
+/// it one.
+std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& open) const {
+    const ByteView rest = ByteView(heard_).subspan(start);
+    const std::size_t size = frame_size(rest, silence);
+    if (size < kMinAdu || size > kMaxLongRtuAdu) return std::nullopt;
+    if (size > rest.size()) {
+        open = !silence;
+        return std::nullopt;
+    }
+    const ByteView frame = rest.first(size);
+    if (!crc_ok(frame)) return std::nullopt;
+    const ByteView pdu = frame.subspan(1, frame.size() - 1 - kCrc);
+    if (!answers(request_, pdu)) return std::nullopt;
+    return Bytes(pdu.begin(), pdu.end());
+}
+
+std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
+    classify(ByteView(heard_).first(start));
+    classify(ByteView(heard_).subspan(start + pdu.size() + 1 + kCrc));
+    heard_.clear();
+    starts_.clear();
+    looked_ = 0;
+    return pdu;
+}
+
+/// Gives up the first `count` bytes heard.
+void ReplyFramer::discard(std::size_t count) {
+    classify(ByteView(heard_).first(count));
+    heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(count));
+    starts_.clear();
+    looked_ = 0;
+    collect_starts();
+}
+
+void ReplyFramer::classify(ByteView bytes) {
+    for (Unused& part : classify_heard(bytes, station_)) {
+        damaged_ = damaged_ || (part.kind == Unused::Kind::damaged && holds_start(part.bytes));
+        constexpr std::size_t kKept = 64;  // parts; beyond, only their bytes matter
+        if (unused_.size() < kKept) {
+            unused_.push_back(std::move(part));
+        } else if (unused_.back().bytes.size() < kMaxHeard) {
+            unused_.back().bytes.insert(unused_.back().bytes.end(), part.bytes.begin(),
+                                        part.bytes.end());
+        }
+    }
+}
+
+std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station) {
+    std::vector<Unused> parts;
+    while (!bytes.empty()) {
+        const ReplyLength length = reply_length(bytes);
+        const bool whole = length.kind == ReplyLength::Kind::known &&
+                           length.length <= bytes.size() && length.length >= kMinAdu &&
+                           crc_ok(bytes.first(length.length));
+        const bool rest_is_frame =
+            !whole && bytes.size() >= kMinAdu && bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes);
+        const std::size_t size = whole ? length.length : bytes.size();
+        Unused part;
+        part.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+        if (whole || rest_is_frame) {
+            part.station = bytes[0];
+            part.kind = bytes[0] == own_station ? Unused::Kind::own : Unused::Kind::foreign;
+        }
+        parts.push_back(std::move(part));
+        bytes = bytes.subspan(size);
+    }
+    return parts;
+}
+
+}  // namespace panelgate::modbus

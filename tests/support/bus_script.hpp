@@ -1,0 +1,148 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::test {
+
+/// Plays one line against an arbiter in virtual time: what goes out is recorded with its instant,
+/// replies are put in at chosen instants, answers are collected. Checks at each step that nothing
+/// is sent inside a gap and that no job is answered twice.
+class BusScript {
+  public:
+    explicit BusScript(arbiter::Settings settings) : settings_(settings), arbiter_(settings) {
+        arbiter_.on_line_up(now_);
+        drain();
+        run_for(100ms);  // past the first silent interval
+    }
+
+    struct Sent {
+        TimePoint at;
+        Bytes adu;
+    };
+    struct Answer {
+        TimePoint at;
+        Result<Bytes> pdu = Fault::cancelled;
+        bool transmitted = false;
+    };
+
+    arbiter::Ticket submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
+                           arbiter::PriorityClass priority = arbiter::PriorityClass::read) {
+        const Result<arbiter::Ticket> ticket =
+            try_submit(station, std::move(pdu), client, priority);
+        EXPECT_TRUE(ticket.has_value());
+        return ticket ? *ticket : 0;
+    }
+    Result<arbiter::Ticket> try_submit(
+        std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
+        arbiter::PriorityClass priority = arbiter::PriorityClass::read) {
+        arbiter::Job job;
+        job.station = station;
+        job.pdu = std::move(pdu);
+        job.client = client;
+        job.priority = priority;
+        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, std::move(job));
+        drain();
+        return ticket;
+    }
+    void cancel(arbiter::Client client) {
+        arbiter_.cancel(now_, client);
+        drain();
+    }
+    void line_down() {
+        arbiter_.on_line_down(now_);
+        drain();
+    }
+    void line_up() {
+        arbiter_.on_line_up(now_);
+        drain();
+    }
+    /// Bytes arrive now.
+    void hear(ByteView bytes) {
+        arbiter_.on_rx(now_, bytes);
+        heard_until_ = now_;
+        drain();
+    }
+    /// A whole reply of a station arrives now, its CRC added.
+    void hear_reply(std::uint8_t station, ByteView pdu) { hear(modbus::encode_adu(station, pdu)); }
+    /// Bytes arrive one by one from now on, at the line's pace.
+    void hear_paced(ByteView bytes) {
+        for (const std::uint8_t& b : bytes) {
+            run_for(character_time(settings_.serial));
+            hear(ByteView(&b, 1));
+        }
+    }
+
+    void run_for(Duration span) { run_until(now_ + span); }
+    void run_until(TimePoint end) {
+        int spins = 0;
+        while (true) {
+            const auto next = arbiter_.next_deadline();
+            if (!next || *next > end) break;
+            spins = *next > now_ ? 0 : spins + 1;
+            ASSERT_LT(spins, 100) << "the arbiter asks again and again for the same instant";
+            now_ = std::max(now_, *next);
+            arbiter_.on_deadline(now_);
+            drain();
+        }
+        now_ = std::max(now_, end);
+    }
+    /// Runs until one more frame was sent (or the limit), and returns it.
+    std::optional<Sent> next_sent(Duration limit = 60s) {
+        const std::size_t before = sent.size();
+        const TimePoint end = now_ + limit;
+        while (sent.size() == before) {
+            const auto next = arbiter_.next_deadline();
+            if (!next || *next > end) return std::nullopt;
+            run_until(*next);
+        }
+        return sent.back();
+    }
+    /// Runs to the last bit of the frame sent last.
+    void run_to_end_of_request() {
+        run_until(sent.back().at + wire_time(settings_.serial, sent.back().adu.size()));
+    }
+    bool answered(arbiter::Ticket ticket) const { return answers.count(ticket) == 1; }
+    const Answer& answer(arbiter::Ticket ticket) const { return answers.at(ticket); }
+
+    TimePoint now() const { return now_; }
+    arbiter::Arbiter& arbiter() { return arbiter_; }
+
+    std::vector<Sent> sent;
+    std::map<arbiter::Ticket, Answer> answers;
+    std::vector<arbiter::Note> notes;
+
+  private:
+    void drain() {
+        while (auto action = arbiter_.poll_action()) {
+            std::visit([this](auto& a) { act(a); }, *action);
+        }
+    }
+    void act(const arbiter::Transmit& transmit) {
+        EXPECT_GE(now_ - std::max(sent_until_, heard_until_), silent_interval(settings_.serial))
+            << "sent within the gap";
+        sent.push_back({now_, transmit.adu});
+        sent_until_ = now_ + wire_time(settings_.serial, transmit.adu.size());
+    }
+    void act(const arbiter::Finish& finish) {
+        EXPECT_EQ(answers.count(finish.ticket), 0u) << "answered twice";
+        answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
+    }
+    void act(const arbiter::Note& note) { notes.push_back(note); }
+
+    arbiter::Settings settings_;
+    arbiter::Arbiter arbiter_;
+    TimePoint now_{1h};
+    TimePoint sent_until_{};
+    TimePoint heard_until_{};
+};
+
+}  // namespace panelgate::test
