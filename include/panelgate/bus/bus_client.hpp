@@ -63,8 +63,8 @@ struct StationStatus {
     std::optional<Duration> last_success;  ///< how long ago
 };
 
-/// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long as
-/// the program's io_context runs; it outlives its clients.
+/// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long
+/// as the program's io_context runs; it outlives its clients.
 class BusClient {
   public:
     virtual ~BusClient() = default;

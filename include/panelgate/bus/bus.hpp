@@ -1,0 +1,49 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/bus/counters.hpp"
+#include "panelgate/line/line.hpp"
+
+namespace panelgate::bus {
+
+struct Settings {
+    std::string name;    ///< of the line
+    std::string device;  ///< as configured
+    arbiter::Settings arbiter;
+    std::map<std::uint8_t, std::string> stations;  ///< names of those the configuration lists
+    std::size_t trace_frames = 2000;
+};
+
+/// Drives one line with one arbiter. Everything happens on the executor's one thread.
+class Bus final : public BusClient {
+  public:
+    Bus(boost::asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line);
+    /// Answers what is still open with Fault::cancelled.
+    ~Bus() override;
+
+    void start();
+    /// Closes the line; what waits is answered at once (line_down, line_lost).
+    void stop();
+
+    void transact(Request request, AnswerHandler handler) override;
+    void cancel(ClientId client) override;
+    LineStatus status() const override;
+    StationStatus station_status(std::uint8_t station) const override;
+    std::vector<TraceFrame> trace(std::size_t last) const override;
+
+    LineReport report() const;
+    /// Nothing waits, nothing is on the wire.
+    bool idle() const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;  ///< shared with completions that are still under way
+};
+
+}  // namespace panelgate::bus

@@ -1,0 +1,255 @@
+#include "panelgate/bus/bus.hpp"
+
+#include <atomic>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <utility>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/bus/flight_recorder.hpp"
+#include "panelgate/bus/load_meter.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/log.hpp"
+#include "request_counters.hpp"
+
+namespace panelgate::bus {
+
+namespace asio = boost::asio;
+
+ClientId next_client_id() {
+    static std::atomic<ClientId> last{0};
+    return ++last;
+}
+
+/// Outlives the Bus for as long as a posted completion needs it.
+struct Bus::State final : public line::Line::Events,
+                          public std::enable_shared_from_this<Bus::State> {
+    struct Pending {
+        AnswerHandler handler;
+        std::uint8_t station = 0;
+        std::uint8_t function = 0;
+        TimePoint arrived;
+    };
+
+    State(const asio::any_io_executor& executor, Settings s, std::unique_ptr<line::Line> l)
+        : settings(std::move(s)),
+          line(std::move(l)),
+          arbiter(settings.arbiter),
+          counters(settings.stations),
+          recorder(settings.trace_frames),
+          alarm(executor) {}
+
+    void on_up() override;
+    void on_down(const std::string& why) override;
+    void on_bytes(ByteView bytes) override;
+
+    void transact(Request request, AnswerHandler handler);
+    void refuse(Pending pending, Fault fault);
+    void pump();
+    void act(arbiter::Transmit& transmit) { line->write(transmit.adu); }
+    void act(arbiter::Finish& finish);
+    void act(arbiter::Note& note);
+    void arm();
+    void on_alarm();
+    void answer(Pending pending, Answer answer);
+
+    Settings settings;
+    std::unique_ptr<line::Line> line;
+    arbiter::Arbiter arbiter;
+    RequestCounters counters;
+    FlightRecorder recorder;
+    mutable LoadMeter load;
+    asio::steady_timer alarm;
+    std::optional<TimePoint> armed;
+    std::map<arbiter::Ticket, Pending> pending;
+    bool pumping = false;
+    bool up = false;
+    std::string why_down = "not opened yet";
+};
+
+void Bus::State::on_up() {
+    up = true;
+    rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
+    arbiter.on_line_up(rt::now());
+    pump();
+}
+
+void Bus::State::on_down(const std::string& why) {
+    up = false;
+    why_down = why;
+    rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
+    arbiter.on_line_down(rt::now());
+    pump();
+}
+
+void Bus::State::on_bytes(ByteView bytes) {
+    arbiter.on_rx(rt::now(), bytes);
+    pump();
+}
+
+void Bus::State::transact(Request request, AnswerHandler handler) {
+    const std::uint8_t function = request.pdu.empty() ? std::uint8_t{0} : request.pdu[0];
+    Pending entry{std::move(handler), request.station, function, rt::now()};
+    const Result<void> legal = modbus::check_request(request.pdu, request.quantity);
+    if (!legal) return refuse(std::move(entry), legal.error());
+    const bool broadcast = request.station == 0;
+    if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
+        return refuse(std::move(entry), Fault::denied);
+    }
+    line->poll_input();
+    arbiter::Job job;
+    job.station = request.station;
+    job.pdu = std::move(request.pdu);
+    job.client = request.client;
+    job.priority = request.priority;
+    const bool read = modbus::is_pure_read(job.pdu);
+    if (job.priority == arbiter::PriorityClass::read && !read)
+        job.priority = arbiter::PriorityClass::write;
+    const Result<arbiter::Ticket> ticket = arbiter.submit(rt::now(), std::move(job));
+    if (!ticket) return refuse(std::move(entry), ticket.error());
+    pending.emplace(*ticket, std::move(entry));
+    pump();
+}
+
+void Bus::State::refuse(Pending entry, Fault fault) {
+    Answer refused;
+    refused.pdu = fault;
+    answer(std::move(entry), std::move(refused));
+}
+
+/// Acts on what the arbiter wants until it wants nothing. Acting can lead back here (a write that
+/// fails takes the line down): the outer loop then drains (house rule 14).
+void Bus::State::pump() {
+    if (pumping) return;
+    pumping = true;
+    while (auto action = arbiter.poll_action()) {
+        std::visit([this](auto& a) { act(a); }, *action);
+    }
+    pumping = false;
+    arm();
+}
+
+void Bus::State::act(arbiter::Finish& finish) {
+    const auto found = pending.find(finish.ticket);
+    if (found == pending.end()) return;
+    Pending entry = std::move(found->second);
+    pending.erase(found);
+    Answer result;
+    result.pdu = std::move(finish.pdu);
+    result.transmitted = finish.transmitted;
+    answer(std::move(entry), std::move(result));
+}
+
+void Bus::State::act(arbiter::Note& note) {
+    static constexpr TraceFrame::Direction kDirections[] = {TraceFrame::Direction::sent,
+                                                            TraceFrame::Direction::received,
+                                                            TraceFrame::Direction::discarded};
+    if (rt::log_enabled(rt::LogLevel::trace)) {
+        rt::log(rt::LogLevel::trace, "frame",
+                {{"line", settings.name},
+                 {"what", std::string(note.what)},
+                 {"bytes", to_hex(note.bytes)}});
+    }
+    TraceFrame frame;
+    frame.at = note.at;
+    frame.direction = kDirections[static_cast<std::size_t>(note.direction)];
+    frame.bytes = std::move(note.bytes);
+    frame.note = note.what;
+    recorder.add(std::move(frame));
+}
+
+void Bus::State::arm() {
+    const auto next = arbiter.next_deadline();
+    if (next == armed) return;
+    armed = next;
+    if (!next) {
+        alarm.cancel();
+        return;
+    }
+    alarm.expires_at(*next);
+    alarm.async_wait([self = shared_from_this()](boost::system::error_code error) {
+        if (!error) self->on_alarm();
+    });
+}
+
+void Bus::State::on_alarm() {
+    armed.reset();
+    line->poll_input();  // what has arrived by now came before whatever is due now
+    arbiter.on_deadline(rt::now());
+    pump();
+}
+
+/// The one place that answers: counted, then handed over from the loop, never from inside a call.
+void Bus::State::answer(Pending entry, Answer result) {
+    counters.count(entry.station, entry.function, result.pdu, rt::now() - entry.arrived);
+    if (result.pdu.has_value()) {
+        if (!modbus::exception_of(*result.pdu))
+            counters.succeeded(entry.station, rt::wall_seconds());
+    }
+    asio::post(alarm.get_executor(),
+               [handler = std::move(entry.handler), result = std::move(result)]() mutable {
+                   handler(std::move(result));
+               });
+}
+
+Bus::Bus(asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line)
+    : state_(std::make_shared<State>(executor, std::move(settings), std::move(line))) {}
+
+Bus::~Bus() { stop(); }
+
+void Bus::start() { state_->line->start(*state_); }
+
+void Bus::stop() {
+    state_->line->stop();
+    state_->arbiter.on_line_down(rt::now());
+    state_->pump();
+    state_->alarm.cancel();
+}
+
+void Bus::transact(Request request, AnswerHandler handler) {
+    state_->transact(std::move(request), std::move(handler));
+}
+
+void Bus::cancel(ClientId client) {
+    state_->arbiter.cancel(rt::now(), client);
+    state_->pump();
+}
+
+LineStatus Bus::status() const {
+    LineStatus status;
+    status.name = state_->settings.name;
+    status.device = state_->settings.device;
+    status.up = state_->up;
+    status.state = state_->up ? "up" : "down: " + state_->why_down;
+    status.queue_depth = state_->arbiter.queue_depth();
+    status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
+    return status;
+}
+
+StationStatus Bus::station_status(std::uint8_t station) const {
+    const arbiter::StationState& seen = state_->arbiter.station(station);
+    StationStatus status;
+    status.state = "unknown";
+    if (seen.tried)
+        status.state = seen.silent_in_a_row > 0 || !seen.last_success ? "silent" : "online";
+    if (seen.last_success) status.last_success = rt::now() - *seen.last_success;
+    return status;
+}
+
+std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }
+
+bool Bus::idle() const { return state_->arbiter.idle(); }
+
+LineReport Bus::report() const {
+    LineReport report;
+    report.line = state_->settings.name;
+    report.up = state_->up;
+    report.queue_depth = state_->arbiter.queue_depth();
+    report.wire = state_->arbiter.counters();
+    report.device = state_->line->counters();
+    report.stations = state_->counters.report(state_->arbiter);
+    return report;
+}
+
+}  // namespace panelgate::bus

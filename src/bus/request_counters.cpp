@@ -1,0 +1,57 @@
+#include "request_counters.hpp"
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::bus {
+namespace {
+
+std::string function_label(std::uint8_t function) {
+    return modbus::is_known(function) ? std::to_string(function) : "other";
+}
+
+std::string outcome_of(const Result<Bytes>& outcome) {
+    if (!outcome) return std::string(outcome_label(outcome.error()));
+    return modbus::exception_of(*outcome) ? "exception" : "ok";
+}
+
+}  // namespace
+
+RequestCounters::RequestCounters(const std::map<std::uint8_t, std::string>& stations) {
+    stations_[0].station = "other";
+    for (const auto& [id, name] : stations) {
+        stations_[id].station = name;
+        stations_[id].configured = true;
+    }
+}
+
+StationReport& RequestCounters::of(std::uint8_t station) {
+    const auto found = stations_.find(station);
+    return found == stations_.end() ? stations_[0] : found->second;
+}
+
+void RequestCounters::count(std::uint8_t station, std::uint8_t function,
+                            const Result<Bytes>& outcome, Duration took) {
+    StationReport& report = of(station);
+    ++report.requests[{function_label(function), outcome_of(outcome)}];
+    report.request_duration.observe(took);
+}
+
+void RequestCounters::succeeded(std::uint8_t station, double wall) {
+    of(station).last_success_unix = wall;
+}
+
+std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
+    std::vector<StationReport> reports;
+    for (const auto& [id, counted] : stations_) {
+        StationReport report = counted;
+        const auto wire = arbiter.station_counters().find(id);
+        if (wire != arbiter.station_counters().end()) report.wire = wire->second;
+        const arbiter::StationState& seen = arbiter.station(id);
+        report.up = seen.last_success && seen.silent_in_a_row == 0;
+        reports.push_back(std::move(report));
+    }
+    return reports;
+}
+
+}  // namespace panelgate::bus

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/bus/counters.hpp"
+
+namespace panelgate::bus {
+
+/// Counts requests by station, function and outcome. Stations the configuration does not list share
+/// one entry, functions outside Table A one label: no client can add a series (P10).
+class RequestCounters {
+  public:
+    explicit RequestCounters(const std::map<std::uint8_t, std::string>& stations);
+
+    void count(std::uint8_t station, std::uint8_t function, const Result<Bytes>& outcome,
+               Duration took);
+    void succeeded(std::uint8_t station, double wall);
+    /// Joined with what the arbiter counted on the wire.
+    std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
+
+  private:
+    StationReport& of(std::uint8_t station);
+
+    std::map<std::uint8_t, StationReport> stations_;  ///< 0: the others, and broadcasts
+};
+
+}  // namespace panelgate::bus

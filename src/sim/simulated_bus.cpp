@@ -1,0 +1,151 @@
+#include "panelgate/sim/simulated_bus.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cerrno>
+#include <utility>
+
+#include "panelgate/line/pty.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+
+namespace panelgate::sim {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+constexpr std::size_t kMaxRequest = 520;  // the GT's 512 bytes, and what shows that it was more
+constexpr Duration kTick = 1ms;  // reply bytes are handed over at this grain, the last one exactly
+
+}  // namespace
+
+struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
+    State(const asio::any_io_executor& executor, Settings s, std::vector<Station> all)
+        : settings(s), stations(std::move(all)), descriptor(executor), timer(executor) {
+        descriptor.assign(::dup(pty.master()));
+    }
+
+    void wait_readable();
+    void read_all();
+    void hear(TimePoint now, ByteView bytes);
+    void at(TimePoint when, void (State::*next)());
+    void request_ended();
+    Bytes reply_to(ByteView adu);
+    void send_some();
+
+    Settings settings;
+    std::vector<Station> stations;
+    line::Pty pty;
+    asio::posix::stream_descriptor descriptor;
+    asio::steady_timer timer;
+    Bytes request;
+    TimePoint request_end;  ///< wire time of its last bit
+    Bytes reply;
+    std::size_t sent = 0;
+    TimePoint reply_start;
+    bool stopped = false;
+};
+
+void SimulatedBus::State::wait_readable() {
+    descriptor.async_wait(asio::posix::stream_descriptor::wait_read,
+                          [self = shared_from_this()](error_code error) {
+                              if (error || self->stopped) return;
+                              self->read_all();
+                              self->wait_readable();
+                          });
+}
+
+void SimulatedBus::State::read_all() {
+    std::array<std::uint8_t, 1024> buffer;
+    const ssize_t n = ::read(descriptor.native_handle(), buffer.data(), buffer.size());
+    if (n > 0) hear(rt::now(), ByteView(buffer).first(static_cast<std::size_t>(n)));
+}
+
+void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
+    if (!reply.empty()) return;  // a collision: neither side understands the other
+    const bool first = request.empty();
+    request_end =
+        (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
+    const std::size_t room = kMaxRequest - std::min(kMaxRequest, request.size());
+    request.insert(request.end(), bytes.begin(),
+                   bytes.begin() + static_cast<std::ptrdiff_t>(std::min(room, bytes.size())));
+    at(request_end + silent_interval(settings.serial), &State::request_ended);
+}
+
+void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
+    timer.expires_at(when);
+    timer.async_wait([self = shared_from_this(), next](error_code error) {
+        if (!error && !self->stopped) (self.get()->*next)();
+    });
+}
+
+void SimulatedBus::State::request_ended() {
+    const Bytes adu = std::exchange(request, {});
+    reply = reply_to(adu);
+    if (reply.empty()) return;
+    sent = 0;
+    reply_start = request_end + silent_interval(settings.serial) + settings.think_time;
+    at(reply_start, &State::send_some);
+}
+
+/// Empty when nobody answers: damage, a broadcast, an address that nobody has.
+Bytes SimulatedBus::State::reply_to(ByteView adu) {
+    constexpr std::size_t kMinAdu = 4;
+    if (adu.size() < kMinAdu || !modbus::crc_ok(adu)) return {};
+    const ByteView pdu = adu.subspan(1, adu.size() - 3);
+    const TimePoint now = rt::now();
+    const std::int64_t wall = rt::local_wall_seconds();
+    Bytes answer;
+    for (Station& station : stations) {
+        if (adu[0] == 0) station.broadcast(now, wall, pdu);
+        if (adu[0] == station.id())
+            answer = modbus::encode_adu(station.id(), station.handle(now, wall, pdu));
+    }
+    return answer;
+}
+
+/// Hands over the bytes whose time has come.
+void SimulatedBus::State::send_some() {
+    const Duration one = character_time(settings.serial);
+    const auto due = static_cast<std::size_t>((rt::now() - reply_start) / one);
+    const std::size_t until = std::min(reply.size(), due);
+    if (until > sent) {
+        const ssize_t n = ::write(descriptor.native_handle(), reply.data() + sent, until - sent);
+        if (n < 0 && errno == EAGAIN) {  // nobody reads: a real line would not wait either
+            reply.clear();
+            return;
+        }
+        sent = until;
+    }
+    if (sent == reply.size()) {
+        reply.clear();
+        return;
+    }
+    const TimePoint end = reply_start + wire_time(settings.serial, reply.size());
+    at(std::min(end, std::max(rt::now() + kTick, reply_start + one)), &State::send_some);
+}
+
+SimulatedBus::SimulatedBus(asio::any_io_executor executor, Settings settings,
+                           std::vector<Station> stations)
+    : state_(std::make_shared<State>(executor, settings, std::move(stations))) {}
+
+SimulatedBus::~SimulatedBus() { stop(); }
+
+const std::string& SimulatedBus::device() const { return state_->pty.path(); }
+
+void SimulatedBus::start() { state_->wait_readable(); }
+
+void SimulatedBus::stop() {
+    state_->stopped = true;
+    state_->timer.cancel();
+    error_code ignored;
+    state_->descriptor.close(ignored);
+}
+
+}  // namespace panelgate::sim
