@@ -6,11 +6,11 @@
 namespace panelgate::modbus {
 namespace {
 
-constexpr std::size_t kAroundPdu = 3;       // address before, CRC after
-constexpr std::size_t kFileReference = 7;   // type, file, record, length
-constexpr std::uint16_t kLoopback = 0;      // 08/0000 Return Query Data
-constexpr std::uint16_t kListenOnly = 4;    // 08/0004 Force Listen Only Mode
-constexpr std::size_t kMaxByteCount = 255;  // one byte
+constexpr std::size_t kAroundPdu = 3;                        // address before, CRC after
+constexpr std::size_t kFileReference = 7;                    // type, file, record, length
+constexpr std::uint16_t kLoopback = 0;                       // 08/0000 Return Query Data
+constexpr std::uint16_t kListenOnly = 4;                     // 08/0004 Force Listen Only Mode
+[[maybe_unused]] constexpr std::size_t kMaxByteCount = 255;  // one byte
 
 std::size_t bytes_for_bits(std::size_t bits) { return (bits + 7) / 8; }
 

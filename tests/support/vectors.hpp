@@ -37,7 +37,8 @@ class Vector {
         if (!digits) return std::nullopt;
         return std::stoul(*digits);
     }
-    /// As said for one direction ("request_crc_ok"), else for both, else good: then it was computed.
+    /// As said for one direction ("request_crc_ok"), else for both, else good: then it was
+    /// computed.
     bool crc_ok(std::string_view direction_key) const {
         return text(direction_key).value_or(text("crc_ok").value_or("true")) == "true";
     }

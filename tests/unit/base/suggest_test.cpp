@@ -1,0 +1,40 @@
+#include "panelgate/base/suggest.hpp"
+
+#include <gtest/gtest.h>
+
+namespace panelgate {
+namespace {
+
+constexpr std::string_view kKeys[] = {"baud", "parity", "stop_bits", "reply_timeout", "retries"};
+
+TEST(Nearest, FindsWhatWasProbablyMeant) {
+    EXPECT_EQ(nearest("bauds", kKeys), "baud") << "one letter more";
+    EXPECT_EQ(nearest("parit", kKeys), "parity") << "one letter less";
+    EXPECT_EQ(nearest("stop-bits", kKeys), "stop_bits") << "another letter";
+    EXPECT_EQ(nearest("reply_timoeut", kKeys), "reply_timeout") << "two swapped";
+    EXPECT_EQ(nearest("reply_time_outs", kKeys), "reply_timeout") << "two edits";
+}
+
+TEST(Nearest, SaysNothingWhenNothingIsNear) {
+    EXPECT_EQ(nearest("address", kKeys), "");
+    EXPECT_EQ(nearest("reply_tmt", kKeys), "") << "four edits";
+    EXPECT_EQ(nearest("", kKeys), "");
+    EXPECT_EQ(nearest("baud", {}), "");
+}
+
+TEST(Nearest, WantsTwoThirdsOfAShortWordRight) {
+    constexpr std::string_view kWords[] = {"id", "unit"};
+    EXPECT_EQ(nearest("ip", kWords), "") << "half of it is wrong";
+    EXPECT_EQ(nearest("unti", kWords), "unit");
+}
+
+TEST(Nearest, TakesTheNearerOfTwo) {
+    constexpr std::string_view kWords[] = {"retries", "retry"};
+    EXPECT_EQ(nearest("retrie", kWords), "retries");
+    EXPECT_EQ(nearest("retr", kWords), "retry");
+}
+
+TEST(Nearest, FindsTheWordItself) { EXPECT_EQ(nearest("baud", kKeys), "baud"); }
+
+}  // namespace
+}  // namespace panelgate
