@@ -1,0 +1,59 @@
+#include <iostream>
+#include <string_view>
+#include <vector>
+
+#include "commands.hpp"
+#include "panelgate/base/suggest.hpp"
+#include "panelgate/profile/describe.hpp"
+#include "panelgate/profile/load_profile.hpp"
+
+namespace panelgate::app {
+namespace {
+
+/// nullptr, and told, when there is none of this name.
+const profile::PanelProfile* find(const profile::Catalogue& catalogue, const std::string& name) {
+    const profile::PanelProfile* found = catalogue.find(name);
+    if (found != nullptr) return found;
+    std::vector<std::string_view> names;
+    for (const auto& [known, profile] : catalogue.all()) names.push_back(known);
+    const std::string near = nearest(name, names);
+    std::cerr << "panelgate: there is no profile '" << name << '\'';
+    if (!near.empty()) {
+        std::cerr << "; did you mean '" << near << "'?\n";
+    } else {
+        std::cerr << "; `panelgate profiles` lists them\n";
+    }
+    return nullptr;
+}
+
+}  // namespace
+
+ExitCode address(const std::string& name, const std::string& what) {
+    const profile::Catalogue catalogue = profile::Catalogue::shipped();
+    const profile::PanelProfile* profile = find(catalogue, name);
+    if (profile == nullptr) return kUsage;
+    const auto text = profile::describe_address(*profile, what);
+    if (!text) {
+        std::cerr << "panelgate: " << text.error().message << '\n';
+        return kUsage;
+    }
+    std::cout << *text;
+    return kFine;
+}
+
+ExitCode profiles(const std::string& name) {
+    const profile::Catalogue catalogue = profile::Catalogue::shipped();
+    if (!name.empty()) {
+        const profile::PanelProfile* profile = find(catalogue, name);
+        if (profile == nullptr) return kUsage;
+        std::cout << profile::describe(*profile);
+        return kFine;
+    }
+    for (const auto& [known, profile] : catalogue.all()) {
+        std::cout << known << std::string(known.size() < 20 ? 20 - known.size() : 1, ' ')
+                  << profile.description << '\n';
+    }
+    return kFine;
+}
+
+}  // namespace panelgate::app

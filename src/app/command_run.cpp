@@ -1,0 +1,95 @@
+#include <boost/asio/io_context.hpp>
+#include <iostream>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "commands.hpp"
+#include "gateway.hpp"
+#include "load.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/log.hpp"
+#include "run_loop.hpp"
+
+namespace panelgate::app {
+
+using Embedded = std::vector<std::pair<std::string_view, std::string_view>>;
+const Embedded& shipped_demo();  // config/demo.yaml, compiled in
+
+namespace {
+
+/// `started` is told the gateway once it serves.
+ExitCode serve(config::Config config, bool simulate,
+               const std::function<void(const Gateway&)>& started) {
+    rt::set_up_log(config.log.level, config.log.format);
+    boost::asio::io_context io(1);
+    Gateway gateway(io.get_executor(), std::move(config), simulate);
+    try {
+        gateway.start();
+    } catch (const std::system_error& error) {
+        std::cerr << "panelgate: " << error.what() << '\n';
+        return kUnavailable;
+    }
+    started(gateway);
+    run_until_signal(io, {[&] { gateway.stop_accepting(); }, [&] { return gateway.drained(); },
+                          [&] { gateway.stop(); }});
+    return kFine;
+}
+
+void print_demo_help(const config::Config& config, const Gateway& gateway) {
+    const auto reachable = [](const std::string& address) {
+        return address == "0.0.0.0" || address == "::" ? std::string("127.0.0.1") : address;
+    };
+    const std::string url =
+        "http://" + reachable(config.http->address) + ':' + std::to_string(gateway.http_port());
+    const std::string host = reachable(config.modbus_tcp[0].address);
+    const std::string port = std::to_string(gateway.modbus_port());
+    std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "
+              << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n"
+              << "  press 31 autonics-gplp-s   mixer 5 autonics-gp-2005   io 17 autonics-arm\n"
+              << "  oven 20 panasonic-gt       filler 1 omron-cp2e\n\n"
+              << "Try, in another terminal:\n"
+              << "  curl -s " << url << "/api/v1/stations\n"
+              << "  curl -s '" << url << "/api/v1/stations/press/devices/UW0?count=5'\n"
+              << "  curl -s -X PUT -d '{\"values\":[215]}' " << url
+              << "/api/v1/stations/oven/devices/GDT108\n"
+              << "  mbpoll -m tcp -p " << port << " -a 31 -t 4 -r 1 -c 5 -1 " << host << "\n\n"
+              << "Also: " << url << "/metrics and " << url << "/api/v1/lines/floor1/trace?last=20\n"
+              << "Ctrl-C ends it.\n"
+              << std::flush;
+}
+
+/// Replaces the address of `settings` by ADDR:PORT; false (and told) when that is not one.
+template <class Settings>
+bool listen_on(const std::string& text, Settings& settings) {
+    if (text.empty()) return true;
+    const auto endpoint = config::parse_endpoint(text);
+    if (!endpoint) {
+        std::cerr << "panelgate: '" << text << "' is not ADDR:PORT, such as 127.0.0.1:8080\n";
+        return false;
+    }
+    settings.address = endpoint->address;
+    settings.port = endpoint->port;
+    return true;
+}
+
+}  // namespace
+
+ExitCode run(const std::string& file, bool simulate) {
+    Loaded loaded = load_file(file);
+    if (!loaded.config) return loaded.code;
+    return serve(std::move(*loaded.config), simulate, [](const Gateway&) {});
+}
+
+ExitCode demo(const std::string& http, const std::string& modbus) {
+    Loaded loaded = load_text(shipped_demo().front().second, "demo.yaml");
+    if (!loaded.config) return loaded.code;
+    config::Config& config = *loaded.config;
+    if (!listen_on(http, *config.http) || !listen_on(modbus, config.modbus_tcp[0])) return kUsage;
+    const config::Config shown = config;
+    return serve(std::move(config), false,
+                 [&](const Gateway& gateway) { print_demo_help(shown, gateway); });
+}
+
+}  // namespace panelgate::app

@@ -1,0 +1,15 @@
+#pragma once
+
+namespace panelgate::app {
+
+/// Exit codes of contract 2, after sysexits(3).
+enum ExitCode : int {
+    kFine = 0,
+    kUsage = 64,
+    kNoInput = 66,
+    kUnavailable = 69,
+    kInternal = 70,
+    kBadConfig = 78,
+};
+
+}  // namespace panelgate::app

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/sim/simulated_bus.hpp"
+#include "panelgate/tcp_server/listener.hpp"
+#include "panelgate/web/directory.hpp"
+#include "panelgate/web/server.hpp"
+
+namespace panelgate::app {
+
+/// The composition root: builds the tree of objects of one configuration and owns it. One thread.
+class Gateway {
+  public:
+    Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate);
+    Gateway(const Gateway&) = delete;
+    Gateway& operator=(const Gateway&) = delete;
+
+    /// Opens lines and listeners. Throws std::system_error when a listener cannot be opened.
+    void start();
+    /// Stops accepting; what was accepted is answered within its deadline.
+    void stop_accepting();
+    /// Nothing is owed to any client any more.
+    bool drained() const;
+    /// Closes everything.
+    void stop();
+
+    std::uint16_t http_port() const { return http_ ? http_->port() : std::uint16_t{0}; }
+    std::uint16_t modbus_port() const {
+        return listeners_.empty() ? std::uint16_t{0} : listeners_[0]->port();
+    }
+
+  private:
+    void add_line(const config::Line& line, bool simulate);
+    void add_stations(const config::Line& line, bus::Bus& bus);
+    void add_listener(const tcp_server::Settings& settings);
+    void add_http(const web::Settings& settings);
+    std::string metrics_text() const;
+
+    boost::asio::any_io_executor executor_;
+    config::Config config_;
+    std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
+    std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
+    std::vector<tcp_server::LineInfo> lines_;
+    web::Directory directory_;
+    std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    std::unique_ptr<web::Server> http_;
+    std::size_t open_listeners_ = 0;
+    bool ready_ = false;
+};
+
+/// A simulated bus with the configured stations of a line.
+std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
+                                                 const config::Line& line);
+
+}  // namespace panelgate::app

@@ -1,0 +1,101 @@
+#include "run_loop.hpp"
+
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <csignal>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::app {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+constexpr auto kLongestEnd = 10s;
+constexpr auto kLook = 5ms;
+
+/// Lives on run_until_signal's stack for as long as the loop runs.
+class Loop {
+  public:
+    Loop(asio::io_context& io, const Ending& ending)
+        : io_(io),
+          ending_(ending),
+          ends_(io, SIGTERM, SIGINT),
+          reloads_(io, SIGHUP),
+          look_(io),
+          limit_(io) {}
+
+    void start() {
+        wait_for_end();
+        wait_for_reload();
+    }
+
+  private:
+    void wait_for_end() {
+        ends_.async_wait([this](error_code error, int) {
+            if (error) return;
+            if (ending_now_) {
+                finish();
+                return;
+            }
+            ending_now_ = true;
+            rt::log(rt::LogLevel::info, "stopping");
+            ending_.begin();
+            limit_.expires_after(kLongestEnd);
+            limit_.async_wait([this](error_code late) {
+                if (!late) finish();
+            });
+            look();
+            wait_for_end();
+        });
+    }
+
+    void look() {
+        if (ending_.done()) {
+            finish();
+            return;
+        }
+        look_.expires_after(kLook);
+        look_.async_wait([this](error_code error) {
+            if (!error) look();
+        });
+    }
+
+    void wait_for_reload() {
+        reloads_.async_wait([this](error_code error, int) {
+            if (error) return;
+            rt::log(rt::LogLevel::warn, "no reload",
+                    {{"why", "this version reads its file at start only"}});
+            wait_for_reload();
+        });
+    }
+
+    void finish() {
+        if (finished_) return;
+        finished_ = true;
+        ending_.finish();
+        io_.stop();
+    }
+
+    asio::io_context& io_;
+    const Ending& ending_;
+    asio::signal_set ends_;
+    asio::signal_set reloads_;
+    asio::steady_timer look_;
+    asio::steady_timer limit_;
+    bool ending_now_ = false;
+    bool finished_ = false;
+};
+
+}  // namespace
+
+void run_until_signal(asio::io_context& io, const Ending& ending) {
+    std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
+    Loop loop(io, ending);
+    loop.start();
+    io.run();
+}
+
+}  // namespace panelgate::app

@@ -1,0 +1,203 @@
+#include "panelgate/bus/bus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::bus {
+namespace {
+
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+const Bytes kWrite = "06 00 01 00 03"_hex;
+
+/// A line in memory: every frame written is answered as the test says, from the loop.
+class MemoryLine final : public line::Line {
+  public:
+    explicit MemoryLine(boost::asio::io_context& io) : io_(io) {}
+
+    void start(Events& events) override {
+        events_ = &events;
+        if (up_at_start) events.on_up();
+    }
+    void stop() override { events_ = nullptr; }
+    void poll_input() override {}
+    void write(ByteView bytes) override {
+        written.emplace_back(bytes.begin(), bytes.end());
+        if (fail_writes) {
+            events_->on_down("unplugged");
+            return;
+        }
+        if (reply.empty() || bytes[0] == 0) return;
+        boost::asio::post(io_, [this, adu = modbus::encode_adu(bytes[0], reply)] {
+            if (events_ != nullptr) events_->on_bytes(adu);
+        });
+    }
+    const line::Counters& counters() const override { return counters_; }
+    Events* events() { return events_; }
+
+    std::vector<Bytes> written;
+    Bytes reply = kReply;
+    bool up_at_start = true;
+    bool fail_writes = false;
+
+  private:
+    boost::asio::io_context& io_;
+    Events* events_ = nullptr;
+    line::Counters counters_;
+};
+
+class BusTest : public testing::Test {
+  protected:
+    BusTest() {
+        Settings settings;
+        settings.name = "floor1";
+        settings.device = "memory";
+        settings.arbiter.serial = {1000000, 8, Parity::none, 1};
+        settings.arbiter.unlisted.response_timeout = 5ms;
+        settings.arbiter.queue.deadline = 200ms;
+        settings.arbiter.stations = {settings.arbiter.unlisted};
+        settings.arbiter.stations[0].id = 17;
+        settings.stations[17] = "press";
+        auto memory = std::make_unique<MemoryLine>(io);
+        line = memory.get();
+        bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
+    }
+    /// Asks and runs the loop until answered.
+    Answer ask(std::uint8_t station, Bytes pdu, ClientId client = 1) {
+        std::optional<Answer> got;
+        Request request;
+        request.station = station;
+        request.pdu = std::move(pdu);
+        request.client = client;
+        bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+        EXPECT_FALSE(got) << "answered from inside transact()";
+        io.restart();
+        while (!got && io.run_one() > 0) {
+        }
+        return got.value_or(Answer{});
+    }
+
+    boost::asio::io_context io{1};
+    MemoryLine* line = nullptr;
+    std::unique_ptr<Bus> bus;
+};
+
+TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
+    bus->start();
+    const Answer answer = ask(17, kRead);
+    EXPECT_EQ(answer.pdu.value(), kReply);
+    EXPECT_TRUE(answer.transmitted);
+    ASSERT_EQ(line->written.size(), 1u);
+    EXPECT_EQ(line->written[0], "11 03 00 6B 00 03 76 87"_hex);
+    const auto trace = bus->trace(10);
+    ASSERT_EQ(trace.size(), 2u);
+    EXPECT_EQ(trace[0].direction, TraceFrame::Direction::sent);
+    EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
+    EXPECT_EQ(bus->station_status(17).state, "online");
+}
+
+TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
+    line->up_at_start = false;
+    bus->start();
+    const Answer answer = ask(17, kRead);
+    EXPECT_EQ(answer.pdu.error(), Fault::line_down);
+    EXPECT_FALSE(answer.transmitted);
+}
+
+TEST_F(BusTest, RefusesWhatMayNotBeTransmitted) {
+    bus->start();
+    EXPECT_EQ(ask(17, "03 00 6B"_hex).pdu.error(), Fault::malformed);
+    EXPECT_EQ(ask(17, "83 00"_hex).pdu.error(), Fault::denied);
+    EXPECT_EQ(ask(17, {}).pdu.error(), Fault::malformed);
+    EXPECT_EQ(ask(0, kRead).pdu.error(), Fault::denied);
+    EXPECT_EQ(ask(17, "08 00 04 00 00"_hex).pdu.error(), Fault::denied);
+    EXPECT_TRUE(line->written.empty());
+}
+
+TEST_F(BusTest, ASilentStationIsATimeoutAndSaysSoInTheStatus) {
+    line->reply.clear();
+    bus->start();
+    const Answer answer = ask(17, kWrite);
+    EXPECT_EQ(answer.pdu.error(), Fault::timeout);
+    EXPECT_TRUE(answer.transmitted);
+    EXPECT_EQ(line->written.size(), 1u);
+    EXPECT_EQ(bus->station_status(17).state, "silent");
+}
+
+TEST_F(BusTest, ABroadcastIsAnsweredWithoutAReply) {
+    bus->start();
+    const Answer answer = ask(0, kWrite);
+    EXPECT_EQ(answer.pdu.value(), kWrite);
+    EXPECT_EQ(line->written.size(), 1u);
+    EXPECT_EQ(line->written[0][0], 0);
+}
+
+TEST_F(BusTest, ALineThatIsLostInsideAWriteAnswersOnceAndDoesNotRecurse) {
+    line->fail_writes = true;
+    bus->start();
+    const Answer answer = ask(17, kWrite);
+    EXPECT_EQ(answer.pdu.error(), Fault::line_lost);
+    EXPECT_TRUE(answer.transmitted);
+    EXPECT_FALSE(bus->status().up);
+}
+
+TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
+    bus->start();
+    int answers = 0;
+    std::function<void()> again = [&] {
+        Request request;
+        request.station = 17;
+        request.pdu = kRead;
+        bus->transact(std::move(request), [&](const Answer& answer) {
+            EXPECT_TRUE(answer.pdu.has_value());
+            if (++answers < 20) again();
+        });
+    };
+    again();
+    while (answers < 20 && io.run_one() > 0) {
+    }
+    EXPECT_EQ(answers, 20);
+}
+
+TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
+    line->reply.clear();
+    bus->start();
+    std::vector<Fault> faults;
+    for (int i = 0; i < 3; ++i) {
+        Request request;
+        request.station = 17;
+        request.pdu = kRead;
+        bus->transact(std::move(request),
+                      [&](const Answer& a) { faults.push_back(a.pdu.error()); });
+    }
+    while (line->written.empty()) io.run_one();
+    bus.reset();
+    io.restart();
+    io.run();
+    EXPECT_EQ(faults, (std::vector<Fault>{Fault::line_lost, Fault::line_down, Fault::line_down}));
+}
+
+TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
+    bus->start();
+    ask(17, kRead);
+    ask(99, kRead);
+    ask(98, "41 00"_hex);
+    const LineReport report = bus->report();
+    ASSERT_EQ(report.stations.size(), 2u);
+    const std::pair<std::string, std::string> read_ok{"3", "ok"};
+    EXPECT_EQ(report.stations[0].station, "other");
+    EXPECT_EQ(report.stations[0].requests.at(read_ok), 1u);
+    EXPECT_EQ(report.stations[0].requests.count({"other", "timeout"}), 1u);
+    EXPECT_EQ(report.stations[1].station, "press");
+    EXPECT_EQ(report.stations[1].requests.at(read_ok), 1u);
+    EXPECT_TRUE(report.stations[1].up);
+}
+
+}  // namespace
+}  // namespace panelgate::bus

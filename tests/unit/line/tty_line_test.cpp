@@ -1,0 +1,165 @@
+#include "panelgate/line/tty_line.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "panelgate/line/pty.hpp"
+#include "panelgate/line/reopen.hpp"
+
+namespace panelgate::line {
+namespace {
+
+struct Heard final : Line::Events {
+    void on_up() override { ++ups; }
+    void on_down(const std::string& why) override { downs.push_back(why); }
+    void on_bytes(ByteView more) override { bytes.insert(bytes.end(), more.begin(), more.end()); }
+
+    int ups = 0;
+    std::vector<std::string> downs;
+    Bytes bytes;
+};
+
+class TtyLineTest : public testing::Test {
+  protected:
+    TtyLineTest() {
+        std::string name = (std::filesystem::temp_directory_path() / "panelgate-XXXXXX").string();
+        dir = mkdtemp(name.data());
+        settings.device = dir / "tty";
+        settings.serial = {38400, 8, Parity::none, 1};
+        settings.reopen_min = 1ms;
+        settings.reopen_max = 4ms;
+    }
+    ~TtyLineTest() override { std::filesystem::remove_all(dir); }
+
+    void plug(const Pty& pty) { std::filesystem::create_symlink(pty.path(), settings.device); }
+    void unplug() { std::filesystem::remove(settings.device); }
+    /// Runs the loop until it is so; a test's time limit is ctest's.
+    void run_until(const std::function<bool()>& so) {
+        while (!so()) io.run_one();
+    }
+    static Bytes read_master(const Pty& pty, std::size_t count) {
+        Bytes got;
+        while (got.size() < count) {
+            pollfd p{pty.master(), POLLIN, 0};
+            if (::poll(&p, 1, 5000) <= 0) break;
+            std::uint8_t buffer[512];
+            const ssize_t n = ::read(pty.master(), buffer, sizeof buffer);
+            if (n > 0) got.insert(got.end(), buffer, buffer + n);
+        }
+        return got;
+    }
+
+    boost::asio::io_context io{1};
+    std::filesystem::path dir;
+    Settings settings;
+    Heard heard;
+};
+
+TEST_F(TtyLineTest, PassesEveryByteValueBothWays) {
+    Pty pty;
+    plug(pty);
+    auto line = make_tty_line(io.get_executor(), settings);
+    line->start(heard);
+    ASSERT_EQ(heard.ups, 1);
+    Bytes all;
+    for (int i = 0; i < 256; ++i) all.push_back(static_cast<std::uint8_t>(i));
+    line->write(all);
+    EXPECT_EQ(read_master(pty, all.size()), all);
+    ASSERT_EQ(::write(pty.master(), all.data(), all.size()), 256);
+    run_until([&] { return heard.bytes.size() >= all.size(); });
+    EXPECT_EQ(heard.bytes, all);
+}
+
+TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndSaysOnceWhatIsMissing) {
+    auto line = make_tty_line(io.get_executor(), settings);
+    line->start(heard);
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_EQ(heard.downs[0], "cannot open " + settings.device + ": No such file or directory");
+    for (int i = 0; i < 3; ++i) io.run_one();  // further attempts say nothing new
+    EXPECT_EQ(heard.downs.size(), 1u);
+    Pty pty;
+    plug(pty);
+    run_until([&] { return heard.ups == 1; });
+}
+
+TEST_F(TtyLineTest, P7NoticesAnUnpluggedDeviceAndOpensItsSuccessor) {
+    auto line = make_tty_line(io.get_executor(), settings);
+    {
+        Pty pty;
+        plug(pty);
+        line->start(heard);
+        ASSERT_EQ(heard.ups, 1);
+        unplug();
+    }
+    run_until([&] { return heard.downs.size() == 1; });
+    Pty successor;
+    plug(successor);
+    run_until([&] { return heard.ups == 2; });
+    EXPECT_EQ(line->counters().reopens, 1u);
+    line->write(Bytes{1, 2, 3});
+    EXPECT_EQ(read_master(successor, 3), (Bytes{1, 2, 3}));
+}
+
+TEST_F(TtyLineTest, P7AWriteToAnUnpluggedDeviceTakesTheLineDown) {
+    auto line = make_tty_line(io.get_executor(), settings);
+    std::optional<Pty> pty(std::in_place);
+    plug(*pty);
+    line->start(heard);
+    unplug();
+    pty.reset();
+    line->write(Bytes{1, 2, 3});
+    EXPECT_EQ(heard.downs.size(), 1u);
+}
+
+TEST_F(TtyLineTest, RefusesAFileThatIsNoSerialDevice) {
+    settings.device = "/dev/null";
+    auto line = make_tty_line(io.get_executor(), settings);
+    line->start(heard);
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_NE(heard.downs[0].find("not a serial device"), std::string::npos) << heard.downs[0];
+}
+
+TEST_F(TtyLineTest, ASecondUserIsTurnedAway) {
+    Pty pty;
+    plug(pty);
+    auto first = make_tty_line(io.get_executor(), settings);
+    first->start(heard);
+    Heard other;
+    auto second = make_tty_line(io.get_executor(), settings);
+    second->start(other);
+    ASSERT_EQ(other.downs.size(), 1u);
+    EXPECT_NE(other.downs[0].find("another program holds it"), std::string::npos);
+    first.reset();
+    run_until([&] { return other.ups == 1; });
+}
+
+TEST_F(TtyLineTest, TakesAnyIntegerRate) {
+    Pty pty;
+    plug(pty);
+    settings.serial.baud = 250001;
+    auto line = make_tty_line(io.get_executor(), settings);
+    line->start(heard);
+    EXPECT_EQ(heard.ups, 1);
+}
+
+TEST(Reopen, DoublesItsPausesUpToTheLimitAndStartsAnewAfterSuccess) {
+    Reopen reopen(100ms, 350ms);
+    EXPECT_EQ(reopen.next_pause(), 100ms);
+    EXPECT_EQ(reopen.next_pause(), 200ms);
+    EXPECT_EQ(reopen.next_pause(), 350ms);
+    EXPECT_EQ(reopen.next_pause(), 350ms);
+    reopen.succeeded();
+    EXPECT_EQ(reopen.next_pause(), 100ms);
+}
+
+}  // namespace
+}  // namespace panelgate::line
