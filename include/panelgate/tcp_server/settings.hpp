@@ -28,18 +28,21 @@ struct UnitTarget {
 /// One Modbus/TCP listener.
 struct Settings {
     std::string address = "127.0.0.1";
-    std::uint16_t port = 502;  ///< 0: any free one
-    std::vector<std::string> lines;         ///< names; never empty after loading
+    std::uint16_t port = 502;                  ///< 0: any free one
+    std::vector<std::string> lines;            ///< names; never empty after loading
     std::map<std::uint8_t, UnitTarget> units;  ///< aliases, looked up before `lines`
     BroadcastMode broadcast = BroadcastMode::reply;
     std::optional<std::uint8_t> diagnostics_unit = 255;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
-    std::size_t in_flight = 16;         ///< per connection; one more is answered 06
-    Duration partial_adu_timeout = 5s;  ///< a half-sent ADU closes its connection
-    int bad_protocol_ids = 3;           ///< in a row close the connection
+    std::size_t in_flight = 16;            ///< per connection; one more is answered 06
+    Duration partial_adu_timeout = 5s;     ///< a half-sent ADU closes its connection
+    int bad_protocol_ids = 3;              ///< in a row close the connection
     std::size_t output_limit = 64 * 1024;  ///< bytes that a client has not read; above it is closed
+    /// After a client's FIN its waiting requests may still start for so long: nobody can tell a
+    /// half-close from a client that left, and that one takes its requests with it (P2).
+    Duration half_close_grace = 100ms;
 
     std::string name() const { return address + ":" + std::to_string(port); }
 };

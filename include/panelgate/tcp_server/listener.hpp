@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/tcp_server/settings.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
+
+namespace boost::asio {
+class any_io_executor;
+}
+
+namespace panelgate::tcp_server {
+
+/// What a listener takes from its surroundings.
+struct Hooks {
+    /// Life-cycle lines, "event key=value ..."; may be empty.
+    std::function<void(std::string_view)> log;
+    std::string version;  ///< of the program, for the device identification
+};
+
+/// One Modbus/TCP port and its connections (contract 4). One thread: everything runs on the
+/// executor given. The buses in the map outlive it; answers that come after its end are dropped.
+class Listener {
+  public:
+    /// Throws std::invalid_argument for an allow list that cannot be read.
+    Listener(const boost::asio::any_io_executor& executor, Settings settings, UnitMap units,
+             Hooks hooks);
+    ~Listener();  ///< as close_now()
+    Listener(const Listener&) = delete;
+    Listener& operator=(const Listener&) = delete;
+
+    /// Binds and accepts. Throws std::system_error with the address in its text when it cannot.
+    void start();
+    /// The port it is bound to; 0 before start().
+    std::uint16_t port() const;
+    Counters counters() const;
+
+    /// No new connections or requests; what is outstanding is answered, then each connection is
+    /// closed. `done` is called once, later, when none is left (also after close_now()).
+    void stop(std::function<void()> done);
+    /// Cuts every connection; requests that wait are taken back from their buses.
+    void close_now();
+
+  private:
+    class Core;
+    std::shared_ptr<Core> core_;
+};
+
+}  // namespace panelgate::tcp_server

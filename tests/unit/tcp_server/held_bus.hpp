@@ -1,0 +1,66 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+
+namespace panelgate::tcp_server {
+
+/// A bus that keeps every request until the test answers it, in any order.
+class HeldBus : public bus::BusClient {
+  public:
+    struct Held {
+        bus::Request request;
+        bus::AnswerHandler handler;
+    };
+
+    explicit HeldBus(boost::asio::io_context& context) : context_(context) {}
+
+    void transact(bus::Request request, bus::AnswerHandler handler) override {
+        seen.push_back(request);
+        if (instant) {
+            bus::Answer answer;
+            answer.pdu = *instant;
+            boost::asio::post(context_,
+                              [handler = std::move(handler), answer] { handler(answer); });
+            return;
+        }
+        held.push_back({std::move(request), std::move(handler)});
+    }
+    void cancel(bus::ClientId client) override {
+        cancelled.push_back(client);
+        std::deque<Held> kept;
+        std::deque<Held> gone;
+        for (Held& one : held) (one.request.client == client ? gone : kept).push_back(one);
+        held = std::move(kept);
+        for (Held& one : gone) one.handler(bus::Answer{});
+    }
+    bus::LineStatus status() const override { return line; }
+    bus::StationStatus station_status(std::uint8_t) const override { return {}; }
+    std::vector<bus::TraceFrame> trace(std::size_t) const override { return {}; }
+
+    /// Answers the held request at `index`.
+    void answer(std::size_t index, Result<Bytes> pdu, bool transmitted = true) {
+        const Held one = std::move(held.at(index));
+        held.erase(held.begin() + static_cast<std::ptrdiff_t>(index));
+        bus::Answer answer;
+        answer.pdu = std::move(pdu);
+        answer.transmitted = transmitted;
+        one.handler(answer);
+    }
+
+    std::deque<Held> held;
+    std::vector<bus::Request> seen;
+    std::vector<bus::ClientId> cancelled;
+    std::optional<Bytes> instant;  ///< the reply to everything, without being held
+    bus::LineStatus line;
+
+  private:
+    boost::asio::io_context& context_;
+};
+
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,187 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "held_bus.hpp"
+#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/tcp_server/listener.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::tcp_server {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+/// Runs the loop until something is true; false after far too long.
+inline bool run_until(asio::io_context& context, const std::function<bool()>& reached) {
+    for (int turn = 0; turn < 2000; ++turn) {
+        if (reached()) return true;
+        context.restart();
+        context.run_one_for(std::chrono::milliseconds(10));
+    }
+    return reached();
+}
+
+inline Bytes operator+(Bytes left, const Bytes& right) {
+    left.insert(left.end(), right.begin(), right.end());
+    return left;
+}
+
+/// A request to read one register of a station, told apart by its address.
+inline Bytes read_pdu(std::uint16_t address) { return Writer().u8(3).u16(address).u16(1).take(); }
+inline Bytes reply_to_read(std::uint16_t value) { return Writer().u8(3).u8(2).u16(value).take(); }
+
+/// A client whose socket lives in the same thread: it runs the loop while it waits.
+class Client {
+  public:
+    Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0)
+        : context_(context), socket_(context) {
+        const tcp::endpoint server(asio::ip::address_v4::loopback(), port);
+        socket_.open(tcp::v4());
+        if (receive_buffer != 0) {
+            socket_.set_option(tcp::socket::receive_buffer_size(receive_buffer));
+        }
+        socket_.connect(server);
+        socket_.set_option(tcp::no_delay(true));
+        socket_.non_blocking(true);
+    }
+
+    /// What the socket takes now; the number of bytes, nothing when the connection is gone.
+    std::optional<std::size_t> try_send(ByteView bytes) {
+        error_code error;
+        const std::size_t n = socket_.write_some(asio::buffer(bytes.data(), bytes.size()), error);
+        if (error == asio::error::would_block) return 0;
+        if (error) return std::nullopt;
+        return n;
+    }
+    void send(ByteView bytes) {
+        while (!bytes.empty()) {
+            const auto n = try_send(bytes);
+            ASSERT_TRUE(n.has_value()) << "the server closed";
+            bytes = bytes.subspan(*n);
+            if (*n == 0) context_.run_one_for(std::chrono::milliseconds(10));
+        }
+    }
+    void request(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
+        send(modbus::encode_mbap(transaction, unit, pdu));
+    }
+
+    /// The next reply, or nothing: the connection was closed.
+    std::optional<modbus::Adu> receive() {
+        std::optional<modbus::Adu> reply;
+        run_until(context_, [&] {
+            pull();
+            if (auto event = framer_.next()) reply = std::get<modbus::Adu>(std::move(*event));
+            return reply.has_value() || closed_;
+        });
+        EXPECT_TRUE(reply || closed_) << "neither a reply nor the end came";
+        return reply;
+    }
+    /// Sends a request and gives the PDU of the next reply.
+    Bytes ask(std::uint8_t unit, const Bytes& pdu) {
+        request(++last_transaction_, unit, pdu);
+        const auto reply = receive();
+        if (!reply) return {};
+        EXPECT_EQ(reply->transaction, last_transaction_);
+        EXPECT_EQ(reply->unit, unit);
+        return reply->pdu;
+    }
+    bool sees_close() {
+        return run_until(context_, [&] {
+            pull();
+            return closed_;
+        });
+    }
+    /// Whether something has come that was not received yet.
+    bool has_input() {
+        pull();
+        return received_ != 0;
+    }
+
+    tcp::socket& socket() { return socket_; }
+
+  private:
+    void pull() {
+        std::array<std::uint8_t, 4096> chunk{};
+        error_code error;
+        const std::size_t n = socket_.read_some(asio::buffer(chunk), error);
+        if (error && error != asio::error::would_block) closed_ = true;
+        received_ += n;
+        framer_.feed(ByteView(chunk.data(), n));
+    }
+
+    asio::io_context& context_;
+    tcp::socket socket_;
+    modbus::MbapFramer framer_;
+    std::uint16_t last_transaction_ = 100;
+    std::size_t received_ = 0;
+    bool closed_ = false;
+};
+
+/// A listener on a free loopback port with two lines: floor1 (stations 1 and 2, the second read
+/// only) and floor2 (stations 11 and 12).
+class Loopback : public ::testing::Test {
+  protected:
+    Loopback() {
+        settings.port = 0;
+        settings.lines = {"floor1"};
+        lines = {{"floor1", &bus1, {1, 2}, {2}, true}, {"floor2", &bus2, {11, 12}, {}, true}};
+    }
+    ~Loopback() override {
+        listener.reset();
+        context.restart();
+        context.poll();
+    }
+
+    void start() {
+        Hooks hooks;
+        hooks.log = [this](std::string_view line) { log.emplace_back(line); };
+        hooks.version = "1.2.3";
+        listener = std::make_unique<Listener>(context.get_executor(), settings,
+                                              UnitMap(settings, lines), std::move(hooks));
+        listener->start();
+    }
+    Client connect() { return Client(context, listener->port()); }
+    bool run_until(const std::function<bool()>& reached) {
+        return tcp_server::run_until(context, reached);
+    }
+    bool run_until_held(std::size_t count) {
+        return run_until([&] { return bus1.held.size() == count; });
+    }
+    /// The bus answers one request, and the client gets it.
+    Bytes ask_bus(Client& client, std::uint8_t unit, const Bytes& pdu, const Result<Bytes>& answer,
+                  bool transmitted = true) {
+        client.request(7, unit, pdu);
+        EXPECT_TRUE(run_until_held(1));
+        bus1.answer(0, answer, transmitted);
+        const auto reply = client.receive();
+        return reply ? reply->pdu : Bytes{};
+    }
+    std::size_t logged(std::string_view word) const {
+        std::size_t n = 0;
+        for (const std::string& line : log) n += line.find(word) != std::string::npos ? 1 : 0;
+        return n;
+    }
+
+    asio::io_context context;
+    HeldBus bus1{context};
+    HeldBus bus2{context};
+    Settings settings;
+    std::vector<LineInfo> lines;
+    std::vector<std::string> log;
+    std::unique_ptr<Listener> listener;
+};
+
+}  // namespace panelgate::tcp_server

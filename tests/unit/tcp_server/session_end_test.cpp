@@ -1,0 +1,88 @@
+#include <gmock/gmock.h>
+
+#include "loopback.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+using ::testing::ElementsAre;
+
+// Clients that leave, and clients that do not read.
+class SessionEnd : public Loopback {};
+
+TEST_F(SessionEnd, TakesItsRequestsBackWhenTheClientIsReset) {
+    start();
+    Client client = connect();
+    client.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until_held(1));
+    const bus::ClientId id = bus1.held[0].request.client;
+    client.socket().set_option(asio::socket_base::linger(true, 0));
+    client.socket().close();
+    ASSERT_TRUE(run_until([&] { return !bus1.cancelled.empty(); }));
+    EXPECT_THAT(bus1.cancelled, ElementsAre(id));
+    EXPECT_THAT(bus2.cancelled, ElementsAre()) << "it never used that one";
+    EXPECT_EQ(listener->counters().connections, 0U);
+}
+
+TEST_F(SessionEnd, P2TakesWaitingRequestsBackWhenTheClientHasClosed) {
+    settings.half_close_grace = 20ms;
+    start();
+    Client client = connect();
+    client.request(1, 1, "06 0000 0001"_hex);
+    ASSERT_TRUE(run_until_held(1));
+    client.socket().close();
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    EXPECT_TRUE(bus1.held.empty());
+    EXPECT_EQ(bus1.cancelled.front(), bus1.seen[0].client);
+}
+
+TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatTheClientHasClosed) {
+    settings.half_close_grace = 60s;
+    start();
+    Client client = connect();
+    for (std::uint16_t i = 0; i < 3; ++i) client.request(i, 1, read_pdu(i));
+    ASSERT_TRUE(run_until_held(3));
+    client.socket().close();
+    bus1.answer(0, reply_to_read(0));
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    EXPECT_TRUE(bus1.held.empty());
+}
+
+TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {
+    settings.half_close_grace = 60s;
+    start();
+    Client client = connect();
+    client.request(1, 1, read_pdu(1));
+    client.request(2, 1, read_pdu(2));
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    ASSERT_TRUE(run_until_held(2));
+    bus1.answer(1, reply_to_read(2));
+    bus1.answer(0, reply_to_read(1));
+    EXPECT_EQ(client.receive(), (modbus::Adu{1, 1, reply_to_read(1)}));
+    EXPECT_EQ(client.receive(), (modbus::Adu{2, 1, reply_to_read(2)}));
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+}
+
+TEST_F(SessionEnd, ClosesAClientThatDoesNotReadAndNobodyElseNotices) {
+    settings.output_limit = 4096;
+    bus1.instant = reply_to_read(7);
+    start();
+    Client bystander = connect();
+    Client slow(context, listener->port(), 4096);
+    const Bytes request = modbus::encode_mbap(1, 255, "2b 0e 01 00"_hex);
+    std::size_t offset = 0;
+    EXPECT_TRUE(run_until([&] {
+        for (int i = 0; i < 100; ++i) {
+            const auto n = slow.try_send(ByteView(request).subspan(offset));
+            if (!n || *n == 0) break;
+            offset = (offset + *n) % request.size();
+        }
+        return logged("does not read") == 1;
+    }));
+    EXPECT_EQ(bystander.ask(1, read_pdu(0)), reply_to_read(7));
+    EXPECT_EQ(listener->counters().connections, 1U);
+}
+
+}  // namespace
+}  // namespace panelgate::tcp_server
