@@ -49,8 +49,11 @@ TEST_P(SerialTiming, IsThatOfTheTable) {
     expect_milliseconds(wire_time(format, 256), row.longest_256, 0.001);
 }
 
-INSTANTIATE_TEST_SUITE_P(Rates, SerialTiming, ::testing::ValuesIn(kRows),
-                         [](const auto& info) { return "At" + std::to_string(info.param.baud); });
+std::string name_of(const ::testing::TestParamInfo<Row>& info) {
+    return "At" + std::to_string(info.param.baud);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rates, SerialTiming, ::testing::ValuesIn(kRows), name_of);
 
 TEST(SerialTimingAt38400, Counts10BitsWithoutParity) {
     const SerialFormat format = plain(38400);
