@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+
+namespace panelgate::web {
+
+struct LineEntry {
+    std::string name;
+    std::string device;             ///< as configured
+    bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
+    bool pass_unlisted_stations = true;
+};
+
+struct StationEntry {
+    std::string name;  ///< "LINE:ID" for a station that the configuration does not list
+    std::string line;
+    std::uint8_t id = 0;
+    const profile::PanelProfile* profile = nullptr;  ///< null: nothing is known of the panel
+    bool read_only = false;
+    std::optional<int> unit;        ///< the unit id that Modbus/TCP clients use, when there is one
+    bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
+};
+
+/// What the API serves. Filled at load; may be changed between requests of the one thread.
+struct Directory {
+    std::vector<LineEntry> lines;
+    std::vector<StationEntry> stations;
+
+    const LineEntry* find_line(std::string_view name) const;
+    /// By name or as LINE:ID; an unlisted id (1..247) is found where its line passes those.
+    std::optional<StationEntry> find_station(std::string_view name) const;
+};
+
+}  // namespace panelgate::web

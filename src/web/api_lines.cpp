@@ -1,0 +1,82 @@
+#include <boost/json/array.hpp>
+#include <cmath>
+#include <cstdlib>
+
+#include "api.hpp"
+#include "items.hpp"
+#include "json_util.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+constexpr unsigned kDefaultTrace = 100;  ///< frames
+constexpr unsigned kMaxTrace = 10'000;
+
+json::object describe(const LineEntry& line) {
+    const bus::LineStatus status = line.bus->status();
+    json::object object;
+    object["name"] = line.name;
+    object["device"] = line.device;
+    object["state"] = status.state;
+    object["up"] = status.up;
+    object["load_percent"] = std::round(status.load_percent * 10) / 10;
+    object["queue_depth"] = status.queue_depth;
+    return object;
+}
+
+std::string_view label(bus::TraceFrame::Direction direction) {
+    switch (direction) {
+        case bus::TraceFrame::Direction::sent:
+            return "sent";
+        case bus::TraceFrame::Direction::received:
+            return "received";
+        case bus::TraceFrame::Direction::discarded:
+            return "discarded";
+    }
+    std::abort();
+}
+
+json::object describe(const bus::TraceFrame& frame) {
+    json::object object;
+    object["sequence"] = frame.sequence;
+    object["at"] = to_seconds(frame.at.time_since_epoch());
+    object["direction"] = label(frame.direction);
+    object["station"] = nullptr;
+    if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
+    object["bytes"] = upper_hex(frame.bytes);
+    object["note"] = frame.note;
+    return object;
+}
+
+}  // namespace
+
+Handling get_lines(HttpRequest, const Api* api) {
+    json::array lines;
+    for (const LineEntry& line : api->directory->lines) lines.push_back(describe(line));
+    json::object body;
+    body["lines"] = std::move(lines);
+    co_return json_response(200, body);
+}
+
+Handling get_line(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    co_return json_response(200, describe(**line));
+}
+
+Handling get_trace(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto last = query_number(request, "last", 1, kMaxTrace, kDefaultTrace);
+    if (!last) co_return to_response(last.error());
+    json::array frames;
+    for (const bus::TraceFrame& frame : (*line)->bus->trace(*last)) {
+        frames.push_back(describe(frame));
+    }
+    json::object body;
+    body["frames"] = std::move(frames);
+    co_return json_response(200, body);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <algorithm>
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/post.hpp>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+
+namespace panelgate::test {
+
+/// A bus that answers from a function, by post; whoever asks is found in `requests`. When the
+/// function gives nothing the request stays open until release() or cancel().
+class FakeBus : public bus::BusClient {
+  public:
+    using Script = std::function<std::optional<bus::Answer>(const bus::Request&)>;
+
+    explicit FakeBus(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
+
+    void transact(bus::Request request, bus::AnswerHandler handler) override {
+        requests.push_back(request);
+        auto answer = script ? script(request) : fault(Fault::timeout, true);
+        if (answer) {
+            settle(std::move(handler), std::move(*answer));
+        } else {
+            open_.emplace_back(request.client, std::move(handler));
+        }
+    }
+
+    void cancel(bus::ClientId client) override {
+        cancelled.push_back(client);
+        std::vector<Open> kept;
+        for (Open& open : std::exchange(open_, {})) {
+            if (open.first == client) {
+                settle(std::move(open.second), fault(Fault::cancelled, false));
+            } else {
+                kept.push_back(std::move(open));
+            }
+        }
+        open_ = std::move(kept);
+    }
+
+    /// Answers every open request.
+    void release(const bus::Answer& answer) {
+        for (Open& open : std::exchange(open_, {})) settle(std::move(open.second), answer);
+    }
+    std::size_t open() const { return open_.size(); }
+
+    bus::LineStatus status() const override { return line; }
+    bus::StationStatus station_status(std::uint8_t station) const override {
+        const auto found = stations.find(station);
+        return found == stations.end() ? bus::StationStatus{"unknown", {}} : found->second;
+    }
+    std::vector<bus::TraceFrame> trace(std::size_t last) const override {
+        const auto skip = frames.size() - std::min(last, frames.size());
+        return {frames.begin() + static_cast<std::ptrdiff_t>(skip), frames.end()};
+    }
+
+    static bus::Answer reply(Bytes pdu) {
+        bus::Answer answer;
+        answer.pdu = std::move(pdu);
+        answer.transmitted = true;
+        return answer;
+    }
+    static bus::Answer fault(Fault fault, bool transmitted) {
+        bus::Answer answer;
+        answer.pdu = fault;
+        answer.transmitted = transmitted;
+        return answer;
+    }
+
+    Script script;
+    std::vector<bus::Request> requests;
+    std::vector<bus::ClientId> cancelled;
+    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0};
+    std::map<std::uint8_t, bus::StationStatus> stations;
+    std::vector<bus::TraceFrame> frames;
+
+  private:
+    using Open = std::pair<bus::ClientId, bus::AnswerHandler>;
+
+    void settle(bus::AnswerHandler handler, bus::Answer answer) {
+        boost::asio::post(executor_, [handler = std::move(handler), answer = std::move(answer)] {
+            handler(answer);
+        });
+    }
+
+    boost::asio::any_io_executor executor_;
+    std::vector<Open> open_;
+};
+
+}  // namespace panelgate::test

@@ -1,0 +1,97 @@
+#include "http_rig.hpp"
+
+namespace panelgate::web {
+namespace {
+
+class Access : public HttpRig {
+  protected:
+    Access() {
+        settings.tokens.push_back({"panel", Role::viewer, "see-me"});
+        settings.tokens.push_back({"ops", Role::operator_, "let-me"});
+        settings.tokens.push_back({"broken", Role::operator_, ""});
+    }
+    /// Status of a request with this token; "" sends none.
+    unsigned status(const std::string& token, const std::string& method, const std::string& target,
+                    const std::string& body = "") {
+        const std::string header = token.empty() ? "" : "Authorization: Bearer " + token + "\r\n";
+        return ask(method, target, body, header).status();
+    }
+    unsigned read(const std::string& token) { return status(token, "GET", "/api/v1/stations"); }
+    unsigned write(const std::string& token) {
+        return status(token, "PUT", "/api/v1/stations/press/coils/1", R"({"values":[1]})");
+    }
+    unsigned broadcast(const std::string& token) {
+        return status(token, "POST", "/api/v1/lines/floor1/broadcast",
+                      R"({"table":"coils","address":1,"values":[1]})");
+    }
+    unsigned raw(const std::string& token) {
+        return status(token, "POST", "/api/v1/lines/floor1/raw",
+                      R"({"station":5,"pdu":"0300010001"})");
+    }
+};
+
+struct RoleCase {
+    Role anonymous;
+    const char* token;
+    unsigned read;
+    unsigned write;  ///< 200 stands for what the request gives when it may
+};
+class AccessMatrix : public Access, public ::testing::WithParamInterface<RoleCase> {};
+
+TEST_P(AccessMatrix, Holds) {
+    const RoleCase& c = GetParam();
+    settings.anonymous = c.anonymous;
+    EXPECT_EQ(read(c.token), c.read);
+    EXPECT_EQ(status(c.token, "GET", "/metrics"), c.read);
+    EXPECT_EQ(status(c.token, "GET", "/"), c.read);
+    EXPECT_EQ(write(c.token), c.write);
+    EXPECT_EQ(broadcast(c.token), c.write == 200 ? 202 : c.write);
+    EXPECT_EQ(raw(c.token), c.write);
+    EXPECT_EQ(status(c.token, "GET", "/healthz"), 200u);
+    EXPECT_EQ(status(c.token, "GET", "/readyz"), 200u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Roles, AccessMatrix,
+                         ::testing::Values(RoleCase{Role::none, "", 401, 401},
+                                           RoleCase{Role::none, "see-me", 200, 403},
+                                           RoleCase{Role::none, "let-me", 200, 200},
+                                           RoleCase{Role::viewer, "", 200, 401},
+                                           RoleCase{Role::viewer, "see-me", 200, 403},
+                                           RoleCase{Role::viewer, "let-me", 200, 200},
+                                           RoleCase{Role::operator_, "", 200, 200},
+                                           RoleCase{Role::operator_, "see-me", 200, 403},
+                                           RoleCase{Role::operator_, "wrong", 401, 401},
+                                           RoleCase{Role::operator_, "let-m", 401, 401},
+                                           RoleCase{Role::operator_, "let-melet-me", 401, 401}));
+
+TEST_F(Access, AsksForATokenInTheWayClientsKnow) {
+    settings.anonymous = Role::none;
+    const Reply reply = get("/api/v1/lines");
+    EXPECT_EQ(reply.header("WWW-Authenticate"), "Bearer realm=\"panelgate\"");
+    EXPECT_EQ(reply.header("Content-Type"), "application/problem+json");
+}
+
+TEST_F(Access, TakesNoOtherSchemeAndNoEmptyToken) {
+    for (const char* value : {"Basic bGV0LW1l", "Bearer", "Bearer ", "let-me"}) {
+        const Reply reply =
+            ask("GET", "/api/v1/lines", "", std::string("Authorization: ") + value + "\r\n");
+        EXPECT_EQ(reply.status(), 401u) << value;
+    }
+    EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: bearer let-me\r\n").status(), 200u);
+}
+
+TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
+    const char* body = R"({"station":5,"pdu":"0500010000"})";
+    const std::string origin = "Origin: http://evil.example\r\nContent-Type: ";
+    const auto post = [&](const char* type) {
+        return ask("POST", "/api/v1/lines/floor1/raw", body, origin + type + "\r\n").status();
+    };
+    EXPECT_EQ(post("text/plain"), 415u);
+    EXPECT_TRUE(bus.requests.empty());
+    EXPECT_EQ(post("application/json"), 200u);
+    EXPECT_EQ(ask("OPTIONS", "/api/v1/lines/floor1/raw", "", origin + "text/plain\r\n").status(),
+              405u);
+}
+
+}  // namespace
+}  // namespace panelgate::web

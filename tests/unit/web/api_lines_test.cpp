@@ -1,0 +1,138 @@
+#include "http_rig.hpp"
+
+namespace panelgate::web {
+namespace {
+
+using ::testing::HasSubstr;
+using ApiLines = HttpRig;
+
+TEST_F(ApiLines, ListsTheLines) {
+    bus.line.queue_depth = 3;
+    bus.line.load_percent = 50;
+    const auto lines = get("/api/v1/lines").at("lines").as_array();
+    ASSERT_EQ(lines.size(), 2u);
+    EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
+        "load_percent":50.0,"queue_depth":3})"));
+    EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
+    EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
+}
+
+TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
+    add_meter();
+    bus.stations[31] = {"online", 1500ms};
+    const auto stations = get("/api/v1/stations").at("stations").as_array();
+    ASSERT_EQ(stations.size(), 2u);
+    EXPECT_EQ(stations[0],
+              json_of(R"({"name":"press","line":"floor1","id":31,"profile":"test-panel",
+        "unit":101,"state":"online","read_only":false,"last_success_ms":1500})"));
+    EXPECT_EQ(stations[1], json_of(R"({"name":"meter","line":"floor1","id":5,"profile":null,
+        "unit":null,"state":"unknown","read_only":true,"last_success_ms":null})"));
+    EXPECT_EQ(get("/api/v1/stations/floor1:31").at("name"), "press");
+    EXPECT_EQ(get("/api/v1/stations/floor1%3A7").at("name"), "floor1:7");
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
+    using Direction = bus::TraceFrame::Direction;
+    bus.frames.push_back({1, TimePoint(1s), Direction::sent, {5, 3}, "request"});
+    bus.frames.push_back({2,
+                          TimePoint(2500ms),
+                          Direction::sent,
+                          {0x1F, 0x01, 0x01, 0x20, 0x00, 0x05, 0xFF, 0x81},
+                          "request"});
+    bus.frames.push_back({3, TimePoint(3s), Direction::discarded, {}, "damaged"});
+    EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
+        {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request"},
+        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}]})"));
+    EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
+    EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
+}
+
+TEST_F(ApiLines, SendsABroadcastAndDoesNotCallItConfirmed) {
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/broadcast",
+            R"({"table":"holding-registers","address":100,"values":[1,2],"verify":false})");
+    EXPECT_EQ(reply.status(), 202u);
+    EXPECT_EQ(reply.json(), json_of(R"({"transmitted":true,"confirmed":false})"));
+    EXPECT_EQ(bus.requests[0].station, 0);
+    EXPECT_EQ(last_pdu(), "10 00 64 00 02 04 00 01 00 02");
+}
+
+TEST_F(ApiLines, BroadcastsByTheFunctionThatThePanelsTake) {
+    const char* one = R"({"table":"holding-registers","address":1,"values":[7]})";
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast", one).status(), 202u);
+    EXPECT_EQ(last_pdu(), "06 00 01 00 07");
+    for (auto& rule : panel.functions) rule.broadcast = rule.code == 16;
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast", one).status(), 202u);
+    EXPECT_EQ(last_pdu(), "10 00 01 00 01 02 00 07");
+}
+
+TEST_F(ApiLines, RefusesBroadcastsThatCannotBe) {
+    const auto status = [&](const char* body) {
+        return ask("POST", "/api/v1/lines/floor1/broadcast", body).status();
+    };
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":[1],"verify":true})"), 400u);
+    EXPECT_EQ(status(R"({"table":"relays","address":1,"values":[1]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"input-registers","address":1,"values":[1]})"), 422u);
+    EXPECT_EQ(status(R"({"table":"coils","address":65536,"values":[1]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"coils","address":65535,"values":[1,1]})"), 422u);
+    EXPECT_EQ(status(R"({"table":"coils","values":[1]})"), 400u);
+    EXPECT_EQ(status(R"({"address":1,"values":[1]})"), 400u);
+    EXPECT_EQ(status("nonsense"), 400u);
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor9/broadcast", "{}").status(), 404u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
+    add_meter();
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast",
+                  R"({"table":"coils","address":1,"values":[1]})")
+                  .status(),
+              403u);
+    EXPECT_EQ(
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"0500010000"})").status(),
+        403u);
+}
+
+TEST_F(ApiLines, SaysWhyABroadcastDidNotLeave) {
+    bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::line_down, false); };
+    const Reply reply = ask("POST", "/api/v1/lines/floor1/broadcast",
+                            R"({"table":"coils","address":1,"values":[1]})");
+    EXPECT_EQ(reply.status(), 502u);
+    EXPECT_EQ(reply.at("transmitted"), false);
+}
+
+TEST_F(ApiLines, PassesARawRequestAndItsReply) {
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"pdu":"0300640002"})");
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(reply.json(), json_of(R"({"pdu":"030400640065"})"));
+    EXPECT_EQ(bus.requests[0].station, 5);
+    EXPECT_EQ(bus.requests[0].priority, arbiter::PriorityClass::read);
+}
+
+TEST_F(ApiLines, GivesAPanelsExceptionToARawRequestAsAnAnswer) {
+    bus.script = [](const bus::Request&) { return test::FakeBus::reply({0x8B, 0x01}); };
+    const Reply reply = ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"pdu":"0b"})");
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(reply.json(), json_of(R"({"pdu":"8B01","exception":1})"));
+}
+
+TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {
+    add_meter();
+    const auto status = [&](const std::string& body, const char* line = "floor1") {
+        return ask("POST", std::string("/api/v1/lines/") + line + "/raw", body).status();
+    };
+    EXPECT_EQ(status(R"({"station":248,"pdu":"0b"})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"0"})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":""})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":7})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":")" + std::string(508, '0') + "\"}"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"0600010002"})"), 403u);
+    EXPECT_EQ(status(R"({"station":9,"pdu":"0300010001"})", "floor2"), 404u);
+    EXPECT_TRUE(bus.requests.empty());
+    EXPECT_EQ(status(R"({"station":5,"pdu":"0300010001"})"), 200u);
+}
+
+}  // namespace
+}  // namespace panelgate::web
