@@ -1,0 +1,73 @@
+#!/usr/bin/env bash
+# tests/run.sh [--quick]: installs what is missing, builds, runs every test, says what was seen.
+# --quick leaves out the second build with AddressSanitizer and UndefinedBehaviorSanitizer.
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/.."
+
+quick=no
+case "${1-}" in
+    "") ;;
+    --quick) quick=yes ;;
+    *) echo "usage: tests/run.sh [--quick]" >&2; exit 64 ;;
+esac
+
+logs=$PWD/build/test-logs
+mkdir -p "$logs"
+jobs=$(nproc)
+summary=()
+failed=0
+
+# step NAME COMMAND...: runs it with its output in a log; shows the log's end when it fails.
+step() {
+    local name=$1 log start seconds verdict=ok count
+    shift
+    log=$logs/${name// /-}.log
+    start=$SECONDS
+    printf '== %-28s ' "$name"
+    "$@" >"$log" 2>&1 || verdict=FAILED
+    seconds=$((SECONDS - start))
+    count=$(sed -nE 's/^[0-9]+% tests passed, .* out of ([0-9]+)$/, \1 tests/p' "$log")
+    echo "$verdict$count, $seconds s"
+    summary+=("$(printf '%-28s %s%s, %s s' "$name" "$verdict" "$count" "$seconds")")
+    [ $verdict = ok ] && return
+    failed=1
+    tail -n 60 "$log"
+    echo "   (all of it: $log)"
+}
+
+# Without a build nothing else makes sense.
+must() {
+    step "$@"
+    [ $failed = 0 ] || finish
+}
+
+build() { cmake --preset "$1" && cmake --build --preset "$1"; }
+run_tests() { env "${@:2}" ctest --preset "$1" -j "$jobs"; }
+check_format() {
+    find src include tests -name '*.[ch]pp' -print0 | xargs -0 clang-format-19 --dry-run -Werror
+}
+
+finish() {
+    echo
+    echo "Summary"
+    printf '  %s\n' "${summary[@]}"
+    echo "  all together $SECONDS s; logs in $logs"
+    if [ $failed = 0 ]; then
+        echo "Everything passed. Next: deploy/demo.sh, or one test: ctest --preset release -R NAME"
+    else
+        echo "Something FAILED, see above. One test alone: ctest --preset release -R NAME"
+    fi
+    exit $failed
+}
+
+must "packages" deploy/install_packages.sh build run test try
+step "format" check_format
+must "build release" build release
+step "headers stand alone" cmake --build --preset release --target all_verify_interface_header_sets
+step "tests release" run_tests release
+if [ $quick = no ]; then
+    export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19
+    must "build asan" build asan
+    step "tests asan" run_tests asan PANELGATE_SANITIZED=1
+fi
+finish
