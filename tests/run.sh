@@ -65,6 +65,7 @@ step "format" check_format
 must "build release" build release
 step "headers stand alone" cmake --build --preset release --target all_verify_interface_header_sets
 step "tests release" run_tests release
+step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py
 if [ $quick = no ]; then
     export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19
     must "build asan" build asan

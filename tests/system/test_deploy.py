@@ -1,0 +1,65 @@
+"""What stands around the program: service, scrape configuration, scripts, the package list."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import harness
+from harness import ROOT
+
+SERVICE = ROOT / "deploy/systemd/panelgate.service"
+SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "tests/run.sh", ".ci/run")
+
+
+def run(*command):
+    return subprocess.run(command, capture_output=True, text=True, timeout=harness.PATIENCE,
+                          check=False)
+
+
+def packages(section):
+    text = re.sub(r"#.*", "", (ROOT / "deploy/packages.txt").read_text())
+    found = re.search(rf"(?s)\[{section}\](.*?)(?=\[|\Z)", text)
+    return found.group(1).split()
+
+
+class Deploy(unittest.TestCase):
+    @unittest.skipUnless(shutil.which("systemd-analyze"), "no systemd-analyze here")
+    def test_the_service_is_understood_and_hardened(self):
+        with tempfile.TemporaryDirectory() as folder:
+            unit = pathlib.Path(folder) / SERVICE.name
+            unit.write_text(SERVICE.read_text().replace("/usr/bin/panelgate", harness.PANELGATE))
+            verified = run("systemd-analyze", "verify", "--man=no", str(unit))
+            # An unknown key is told on stderr only.
+            self.assertEqual((verified.returncode, verified.stderr), (0, ""))
+            rated = run("systemd-analyze", "security", "--offline=true", "--threshold=20", str(unit))
+            self.assertEqual(rated.returncode, 0, rated.stdout)
+
+    @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
+    def test_prometheus_takes_the_scrape_configuration(self):
+        checked = run("promtool", "check", "config", str(ROOT / "deploy/prometheus/prometheus.yml"))
+        self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    def test_the_scripts_parse_and_may_be_executed(self):
+        for script in SCRIPTS:
+            self.assertTrue(os.access(ROOT / script, os.X_OK), script)
+            self.assertEqual(run("bash", "-n", str(ROOT / script)).stderr, "")
+
+    def test_an_unknown_section_is_an_error(self):
+        asked = run(str(ROOT / "deploy/install_packages.sh"), "nothing")
+        self.assertEqual(asked.returncode, 1)
+        self.assertIn("no section 'nothing'", asked.stderr)
+
+    @unittest.skipIf(harness.SANITIZED, "the sanitizers need more")
+    @unittest.skipUnless(shutil.which("dpkg-query"), "not Debian")
+    def test_every_library_that_the_program_needs_is_in_the_run_list(self):
+        listed = set(packages("run")) | {"libc6", "libgcc-s1"}
+        for name in re.findall(r"(?m)^\s*(\S+\.so\S*) =>", run("ldd", harness.PANELGATE).stdout):
+            owners = run("dpkg-query", "-S", f"*/{name}").stdout
+            self.assertTrue(listed & set(re.findall(r"(?m)^([^:,\s]+)", owners)), (name, owners))
+
+
+if __name__ == "__main__":
+    unittest.main()
