@@ -62,16 +62,10 @@ class FakeBus : public bus::BusClient {
     }
 
     static bus::Answer reply(Bytes pdu) {
-        bus::Answer answer;
-        answer.pdu = std::move(pdu);
-        answer.transmitted = true;
-        return answer;
+        return {Result<Bytes>(std::move(pdu)), true, bus::Source::bus, {}};
     }
     static bus::Answer fault(Fault fault, bool transmitted) {
-        bus::Answer answer;
-        answer.pdu = fault;
-        answer.transmitted = transmitted;
-        return answer;
+        return {Result<Bytes>(fault), transmitted, bus::Source::bus, {}};
     }
 
     Script script;
