@@ -28,32 +28,60 @@ void JobQueue::put_back(Job job) {
     ++size_;
 }
 
-JobQueue::Lanes::const_iterator JobQueue::next() const {
-    const auto rank = [](const Lanes::value_type& entry) {
-        return std::tuple(entry.second.jobs.front().priority, entry.second.turn);
+bool JobQueue::is_aged(TimePoint now, const Job& job, PriorityClass over) const {
+    const int steps = static_cast<int>(job.priority) - static_cast<int>(over);
+    return steps > 0 && now - job.arrived >= steps * settings_.ageing;
+}
+
+JobQueue::Choice JobQueue::choose(TimePoint now, const Test& may_run) const {
+    Choice best{lanes_.end(), false};
+    const auto rank = [](Lanes::const_iterator it) {
+        return std::tuple(it->second.jobs.front().priority, it->second.turn);
     };
-    return std::min_element(lanes_.begin(), lanes_.end(),
-                            [&](const auto& a, const auto& b) { return rank(a) < rank(b); });
+    for (auto it = lanes_.begin(); it != lanes_.end(); ++it) {
+        if (!may_run(it->second.jobs.front())) continue;
+        if (best.lane == lanes_.end() || rank(it) < rank(best.lane)) best.lane = it;
+    }
+    if (best.lane == lanes_.end() || last_was_aged_) return best;
+    const PriorityClass over = best.lane->second.jobs.front().priority;
+    for (auto it = lanes_.begin(); it != lanes_.end(); ++it) {
+        const Job& job = it->second.jobs.front();
+        if (!is_aged(now, job, over) || !may_run(job)) continue;
+        if (!best.aged || job.arrived < best.lane->second.jobs.front().arrived) best = {it, true};
+    }
+    return best;
 }
 
-const Job* JobQueue::peek() const {
-    const auto it = next();
-    return it == lanes_.end() ? nullptr : &it->second.jobs.front();
-}
-
-std::optional<Job> JobQueue::pop() {
-    const auto it = next();
-    if (it == lanes_.end()) return std::nullopt;
+Job JobQueue::take(Lanes::const_iterator it) {
     Lane& lane = lanes_.find(it->first)->second;
     Job job = std::move(lane.jobs.front());
     lane.jobs.pop_front();
-    lane.turn = ++turns_;
     if (lane.jobs.empty()) lanes_.erase(it);
     --size_;
     return job;
 }
 
-std::vector<Job> JobQueue::remove_if(const std::function<bool(const Job&)>& match) {
+const Job* JobQueue::peek(TimePoint now, const Test& may_run) const {
+    const Choice choice = choose(now, may_run);
+    return choice.lane == lanes_.end() ? nullptr : &choice.lane->second.jobs.front();
+}
+
+std::optional<Job> JobQueue::pop(TimePoint now, const Test& may_run) {
+    const Choice choice = choose(now, may_run);
+    if (choice.lane == lanes_.end()) return std::nullopt;
+    last_was_aged_ = choice.aged;
+    lanes_.find(choice.lane->first)->second.turn = ++turns_;
+    return take(choice.lane);
+}
+
+std::optional<Job> JobQueue::take_first(const Test& wanted) {
+    for (auto it = lanes_.begin(); it != lanes_.end(); ++it) {
+        if (wanted(it->second.jobs.front())) return take(it);
+    }
+    return std::nullopt;
+}
+
+std::vector<Job> JobQueue::remove_if(const Test& match) {
     std::vector<Job> removed;
     for (auto it = lanes_.begin(); it != lanes_.end();) {
         std::deque<Job> kept;
@@ -71,6 +99,10 @@ std::vector<Job> JobQueue::remove_if(const std::function<bool(const Job&)>& matc
     std::sort(removed.begin(), removed.end(),
               [](const Job& a, const Job& b) { return a.ticket < b.ticket; });
     return removed;
+}
+
+void JobQueue::each_first(const std::function<void(const Job&)>& show) const {
+    for (const auto& [client, lane] : lanes_) show(lane.jobs.front());
 }
 
 std::optional<TimePoint> JobQueue::first_expiry() const {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <cmath>
 #include <utility>
 
 #include "panelgate/arbiter/arbiter.hpp"
@@ -50,6 +51,7 @@ struct Bus::State final : public line::Line::Events,
     void act(arbiter::Transmit& transmit) { line->write(transmit.adu); }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note);
+    void act(arbiter::StationEvent& event);
     void arm();
     void on_alarm();
     void answer(Pending pending, Answer answer);
@@ -138,6 +140,7 @@ void Bus::State::act(arbiter::Finish& finish) {
     Answer result;
     result.pdu = std::move(finish.pdu);
     result.transmitted = finish.transmitted;
+    result.shared = finish.shared;
     answer(std::move(entry), std::move(result));
 }
 
@@ -157,6 +160,30 @@ void Bus::State::act(arbiter::Note& note) {
     frame.bytes = std::move(note.bytes);
     frame.note = note.what;
     recorder.add(std::move(frame));
+}
+
+void Bus::State::act(arbiter::StationEvent& event) {
+    const auto named = settings.stations.find(event.station);
+    const std::string id = std::to_string(event.station);
+    const std::string station = named == settings.stations.end() ? id : named->second;
+    switch (event.kind) {
+        case arbiter::StationEvent::Kind::offline:
+            rt::log(rt::LogLevel::warn, "station offline",
+                    {{"line", settings.name}, {"station", station}});
+            return;
+        case arbiter::StationEvent::Kind::online:
+            rt::log(rt::LogLevel::info, "station online",
+                    {{"line", settings.name}, {"station", station}});
+            return;
+        case arbiter::StationEvent::Kind::late: {
+            const std::string ms = std::to_string(std::lround(to_milliseconds(event.late_by)));
+            rt::log(rt::LogLevel::warn, "late reply",
+                    {{"line", settings.name},
+                     {"station", station},
+                     {"hint", "raise its response_timeout by at least " + ms + "ms"}});
+            return;
+        }
+    }
 }
 
 void Bus::State::arm() {
@@ -182,7 +209,7 @@ void Bus::State::on_alarm() {
 
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
-    counters.count(entry.station, entry.function, result.pdu, rt::now() - entry.arrived);
+    counters.count(entry.station, entry.function, result, rt::now() - entry.arrived);
     if (result.pdu.has_value()) {
         if (!modbus::exception_of(*result.pdu))
             counters.succeeded(entry.station, rt::wall_seconds());
@@ -228,12 +255,10 @@ LineStatus Bus::status() const {
 }
 
 StationStatus Bus::station_status(std::uint8_t station) const {
-    const arbiter::StationState& seen = state_->arbiter.station(station);
+    const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
-    status.state = "unknown";
-    if (seen.tried)
-        status.state = seen.silent_in_a_row > 0 || !seen.last_success ? "silent" : "online";
-    if (seen.last_success) status.last_success = rt::now() - *seen.last_success;
+    status.state = label(health.state());
+    if (const auto last = health.last_success()) status.last_success = rt::now() - *last;
     return status;
 }
 

@@ -10,9 +10,10 @@ std::string function_label(std::uint8_t function) {
     return modbus::is_known(function) ? std::to_string(function) : "other";
 }
 
-std::string outcome_of(const Result<Bytes>& outcome) {
-    if (!outcome) return std::string(outcome_label(outcome.error()));
-    return modbus::exception_of(*outcome) ? "exception" : "ok";
+std::string outcome_of(const Answer& answer) {
+    if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
+    if (modbus::exception_of(*answer.pdu)) return "exception";
+    return answer.shared ? "shared" : "ok";
 }
 
 }  // namespace
@@ -30,10 +31,10 @@ StationReport& RequestCounters::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[0] : found->second;
 }
 
-void RequestCounters::count(std::uint8_t station, std::uint8_t function,
-                            const Result<Bytes>& outcome, Duration took) {
+void RequestCounters::count(std::uint8_t station, std::uint8_t function, const Answer& answer,
+                            Duration took) {
     StationReport& report = of(station);
-    ++report.requests[{function_label(function), outcome_of(outcome)}];
+    ++report.requests[{function_label(function), outcome_of(answer)}];
     report.request_duration.observe(took);
 }
 
@@ -47,8 +48,9 @@ std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbit
         StationReport report = counted;
         const auto wire = arbiter.station_counters().find(id);
         if (wire != arbiter.station_counters().end()) report.wire = wire->second;
-        const arbiter::StationState& seen = arbiter.station(id);
-        report.up = seen.last_success && seen.silent_in_a_row == 0;
+        const auto state = arbiter.health(id).state();
+        report.up = state == arbiter::StationHealth::State::online ||
+                    state == arbiter::StationHealth::State::suspect;
         reports.push_back(std::move(report));
     }
     return reports;

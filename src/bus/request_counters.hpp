@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
 
 namespace panelgate::bus {
@@ -15,8 +16,7 @@ class RequestCounters {
   public:
     explicit RequestCounters(const std::map<std::uint8_t, std::string>& stations);
 
-    void count(std::uint8_t station, std::uint8_t function, const Result<Bytes>& outcome,
-               Duration took);
+    void count(std::uint8_t station, std::uint8_t function, const Answer& answer, Duration took);
     void succeeded(std::uint8_t station, double wall);
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;

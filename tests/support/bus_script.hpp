@@ -119,6 +119,7 @@ class BusScript {
     std::vector<Sent> sent;
     std::map<arbiter::Ticket, Answer> answers;
     std::vector<arbiter::Note> notes;
+    std::vector<arbiter::StationEvent> events;
 
   private:
     void drain() {
@@ -137,6 +138,7 @@ class BusScript {
         answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
     }
     void act(const arbiter::Note& note) { notes.push_back(note); }
+    void act(const arbiter::StationEvent& event) { events.push_back(event); }
 
     arbiter::Settings settings_;
     arbiter::Arbiter arbiter_;

@@ -1,17 +1,19 @@
 #pragma once
 
-#include <array>
 #include <deque>
 #include <map>
 #include <optional>
-#include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/late_window.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
@@ -27,6 +29,7 @@ struct Finish {
     Ticket ticket = 0;
     Result<Bytes> pdu = Fault::cancelled;
     bool transmitted = false;  ///< at least once, at least partly
+    bool shared = false;       ///< another job's transaction answered it too
 };
 /// Something was seen on the wire, for the trace.
 struct Note {
@@ -36,18 +39,17 @@ struct Note {
     Bytes bytes;
     std::string_view what;  ///< a literal: "request", "reply", "foreign"…
 };
-using Action = std::variant<Transmit, Finish, Note>;
-
-struct StationState {
-    std::optional<TimePoint> last_success;
-    int silent_in_a_row = 0;  ///< transactions without any sign of life
-    bool tried = false;
+/// A station changed its health, or showed that its timeout is too short.
+struct StationEvent {
+    enum class Kind : std::uint8_t { offline, online, late };
+    Kind kind = Kind::online;
+    std::uint8_t station = 0;
+    Duration late_by{};  ///< Kind::late: beyond the response timeout
 };
+using Action = std::variant<Transmit, Finish, Note, StationEvent>;
 
-/// Decides what one line does: one transaction at a time, the frame gap and nothing else between
-/// two, a response timeout from the end of the request on the wire, retries of reads and none of
-/// writes, broadcasts without waiting for a reply, a deadline for every request. Pure: time is an
-/// argument, actions come out of poll_action(); calling on_deadline early or twice is harmless.
+/// Decides what one line does. Pure: time is an argument, actions come out of poll_action();
+/// calling on_deadline early or twice is harmless.
 ///
 ///     hand in all bytes that the device holds (on_rx), so that nothing old is taken for new;
 ///     now = clock; arbiter.on_…(now, …);
@@ -55,13 +57,13 @@ struct StationState {
 ///     alarm at arbiter.next_deadline();
 ///
 /// A line starts down: on_line_up comes first. Acting may call in again: finish the loop, it
-/// drains.
+/// drains. The promises (P1…P9) are those of the README.
 class Arbiter {
   public:
     explicit Arbiter(Settings settings);
 
-    /// Accepts a job (its deadline is set here), or Fault::busy / Fault::line_down / Fault::expired
-    /// at once. An accepted job gets exactly one Finish.
+    /// Accepts a job (its deadline is set here), or a fault at once: busy, line_down, offline. An
+    /// accepted job gets exactly one Finish.
     Result<Ticket> submit(TimePoint now, Job job);
     /// The client is gone: what it has waiting is finished as cancelled and never transmitted.
     void cancel(TimePoint now, Client client);
@@ -75,56 +77,118 @@ class Arbiter {
     std::optional<TimePoint> next_deadline() const;
 
     std::size_t queue_depth() const { return queue_.size(); }
-    /// Nothing waits and nothing is on the wire.
-    bool idle() const { return queue_.empty() && !active_; }
+    /// Nothing waits and no client's request is on the wire.
+    bool idle() const {
+        return queue_.empty() && !retry_ && (!active_ || active_->group.jobs.empty());
+    }
     const LineCounters& counters() const { return line_counters_; }
     /// By station; those that the settings do not list share the entry 0.
     const std::map<std::uint8_t, StationCounters>& station_counters() const { return counters_; }
-    const StationState& station(std::uint8_t id) const { return states_[id]; }
+    /// Of a station that was never asked: unknown.
+    StationHealth health(std::uint8_t id) const;
 
   private:
+    /// What is known of a station beyond its settings; made when it is first asked.
+    struct Station {
+        Station(const StationSettings& s, const OfflineSettings& offline)
+            : settings(s), health(offline), late(s.late_window, s.response_timeout) {}
+
+        StationSettings settings;
+        StationHealth health;
+        LateWindow late;
+        TimePoint not_before{};  ///< its quarantine
+        Bytes unanswered;        ///< the request whose replies may still come
+        int owed = 0;            ///< how many of them
+        TimePoint due{};         ///< when the last one should have begun
+        Bytes probe;             ///< the cheapest read it has answered
+        Bytes last_read;         ///< what to probe with before it has answered any
+        Duration slowest{};      ///< longest think time seen
+    };
+    /// Jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
+    struct Group {
+        std::vector<Job> jobs;
+        std::uint8_t station = 0;
+        Bytes pdu;
+        std::optional<ReadSpan> span;
+        int attempts = 0;
+        bool probe = false;
+    };
     /// The transaction on the wire.
     struct Active {
-        Job job;
+        Group group;
         modbus::ReplyFramer framer;
-        TimePoint started;    ///< first bit out
-        TimePoint sent;       ///< last bit out, computed
-        TimePoint give_up;    ///< no sign of a reply until here: timeout
-        TimePoint last_byte;  ///< heard in this attempt
-        TimePoint longest;    ///< a reply that has begun must have ended here
+        TimePoint started;     ///< first bit out
+        TimePoint sent;        ///< last bit out, computed
+        TimePoint give_up;     ///< no sign of a reply until here: timeout
+        TimePoint longest;     ///< a reply that has begun must have ended here
+        TimePoint first_byte;  ///< heard in this attempt
+        TimePoint last_byte;
         bool heard = false;
     };
 
+    // What happens next (schedule.cpp)
     void step(TimePoint now);
     bool start_next(TimePoint now);
-    void start(TimePoint now, Job job);
+    bool start_retry(TimePoint now);
+    bool start_probe(TimePoint now);
+    bool start_job(TimePoint now);
+    bool may_run(TimePoint now, const Job& job) const;
+    bool gap_is_over(TimePoint now, std::uint8_t station);
+    void start(TimePoint now, Group group);
+    Group gather(Job leader);
+    bool joins(const Group& group, const Job& job) const;
     void expire(TimePoint now);
+    void expire_jobs(TimePoint now, std::vector<Job>& jobs);
+    std::uint8_t next_to_probe(TimePoint now) const;
+    std::optional<TimePoint> next_probe() const;
+    std::optional<TimePoint> next_start() const;
+    Bytes probe_for(const Station& station) const;
+    Duration patience(const Group& group, const Station& station) const;
+
+    // What a transaction came to (transaction.cpp)
     void check_active(TimePoint now);
     void check_broadcast(TimePoint now);
-    void settle(TimePoint now, Bytes reply);
+    void settle(TimePoint now, const Bytes& reply);
+    void deliver(const Group& group, const Bytes& reply);
+    bool split(Group& group, const Bytes& reply);
+    void count_reply(TimePoint now, const Bytes& reply);
     void fail_attempt(TimePoint now, Fault fault);
+    void quarantine(TimePoint now, const Group& group, Station& station);
+    void went_silent(TimePoint now, const Group& group, Station& station);
+    bool may_retry(TimePoint now, const Group& group, const Station& station) const;
     void close_active(TimePoint now);
-    void finish(const Job& job, Result<Bytes> pdu);
-    void note_unused(TimePoint now);
+    void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
+    void note_unused(TimePoint now, const std::vector<modbus::Unused>& parts);
     void hear_idle(TimePoint now, ByteView bytes);
+    void judge_idle(TimePoint now);
+    void on_good_frame(TimePoint now, const modbus::Unused& part);
+    bool is_stale(TimePoint now) const;
     TimePoint active_deadline() const;
-    bool may_retry(const Job& job) const;
     Duration shortest_transaction(const Job& job) const;
     const StationSettings& settings_of(std::uint8_t station) const;
+    Station& station_of(std::uint8_t station);
     StationCounters& counters_of(std::uint8_t station);
     Duration gap_of(std::uint8_t station) const;
 
     Settings settings_;
-    std::map<std::uint8_t, StationSettings> stations_;
+    std::map<std::uint8_t, StationSettings> configured_;
+    std::map<std::uint8_t, Station> stations_;
     std::map<std::uint8_t, StationCounters> counters_;
-    std::array<StationState, 256> states_{};
     LineCounters line_counters_;
     JobQueue queue_;
     std::optional<Active> active_;
+    std::optional<Group> retry_;           ///< an attempt failed: the same request goes again
+    std::vector<ReadSpan> refused_spans_;  ///< joined reads that a panel did not take
+    ProbeBudget budget_;
     std::deque<Action> actions_;
+    Bytes idle_heard_;               ///< unasked bytes, until silence ends them
     TimePoint quiet_since_{};        ///< the last bit seen on the line, sent or heard
     TimePoint quiet_until_{};        ///< nothing may be sent before, whatever comes next
+    TimePoint quarantined_until_{};  ///< the line's quarantine: only the same request may go again
     std::uint8_t last_station_ = 0;  ///< whose gap follows quiet_since_
+    int early_replies_ = 0;          ///< that began before the gap was over: no real UART
+    int timely_replies_ = 0;
+    bool other_first_ = false;  ///< a retry lets one other go first
     bool up_ = false;
     Ticket last_ticket_ = 0;
 };

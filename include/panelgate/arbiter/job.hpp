@@ -22,9 +22,9 @@ struct Job {
     PriorityClass priority = PriorityClass::read;
     TimePoint arrived;
     TimePoint deadline;
-    TimePoint start_by;           ///< the last moment at which starting it makes sense
-    int attempts = 0;             ///< transmissions so far
-    Fault last = Fault::timeout;  ///< how the last attempt failed
+    TimePoint start_by;  ///< the last moment at which starting it makes sense
+    int attempts = 0;    ///< transmissions so far
+    bool alone = false;  ///< a shared transaction for it was refused: ask for just this
 };
 
 }  // namespace panelgate::arbiter

@@ -12,10 +12,14 @@
 
 namespace panelgate::arbiter {
 
-/// The requests that wait for one line. A client's own requests keep their order; between clients
-/// the class of each one's first request decides, and inside a class they take turns.
+/// The requests that wait for one line. A client's own requests keep their order (it never reads
+/// older than its own write); between clients the class of each one's first request decides, inside
+/// a class they take turns, and what has waited long goes ahead of a higher class every other time,
+/// so that every class progresses and a write still starts within two transactions (P9).
 class JobQueue {
   public:
+    using Test = std::function<bool(const Job&)>;
+
     explicit JobQueue(const QueueSettings& settings) : settings_(settings) {}
 
     /// No room for another request of this client (P9: the answer is 06, at once).
@@ -24,12 +28,18 @@ class JobQueue {
     void push(Job job);
     /// Puts a job back that was taken: before the client's others, though other clients go first.
     void put_back(Job job);
-    /// The next one in turn, or nullptr; pop() takes it.
-    const Job* peek() const;
-    std::optional<Job> pop();
+    /// The next one in turn of those that may run, or nullptr; pop() with the same arguments takes
+    /// it.
+    const Job* peek(TimePoint now, const Test& may_run) const;
+    std::optional<Job> pop(TimePoint now, const Test& may_run);
+    /// Takes some client's first request that matches; the client keeps its turn.
+    std::optional<Job> take_first(const Test& wanted);
     /// Removes and returns all that match, in order of arrival.
-    std::vector<Job> remove_if(const std::function<bool(const Job&)>& match);
+    std::vector<Job> remove_if(const Test& match);
+    /// Shows each client's first request.
+    void each_first(const std::function<void(const Job&)>& show) const;
 
+    bool has(Client client) const { return lanes_.contains(client); }
     std::size_t size() const { return size_; }
     bool empty() const { return size_ == 0; }
     /// The earliest start_by of all.
@@ -41,13 +51,20 @@ class JobQueue {
         std::uint64_t turn = 0;  ///< smaller goes first
     };
     using Lanes = std::map<Client, Lane>;
+    struct Choice {
+        Lanes::const_iterator lane;
+        bool aged = false;  ///< it overtakes a higher class
+    };
     Lane& lane(Client client);
-    Lanes::const_iterator next() const;
+    Choice choose(TimePoint now, const Test& may_run) const;
+    bool is_aged(TimePoint now, const Job& job, PriorityClass over) const;
+    Job take(Lanes::const_iterator it);
 
     QueueSettings settings_;
     Lanes lanes_;  ///< never an empty lane
     std::size_t size_ = 0;
     std::uint64_t turns_ = 0;
+    bool last_was_aged_ = false;
 };
 
 }  // namespace panelgate::arbiter

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 
@@ -19,12 +20,26 @@ struct StationSettings {
     Duration frame_gap = 1750us;
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
+    /// How long after a timeout a reply may still come; nothing = auto: the response timeout at
+    /// first, then what lateness was seen.
+    std::optional<Duration> late_window;
+    /// Items of one read, for merging: the profile's or the standard's limit.
+    std::uint16_t max_registers = 125;
+    std::uint16_t max_bits = 2000;
 };
 
 struct QueueSettings {
     std::size_t limit = 256;      ///< requests that wait on this line
     std::size_t per_client = 32;  ///< of one client
     Duration deadline = 2s;       ///< of a request, from its arrival to its answer
+    /// A request that has waited this long is treated as one class higher; twice, as two (P9).
+    Duration ageing = 500ms;
+};
+
+/// Who has to be quiet after a timeout until a late reply can no longer come (P1).
+enum class Quarantine : std::uint8_t {
+    line,     ///< everybody
+    station,  ///< the silent station; others may be asked, at the risk of a collision
 };
 
 struct Settings {
@@ -36,6 +51,12 @@ struct Settings {
     /// Silence that ends a reply whose length nothing tells (FRM-11); counted from its last byte.
     Duration end_of_frame = 20ms;
     QueueSettings queue;
+    OfflineSettings offline;
+    Quarantine quarantine = Quarantine::line;
+    /// The line is a real UART: bytes cannot come before the request has left. Not so on a pty.
+    bool paced = false;
+    /// Identical, contained and adjacent reads share one transaction (P6).
+    bool share_reads = true;
 };
 
 }  // namespace panelgate::arbiter

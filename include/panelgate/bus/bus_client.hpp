@@ -34,6 +34,7 @@ enum class Source : std::uint8_t { bus, cache };
 struct Answer {
     Result<Bytes> pdu = Fault::cancelled;
     bool transmitted = false;  ///< the request was (at least partly) on the wire at least once
+    bool shared = false;       ///< another request's transaction answered this one, too
     Source source = Source::bus;
     Duration age{};  ///< of the value, when source is cache
 };
@@ -59,7 +60,7 @@ struct LineStatus {
 };
 
 struct StationStatus {
-    std::string state;                     ///< "unknown" before the first try, "online", "silent"
+    std::string state;  ///< "unknown" before the first try, "online", "suspect", "offline"
     std::optional<Duration> last_success;  ///< how long ago
 };
 

@@ -15,6 +15,9 @@ const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kWrite = "06 00 01 00 03"_hex;
 
+/// A read of three registers that touches no other one with another number.
+Bytes read_at(unsigned number) { return Writer().u8(3).u16(100 * number).u16(3).take(); }
+
 Settings settings_38400() {
     Settings settings;
     settings.serial = {38400, 8, Parity::none, 1};
@@ -107,21 +110,289 @@ TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationSaysSo) {
     EXPECT_EQ(script.sent.size(), 2u);
 }
 
-TEST_F(ArbiterTest, OtherClientsAreAnsweredBetweenTheAttemptsOfASilentStation) {
-    bus.submit(17, kRead, 1);
-    const Ticket other = bus.submit(18, kRead, 2);
-    const auto second = bus.next_sent();
+TEST_F(ArbiterTest, OtherStationsAreAskedBetweenTheAttemptsWhenOnlyTheStationIsQuarantined) {
+    settings.quarantine = Quarantine::station;
+    BusScript script{settings};
+    script.submit(17, kRead, 1);
+    const Ticket other = script.submit(18, kRead, 2);
+    const auto second = script.next_sent();
     ASSERT_TRUE(second);
     EXPECT_EQ(second->adu[0], 18);
+    script.run_to_end_of_request();
+    script.hear_reply(18, kReply);
+    EXPECT_TRUE(script.answered(other));
+    EXPECT_EQ(script.next_sent()->adu[0], 17);
+}
+
+TEST_F(ArbiterTest, P1AfterATimeoutTheLineWaitsUntilALateReplyCanNoLongerCome) {
+    const Ticket silent = bus.submit(17, kRead, 1);
+    const Ticket other = bus.submit(18, kRead, 2);
+    ASSERT_EQ(bus.next_sent()->adu[0], 17);  // its retry comes first
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->adu[0], 18);
+    ASSERT_TRUE(bus.answered(silent));
+    EXPECT_EQ(next->at - bus.answer(silent).at, 500ms);
     bus.run_to_end_of_request();
     bus.hear_reply(18, kReply);
-    EXPECT_TRUE(bus.answered(other));
-    EXPECT_EQ(bus.next_sent()->adu[0], 17);
+    EXPECT_EQ(bus.answer(other).pdu.value(), kReply);
+}
+
+TEST_F(ArbiterTest, P1ALateReplyOfTheSameShapeAnswersNobody) {
+    settings.unlisted.retries = 0;
+    settings.stations.clear();
+    BusScript script{settings};
+    const Ticket first = script.submit(17, read_at(1), 1);
+    const Ticket second = script.submit(17, read_at(2), 2);
+    while (!script.answered(first)) script.run_for(1ms);
+    script.run_for(300ms);
+    script.hear_reply(17, kReply);  // of the first: same station, function and length
+    script.run_for(100ms);
+    EXPECT_FALSE(script.answered(second));
+    EXPECT_EQ(script.events.size(), 1u);
+    EXPECT_EQ(script.events[0].kind, StationEvent::Kind::late);
+    script.run_for(100ms);
+    ASSERT_EQ(script.sent.size(), 2u);
+    script.run_to_end_of_request();
+    script.hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script.answer(second).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+}
+
+TEST_F(ArbiterTest, P1BytesBeforeAReplyCouldHaveBegunAreStaleOnARealLine) {
+    settings.paced = true;
+    BusScript script{settings};
+    const Ticket ticket = script.submit(17, kRead);
+    script.run_for(1ms);  // the request is still leaving
+    script.hear_reply(17, kReply);
+    script.run_for(30ms);
+    EXPECT_FALSE(script.answered(ticket));
+    script.hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script.answer(ticket).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+}
+
+TEST_F(ArbiterTest, ALineWithoutARealPaceIsLearned) {
+    const Ticket ticket = bus.submit(17, kRead);
+    bus.hear_reply(17, kReply);  // a pty answers before the computed end of the request
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+}
+
+TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
+    for (int i = 0; i < 3; ++i) {
+        const Ticket ticket = bus.submit(17, kRead);
+        bus.run_for(3s);
+        EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+    }
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::offline);
+    const std::size_t frames = bus.sent.size();
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
+    EXPECT_EQ(bus.sent.size(), frames);
+}
+
+/// Takes station 17 offline.
+void silence(BusScript& bus) {
+    while (!bus.arbiter().health(17).offline()) {
+        if (bus.arbiter().idle()) bus.submit(17, kRead, 7);
+        bus.run_for(100ms);
+    }
+}
+
+TEST_F(ArbiterTest, P4QueuedRequestsOfAStationThatGoesOfflineAreAnsweredAtOnce) {
+    settings.queue.deadline = 60s;
+    BusScript script{settings};
+    std::vector<Ticket> tickets;
+    for (unsigned i = 0; i < 6; ++i) tickets.push_back(script.submit(17, read_at(i), i + 1));
+    while (!script.arbiter().health(17).offline()) script.run_for(10ms);
+    for (const Ticket ticket : tickets) EXPECT_TRUE(script.answered(ticket));
+    EXPECT_EQ(script.answer(tickets[5]).pdu.error(), Fault::offline);
+    EXPECT_FALSE(script.answer(tickets[5]).transmitted);
+}
+
+TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBringsItBack) {
+    silence(bus);
+    const std::size_t before = bus.sent.size();
+    const Duration busy = bus.arbiter().counters().busy;
+    bus.run_for(1000s);
+    EXPECT_GT(bus.sent.size(), before + 10) << "it is asked again and again";
+    EXPECT_LT(to_seconds(bus.arbiter().counters().busy - busy), 0.05 * 1000);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+    const Ticket ticket = bus.submit(17, kRead);
+    ASSERT_TRUE(bus.next_sent(1s));
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answer(ticket).pdu.has_value());
+}
+
+TEST_F(ArbiterTest, P4AProbeOfAStationWhosePaceIsKnownIsShort) {
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.run_for(4ms);
+    bus.hear_reply(17, kReply);
+    silence(bus);
+    ASSERT_TRUE(bus.next_sent(60s));
+    const Ticket other = bus.submit(18, kRead);
+    const TimePoint asked = bus.now();
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().adu[0], 18);
+    EXPECT_LT(bus.now() - asked, 50ms);
+    EXPECT_FALSE(bus.answered(other));
+}
+
+TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
+    silence(bus);
+    bus.run_for(1s);
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
+    const Ticket write = bus.submit(17, kWrite);
+    EXPECT_EQ(bus.try_submit(17, kWrite).error(), Fault::offline);
+    while (bus.sent.back().adu[1] != 6) ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kWrite);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+}
+
+TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {
+    for (int i = 0; i < 5; ++i) {
+        bus.submit(17, kRead);
+        for (int attempt = 0; attempt < 2; ++attempt) {
+            if (attempt > 0 || bus.sent.empty() || bus.now() >= bus.sent.back().at + 10ms) {
+                ASSERT_TRUE(attempt == 0 || bus.next_sent());
+            }
+            bus.run_to_end_of_request();
+            bus.hear(ByteView(modbus::encode_adu(17, kReply)).first(6));
+        }
+        bus.run_for(30ms);
+    }
+    EXPECT_FALSE(bus.arbiter().health(17).offline());
+}
+
+TEST_F(ArbiterTest, P6IdenticalReadsShareOneTransaction) {
+    bus.submit(18, kRead, 99);
+    std::vector<Ticket> tickets;
+    for (Client client = 1; client <= 8; ++client) tickets.push_back(bus.submit(17, kRead, client));
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    for (const Ticket ticket : tickets) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+    bus.run_for(5s);
+    EXPECT_EQ(bus.sent.size(), 2u);
+}
+
+TEST_F(ArbiterTest, P6OneMayJoinWhileTheRequestLeavesButNotLater) {
+    bus.submit(17, kRead, 1);
+    bus.run_for(1ms);
+    const Ticket joined = bus.submit(17, kRead, 2);
+    bus.run_to_end_of_request();
+    const Ticket late = bus.submit(17, kRead, 3);
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answered(joined));
+    EXPECT_FALSE(bus.answered(late)) << "its value would have been sampled before it asked";
+    EXPECT_TRUE(bus.next_sent());
+}
+
+TEST_F(ArbiterTest, P6TouchingReadsAreJoinedAndContainedOnesSliced) {
+    bus.submit(18, kRead, 99);
+    const Ticket a = bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    const Ticket b = bus.submit(17, "03 00 0C 00 01"_hex, 2);
+    const Ticket c = bus.submit(17, "03 00 0B 00 01"_hex, 3);
+    const Ticket apart = bus.submit(17, "03 00 0E 00 01"_hex, 4);
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().adu, modbus::encode_adu(17, "03 00 0A 00 03"_hex));
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(bus.answer(a).pdu.value(), "03 04 00 01 00 02"_hex);
+    EXPECT_EQ(bus.answer(b).pdu.value(), "03 02 00 03"_hex);
+    EXPECT_EQ(bus.answer(c).pdu.value(), "03 02 00 02"_hex);
+    EXPECT_FALSE(bus.answered(apart));
+}
+
+TEST_F(ArbiterTest, P6BitsAreSlicedToo) {
+    bus.submit(18, kRead, 99);
+    const Ticket a = bus.submit(17, "01 00 03 00 0A"_hex, 1);
+    const Ticket b = bus.submit(17, "01 00 0D 00 05"_hex, 2);
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, "01 02 CD 6B"_hex);  // bits 3..17, the sixteenth is padding
+    EXPECT_EQ(bus.answer(a).pdu.value(), "01 02 CD 03"_hex);
+    EXPECT_EQ(bus.answer(b).pdu.value(), "01 01 1A"_hex);
+}
+
+TEST_F(ArbiterTest, P6AJoinThatThePanelRefusesIsSplitAndRemembered) {
+    bus.submit(18, kRead, 99);
+    const Ticket a = bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    const Ticket b = bus.submit(17, "03 00 0C 00 02"_hex, 2);
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, "83 02"_hex);
+    EXPECT_FALSE(bus.answered(a));
+    for (int i = 0; i < 2; ++i) {
+        ASSERT_TRUE(bus.next_sent());
+        bus.run_to_end_of_request();
+        const bool first_half = bus.sent.back().adu[3] == 0x0A;
+        bus.hear_reply(17, first_half ? "03 04 00 01 00 02"_hex : "83 02"_hex);
+    }
+    EXPECT_EQ(bus.answer(a).pdu.value(), "03 04 00 01 00 02"_hex);
+    EXPECT_EQ(bus.answer(b).pdu.value(), "83 02"_hex);
+    bus.submit(18, kRead, 99);
+    bus.submit(17, "03 00 0A 00 02"_hex, 1);
+    bus.submit(17, "03 00 0C 00 02"_hex, 2);
+    ASSERT_TRUE(bus.sent.back().adu[0] == 18 || bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().adu, modbus::encode_adu(17, "03 00 0A 00 02"_hex));
+}
+
+TEST_F(ArbiterTest, P6AClientNeverReadsOlderThanItsOwnWrite) {
+    bus.submit(18, kRead, 99);
+    const Ticket others = bus.submit(17, kRead, 1);
+    bus.submit(17, "06 00 6B 00 07"_hex, 2, PriorityClass::write);
+    const Ticket own = bus.submit(17, kRead, 2);
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    ASSERT_EQ(bus.next_sent()->adu[1], 6);
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, "06 00 6B 00 07"_hex);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answered(others));
+    EXPECT_TRUE(bus.answered(own)) << "after the write it may share";
+    EXPECT_EQ(bus.sent.size(), 3u);
+}
+
+TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransactions) {
+    settings.queue.deadline = 60s;
+    BusScript script{settings};
+    script.submit(18, kRead, 99);
+    const Ticket poll = script.submit(17, read_at(1), 1, PriorityClass::poll);
+    for (unsigned i = 0; i < 200 && !script.answered(poll); ++i) {
+        if (i % 2 == 0) script.submit(17, read_at(2 + i), 2);
+        if (script.arbiter().queue_depth() < 8) script.submit(17, kWrite, 3, PriorityClass::write);
+        script.run_to_end_of_request();
+        script.run_for(10ms);
+        const Bytes request(script.sent.back().adu.begin() + 1, script.sent.back().adu.end() - 2);
+        script.hear_reply(script.sent.back().adu[0], request[0] == 6 ? request : kReply);
+        ASSERT_TRUE(script.next_sent());
+    }
+    EXPECT_TRUE(script.answered(poll));
 }
 
 TEST_F(ArbiterTest, ClientsTakeTurns) {
-    bus.submit(18, kRead, 9);  // keeps the line busy while the others queue
-    for (int i = 0; i < 3; ++i) bus.submit(17, kRead, 1);
+    bus.submit(18, read_at(9), 9);  // keeps the line busy while the others queue
+    for (unsigned i = 0; i < 3; ++i) bus.submit(17, read_at(i), 1);
     bus.submit(18, kRead, 2);
     std::vector<int> order;
     while (order.size() < 4) {
@@ -192,13 +463,13 @@ TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
     settings.queue.limit = 4;
     settings.queue.per_client = 2;
     BusScript script{settings};
-    script.submit(17, kRead, 1);  // on the wire: does not count
-    script.submit(17, kRead, 1);
-    script.submit(17, kRead, 1);
-    EXPECT_EQ(script.try_submit(17, kRead, 1).error(), Fault::busy);
-    script.submit(17, kRead, 2);
-    script.submit(17, kRead, 2);
-    EXPECT_EQ(script.try_submit(17, kRead, 3).error(), Fault::busy);
+    script.submit(17, read_at(1), 1);  // on the wire: does not count
+    script.submit(17, read_at(2), 1);
+    script.submit(17, read_at(3), 1);
+    EXPECT_EQ(script.try_submit(17, read_at(4), 1).error(), Fault::busy);
+    script.submit(17, read_at(5), 2);
+    script.submit(17, read_at(6), 2);
+    EXPECT_EQ(script.try_submit(17, read_at(7), 3).error(), Fault::busy);
     EXPECT_EQ(script.arbiter().queue_depth(), 4u);
 }
 
@@ -264,7 +535,7 @@ TEST_F(ArbiterTest, OnlyDamagedRepliesEndAsDamaged) {
     }
     ASSERT_TRUE(bus.answered(ticket));
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged);
-    EXPECT_EQ(bus.arbiter().station(17).silent_in_a_row, 0);
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
 }
 
 TEST_F(ArbiterTest, APanelsExceptionIsFinal) {
@@ -321,9 +592,9 @@ TEST_F(ArbiterTest, AReplyWithoutAKnownLengthEndsWithSilence) {
 TEST_F(ArbiterTest, TheLongerGapOfAStationIsKept) {
     settings.stations[1].frame_gap = 40ms;
     BusScript script{settings};
-    script.submit(17, kRead, 1);
+    script.submit(17, read_at(1), 1);
     script.submit(18, kRead, 2);
-    script.submit(17, kRead, 1);
+    script.submit(17, read_at(2), 1);
     script.run_to_end_of_request();
     script.hear_reply(17, kReply);
     TimePoint last = script.now();

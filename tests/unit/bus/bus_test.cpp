@@ -127,7 +127,7 @@ TEST_F(BusTest, ASilentStationIsATimeoutAndSaysSoInTheStatus) {
     EXPECT_EQ(answer.pdu.error(), Fault::timeout);
     EXPECT_TRUE(answer.transmitted);
     EXPECT_EQ(line->written.size(), 1u);
-    EXPECT_EQ(bus->station_status(17).state, "silent");
+    EXPECT_EQ(bus->station_status(17).state, "suspect");
 }
 
 TEST_F(BusTest, ABroadcastIsAnsweredWithoutAReply) {

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+struct OfflineSettings {
+    int after = 3;               ///< silent transactions in a row; 1..1000
+    Duration probe_min = 500ms;  ///< first pause between two probes
+    Duration probe_max = 30s;    ///< the pause doubles up to here
+};
+
+/// What is known of one station's life. Pure. A transaction that hears anything of the station,
+/// damaged or an exception, is a sign of life; only silence counts towards offline (P4).
+class StationHealth {
+  public:
+    enum class State : std::uint8_t { unknown, online, suspect, offline };
+
+    explicit StationHealth(OfflineSettings settings = {}) : settings_(settings) {}
+
+    State state() const { return state_; }
+    bool offline() const { return state_ == State::offline; }
+    std::optional<TimePoint> last_success() const { return last_success_; }
+    int silent_in_a_row() const { return silent_; }
+
+    /// A good frame of the station came, in time or late. True when that brought it back.
+    bool on_reply(TimePoint now);
+    /// Only damaged bytes came: alive, though not well.
+    void on_damaged();
+    /// A whole transaction (all its attempts) passed in silence. True when that took it offline.
+    bool on_silence(TimePoint now);
+
+    /// When an offline station may be asked again; the budget of the line may postpone it.
+    TimePoint next_probe() const { return next_probe_; }
+    /// A client's write may be the probe, once an interval: true if this one may, and then it is.
+    bool take_half_open(TimePoint now);
+
+  private:
+    OfflineSettings settings_;
+    State state_ = State::unknown;
+    int silent_ = 0;
+    Duration pause_{};
+    TimePoint next_probe_{};
+    TimePoint next_half_open_{};
+    std::optional<TimePoint> last_success_;
+};
+
+std::string_view label(StationHealth::State state);
+
+/// Keeps all probes of a line's offline stations together below a share of its time (P4: at most
+/// 5 %, aiming at 3 %): after one that cost d nothing is probed for d * (1 / share - 1). Pure.
+class ProbeBudget {
+  public:
+    static constexpr double kShare = 0.03;
+
+    bool allows(TimePoint now) const { return now >= next_; }
+    TimePoint next() const { return next_; }
+    /// A probe without reply ended at `now` after having kept the line for `cost`.
+    void spend(TimePoint now, Duration cost) {
+        const double rest = to_seconds(cost) * (1.0 / kShare - 1.0);
+        next_ = now + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(rest));
+    }
+
+  private:
+    TimePoint next_{};
+};
+
+}  // namespace panelgate::arbiter

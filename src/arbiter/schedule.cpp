@@ -1,0 +1,275 @@
+// What a line does next: which request, when, and together with which others.
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
+    if (!up_) return Fault::line_down;
+    if (queue_.full(job.client)) return Fault::busy;
+    if (job.station != kBroadcast) {
+        StationHealth& health = station_of(job.station).health;
+        const bool may_wake = !modbus::is_pure_read(job.pdu) && health.offline();
+        if (health.offline() && !(may_wake && health.take_half_open(now))) return Fault::offline;
+    }
+    job.ticket = ++last_ticket_;
+    job.arrived = now;
+    job.deadline = now + settings_.queue.deadline;
+    job.start_by = job.deadline - shortest_transaction(job);
+    const Ticket ticket = job.ticket;
+    const bool first_of_client = !queue_.has(job.client);
+    const bool request_still_leaving = active_ && now < active_->sent;
+    if (request_still_leaving && first_of_client && contained_in(active_->group.span, job) &&
+        active_->group.jobs.size() < settings_.queue.limit) {
+        job.attempts = 1;
+        active_->group.jobs.push_back(std::move(job));
+    } else {
+        queue_.push(std::move(job));
+    }
+    step(now);
+    return ticket;
+}
+
+void Arbiter::cancel(TimePoint now, Client client) {
+    const auto theirs = [&](const Job& job) { return job.client == client; };
+    for (const Job& job : queue_.remove_if(theirs)) finish(job, Fault::cancelled);
+    if (retry_) {
+        for (const Job& job : retry_->jobs) {
+            if (theirs(job)) finish(job, Fault::cancelled);
+        }
+        std::erase_if(retry_->jobs, theirs);
+        if (retry_->jobs.empty()) retry_.reset();
+    }
+    step(now);
+}
+
+void Arbiter::on_deadline(TimePoint now) { step(now); }
+
+void Arbiter::step(TimePoint now) {
+    check_active(now);
+    expire(now);
+    if (!active_ && !idle_heard_.empty() && now >= quiet_since_ + settings_.end_of_frame)
+        judge_idle(now);
+    while (up_ && !active_ && start_next(now)) check_active(now);
+}
+
+/// Starts what is next when the line may be used. False when nothing can be done now.
+bool Arbiter::start_next(TimePoint now) {
+    if (now < quiet_until_ || now < quiet_since_ + gap_of(last_station_)) return false;
+    if (retry_ && !other_first_) return start_retry(now);
+    const auto due = next_probe();
+    constexpr Duration kPatience = 1s;  // a probe waits for an idle line, but not for ever
+    if (due && now >= *due + kPatience && start_probe(now)) return true;
+    if (start_job(now)) return true;
+    if (retry_) return start_retry(now);
+    return due && now >= *due && start_probe(now);
+}
+
+bool Arbiter::start_retry(TimePoint now) {
+    if (!gap_is_over(now, retry_->station)) return false;
+    start(now, *std::exchange(retry_, std::nullopt));
+    return true;
+}
+
+bool Arbiter::start_job(TimePoint now) {
+    const auto runnable = [&](const Job& job) { return may_run(now, job); };
+    const Job* next = queue_.peek(now, runnable);
+    if (next == nullptr || !gap_is_over(now, next->station)) return false;
+    other_first_ = false;
+    start(now, gather(*queue_.pop(now, runnable)));
+    return true;
+}
+
+bool Arbiter::start_probe(TimePoint now) {
+    if (now < quarantined_until_) return false;
+    const std::uint8_t station = next_to_probe(now);
+    if (station == kBroadcast || !gap_is_over(now, station)) return false;
+    Group group;
+    group.station = station;
+    group.pdu = probe_for(station_of(station));
+    group.span = read_span(station, group.pdu);
+    group.probe = true;
+    start(now, std::move(group));
+    return true;
+}
+
+/// Not while a late reply could be taken for the answer (P1).
+bool Arbiter::may_run(TimePoint now, const Job& job) const {
+    if (now < quarantined_until_) return false;
+    const auto station = stations_.find(job.station);
+    return station == stations_.end() || now >= station->second.not_before;
+}
+
+/// The longer of the silences that the last station and this one ask for.
+bool Arbiter::gap_is_over(TimePoint now, std::uint8_t station) {
+    const TimePoint allowed = quiet_since_ + std::max(gap_of(last_station_), gap_of(station));
+    if (now >= allowed) return true;
+    quiet_until_ = allowed;
+    return false;
+}
+
+/// Takes along what the same transaction can answer (P6): contained reads always, touching ones as
+/// long as the panel's limit allows. One request saves a request, a reply header and two gaps, so
+/// joining reads without a hole is always cheaper on the wire.
+Arbiter::Group Arbiter::gather(Job leader) {
+    Group group;
+    group.station = leader.station;
+    group.pdu = leader.pdu;
+    if (settings_.share_reads && !leader.alone) group.span = read_span(leader.station, leader.pdu);
+    group.jobs.push_back(std::move(leader));
+    while (group.span) {
+        auto job = queue_.take_first([&](const Job& other) { return joins(group, other); });
+        if (!job) break;
+        group.span = join(*group.span, *read_span(job->station, job->pdu));
+        group.jobs.push_back(std::move(*job));
+    }
+    if (group.jobs.size() > 1) group.pdu = encode_span(*group.span);
+    return group;
+}
+
+bool Arbiter::joins(const Group& group, const Job& job) const {
+    if (job.alone || job.station != group.station) return false;
+    const auto span = read_span(job.station, job.pdu);
+    if (!span || !group.span->touches(*span)) return false;
+    if (group.span->contains(*span)) return true;
+    const ReadSpan both = join(*group.span, *span);
+    const StationSettings& station = settings_of(job.station);
+    if (both.count > (both.reads_bits() ? station.max_bits : station.max_registers)) return false;
+    return std::none_of(refused_spans_.begin(), refused_spans_.end(),
+                        [&](const ReadSpan& refused) { return both.contains(refused); });
+}
+
+void Arbiter::start(TimePoint now, Group group) {
+    judge_idle(now);
+    Bytes adu = modbus::encode_adu(group.station, group.pdu);
+    if (++group.attempts > 1) ++counters_of(group.station).retries;
+    for (Job& job : group.jobs) {
+        const auto rank = static_cast<std::size_t>(job.priority);
+        if (job.attempts++ == 0) line_counters_.queue_wait[rank].observe(now - job.arrived);
+    }
+    const TimePoint sent = now + wire_time(settings_.serial, adu.size());
+    Duration wait{};
+    std::string_view what = "broadcast";
+    if (group.station == kBroadcast) {
+        ++line_counters_.broadcasts;
+    } else {
+        Station& station = station_of(group.station);
+        if (now >= station.not_before) station.owed = 0;  // its late window has passed
+        if (group.span) station.last_read = group.pdu;
+        wait = patience(group, station);
+        what = group.probe ? "probe" : group.attempts > 1 ? "retry" : "request";
+    }
+    const TimePoint longest = sent + wait +
+                              2 * wire_time(settings_.serial, modbus::kMaxLongRtuAdu) +
+                              settings_.end_of_frame;
+    actions_.push_back(Note{now, Note::Direction::sent, adu, what});
+    actions_.push_back(Transmit{std::move(adu)});
+    modbus::ReplyFramer framer(group.station, group.pdu);
+    quiet_since_ = sent;
+    last_station_ = group.station;
+    active_.emplace(Active{std::move(group), std::move(framer), now, sent, sent + wait, longest,
+                           sent, sent, false});
+}
+
+/// How long to wait for a reply to begin. A probe of a station whose pace is known does not wait
+/// the whole timeout: should it answer later, the late frame brings it back just as well.
+Duration Arbiter::patience(const Group& group, const Station& station) const {
+    const Duration whole = station.settings.response_timeout;
+    if (!group.probe || !station.health.last_success()) return whole;
+    return std::min(whole, std::max<Duration>(20ms, 3 * station.slowest + 10ms));
+}
+
+Bytes Arbiter::probe_for(const Station& station) const {
+    if (!station.probe.empty()) return station.probe;
+    if (!station.last_read.empty()) return station.last_read;
+    return modbus::encode_read(modbus::Table::holding_registers, 0, 1);
+}
+
+/// The offline station whose probe is due longest, kBroadcast when none is.
+std::uint8_t Arbiter::next_to_probe(TimePoint now) const {
+    std::uint8_t best = kBroadcast;
+    TimePoint earliest = TimePoint::max();
+    for (const auto& [id, station] : stations_) {
+        const TimePoint due = std::max(station.health.next_probe(), station.not_before);
+        if (station.health.offline() && due <= now && due < earliest) {
+            earliest = due;
+            best = id;
+        }
+    }
+    return best;
+}
+
+std::optional<TimePoint> Arbiter::next_probe() const {
+    std::optional<TimePoint> next;
+    for (const auto& [id, station] : stations_) {
+        if (!station.health.offline()) continue;
+        const TimePoint due =
+            std::max({station.health.next_probe(), station.not_before, budget_.next()});
+        if (!next || due < *next) next = due;
+    }
+    return next;
+}
+
+void Arbiter::expire(TimePoint now) {
+    if (active_) expire_jobs(now, active_->group.jobs);
+    if (retry_) {
+        expire_jobs(now, retry_->jobs);
+        if (retry_->jobs.empty()) retry_.reset();
+    }
+    const auto first = queue_.first_expiry();
+    if (!first || now < *first) return;
+    for (const Job& job : queue_.remove_if([&](const Job& j) { return j.start_by <= now; })) {
+        finish(job, job.attempts > 0 ? Fault::timeout : Fault::expired);
+    }
+}
+
+/// Those of a transaction whose own deadline has come; the others go on waiting for its reply.
+void Arbiter::expire_jobs(TimePoint now, std::vector<Job>& jobs) {
+    if (active_ && active_->group.station == kBroadcast) return;
+    for (const Job& job : jobs) {
+        if (job.deadline <= now) finish(job, Fault::timeout);
+    }
+    std::erase_if(jobs, [&](const Job& job) { return job.deadline <= now; });
+}
+
+std::optional<TimePoint> Arbiter::next_start() const {
+    const TimePoint free = std::max(quiet_until_, quiet_since_ + gap_of(last_station_));
+    std::optional<TimePoint> next;
+    const auto earlier = [&](TimePoint t) {
+        next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
+    };
+    if (retry_) earlier(free);
+    queue_.each_first([&](const Job& job) {
+        const auto station = stations_.find(job.station);
+        const TimePoint rested = station == stations_.end() ? free : station->second.not_before;
+        earlier(std::max(quarantined_until_, rested));
+    });
+    if (const auto probe = next_probe()) earlier(std::max(quarantined_until_, *probe));
+    return next;
+}
+
+std::optional<TimePoint> Arbiter::next_deadline() const {
+    std::optional<TimePoint> next = queue_.first_expiry();
+    const auto earlier = [&next](TimePoint t) { next = next ? std::min(*next, t) : t; };
+    const auto deadlines = [&](const Group& group) {
+        for (const Job& job : group.jobs) earlier(job.deadline);
+    };
+    if (retry_) deadlines(*retry_);
+    if (active_) {
+        earlier(active_deadline());
+        if (active_->group.station != kBroadcast) deadlines(active_->group);
+        return next;
+    }
+    if (!idle_heard_.empty()) earlier(quiet_since_ + settings_.end_of_frame);
+    if (!up_) return next;
+    if (const auto start = next_start()) earlier(*start);
+    return next;
+}
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,59 @@
+#include "panelgate/arbiter/station_health.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+
+namespace panelgate::arbiter {
+
+bool StationHealth::on_reply(TimePoint now) {
+    const bool back = offline();
+    state_ = State::online;
+    silent_ = 0;
+    last_success_ = now;
+    return back;
+}
+
+void StationHealth::on_damaged() {
+    silent_ = 0;
+    state_ = State::suspect;
+}
+
+bool StationHealth::on_silence(TimePoint now) {
+    ++silent_;
+    if (offline()) {
+        pause_ = std::min(pause_ * 2, settings_.probe_max);
+        next_probe_ = now + pause_;
+        return false;
+    }
+    if (silent_ < settings_.after) {
+        state_ = State::suspect;
+        return false;
+    }
+    state_ = State::offline;
+    pause_ = settings_.probe_min;
+    next_probe_ = now + pause_;
+    next_half_open_ = now + pause_;
+    return true;
+}
+
+bool StationHealth::take_half_open(TimePoint now) {
+    if (now < next_half_open_) return false;
+    next_half_open_ = now + pause_;
+    return true;
+}
+
+std::string_view label(StationHealth::State state) {
+    switch (state) {
+        case StationHealth::State::unknown:
+            return "unknown";
+        case StationHealth::State::online:
+            return "online";
+        case StationHealth::State::suspect:
+            return "suspect";
+        case StationHealth::State::offline:
+            return "offline";
+    }
+    std::abort();
+}
+
+}  // namespace panelgate::arbiter

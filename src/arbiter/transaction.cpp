@@ -1,0 +1,331 @@
+// What a transaction came to: a reply, damage, silence, and what was heard besides.
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+Arbiter::Arbiter(Settings settings) : settings_(std::move(settings)), queue_(settings_.queue) {
+    for (const StationSettings& station : settings_.stations) {
+        configured_[station.id] = station;
+        counters_[station.id];
+    }
+    counters_[kUnlisted];
+    settings_.end_of_frame = std::max(settings_.end_of_frame, silent_interval(settings_.serial));
+}
+
+void Arbiter::on_line_up(TimePoint now) {
+    up_ = true;
+    // The receiver's first state: one silent interval before the first frame (MST-01).
+    quiet_since_ = now;
+    quiet_until_ = now;
+    last_station_ = kBroadcast;
+    early_replies_ = 0;
+    timely_replies_ = 0;
+    step(now);
+}
+
+void Arbiter::on_line_down(TimePoint now) {
+    up_ = false;
+    idle_heard_.clear();
+    if (active_) {
+        Group group = std::move(active_->group);
+        note_unused(now, active_->framer.take_unused());
+        close_active(now);
+        for (const Job& job : group.jobs) finish(job, Fault::line_lost);
+    }
+    if (retry_) {
+        for (const Job& job : retry_->jobs) finish(job, Fault::line_lost);
+        retry_.reset();
+    }
+    for (const Job& job : queue_.remove_if([](const Job&) { return true; })) {
+        finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
+    }
+}
+
+void Arbiter::on_rx(TimePoint now, ByteView bytes) {
+    if (bytes.empty() || !up_) return;
+    if (!active_ || active_->group.station == kBroadcast || is_stale(now)) {
+        hear_idle(now, bytes);
+    } else {
+        if (!active_->heard) active_->first_byte = now;
+        active_->last_byte = now;
+        active_->heard = true;
+        quiet_since_ = std::max(active_->sent, now);
+        if (auto reply = active_->framer.feed(bytes)) settle(now, *reply);
+    }
+    step(now);
+}
+
+/// No reply can begin before the request has left and the silence after it told the station so. On
+/// a real UART, or a line that has shown to behave like one, such bytes are old (P1).
+bool Arbiter::is_stale(TimePoint now) const {
+    constexpr int kEnough = 3;
+    const bool paced = settings_.paced || (timely_replies_ >= kEnough && early_replies_ == 0);
+    return paced && !active_->heard && now < active_->sent + silent_interval(settings_.serial);
+}
+
+/// Bytes that nobody asked for (MST-04): counted, never matched with a later request.
+void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
+    quiet_since_ = std::max(quiet_since_, now);
+    idle_heard_.insert(idle_heard_.end(), bytes.begin(), bytes.end());
+    if (idle_heard_.size() > modbus::ReplyFramer::kMaxHeard) judge_idle(now);
+}
+
+void Arbiter::judge_idle(TimePoint now) {
+    if (idle_heard_.empty()) return;
+    const Bytes heard = std::exchange(idle_heard_, {});
+    note_unused(now, modbus::classify_heard(heard, last_station_));
+}
+
+/// Counts and traces what was heard and is nobody's answer.
+void Arbiter::note_unused(TimePoint now, const std::vector<modbus::Unused>& parts) {
+    for (const modbus::Unused& part : parts) {
+        const bool good = part.kind != modbus::Unused::Kind::damaged;
+        const bool known = good && stations_.contains(part.station);
+        counters_of(known ? part.station : last_station_).discarded_bytes += part.bytes.size();
+        std::string_view what = good ? "foreign" : "damaged";
+        if (known && part.kind == modbus::Unused::Kind::own) what = "late";
+        if (known && stations_.at(part.station).owed > 0) what = "late";
+        if (what == "late") ++counters_of(part.station).late_frames;
+        if (what == "foreign") ++counters_of(last_station_).foreign_frames;
+        actions_.push_back(Note{now, Note::Direction::discarded, part.bytes, what});
+        if (known) on_good_frame(now, part);
+    }
+}
+
+/// A good frame of a station that we know, outside its transaction: perhaps the reply that is owed.
+void Arbiter::on_good_frame(TimePoint now, const modbus::Unused& part) {
+    Station& station = stations_.at(part.station);
+    const ByteView pdu = ByteView(part.bytes).subspan(1, part.bytes.size() - kAduOverhead);
+    if (station.owed == 0 || !modbus::answers(station.unanswered, pdu)) return;
+    --station.owed;
+    const Duration lateness = std::max(now - station.due, Duration::zero());
+    station.late.on_late(lateness);
+    actions_.push_back(StationEvent{StationEvent::Kind::late, part.station, lateness});
+    if (station.health.on_reply(now)) {
+        actions_.push_back(StationEvent{StationEvent::Kind::online, part.station, {}});
+    }
+}
+
+/// When the transaction on the wire must be looked at again.
+TimePoint Arbiter::active_deadline() const {
+    const Active& a = *active_;
+    if (a.group.station == kBroadcast) return a.sent;
+    if (!a.framer.has_pending()) return a.give_up;
+    // Something is being heard: its silence decides, also after give_up, but not for ever.
+    return std::min(std::max(a.sent, a.last_byte) + settings_.end_of_frame, a.longest);
+}
+
+void Arbiter::check_active(TimePoint now) {
+    if (!active_ || now < active_deadline()) return;
+    if (active_->group.station == kBroadcast) {
+        check_broadcast(now);
+        return;
+    }
+    if (auto reply = active_->framer.on_silence()) {
+        settle(now, *reply);
+        return;
+    }
+    if (active_->framer.was_damaged()) {
+        fail_attempt(now, Fault::damaged);
+    } else if (now >= active_->give_up) {
+        fail_attempt(now, Fault::timeout);
+    }
+}
+
+/// The last bit of a broadcast has left: nobody answers, the line rests for the turnaround.
+void Arbiter::check_broadcast(TimePoint now) {
+    const Group group = std::move(active_->group);
+    const TimePoint sent = active_->sent;
+    close_active(now);
+    quiet_until_ = sent + settings_.broadcast_turnaround;
+    for (const Job& job : group.jobs) finish(job, modbus::normal_write_reply(job.pdu));
+}
+
+void Arbiter::settle(TimePoint now, const Bytes& reply) {
+    count_reply(now, reply);
+    note_unused(now, active_->framer.take_unused());
+    Group group = std::move(active_->group);
+    actions_.push_back(
+        Note{now, Note::Direction::received, modbus::encode_adu(group.station, reply), "reply"});
+    close_active(now);
+    Station& station = station_of(group.station);
+    // An earlier attempt may still be answered, too: nothing else of this shape until it cannot.
+    if (station.owed > 0) station.not_before = now + station.late.value();
+    if (!split(group, reply)) deliver(group, reply);
+}
+
+void Arbiter::count_reply(TimePoint now, const Bytes& reply) {
+    const Active& a = *active_;
+    StationCounters& counters = counters_of(a.group.station);
+    Station& station = station_of(a.group.station);
+    const bool early = a.first_byte < a.sent + silent_interval(settings_.serial);
+    ++(early ? early_replies_ : timely_replies_);
+    const Duration reply_time = wire_time(settings_.serial, reply.size() + kAduOverhead);
+    const Duration think =
+        std::max(now - a.sent - reply_time - silent_interval(settings_.serial), Duration::zero());
+    counters.turnaround.observe(think);
+    counters.bus_transaction.observe(now - a.started);
+    station.slowest = std::max(station.slowest, think);
+    const auto code = modbus::exception_of(reply);
+    if (code) ++counters.exceptions[*code];
+    const bool cheaper =
+        station.probe.empty() || a.group.span->count < read_span(0, station.probe)->count;
+    if (!code && a.group.span && cheaper) station.probe = a.group.pdu;
+    if (station.health.on_reply(now)) {
+        actions_.push_back(StationEvent{StationEvent::Kind::online, a.group.station, {}});
+    }
+}
+
+/// A panel that refuses a joined read may take the parts: they go again, each for itself, and the
+/// join is remembered. True when that is so; those who asked for the whole have their answer.
+bool Arbiter::split(Group& group, const Bytes& reply) {
+    const auto code = modbus::exception_of(reply);
+    const bool about_range = code && (*code == 2 || *code == 3);
+    const auto asked_all = [&](const Job& job) { return job.pdu == group.pdu; };
+    if (!about_range || std::all_of(group.jobs.begin(), group.jobs.end(), asked_all)) return false;
+    if (std::none_of(group.jobs.begin(), group.jobs.end(), asked_all)) {
+        constexpr std::size_t kRemembered = 64;
+        if (refused_spans_.size() >= kRemembered) refused_spans_.erase(refused_spans_.begin());
+        refused_spans_.push_back(*group.span);
+    }
+    for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
+        if (asked_all(*job)) {
+            finish(*job, reply);
+            continue;
+        }
+        job->alone = true;
+        queue_.put_back(std::move(*job));
+    }
+    return true;
+}
+
+void Arbiter::deliver(const Group& group, const Bytes& reply) {
+    const bool exception = modbus::exception_of(reply).has_value();
+    for (const Job& job : group.jobs) {
+        const bool shared = &job != &group.jobs.front();
+        if (exception || job.pdu == group.pdu) {
+            finish(job, reply, shared);
+        } else {
+            finish(job, slice_reply(*group.span, reply, *read_span(job.station, job.pdu)), shared);
+        }
+    }
+}
+
+void Arbiter::fail_attempt(TimePoint now, Fault fault) {
+    note_unused(now, active_->framer.take_unused());
+    Group group = std::move(active_->group);
+    Station& station = station_of(group.station);
+    const Duration cost = now - active_->started + gap_of(group.station);
+    const TimePoint sent = active_->sent;
+    close_active(now);
+    const bool offline = station.health.offline();
+    if (fault == Fault::damaged) {
+        ++counters_of(group.station).damaged_frames;
+    } else {
+        ++station.owed;
+        station.unanswered = group.pdu;
+        station.due = sent + station.settings.response_timeout;
+        quarantine(now, group, station);
+    }
+    if (offline) budget_.spend(now, cost);
+    if (may_retry(now, group, station)) {
+        other_first_ = settings_.quarantine == Quarantine::station;
+        retry_ = std::move(group);
+        return;
+    }
+    for (const Job& job : group.jobs) finish(job, fault);
+    if (fault == Fault::damaged && !offline) {
+        station.health.on_damaged();
+    } else {
+        went_silent(now, group, station);
+    }
+}
+
+/// P1: until the reply can no longer come, only the same request may go again. A probe lets the
+/// others go on: its station is known to be silent, and its address tells a late reply apart.
+void Arbiter::quarantine(TimePoint now, const Group& group, Station& station) {
+    station.not_before = now + station.late.value();
+    if (settings_.quarantine == Quarantine::line && !group.probe) {
+        quarantined_until_ = std::max(quarantined_until_, station.not_before);
+    }
+}
+
+void Arbiter::went_silent(TimePoint now, const Group& group, Station& station) {
+    if (!station.health.on_silence(now)) return;
+    actions_.push_back(StationEvent{StationEvent::Kind::offline, group.station, {}});
+    for (const Job& job :
+         queue_.remove_if([&](const Job& j) { return j.station == group.station; })) {
+        finish(job, Fault::offline);
+    }
+}
+
+bool Arbiter::may_retry(TimePoint now, const Group& group, const Station& station) const {
+    if (group.jobs.empty() || station.health.offline()) return false;
+    const bool harmless = modbus::is_pure_read(group.pdu) || station.settings.retry_writes;
+    const bool in_time = std::any_of(group.jobs.begin(), group.jobs.end(),
+                                     [&](const Job& job) { return now < job.start_by; });
+    return harmless && in_time && group.attempts <= station.settings.retries;
+}
+
+void Arbiter::close_active(TimePoint now) {
+    const TimePoint end =
+        std::max({active_->sent, active_->last_byte, std::min(now, active_->longest)});
+    line_counters_.busy += end - active_->started + gap_of(active_->group.station);
+    active_.reset();
+}
+
+void Arbiter::finish(const Job& job, Result<Bytes> pdu, bool shared) {
+    actions_.push_back(Finish{job.ticket, std::move(pdu), job.attempts > 0, shared});
+}
+
+std::optional<Action> Arbiter::poll_action() {
+    if (actions_.empty()) return std::nullopt;
+    Action action = std::move(actions_.front());
+    actions_.pop_front();
+    return action;
+}
+
+/// Request, gap, and the shortest thing a station can say.
+Duration Arbiter::shortest_transaction(const Job& job) const {
+    const std::size_t request = job.pdu.size() + kAduOverhead;
+    if (job.station == kBroadcast) return wire_time(settings_.serial, request);
+    return wire_time(settings_.serial, request + kShortestReplyAdu) +
+           silent_interval(settings_.serial);
+}
+
+const StationSettings& Arbiter::settings_of(std::uint8_t station) const {
+    const auto found = configured_.find(station);
+    return found == configured_.end() ? settings_.unlisted : found->second;
+}
+
+Arbiter::Station& Arbiter::station_of(std::uint8_t id) {
+    const auto found = stations_.find(id);
+    if (found != stations_.end()) return found->second;
+    const StationSettings& settings = settings_of(id);
+    return stations_.try_emplace(id, settings, settings_.offline).first->second;
+}
+
+StationHealth Arbiter::health(std::uint8_t id) const {
+    const auto found = stations_.find(id);
+    return found == stations_.end() ? StationHealth(settings_.offline) : found->second.health;
+}
+
+StationCounters& Arbiter::counters_of(std::uint8_t station) {
+    const auto found = counters_.find(station);
+    return found == counters_.end() ? counters_[kUnlisted] : found->second;
+}
+
+Duration Arbiter::gap_of(std::uint8_t station) const {
+    return std::max(settings_of(station).frame_gap, silent_interval(settings_.serial));
+}
+
+}  // namespace panelgate::arbiter
