@@ -169,10 +169,10 @@ TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
     line->reply.clear();
     bus->start();
     std::vector<Fault> faults;
-    for (int i = 0; i < 3; ++i) {
+    for (const char* pdu : {"03 00 00 00 01", "03 00 10 00 01", "03 00 20 00 01"}) {
         Request request;
         request.station = 17;
-        request.pdu = kRead;
+        request.pdu = from_hex(pdu).value();
         bus->transact(std::move(request),
                       [&](const Answer& a) { faults.push_back(a.pdu.error()); });
     }
