@@ -69,16 +69,29 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(client.ask(1, read_registers(9)), holding(9))  # all is quiet again
             self.assertEqual([f.bytes for f in bus.frames(2)], [harness.rtu(2, write_register(4, 5))])
 
-    def test_other_clients_are_answered_between_its_attempts(self):
-        with gateway_and_bus({1: echo_address}) as (program, bus), \
-                program.client() as patient, program.client() as other:
+    def test_other_clients_are_answered_when_no_late_reply_can_come(self):
+        with gateway_and_bus({1: echo_address}) as (program, bus), contextlib.ExitStack() as stack:
+            patient, *others = [stack.enter_context(program.client()) for _ in range(4)]
             patient.send(2, read_registers(0))
-            for attempt in range(1, RETRIES + 2):
-                bus.wait_for(attempt, station=2)
-                self.assertEqual(other.ask(1, read_registers(attempt)), holding(attempt))
+            bus.wait_for(1, station=2)
+            for address, other in enumerate(others, 20):
+                other.send(1, read_registers(2 * address))
             self.assertEqual(patient.receive()[2], fault(3, NO_REPLY))
-            order = [f.bytes[0] for f in bus.frames()][1:]
-            self.assertEqual(order, [2, 1] * (RETRIES + 1))
+            for address, other in enumerate(others, 20):
+                self.assertEqual(other.receive()[2], holding(2 * address))
+            frames = bus.frames()[1:]
+            self.assertEqual([f.bytes[0] for f in frames], [2] * (RETRIES + 1) + [1] * len(others))
+            last_attempt, first_other = frames[RETRIES:RETRIES + 2]
+            self.assertGreaterEqual(first_other.at - last_attempt.at, TIMEOUT * 5 / 6)
+
+    def test_a_late_reply_never_answers_a_later_request(self):
+        late = [None] * (RETRIES + 1)
+        with gateway_and_bus({1: echo_address, 2: scripted(*late, echo_address)}) as (program, bus), \
+                program.client() as client:
+            self.assertEqual(client.ask(2, read_registers(3)), fault(3, NO_REPLY))
+            bus.inject(harness.rtu(2, holding(3)))
+            for address in range(9, 12):
+                self.assertEqual(client.ask(2, read_registers(address)), holding(address))
 
     def test_a_reply_in_time_of_the_second_attempt_is_the_answer(self):
         with gateway_and_bus({1: echo_address, 2: scripted(None, echo_address)}) as (program, bus), \

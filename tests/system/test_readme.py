@@ -1,0 +1,89 @@
+"""What README.md shows is what happens. Each of its code blocks is marked with how it is tested:
+
+script         the files that it calls exist; they are run by people and by CI, not from here
+demo           pasted into a shell beside a running demo (on other ports)
+program        pasted into a shell with the built panelgate in PATH
+config         a valid configuration
+config-errors  exactly what `check` prints for that configuration, with the faults it speaks of
+"""
+import os
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import harness
+from harness import ROOT
+
+README = (ROOT / "README.md").read_text()
+BLOCKS = re.findall(r"(?ms)^(?:<!-- test: (\S+) -->\n)?```(\w*)\n(.*?)^```$", README)
+
+
+def blocks(mark):
+    found = [text for marked, _, text in BLOCKS if marked == mark]
+    assert found, f"README.md has no block '{mark}'"
+    return found
+
+
+def commands(mark):
+    lines = [line for text in blocks(mark) for line in text.splitlines()]
+    return [line for line in lines if line and not line.startswith("#")]
+
+
+class Readme(unittest.TestCase):
+    def paste(self, command, path=None):
+        environment = {**os.environ, "PATH": f"{path or ''}:{os.environ['PATH']}"}
+        done = subprocess.run(["bash", "-o", "pipefail", "-c", command], capture_output=True,
+                              text=True, timeout=harness.PATIENCE, check=False, cwd=ROOT,
+                              env=environment)
+        self.assertEqual(done.returncode, 0, f"{command}\n{done.stdout}{done.stderr}")
+        return done.stdout
+
+    def test_every_block_of_commands_and_yaml_is_tested(self):
+        self.assertEqual([text for mark, kind, text in BLOCKS
+                          if kind in ("sh", "yaml") and not mark], [])
+
+    def test_it_is_short(self):
+        self.assertLessEqual(len(README.splitlines()), 200)
+
+    def test_scripts_and_files_that_it_names_exist(self):
+        named = re.findall(r"\b(?:deploy|tests|config|src)/[\w./-]*\w|\.ci/run", README)
+        self.assertTrue(named)
+        for path in named:
+            self.assertTrue((ROOT / path).exists(), path)
+        presets = re.findall(r"--preset (\w+)", " ".join(commands("script")))
+        for preset in presets:
+            self.assertIn(f'"name": "{preset}"', (ROOT / "CMakePresets.json").read_text())
+
+    def test_the_demos_commands_work(self):
+        with harness.demo() as program:
+            for command in commands("demo"):
+                with self.subTest(command=command):
+                    moved = command.replace(":8080", f":{program.http_port()}")
+                    moved = moved.replace("-p 1502", f"-p {program.modbus_port()}")
+                    self.assertNotEqual(moved, command)
+                    self.assertNotRegex(self.paste(moved), r'"status":[45]\d\d')
+
+    def test_the_programs_commands_work(self):
+        with tempfile.TemporaryDirectory() as folder:
+            os.symlink(harness.PANELGATE, pathlib.Path(folder) / "panelgate")
+            for command in commands("program"):
+                with self.subTest(command=command):
+                    self.assertNotEqual(self.paste(command, folder), "")
+
+    def test_its_configuration_is_valid_and_its_sample_errors_are_exact(self):
+        [good] = blocks("config")
+        [expected] = blocks("config-errors")
+        bad = good.replace("baud:", "bauds:").replace("500ms", "500")
+        with tempfile.TemporaryDirectory() as folder:
+            (pathlib.Path(folder) / "good.yaml").write_text(good)
+            (pathlib.Path(folder) / "panelgate.yaml").write_text(bad)
+            checked = harness.run("check", "-c", "good.yaml", cwd=folder)
+            self.assertEqual(checked.returncode, 0, checked.stderr)
+            checked = harness.run("check", "-c", "panelgate.yaml", cwd=folder)
+            self.assertEqual((checked.returncode, checked.stderr), (78, expected))
+
+
+if __name__ == "__main__":
+    unittest.main()
