@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace panelgate::yaml {
@@ -21,15 +22,24 @@ struct Problem {
 /// "FILE:LINE:COLUMN: message" (contract 2).
 std::string format(const Problem& problem);
 
-/// Collects every problem of one file, in the order found.
+/// Collects every problem of one file, and of the files it names, in the order found.
 class Problems {
   public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
     void add(Mark mark, std::string message) { list_.push_back({file_, mark, std::move(message)}); }
+    /// Those of another file that this one names; they keep their file.
+    void add(const Problems& other) {
+        list_.insert(list_.end(), other.list_.begin(), other.list_.end());
+    }
+    /// Those of another file, under their own name.
+    void take(const Problems& other) {
+        list_.insert(list_.end(), other.list_.begin(), other.list_.end());
+    }
     bool empty() const { return list_.empty(); }
     const std::vector<Problem>& list() const { return list_; }
     const std::string& file() const { return file_; }
-    /// Sorted by line and column, one line each, each ended by '\n'.
+    /// This file's first, then those of other files; sorted by line and column, one line each, each
+    /// ended by '\n'.
     std::string text() const;
 
   private:
@@ -45,9 +55,9 @@ struct Node {
     enum class Kind { null, scalar, sequence, map };
 
     Kind kind = Kind::null;
-    Mark mark;             ///< of a null in a map: its key's mark
-    std::string scalar;    ///< Kind::scalar
-    bool quoted = false;   ///< the scalar stood in quotes: it is text, never a number
+    Mark mark;                   ///< of a null in a map: its key's mark
+    std::string scalar;          ///< Kind::scalar
+    bool quoted = false;         ///< the scalar stood in quotes: it is text, never a number
     std::vector<Node> items;     ///< Kind::sequence
     std::vector<Entry> entries;  ///< Kind::map
 };
@@ -58,9 +68,10 @@ struct Entry {
     Node value;
 };
 
-/// Parses one YAML document. Syntax errors, duplicate keys, non-scalar keys, more than one document,
-/// aliases that grow beyond 100000 nodes and nesting deeper than 64 are added to `problems`; the
-/// result is then whatever could be read (a null node if nothing).
+/// Parses one YAML document. Syntax errors, duplicate keys, non-scalar keys, tags, more than one
+/// document, more than 100000 nodes (aliases counted as what they stand for) and nesting deeper
+/// than 64 are added to `problems`; the result is then whatever could be read (a null node if
+/// nothing).
 Node parse(std::string_view text, Problems& problems);
 
 }  // namespace panelgate::yaml

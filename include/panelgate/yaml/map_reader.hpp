@@ -13,10 +13,11 @@
 
 namespace panelgate::yaml {
 
-/// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key is
-/// absent and when its value is wrong; a wrong value has then been added to the problems with its
-/// place and what would be right. finish() reports the keys nobody asked for, each with the nearest
-/// known one, so ask for every key you know before it. Does not own the node or the problems.
+/// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key
+/// is absent and when its value is wrong; a wrong value has then been added to the problems with
+/// its place and what would be right. finish() reports the keys nobody asked for, each with the
+/// nearest known one, so ask for every key you know before it. Does not own the node or the
+/// problems.
 class MapReader {
   public:
     /// `what` names the map in messages: "a line", "serial". A node that is not a map is a problem.
@@ -30,14 +31,15 @@ class MapReader {
     std::optional<std::string> text(std::string_view key);
     /// As text(), and its absence is a problem.
     std::optional<std::string> required_text(std::string_view key);
-    /// A decimal integer without leading zeros, inside [min, max].
+    /// A decimal integer without leading zeros or quotes, inside [min, max].
     std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max);
     std::optional<std::int64_t> required_integer(std::string_view key, std::int64_t min,
                                                  std::int64_t max);
     std::optional<double> number(std::string_view key);
     /// `true` or `false`, nothing else (no yes, no on).
     std::optional<bool> boolean(std::string_view key);
-    /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a unit.
+    /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a
+    /// unit.
     std::optional<Duration> duration(std::string_view key, Duration min, Duration max);
     /// One of the words; anything else is a problem that lists them (and the nearest).
     template <class T>
@@ -70,6 +72,7 @@ class MapReader {
   private:
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
+    bool require(std::string_view key);
 
     const Node* node_;
     Problems* problems_;
@@ -78,9 +81,10 @@ class MapReader {
 };
 
 /// The text forms above, for scalars that are not map values. Nothing when the text is not one.
+/// Units: us, ms, s, min.
 std::optional<Duration> parse_duration(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
-/// The shortest exact form: 1500ms, 2s, 250us.
+/// In the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
 std::string format_duration(Duration duration);
 
 }  // namespace panelgate::yaml

@@ -1,0 +1,227 @@
+#include "panelgate/yaml/map_reader.hpp"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <string>
+
+namespace panelgate::yaml {
+namespace {
+
+using ::testing::IsEmpty;
+
+enum class Fruit { apple, pear };
+constexpr std::array<std::pair<std::string_view, Fruit>, 2> kFruits{
+    {{"apple", Fruit::apple}, {"pear", Fruit::pear}}};
+
+/// A reader over its own document.
+class Subject {
+  public:
+    explicit Subject(std::string_view text) : node_(parse(text, problems_)) {}
+
+    MapReader& read() { return reader_; }
+    std::string problems() const { return problems_.text(); }
+
+  private:
+    Problems problems_{"f"};
+    Node node_;
+    MapReader reader_{node_, problems_, "thing"};
+};
+
+TEST(MapReader, ReadsTextQuotedOrNot) {
+    Subject s("a: 010\nb: '010'\n");
+    EXPECT_EQ(s.read().text("a"), "010");
+    EXPECT_EQ(s.read().text("b"), "010");
+    EXPECT_EQ(s.read().text("absent"), std::nullopt);
+    EXPECT_THAT(s.problems(), IsEmpty());
+}
+
+TEST(MapReader, RefusesTextThatIsEmptyOrNoScalar) {
+    Subject s("a: ''\nb:\nc: [1]\n");
+    for (const char* key : {"a", "b", "c"}) EXPECT_EQ(s.read().text(key), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:1:4: a must not be empty\n"
+              "f:2:1: b has no value; it must be a text\n"
+              "f:3:4: c must be a text, not a list\n");
+}
+
+TEST(MapReader, TellsWhichRequiredKeyIsMissing) {
+    Subject s("  a: 1\n");
+    EXPECT_EQ(s.read().required_text("name"), std::nullopt);
+    EXPECT_EQ(s.read().required_integer("id", 1, 9), std::nullopt);
+    EXPECT_EQ(s.read().required_integer("a", 1, 9), 1);
+    EXPECT_EQ(s.read().required_text("a"), "1");
+    EXPECT_EQ(s.problems(), "f:1:3: thing needs 'name'\nf:1:3: thing needs 'id'\n");
+}
+
+TEST(MapReader, ReadsWholeNumbersInRange) {
+    Subject s("a: 0\nb: -5\nc: 4096\n");
+    EXPECT_EQ(s.read().integer("a", 0, 9), 0);
+    EXPECT_EQ(s.read().integer("b", -5, 9), -5);
+    EXPECT_EQ(s.read().integer("c", 1, 4096), 4096);
+    EXPECT_THAT(s.problems(), IsEmpty());
+}
+
+TEST(MapReader, RefusesEveryOtherSpellingOfANumber) {
+    Subject s("a: 10\nb: 007\nc: '7'\nd: 0x7\ne: 7.0\nf: many\ng: 99999999999999999999\nh:\n");
+    for (const char* key : {"a", "b", "c", "d", "e", "f", "g", "h"})
+        EXPECT_EQ(s.read().integer(key, 1, 9), std::nullopt) << key;
+    EXPECT_EQ(s.problems(),
+              "f:1:4: a must be a whole number from 1 to 9, not '10'\n"
+              "f:2:4: b must be a whole number from 1 to 9, not '007' (no leading zeros)\n"
+              "f:3:4: c must be a whole number from 1 to 9, not '7' in quotes\n"
+              "f:4:4: d must be a whole number from 1 to 9, not '0x7'\n"
+              "f:5:4: e must be a whole number from 1 to 9, not '7.0'\n"
+              "f:6:4: f must be a whole number from 1 to 9, not 'many'\n"
+              "f:7:4: g must be a whole number from 1 to 9, not '99999999999999999999'\n"
+              "f:8:1: h has no value; it must be a whole number from 1 to 9\n");
+}
+
+TEST(MapReader, ReadsNumbersWithAFraction) {
+    Subject s("a: 0.1\nb: -3\nc: 1e3\nd: 00.5\ne: nan\nf: '1'\ng: 1,5\nh: -01\n");
+    EXPECT_EQ(s.read().number("a"), 0.1);
+    EXPECT_EQ(s.read().number("b"), -3.0);
+    EXPECT_EQ(s.read().number("c"), 1000.0);
+    EXPECT_THAT(s.problems(), IsEmpty());
+    for (const char* key : {"d", "e", "f", "g", "h"}) EXPECT_EQ(s.read().number(key), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:4:4: d must be a number, not '00.5' (no leading zeros)\n"
+              "f:5:4: e must be a number, not 'nan'\n"
+              "f:6:4: f must be a number, not '1'\n"
+              "f:7:4: g must be a number, not '1,5'\n"
+              "f:8:4: h must be a number, not '-01' (no leading zeros)\n");
+}
+
+TEST(MapReader, KnowsTrueAndFalseOnly) {
+    Subject s("a: true\nb: false\nc: yes\nd: 'true'\ne: True\n");
+    EXPECT_EQ(s.read().boolean("a"), true);
+    EXPECT_EQ(s.read().boolean("b"), false);
+    for (const char* key : {"c", "d", "e"}) EXPECT_EQ(s.read().boolean(key), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:3:4: c must be true or false, not 'yes'\n"
+              "f:4:4: d must be true or false, not 'true'\n"
+              "f:5:4: e must be true or false, not 'True'\n");
+}
+
+TEST(MapReader, ReadsDurationsWithTheirUnit) {
+    Subject s("a: 250us\nb: 20ms\nc: 2s\nd: 5min\n");
+    EXPECT_EQ(s.read().duration("a", 0s, 10min), Duration(250us));
+    EXPECT_EQ(s.read().duration("b", 0s, 10min), Duration(20ms));
+    EXPECT_EQ(s.read().duration("c", 0s, 10min), Duration(2s));
+    EXPECT_EQ(s.read().duration("d", 0s, 10min), Duration(5min));
+    EXPECT_THAT(s.problems(), IsEmpty());
+}
+
+TEST(MapReader, AsksForTheUnitOfABareNumber) {
+    Subject s("response_timeout: 300\nb: 3 s\nc: 11min\nd: 1.5s\ne: fast\n");
+    for (const char* key : {"response_timeout", "b", "c", "d", "e"})
+        EXPECT_EQ(s.read().duration(key, 1ms, 10min), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:1:19: response_timeout must be a duration such as 300ms, not '300' (add a unit: "
+              "us, ms, s, min)\n"
+              "f:2:4: b must be a duration such as 300ms, not '3 s'\n"
+              "f:3:4: c must be from 1ms to 10min, not '11min'\n"
+              "f:4:4: d must be a duration such as 300ms, not '1.5s'\n"
+              "f:5:4: e must be a duration such as 300ms, not 'fast'\n");
+}
+
+TEST(MapReader, ReadsOneOfTheWords) {
+    Subject s("a: pear\nb: peer\nc: stone\nd:\n");
+    EXPECT_EQ(s.read().choice<Fruit>("a", kFruits), Fruit::pear);
+    EXPECT_EQ(s.read().choice<Fruit>("absent", kFruits), std::nullopt);
+    for (const char* key : {"b", "c", "d"})
+        EXPECT_EQ(s.read().choice<Fruit>(key, kFruits), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:2:4: b must be apple or pear, not 'peer'; did you mean 'pear'?\n"
+              "f:3:4: c must be apple or pear, not 'stone'\n"
+              "f:4:1: d has no value; it must be apple or pear\n");
+}
+
+TEST(MapReader, HandsOutChildren) {
+    Subject s("a: {b: 1}\nc: [1, 2]\nd: 5\ne:\n");
+    ASSERT_NE(s.read().map("a"), nullptr);
+    EXPECT_EQ(s.read().map("a")->entries[0].key, "b");
+    ASSERT_NE(s.read().sequence("c"), nullptr);
+    EXPECT_EQ(s.read().sequence("c")->items.size(), 2U);
+    ASSERT_NE(s.read().child("d"), nullptr);
+    EXPECT_EQ(s.read().child("e"), nullptr);
+    EXPECT_EQ(s.read().map("e"), nullptr);
+    EXPECT_EQ(s.read().child("absent"), nullptr);
+    EXPECT_THAT(s.problems(), IsEmpty());
+    EXPECT_EQ(s.read().map("c"), nullptr);
+    EXPECT_EQ(s.read().sequence("d"), nullptr);
+    EXPECT_EQ(s.problems(),
+              "f:2:4: c must be a map of keys, not a list\n"
+              "f:3:4: d must be a list, not '5'\n");
+}
+
+TEST(MapReader, KnowsWhichKeysAreThere) {
+    Subject s("a: 1\nb:\n");
+    EXPECT_TRUE(s.read().has("a"));
+    EXPECT_TRUE(s.read().has("b"));
+    EXPECT_FALSE(s.read().has("c"));
+}
+
+TEST(MapReader, PointsAtValuesAndAtTheMapForAbsentKeys) {
+    Subject s("\n a: 1\n");
+    EXPECT_EQ(s.read().mark("a").column, 5);
+    EXPECT_EQ(s.read().mark("b").column, 2);
+    s.read().problem("a", "odd");
+    s.read().problem("b", "absent");
+    EXPECT_EQ(s.problems(), "f:2:2: absent\nf:2:5: odd\n");
+}
+
+TEST(MapReader, ReportsUnknownKeysWithTheNearestKnownOne) {
+    Subject s("bauds: 1\nparity: none\n");
+    s.read().integer("baud", 1, 9);
+    s.read().text("parity");
+    s.read().finish();
+    EXPECT_EQ(s.problems(), "f:1:1: unknown key 'bauds' in thing; did you mean 'baud'?\n");
+}
+
+TEST(MapReader, ListsTheKnownKeysWhenNoneIsNear) {
+    Subject s("foo: 1\n? \"line\\nbreak\"\n: 1\n");
+    for (const char* key : {"baud", "data_bits", "parity", "stop_bits"}) s.read().text(key);
+    s.read().finish();
+    EXPECT_EQ(s.problems(),
+              "f:1:1: unknown key 'foo' in thing; known keys are baud, data_bits, parity, "
+              "stop_bits\n"
+              "f:2:3: unknown key 'line break' in thing; known keys are baud, data_bits, parity, "
+              "stop_bits\n");
+}
+
+TEST(MapReader, TellsOnceThatANodeIsNoMap) {
+    Subject s("[1, 2]\n");
+    EXPECT_EQ(s.read().required_text("name"), std::nullopt);
+    EXPECT_EQ(s.read().integer("id", 1, 2), std::nullopt);
+    s.read().finish();
+    EXPECT_EQ(s.problems(), "f:1:1: thing must be a map of keys, not a list\n");
+}
+
+TEST(TextForms, ParseIntegersStrictly) {
+    EXPECT_EQ(parse_integer("0"), 0);
+    EXPECT_EQ(parse_integer("-12"), -12);
+    EXPECT_EQ(parse_integer("9223372036854775807"), INT64_MAX);
+    for (const char* text : {"", "-", "+1", "01", "-01", "1 ", " 1", "1e3", "9223372036854775808"})
+        EXPECT_EQ(parse_integer(text), std::nullopt) << text;
+}
+
+TEST(TextForms, ParseDurationsStrictly) {
+    EXPECT_EQ(parse_duration("0ms"), Duration(0));
+    EXPECT_EQ(parse_duration("90min"), Duration(90min));
+    for (const char* text : {"", "ms", "5", "5h", "5ns", "05ms", "-5ms", "5 ms", "5MS",
+                             "999999999999s", "99999999999999999999s"})
+        EXPECT_EQ(parse_duration(text), std::nullopt) << text;
+}
+
+TEST(TextForms, FormatDurationsInTheLargestExactUnit) {
+    EXPECT_EQ(format_duration(0s), "0ms");
+    EXPECT_EQ(format_duration(1500ms), "1500ms");
+    EXPECT_EQ(format_duration(2s), "2s");
+    EXPECT_EQ(format_duration(250us), "250us");
+    EXPECT_EQ(format_duration(10min), "10min");
+    EXPECT_EQ(format_duration(2005209ns), "2005209ns");
+}
+
+}  // namespace
+}  // namespace panelgate::yaml
