@@ -22,7 +22,7 @@ namespace {
 /// `started` is told the gateway once it serves.
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
-    rt::set_up_log(config.log.level, config.log.format);
+    rt::set_up_log(config.log);
     boost::asio::io_context io(1);
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {

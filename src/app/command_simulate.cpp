@@ -48,7 +48,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     std::map<std::string, std::string> links;
     if (!parse_links(texts, *loaded.config, links)) return kUsage;
 
-    rt::set_up_log(loaded.config->log.level, loaded.config->log.format);
+    rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
     std::vector<std::unique_ptr<sim::SimulatedBus>> buses;
     std::vector<std::unique_ptr<PtyLink>> made;

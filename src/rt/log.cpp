@@ -1,6 +1,7 @@
 #include "panelgate/rt/log.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -61,10 +62,10 @@ std::string text_value(const std::string& value) {
 
 }  // namespace
 
-void set_up_log(LogLevel level, LogFormat format) {
-    g_format = format;
-    logger().set_level(level_of(level));
-    const bool json = format == LogFormat::json;
+void set_up_log(const LogSettings& settings) {
+    g_format = settings.format;
+    logger().set_level(level_of(settings.level));
+    const bool json = settings.format == LogFormat::json;
     logger().set_formatter(std::make_unique<spdlog::pattern_formatter>(
         json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})"
              : "%Y-%m-%dT%H:%M:%S.%eZ %l %v",

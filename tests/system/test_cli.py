@@ -13,6 +13,7 @@ GOOD = """\
 lines:
   - name: floor1
     device: sim
+    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
     stations:
       - {id: 31, name: press, profile: autonics-gplp-s}
 modbus_tcp:

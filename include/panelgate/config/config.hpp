@@ -9,6 +9,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
+#include "panelgate/rt/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/settings.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -32,21 +33,15 @@ struct Line {
     std::vector<Station> stations;
 };
 
-struct Log {
-    enum class Level : std::uint8_t { error, warn, info, debug, trace };
-    enum class Format : std::uint8_t { text, json };
-    Level level = Level::info;
-    Format format = Format::text;
-};
-
 /// A valid configuration (contract 3): every default filled in, every reference resolved.
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
     std::vector<Line> lines;
     std::vector<tcp_server::Settings> modbus_tcp;
     std::optional<web::Settings> http;
-    Log log;
-    /// Things that are legal but worth a word ("8N1 is outside the standard"), FILE:LINE:COLUMN text.
+    rt::LogSettings log;
+    /// Things that are legal but worth a word ("8N1 is outside the standard"), FILE:LINE:COLUMN
+    /// text.
     std::vector<std::string> warnings;
 };
 

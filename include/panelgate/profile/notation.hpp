@@ -25,14 +25,15 @@ struct NotationError {
 [[noreturn]] void throw_exception_from_error(const NotationError& error,
                                              const boost::source_location& where);
 
-/// "UB180" -> area UB, address 288. Letters in any case; UB00180 = UB180. A text no area understands
-/// says which notations the panel has; a number outside says what the range is.
+/// "UB180" -> area UB, address 288. Letters in any case; UB00180 = UB180. A text no area
+/// understands says which notations the panel has; a number outside says what the range is.
 boost::system::result<Item, NotationError> parse_notation(const PanelProfile& profile,
                                                           std::string_view text);
 
 /// The canonical notation of an item of this area: 288 -> "UB180". The address must be readable.
 std::string format_notation(const Area& area, std::uint16_t address);
 /// In the first area that reaches the item; "" when none does.
-std::string format_notation(const PanelProfile& profile, modbus::Table table, std::uint16_t address);
+std::string format_notation(const PanelProfile& profile, modbus::Table table,
+                            std::uint16_t address);
 
 }  // namespace panelgate::profile

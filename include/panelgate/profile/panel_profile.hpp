@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
@@ -12,9 +13,9 @@ namespace panelgate::profile {
 
 /// How the bit part of a notation is written.
 enum class BitDigits : std::uint8_t {
-    none,      ///< the number is the item: UW100, GDT108, 400001
-    hex,       ///< decimal word, one hex digit for the bit: UB180 = word 18 bit 0, GR12F
-    decimal,   ///< decimal word, '.', two decimal digits: W127.15
+    none,     ///< the number is the item: UW100, GDT108, 400001
+    hex,      ///< decimal word, one hex digit for the bit: UB180 = word 18 bit 0, GR12F
+    decimal,  ///< decimal word, '.', two decimal digits: W127.15
 };
 
 /// The grammar of one area's notation: PREFIX NUMBER [BIT].
@@ -71,13 +72,20 @@ struct Serial {
 
 struct Timing {
     double frame_gap_characters = 3.5;  ///< GT: 4
-    unsigned max_gap_bits = 0;          ///< the panel ignores a request with a longer pause inside; 0 = not given
+    unsigned max_gap_bits =
+        0;  ///< the panel ignores a request with a longer pause inside; 0 = not given
     std::string source;
 };
 
 struct ExceptionMeaning {
     std::uint8_t code = 0;
     std::string meaning;  ///< as the manual words it
+};
+
+/// A notation that people try and that no function reaches, and why.
+struct Unreachable {
+    std::string prefix;
+    std::string reason;
 };
 
 /// Values a simulated panel starts with, and which of them move.
@@ -98,13 +106,14 @@ struct Simulation {
     };
     std::vector<Cell> memory;
     std::vector<Motion> motion;
-    /// What a write into a protected part of a readable area is answered: the GP manuals allow both.
+    /// What a write into a protected part of a readable area is answered: the GP manuals allow
+    /// both.
     std::uint8_t protected_exception = 3;
 };
 
 /// What the manual of one panel family says. Data only: config/profiles/NAME.yaml.
 struct PanelProfile {
-    std::string name;         ///< file name without ending: "autonics-gplp-s"
+    std::string name;  ///< file name without ending: "autonics-gplp-s"
     std::string description;
     std::string manual;
     std::uint8_t first_station = 1;
@@ -114,6 +123,7 @@ struct PanelProfile {
     std::vector<Area> areas;
     Timing timing;
     std::vector<ExceptionMeaning> exceptions;
+    std::vector<Unreachable> unreachable;
     Simulation simulation;
 
     const FunctionRule* find_function(std::uint8_t code) const;

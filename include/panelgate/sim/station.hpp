@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
+#include <memory>
 #include <string>
-#include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
@@ -16,8 +15,11 @@ namespace panelgate::sim {
 class Station {
   public:
     Station(const profile::PanelProfile& profile, std::uint8_t id);
+    Station(Station&&) noexcept;
+    Station& operator=(Station&&) noexcept;
+    ~Station();
 
-    std::uint8_t id() const { return id_; }
+    std::uint8_t id() const;
 
     /// The reply PDU to a request PDU: normal or exception. `now` moves what moves (ramps, clocks).
     /// `wall` is local wall-clock time as seconds since 1970, for clock registers.
@@ -25,19 +27,13 @@ class Station {
     /// A broadcast: executed when the profile lets the function be broadcast, never answered.
     void broadcast(TimePoint now, std::int64_t wall, ByteView pdu);
 
-    /// Memory by area name; bits are 0 or 1. For tests and start values.
+    /// Memory by area name; bits are 0 or 1. The area and the address must be the profile's.
     std::uint16_t peek(const std::string& area, std::uint32_t address) const;
     void poke(const std::string& area, std::uint32_t address, std::uint16_t value);
 
   private:
-    Bytes execute(ByteView pdu);
-    void move(TimePoint now, std::int64_t wall);
-
-    const profile::PanelProfile& profile_;
-    std::uint8_t id_;
-    std::map<std::string, std::vector<std::uint16_t>> words_;  ///< by area; bit areas one word a bit
-    TimePoint started_{};
-    bool running_ = false;
+    struct State;
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace panelgate::sim

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace panelgate::config {
+
+struct Endpoint {
+    std::string address;  ///< IPv4 or IPv6, in text, without brackets
+    std::uint16_t port = 0;
+};
+
+/// "127.0.0.1:502", "[::1]:502"; nothing on anything else (names are not looked up).
+std::optional<Endpoint> parse_endpoint(std::string_view text);
+
+/// "10.0.0.0/8" or a bare address: address and prefix length; nothing on anything else.
+struct Cidr {
+    std::string address;
+    unsigned prefix = 0;
+};
+std::optional<Cidr> parse_cidr(std::string_view text);
+
+}  // namespace panelgate::config

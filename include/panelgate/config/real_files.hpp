@@ -1,0 +1,14 @@
+#pragma once
+
+#include "panelgate/config/config.hpp"
+
+namespace panelgate::config {
+
+/// Files of the real file system. After a failed read errno says why.
+class RealFiles final : public Files {
+  public:
+    std::optional<std::string> read(const std::string& path) const override;
+    std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const override;
+};
+
+}  // namespace panelgate::config

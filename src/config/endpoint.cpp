@@ -1,0 +1,48 @@
+#include "panelgate/config/endpoint.hpp"
+
+#include <arpa/inet.h>
+
+#include <array>
+
+#include "panelgate/yaml/map_reader.hpp"
+
+namespace panelgate::config {
+namespace {
+
+/// 32 or 128 for an address of that family, 0 for anything else.
+unsigned bits_of_address(const std::string& text) {
+    std::array<unsigned char, 16> buffer{};
+    if (inet_pton(AF_INET, text.c_str(), buffer.data()) == 1) return 32;
+    if (inet_pton(AF_INET6, text.c_str(), buffer.data()) == 1) return 128;
+    return 0;
+}
+
+}  // namespace
+
+std::optional<Endpoint> parse_endpoint(std::string_view text) {
+    const std::size_t colon = text.rfind(':');
+    if (colon == std::string_view::npos) return std::nullopt;
+    const auto port = yaml::parse_integer(text.substr(colon + 1));
+    std::string address(text.substr(0, colon));
+    const bool bracketed = address.size() > 2 && address.front() == '[' && address.back() == ']';
+    if (bracketed) address = address.substr(1, address.size() - 2);
+    const unsigned bits = bits_of_address(address);
+    if (!port || *port < 0 || *port > 65535 || bits == 0 || bracketed != (bits == 128))
+        return std::nullopt;
+    return Endpoint{std::move(address), static_cast<std::uint16_t>(*port)};
+}
+
+std::optional<Cidr> parse_cidr(std::string_view text) {
+    const std::size_t slash = text.find('/');
+    Cidr cidr{std::string(text.substr(0, slash)), 0};
+    const unsigned bits = bits_of_address(cidr.address);
+    if (bits == 0) return std::nullopt;
+    cidr.prefix = bits;
+    if (slash == std::string_view::npos) return cidr;
+    const auto prefix = yaml::parse_integer(text.substr(slash + 1));
+    if (!prefix || *prefix < 0 || *prefix > bits) return std::nullopt;
+    cidr.prefix = static_cast<unsigned>(*prefix);
+    return cidr;
+}
+
+}  // namespace panelgate::config

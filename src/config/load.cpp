@@ -1,0 +1,94 @@
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "loader.hpp"
+#include "panelgate/config/config.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using yaml::MapReader;
+
+constexpr std::array<std::pair<std::string_view, rt::LogLevel>, 5> kLevels{
+    {{"error", rt::LogLevel::error},
+     {"warn", rt::LogLevel::warn},
+     {"info", rt::LogLevel::info},
+     {"debug", rt::LogLevel::debug},
+     {"trace", rt::LogLevel::trace}}};
+constexpr std::array<std::pair<std::string_view, rt::LogFormat>, 2> kFormats{
+    {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
+
+void load_log(Loading& loading, MapReader& root) {
+    const yaml::Node* node = root.map("log");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "log");
+    rt::LogSettings& log = loading.config.log;
+    log.level = in.choice<rt::LogLevel>("level", kLevels).value_or(log.level);
+    log.format = in.choice<rt::LogFormat>("format", kFormats).value_or(log.format);
+    in.finish();
+}
+
+/// The shipped profiles, with those of profiles_dir added or in their place.
+std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
+    auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
+    const auto dir = root.text("profiles_dir");
+    if (!dir) return catalogue;
+    const auto paths = loading.files.list_yaml(*dir);
+    if (!paths) {
+        root.problem("profiles_dir", "profiles_dir: cannot list the directory " + *dir);
+        return catalogue;
+    }
+    for (const std::string& path : *paths) {
+        const auto text = loading.files.read(path);
+        if (!text) {
+            root.problem("profiles_dir", "profiles_dir: cannot read " + path);
+            continue;
+        }
+        yaml::Problems own(path);
+        auto profile =
+            profile::load_profile(*text, std::filesystem::path(path).stem().string(), own);
+        loading.problems.take(own);
+        if (profile) catalogue->add(std::move(*profile));
+    }
+    return catalogue;
+}
+
+}  // namespace
+
+bool is_name(std::string_view text) {
+    constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
+    return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems) {
+    const yaml::Node tree = yaml::parse(text, problems);
+    if (!problems.empty()) return std::nullopt;
+    if (tree.kind == yaml::Node::Kind::null) {
+        problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
+        return std::nullopt;
+    }
+    Config config;
+    Loading loading{files, problems, config, {}};
+    MapReader root(tree, problems, "the configuration");
+    if (tree.kind != yaml::Node::Kind::map) return std::nullopt;
+    config.profiles = load_profiles(loading, root);
+    load_lines(loading, root);
+    load_modbus_tcp(loading, root);
+    load_http(loading, root);
+    load_log(loading, root);
+    if (const yaml::Node* relays = root.child("relays")) {
+        problems.add(relays->mark, "relays are not in this version; remove them");
+    }
+    if (!root.has("modbus_tcp") && !root.has("http")) {
+        problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
+    }
+    root.finish();
+    if (!problems.empty()) return std::nullopt;
+    return config;
+}
+
+}  // namespace panelgate::config

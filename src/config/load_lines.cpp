@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "load_stations.hpp"
+#include "loader.hpp"
+#include "panelgate/base/serial_format.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using yaml::MapReader;
+using yaml::Node;
+
+constexpr std::array<std::pair<std::string_view, Parity>, 3> kParities{
+    {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
+
+void load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
+    const Node* node = line.map("serial");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "serial");
+    format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
+    if (in.integer("data_bits", 7, 8) == 7) {
+        in.problem("data_bits", "data_bits must be 8: RTU needs 8, 7 is for the ASCII mode");
+    }
+    format.parity = in.choice<Parity>("parity", kParities).value_or(format.parity);
+    format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
+    in.finish();
+}
+
+void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue) {
+    const Node* node = line.map("queue");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "queue");
+    const auto limit = in.integer("limit", 1, 4096);
+    queue.limit = static_cast<std::size_t>(limit.value_or(static_cast<std::int64_t>(queue.limit)));
+    queue.per_client = std::min(queue.per_client, queue.limit);
+    const auto own = in.integer("per_client", 1, static_cast<std::int64_t>(queue.limit));
+    queue.per_client =
+        static_cast<std::size_t>(own.value_or(static_cast<std::int64_t>(queue.per_client)));
+    queue.deadline = in.duration("deadline", 10ms, 10min).value_or(queue.deadline);
+    in.finish();
+}
+
+void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& offline) {
+    const Node* node = line.map("offline");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "offline");
+    offline.after = static_cast<int>(in.integer("after", 1, 1000).value_or(offline.after));
+    offline.probe_min = in.duration("probe_min", 10ms, 1h).value_or(offline.probe_min);
+    offline.probe_max = std::max(offline.probe_max, offline.probe_min);
+    offline.probe_max =
+        in.duration("probe_max", offline.probe_min, 24h).value_or(offline.probe_max);
+    in.finish();
+}
+
+void load_rs485(Loading& loading, MapReader& line) {
+    const Node* node = line.map("rs485");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "rs485");
+    constexpr std::array<std::string_view, 3> kModes{"off", "kernel", "rts"};
+    const auto mode = in.choice_index("mode", kModes);
+    if (mode && *mode != 0) {
+        in.problem("mode",
+                   "rs485 mode '" + std::string(kModes[*mode]) +
+                       "' is not in this version; use off and an adapter that switches by itself");
+    }
+    in.finish();
+}
+
+void load_device(MapReader& in, Line& line) {
+    line.device.device = in.required_text("device").value_or("");
+    if (line.device.device == "sim") {
+        line.kind = Line::Kind::simulated;
+    } else if (line.device.device.starts_with("tcp://")) {
+        in.problem("device", "RTU over TCP is not in this version; use a serial device or sim");
+    } else if (!line.device.device.empty() && line.device.device[0] != '/') {
+        in.problem("device", "device must be an absolute path such as /dev/ttyUSB0, or sim");
+    }
+}
+
+void load_echo(MapReader& in) {
+    constexpr std::array<std::string_view, 3> kModes{"auto", "on", "off"};
+    if (in.choice_index("echo", kModes) == std::size_t{1}) {
+        in.problem("echo",
+                   "echo: on is not in this version; use an adapter that does not hear itself");
+    }
+}
+
+Line load_line(Loading& loading, const Node& node) {
+    MapReader in(node, loading.problems, "a line");
+    Line line;
+    line.name = in.required_text("name").value_or("");
+    if (!line.name.empty() && !is_name(line.name)) {
+        in.problem("name", "name must be of a-z, 0-9 and '-', not '" + line.name + '\'');
+    }
+    for (const Line& other : loading.config.lines) {
+        if (other.name == line.name) in.problem("name", "there are two lines '" + line.name + '\'');
+    }
+    load_device(in, line);
+    load_serial(loading, in, line.device.serial);
+    line.arbiter.serial = line.device.serial;
+    load_rs485(loading, in);
+    load_echo(in);
+    load_queue(loading, in, line.arbiter.queue);
+    load_offline(loading, in, line.arbiter.offline);
+    constexpr std::array<std::string_view, 2> kQuarantine{"line", "station"};
+    if (in.choice_index("quarantine", kQuarantine) == std::size_t{1}) {
+        line.arbiter.quarantine = arbiter::Quarantine::station;
+    }
+    constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
+    line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
+    load_stations(loading, in, line);
+    in.finish();
+    return line;
+}
+
+}  // namespace
+
+void load_lines(Loading& loading, MapReader& root) {
+    const Node* list = root.sequence("lines");
+    if (list == nullptr || list->items.empty()) {
+        loading.problems.add(root.mark("lines"),
+                             "a configuration needs at least one line in 'lines'");
+        return;
+    }
+    for (const Node& node : list->items) loading.config.lines.push_back(load_line(loading, node));
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,290 @@
+#include "panelgate/profile/load_profile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "load_simulation.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+
+namespace panelgate::profile {
+
+using Embedded = std::vector<std::pair<std::string_view, std::string_view>>;
+const Embedded& shipped_profiles();  // config/profiles/*.yaml, compiled in
+
+namespace {
+
+using yaml::MapReader;
+using yaml::Node;
+using yaml::Problems;
+using Tables = std::array<std::pair<std::string_view, modbus::Table>, 4>;
+
+constexpr std::uint32_t kLastAddress = 65535;
+constexpr Tables kTables{{{"coils", modbus::Table::coils},
+                          {"discrete-inputs", modbus::Table::discrete_inputs},
+                          {"input-registers", modbus::Table::input_registers},
+                          {"holding-registers", modbus::Table::holding_registers}}};
+constexpr std::array<std::pair<std::string_view, Parity>, 3> kParities{
+    {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
+constexpr std::array<std::pair<std::string_view, BitDigits>, 3> kBits{
+    {{"none", BitDigits::none}, {"hex", BitDigits::hex}, {"decimal", BitDigits::decimal}}};
+
+/// The integers of a list, each inside [min, max].
+std::vector<int> integers(MapReader& in, std::string_view key, int min, int max) {
+    std::vector<int> values;
+    const Node* list = in.sequence(key);
+    if (list == nullptr) return values;
+    for (const Node& item : list->items) {
+        const auto value = yaml::parse_integer(item.scalar);
+        if (!value || *value < min || *value > max) {
+            in.problems().add(item.mark, std::string(key) + " must list whole numbers from " +
+                                             std::to_string(min) + " to " + std::to_string(max));
+            continue;
+        }
+        values.push_back(static_cast<int>(*value));
+    }
+    return values;
+}
+
+/// The words of a list, each one of `words`.
+template <class T, std::size_t N>
+std::vector<T> choices(MapReader& in, std::string_view key,
+                       const std::array<std::pair<std::string_view, T>, N>& words) {
+    std::vector<T> values;
+    const Node* list = in.sequence(key);
+    if (list == nullptr) return values;
+    for (const Node& item : list->items) {
+        const auto found = std::find_if(words.begin(), words.end(), [&](const auto& word) {
+            return word.first == item.scalar;
+        });
+        if (found != words.end()) {
+            values.push_back(found->second);
+            continue;
+        }
+        std::string message = std::string(key) + " must list";
+        for (const auto& [name, value] : words) message += ' ' + std::string(name);
+        in.problems().add(item.mark, message);
+    }
+    return values;
+}
+
+std::optional<AddressRange> range(MapReader& in, std::string_view key) {
+    if (!in.has(key)) return std::nullopt;
+    const std::vector<int> ends = integers(in, key, 0, kLastAddress);
+    if (ends.size() != 2 || ends[0] > ends[1]) {
+        in.problem(key, std::string(key) + " must be [FIRST, LAST], two addresses from 0 to 65535");
+        return std::nullopt;
+    }
+    return AddressRange{static_cast<std::uint32_t>(ends[0]), static_cast<std::uint32_t>(ends[1])};
+}
+
+void load_stations(const Node& node, PanelProfile& profile, Problems& problems) {
+    MapReader in(node, problems, "stations");
+    profile.first_station =
+        static_cast<std::uint8_t>(in.integer("first", 1, modbus::kMaxStation).value_or(1));
+    profile.last_station =
+        static_cast<std::uint8_t>(in.integer("last", profile.first_station, modbus::kMaxStation)
+                                      .value_or(modbus::kMaxStation));
+    in.text("source");
+    in.finish();
+}
+
+void load_serial(const Node& node, Serial& serial, Problems& problems) {
+    MapReader in(node, problems, "serial");
+    serial.baud = integers(in, "baud", 50, 4'000'000);
+    serial.parity = choices(in, "parity", kParities);
+    serial.stop_bits = integers(in, "stop_bits", 1, 2);
+    serial.source = in.text("source").value_or("");
+    if (const Node* standard = in.map("default")) {
+        MapReader format(*standard, problems, "default");
+        SerialFormat& f = serial.default_format;
+        f.baud = static_cast<int>(format.integer("baud", 50, 4'000'000).value_or(f.baud));
+        f.parity = format.choice<Parity>("parity", kParities).value_or(f.parity);
+        f.stop_bits = static_cast<int>(format.integer("stop_bits", 1, 2).value_or(f.stop_bits));
+        format.finish();
+    }
+    in.finish();
+}
+
+FunctionRule load_function(const Node& node, Problems& problems) {
+    MapReader in(node, problems, "a function");
+    FunctionRule rule;
+    rule.code = static_cast<std::uint8_t>(in.required_integer("code", 1, 127).value_or(1));
+    rule.max_count = static_cast<unsigned>(in.integer("max", 1, 2040).value_or(0));
+    rule.broadcast = in.boolean("broadcast").value_or(false);
+    if (rule.broadcast && !modbus::is_broadcastable(rule.code)) {
+        in.problem("broadcast", "only functions 5, 6, 15 and 16 can be broadcast");
+    }
+    rule.source = in.text("source").value_or("");
+    in.finish();
+    return rule;
+}
+
+Notation load_notation(const Node& node, Problems& problems) {
+    MapReader in(node, problems, "notation");
+    Notation notation;
+    notation.prefix = in.required_text("prefix").value_or("?");
+    notation.bit = in.choice<BitDigits>("bit", kBits).value_or(BitDigits::none);
+    notation.base = static_cast<unsigned>(in.integer("base", 0, 1).value_or(0));
+    notation.digits = static_cast<unsigned>(in.integer("digits", 1, 6).value_or(0));
+    notation.short_digits = static_cast<unsigned>(in.integer("short_digits", 1, 6).value_or(0));
+    if (notation.bit != BitDigits::none && (notation.base != 0 || notation.digits != 0)) {
+        in.problem("bit", "a notation with a bit part has neither base nor digits");
+    }
+    in.finish();
+    return notation;
+}
+
+Area load_area(const Node& node, Problems& problems) {
+    MapReader in(node, problems, "an area");
+    Area area;
+    area.name = in.required_text("name").value_or("?");
+    area.description = in.text("description").value_or("");
+    if (const Node* notation = in.map("notation")) {
+        area.notation = load_notation(*notation, problems);
+    } else if (!in.has("notation")) {
+        problems.add(in.mark(), "an area needs 'notation'");
+    }
+    if (!in.has("table")) problems.add(in.mark(), "an area needs 'table'");
+    area.table = in.choice<modbus::Table>("table", kTables).value_or(area.table);
+    area.also = choices(in, "also", kTables);
+    if (!in.has("readable")) problems.add(in.mark(), "an area needs 'readable'");
+    area.readable = range(in, "readable").value_or(AddressRange{});
+    area.writable = range(in, "writable");
+    if (area.writable && !(area.readable.contains(area.writable->first) &&
+                           area.readable.contains(area.writable->last))) {
+        in.problem("writable", "writable must lie inside readable");
+    }
+    area.view_of = in.text("view_of").value_or("");
+    area.source = in.text("source").value_or("");
+    in.finish();
+    return area;
+}
+
+void load_areas(MapReader& in, PanelProfile& profile) {
+    const Node* list = in.sequence("areas");
+    if (list == nullptr) {
+        in.problems().add(in.mark(), "a profile needs 'areas'");
+        return;
+    }
+    for (const Node& item : list->items) {
+        Area area = load_area(item, in.problems());
+        if (profile.find_area(area.name) != nullptr) {
+            in.problems().add(item.mark, "there are two areas '" + area.name + '\'');
+        }
+        profile.areas.push_back(std::move(area));
+    }
+    for (std::size_t i = 0; i < profile.areas.size(); ++i) {
+        const std::string& base = profile.areas[i].view_of;
+        const Area* words = profile.find_area(std::string_view(base));
+        if (base.empty() || (words != nullptr && !modbus::is_bit_table(words->table))) continue;
+        in.problems().add(list->items[i].mark,
+                          "view_of must name a word area, not '" + base + '\'');
+    }
+}
+
+void load_timing(const Node& node, Timing& timing, Problems& problems) {
+    MapReader in(node, problems, "timing");
+    timing.frame_gap_characters =
+        in.number("frame_gap_characters").value_or(timing.frame_gap_characters);
+    if (timing.frame_gap_characters < 3.5 || timing.frame_gap_characters > 1000) {
+        in.problem("frame_gap_characters", "frame_gap_characters must be from 3.5 to 1000");
+    }
+    timing.max_gap_bits = static_cast<unsigned>(in.integer("max_gap_bits", 0, 10000).value_or(0));
+    timing.source = in.text("source").value_or("");
+    in.finish();
+}
+
+void load_exceptions(MapReader& in, PanelProfile& profile) {
+    const Node* list = in.sequence("exceptions");
+    if (list == nullptr) return;
+    for (const Node& item : list->items) {
+        MapReader entry(item, in.problems(), "an exception");
+        ExceptionMeaning meaning;
+        meaning.code =
+            static_cast<std::uint8_t>(entry.required_integer("code", 1, 255).value_or(1));
+        meaning.meaning = entry.required_text("meaning").value_or("");
+        entry.finish();
+        profile.exceptions.push_back(std::move(meaning));
+    }
+}
+
+void load_unreachable(MapReader& in, PanelProfile& profile) {
+    const Node* list = in.sequence("unreachable");
+    if (list == nullptr) return;
+    for (const Node& item : list->items) {
+        MapReader entry(item, in.problems(), "unreachable");
+        Unreachable hint;
+        hint.prefix = entry.required_text("prefix").value_or("?");
+        hint.reason = entry.required_text("reason").value_or("");
+        entry.finish();
+        profile.unreachable.push_back(std::move(hint));
+    }
+}
+
+void load_functions(MapReader& in, PanelProfile& profile) {
+    const Node* list = in.sequence("functions");
+    if (list == nullptr) {
+        in.problems().add(in.mark(), "a profile needs 'functions'");
+        return;
+    }
+    for (const Node& item : list->items) {
+        FunctionRule rule = load_function(item, in.problems());
+        if (profile.find_function(rule.code) != nullptr) {
+            in.problems().add(item.mark,
+                              "function " + std::to_string(rule.code) + " is there twice");
+        }
+        profile.functions.push_back(std::move(rule));
+    }
+}
+
+}  // namespace
+
+std::optional<PanelProfile> load_profile(std::string_view text, std::string name,
+                                         Problems& problems) {
+    const Node root = yaml::parse(text, problems);
+    if (!problems.empty()) return std::nullopt;
+    PanelProfile profile;
+    profile.name = std::move(name);
+    MapReader in(root, problems, "a profile");
+    profile.description = in.required_text("description").value_or("");
+    profile.manual = in.required_text("manual").value_or("");
+    if (const Node* stations = in.map("stations")) load_stations(*stations, profile, problems);
+    if (const Node* serial = in.map("serial")) load_serial(*serial, profile.serial, problems);
+    load_functions(in, profile);
+    load_areas(in, profile);
+    if (const Node* timing = in.map("timing")) load_timing(*timing, profile.timing, problems);
+    load_exceptions(in, profile);
+    load_unreachable(in, profile);
+    if (const Node* simulation = in.map("simulation"))
+        load_simulation(*simulation, profile, problems);
+    in.finish();
+    if (!problems.empty()) return std::nullopt;
+    return profile;
+}
+
+Catalogue Catalogue::shipped() {
+    Catalogue catalogue;
+    for (const auto& [name, text] : shipped_profiles()) {
+        Problems problems("config/profiles/" + std::string(name) + ".yaml");
+        auto profile = load_profile(text, std::string(name), problems);
+        if (!profile) throw std::logic_error(problems.text());
+        catalogue.add(std::move(*profile));
+    }
+    return catalogue;
+}
+
+void Catalogue::add(PanelProfile profile) {
+    std::string name = profile.name;
+    profiles_.insert_or_assign(std::move(name), std::move(profile));
+}
+
+const PanelProfile* Catalogue::find(std::string_view name) const {
+    const auto found = profiles_.find(name);
+    return found == profiles_.end() ? nullptr : &found->second;
+}
+
+}  // namespace panelgate::profile

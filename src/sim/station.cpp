@@ -1,0 +1,215 @@
+#include "panelgate/sim/station.hpp"
+
+#include <cmath>
+#include <ctime>
+#include <numbers>
+#include <utility>
+
+#include "memory.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::sim {
+namespace {
+
+using modbus::ExceptionCode;
+using profile::Area;
+using profile::Simulation;
+using Motion = Simulation::Motion;
+
+/// What register `index` (0..6) of a clock shows: second, minute, hour, day, month, year, weekday.
+std::uint16_t clock_field(std::int64_t wall, std::uint32_t index) {
+    const std::time_t seconds = wall;
+    std::tm t{};
+    gmtime_r(&seconds, &t);
+    const int fields[] = {t.tm_sec,     t.tm_min,        t.tm_hour, t.tm_mday,
+                          t.tm_mon + 1, t.tm_year % 100, t.tm_wday};
+    return static_cast<std::uint16_t>(fields[index % 7]);
+}
+
+std::uint16_t moved(const Motion& motion, Duration running, std::int64_t wall,
+                    std::uint32_t first) {
+    const double turns = to_seconds(running) / to_seconds(motion.period);
+    const double phase = turns - std::floor(turns);
+    const double span = motion.high - motion.low;
+    switch (motion.kind) {
+        case Motion::Kind::ramp:
+            return static_cast<std::uint16_t>(motion.low + span * phase);
+        case Motion::Kind::sine: {
+            const double wave = 0.5 + 0.5 * std::sin(2 * std::numbers::pi * phase);
+            return static_cast<std::uint16_t>(motion.low + span * wave);
+        }
+        case Motion::Kind::toggle:
+            return phase < 0.5 ? 0 : 1;
+        case Motion::Kind::clock:
+            return clock_field(wall, motion.address - first);
+    }
+    return 0;
+}
+
+}  // namespace
+
+struct Station::State {
+    State(const profile::PanelProfile& p, std::uint8_t station)
+        : profile(&p), id(station), memory(p) {}
+
+    Bytes refuse(std::uint8_t function, ExceptionCode code) const {
+        return modbus::encode_exception(function, code);
+    }
+    void move(TimePoint now, std::int64_t wall);
+    Bytes execute(ByteView pdu);
+    const Area* readable(const modbus::Range& range) const;
+    Bytes read(std::uint8_t function, const modbus::Range& range) const;
+    std::optional<Bytes> refuse_write(std::uint8_t function, const modbus::Range& range) const;
+    void write(ByteView pdu, const modbus::Range& range);
+    std::uint16_t written(ByteView pdu, const Area& area, std::uint32_t address,
+                          std::uint16_t index) const;
+
+    const profile::PanelProfile* profile;
+    std::uint8_t id;
+    Memory memory;
+    TimePoint started{};
+    bool running = false;
+};
+
+Station::Station(const profile::PanelProfile& profile, std::uint8_t id)
+    : state_(std::make_unique<State>(profile, id)) {
+    for (const Simulation::Cell& cell : profile.simulation.memory) {
+        for (std::uint32_t i = 0; i < cell.values.size(); ++i)
+            poke(cell.area, cell.address + i, cell.values[i]);
+    }
+}
+Station::Station(Station&&) noexcept = default;
+Station& Station::operator=(Station&&) noexcept = default;
+Station::~Station() = default;
+
+std::uint8_t Station::id() const { return state_->id; }
+
+std::uint16_t Station::peek(const std::string& area, std::uint32_t address) const {
+    return state_->memory.get(*state_->profile->find_area(std::string_view(area)), address);
+}
+
+void Station::poke(const std::string& area, std::uint32_t address, std::uint16_t value) {
+    state_->memory.set(*state_->profile->find_area(std::string_view(area)), address, value);
+}
+
+Bytes Station::handle(TimePoint now, std::int64_t wall, ByteView pdu) {
+    state_->move(now, wall);
+    return state_->execute(pdu);
+}
+
+void Station::broadcast(TimePoint now, std::int64_t wall, ByteView pdu) {
+    const profile::FunctionRule* rule =
+        pdu.empty() ? nullptr : state_->profile->find_function(pdu[0]);
+    if (rule == nullptr || !rule->broadcast) return;
+    state_->move(now, wall);
+    state_->execute(pdu);
+}
+
+void Station::State::move(TimePoint now, std::int64_t wall) {
+    if (!std::exchange(running, true)) started = now;
+    for (const Motion& motion : profile->simulation.motion) {
+        const Area& area = *profile->find_area(std::string_view(motion.area));
+        memory.set(area, motion.address, moved(motion, now - started, wall, area.readable.first));
+    }
+}
+
+/// In the order of the Application Protocol: function, quantity and structure, address, execution.
+Bytes Station::State::execute(ByteView pdu) {
+    if (pdu.empty()) return {};
+    const std::uint8_t function = pdu[0];
+    if (profile->find_function(function) == nullptr)
+        return refuse(function, ExceptionCode::illegal_function);
+    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide)) {
+        return refuse(function, ExceptionCode::illegal_data_value);
+    }
+    const modbus::Access access = modbus::access_of(pdu);
+    if (!access.read && !access.write) return refuse(function, ExceptionCode::illegal_function);
+    for (const auto& range : {access.read, access.write}) {
+        if (range && (range->count == 0 || range->count > profile->max_count(function))) {
+            return refuse(function, ExceptionCode::illegal_data_value);
+        }
+    }
+    if (function == modbus::kWriteSingleCoil && !((pdu[3] == 0xFF || pdu[3] == 0) && pdu[4] == 0)) {
+        return refuse(function, ExceptionCode::illegal_data_value);
+    }
+    if (access.read && readable(*access.read) == nullptr) {
+        return refuse(function, ExceptionCode::illegal_data_address);
+    }
+    if (access.write) {
+        if (auto refusal = refuse_write(function, *access.write)) return *refusal;
+        write(pdu, *access.write);
+        if (!access.read) {
+            return modbus::is_broadcastable(function) ? modbus::normal_write_reply(pdu)
+                                                      : Bytes(pdu.begin(), pdu.end());
+        }
+    }
+    return read(function, *access.read);
+}
+
+/// The one area that holds the whole range.
+const Area* Station::State::readable(const modbus::Range& range) const {
+    const Area* area = profile->find_area(range.table, range.address);
+    return area != nullptr && area->readable.contains(range.address, range.count) ? area : nullptr;
+}
+
+Bytes Station::State::read(std::uint8_t function, const modbus::Range& range) const {
+    const Area& area = *readable(range);
+    if (modbus::is_bit_table(range.table)) {
+        std::vector<bool> bits;
+        for (std::uint32_t i = 0; i < range.count; ++i)
+            bits.push_back(memory.get(area, range.address + i) != 0);
+        const Bytes packed = modbus::pack_bits(bits);
+        return Writer().u8(function).u8(static_cast<unsigned>(packed.size())).raw(packed).take();
+    }
+    Writer reply;
+    reply.u8(function).u8(2u * range.count);
+    for (std::uint32_t i = 0; i < range.count; ++i) reply.u16(memory.get(area, range.address + i));
+    return reply.take();
+}
+
+std::optional<Bytes> Station::State::refuse_write(std::uint8_t function,
+                                                  const modbus::Range& range) const {
+    const Area* area = readable(range);
+    if (area == nullptr) return refuse(function, ExceptionCode::illegal_data_address);
+    if (area->writable && area->writable->contains(range.address, range.count)) return std::nullopt;
+    return Bytes{static_cast<std::uint8_t>(function | modbus::kExceptionBit),
+                 profile->simulation.protected_exception};
+}
+
+/// The value that a write request carries for its `index`-th item.
+std::uint16_t Station::State::written(ByteView pdu, const Area& area, std::uint32_t address,
+                                      std::uint16_t index) const {
+    const auto word = [&](std::size_t at) {
+        return static_cast<std::uint16_t>(pdu[at] << 8 | pdu[at + 1]);
+    };
+    switch (pdu[0]) {
+        case modbus::kWriteSingleCoil:
+        case modbus::kWriteSingleRegister:
+            return word(3);
+        case modbus::kWriteMultipleCoils:
+            return pdu[6u + index / 8] >> (index % 8) & 1;
+        case modbus::kWriteMultipleRegisters:
+            return word(6u + 2u * index);
+        case modbus::kReadWriteMultipleRegisters:
+            return word(10u + 2u * index);
+        case modbus::kMaskWriteRegister: {
+            const std::uint16_t old = memory.get(area, address);
+            return static_cast<std::uint16_t>((old & word(3)) | (word(5) & ~word(3)));
+        }
+        default:
+            return 0;
+    }
+}
+
+void Station::State::write(ByteView pdu, const modbus::Range& range) {
+    const Area& area = *readable(range);
+    for (std::uint16_t i = 0; i < range.count; ++i) {
+        const std::uint32_t address = std::uint32_t{range.address} + i;
+        memory.set(area, address, written(pdu, area, address, i));
+    }
+}
+
+}  // namespace panelgate::sim
