@@ -116,7 +116,7 @@ class Demo(unittest.TestCase):
                                  text=True, timeout=harness.PATIENCE, check=False)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
 
-    def test_looking_at_the_gateway_never_uses_the_bus(self):
+    def test_P10_looking_at_the_gateway_never_uses_the_bus(self):
         before = self.program.trace(LINE)
         for path in ("/metrics", "/api/v1/lines", "/api/v1/stations", "/readyz", "/healthz"):
             self.assertEqual(self.program.get(path)[0], 200)

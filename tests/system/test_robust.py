@@ -29,11 +29,11 @@ MEMORY_LIMIT = 40 * 1024  # KiB
 
 
 class ManyClients(unittest.TestCase):
-    def test_300_connections_with_a_request_each_are_all_answered(self):
+    def test_P3_P9_300_connections_with_a_request_each_are_all_answered(self):
         with harness.configured(PATIENT) as program, contextlib.ExitStack() as stack:
             port = program.modbus_port()
             clients = [stack.enter_context(harness.Client(port)) for _ in range(CONNECTIONS)]
-            writes = [struct.pack(">BHHBH", 16, 100 + n, 1, 2, n) for n in range(CONNECTIONS // 2)]
+            writes = [struct.pack(">BHHBH", 16, 1000 + n, 1, 2, n) for n in range(CONNECTIONS // 2)]
             readers = clients[len(writes):]
             for client, write in zip(clients, writes):
                 client.send(31, write)
@@ -43,14 +43,14 @@ class ManyClients(unittest.TestCase):
                 self.assertEqual(client.receive()[2], write[:5])
             for client in readers:
                 self.assertEqual(client.receive()[2], FIVE_WORDS)
-            words = self.registers(clients[0], 100, 125) + self.registers(clients[0], 225, 25)
+            words = self.registers(clients[0], 1000, 125) + self.registers(clients[0], 1125, 25)
             self.assertEqual(words, list(range(CONNECTIONS // 2)))
 
     def registers(self, client, address, count):
         reply = client.ask(31, read_registers(address, count))
         return list(struct.unpack(f">BB{count}H", reply)[2:])
 
-    def test_sixteen_requests_in_flight_are_answered_in_order_the_next_is_busy(self):
+    def test_P3_P9_sixteen_requests_in_flight_are_answered_in_order_the_next_is_busy(self):
         with harness.configured(PATIENT) as program, program.client() as client:
             client.send_bytes(b"".join(
                 adu(n, 31, read_registers(0, 5)) for n in range(17)))

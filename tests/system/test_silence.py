@@ -55,7 +55,7 @@ def gateway_and_bus(panels):
 
 
 class SilentStation(unittest.TestCase):
-    def test_a_read_is_tried_again_then_answered_0b(self):
+    def test_P2_P3_a_read_is_tried_again_then_answered_0b(self):
         with gateway_and_bus({1: echo_address}) as (program, bus), program.client() as client:
             start = time.monotonic()
             self.assertEqual(client.ask(2, read_registers(0)), fault(3, NO_REPLY))
@@ -63,7 +63,7 @@ class SilentStation(unittest.TestCase):
             request = harness.rtu(2, read_registers(0))
             self.assertEqual([f.bytes for f in bus.frames(2)], [request] * (RETRIES + 1))
 
-    def test_a_write_is_on_the_wire_once(self):
+    def test_P2_a_write_is_on_the_wire_once(self):
         with gateway_and_bus({1: echo_address}) as (program, bus), program.client() as client:
             self.assertEqual(client.ask(2, write_register(4, 5)), fault(6, NO_REPLY))
             self.assertEqual(client.ask(1, read_registers(9)), holding(9))  # all is quiet again
@@ -84,7 +84,7 @@ class SilentStation(unittest.TestCase):
             last_attempt, first_other = frames[RETRIES:RETRIES + 2]
             self.assertGreaterEqual(first_other.at - last_attempt.at, TIMEOUT * 5 / 6)
 
-    def test_a_late_reply_never_answers_a_later_request(self):
+    def test_P1_a_late_reply_never_answers_a_later_request(self):
         late = [None] * (RETRIES + 1)
         with gateway_and_bus({1: echo_address, 2: scripted(*late, echo_address)}) as (program, bus), \
                 program.client() as client:
@@ -100,15 +100,33 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(len(bus.frames(2)), 2)
 
 
+    def test_P4_a_station_that_stays_silent_is_answered_at_once_and_comes_back(self):
+        alive = threading.Event()
+
+        def panel(frame):
+            return echo_address(frame) if alive.is_set() else None
+        with gateway_and_bus({1: echo_address, 2: panel}) as (program, bus), \
+                program.client() as client:
+            for address in range(4):  # each asked RETRIES + 1 times, until it is offline
+                self.assertEqual(client.ask(2, read_registers(address)), fault(3, NO_REPLY))
+            self.assertLess(len(bus.frames(2)), 4 * (RETRIES + 1))
+            self.assertEqual(client.ask(1, read_registers(7)), holding(7))
+            heard = len(bus.frames(2))
+            alive.set()
+            bus.wait_for(heard + 1, station=2)  # a probe
+            while (reply := client.ask(2, read_registers(5))) != holding(5):
+                self.assertEqual(reply, fault(3, NO_REPLY))
+
+
 class Noise(unittest.TestCase):
-    def test_a_damaged_reply_is_asked_again_and_never_forwarded(self):
+    def test_P1_a_damaged_reply_is_asked_again_and_never_forwarded(self):
         damaged = Raw(harness.rtu(2, holding(4711))[:-1] + b"\0")
         with gateway_and_bus({1: echo_address, 2: scripted(damaged, echo_address)}) as (program, bus), \
                 program.client() as client:
             self.assertEqual(client.ask(2, read_registers(3)), holding(3))
             self.assertEqual(len(bus.frames(2)), 2)
 
-    def test_the_reply_of_another_station_or_function_is_not_taken(self):
+    def test_P1_the_reply_of_another_station_or_function_is_not_taken(self):
         for foreign in (harness.rtu(1, holding(4711)), harness.rtu(2, b"\x04\x02\x12\x67"),
                         harness.rtu(2, holding(4711, 4711))):
             with self.subTest(foreign=foreign.hex(" ")):
@@ -154,7 +172,7 @@ class Broadcast(unittest.TestCase):
 
 
 class Device(unittest.TestCase):
-    def test_one_that_is_missing_at_start_may_come_later(self):
+    def test_P7_one_that_is_missing_at_start_may_come_later(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
             with harness.configured(CONFIG % link) as program, program.client() as client:
@@ -164,7 +182,7 @@ class Device(unittest.TestCase):
                     program.log.wait_for("line up")
                     self.assertEqual(client.ask(1, read_registers(5)), holding(5))
 
-    def test_one_that_is_unplugged_and_replugged_works_again(self):
+    def test_P7_one_that_is_unplugged_and_replugged_works_again(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
             with contextlib.ExitStack() as stack:
@@ -184,7 +202,7 @@ class Device(unittest.TestCase):
 
 
 class Ending(unittest.TestCase):
-    def test_sigterm_answers_what_is_on_the_wire(self):
+    def test_P3_sigterm_answers_what_is_on_the_wire(self):
         may_answer = threading.Event()
         self.addCleanup(may_answer.set)
 
