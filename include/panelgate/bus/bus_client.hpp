@@ -34,9 +34,9 @@ enum class Source : std::uint8_t { bus, cache };
 struct Answer {
     Result<Bytes> pdu = Fault::cancelled;
     bool transmitted = false;  ///< the request was (at least partly) on the wire at least once
-    bool shared = false;       ///< another request's transaction answered this one, too
     Source source = Source::bus;
-    Duration age{};  ///< of the value, when source is cache
+    Duration age{};       ///< of the value, when source is cache
+    bool shared = false;  ///< another request's transaction answered this one, too
 };
 using AnswerHandler = std::function<void(Answer)>;
 
