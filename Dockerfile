@@ -10,7 +10,7 @@ RUN cmake --preset release -DPANELGATE_TESTS=OFF && cmake --build --preset relea
 
 FROM debian:bookworm-slim
 COPY deploy/install_packages.sh deploy/packages.txt /tmp/deploy/
-RUN /tmp/deploy/install_packages.sh run && rm -rf /tmp/deploy /var/lib/apt/lists/*
+RUN /tmp/deploy/install_packages.sh run && rm -rf /tmp/deploy /var/lib/apt/lists/* /var/cache/apt/*
 COPY --from=build /src/build/release/panelgate /usr/bin/panelgate
 EXPOSE 502 8080
 USER 10001:10001
