@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "loader.hpp"
+#include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
 
 namespace panelgate::config {
@@ -64,11 +65,40 @@ bool is_name(std::string_view text) {
     return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
+std::optional<std::string> load_name(MapReader& in, bool required) {
+    const auto name = required ? in.required_text("name") : in.text("name");
+    if (!name || is_name(*name)) return name;
+    in.problem("name", "name must be of a-z, 0-9 and '-', not '" + *name + '\'');
+    return std::nullopt;
+}
+
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
+                         std::string_view noun) {
+    const std::string near = nearest(typed, known);
+    if (!near.empty()) return "; did you mean '" + near + "'?";
+    std::string list;
+    for (const std::string_view word : known)
+        list += (list.empty() ? "" : ", ") + std::string(word);
+    return "; known " + std::string(noun) + " are " + list;
+}
+
+std::optional<bool> load_read_only(MapReader& in) {
+    const yaml::Node* access = in.child("access");
+    if (access != nullptr && access->kind != yaml::Node::Kind::scalar) {
+        in.problem("access", "access rules are not in this version; use read_write or read_only");
+        return std::nullopt;
+    }
+    constexpr std::array<std::string_view, 2> kAccess{"read_write", "read_only"};
+    const auto chosen = in.choice_index("access", kAccess);
+    if (!chosen) return std::nullopt;
+    return *chosen == 1;
+}
+
 std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems) {
     const yaml::Node tree = yaml::parse(text, problems);
-    if (!problems.empty()) return std::nullopt;
     if (tree.kind == yaml::Node::Kind::null) {
-        problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
+        if (problems.empty())
+            problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
         return std::nullopt;
     }
     Config config;
@@ -83,9 +113,11 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     if (const yaml::Node* relays = root.child("relays")) {
         problems.add(relays->mark, "relays are not in this version; remove them");
     }
-    if (!root.has("modbus_tcp") && !root.has("http")) {
+    const yaml::Node* listeners = root.child("modbus_tcp");
+    const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
+                                                   listeners->items.empty());
+    if (is_empty && root.child("http") == nullptr)
         problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
-    }
     root.finish();
     if (!problems.empty()) return std::nullopt;
     return config;

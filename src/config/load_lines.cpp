@@ -15,17 +15,23 @@ using yaml::Node;
 constexpr std::array<std::pair<std::string_view, Parity>, 3> kParities{
     {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
 
-void load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
+/// False when there was a fault: then nothing may be concluded from the format.
+bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
+    const std::size_t before = loading.problems.list().size();
     const Node* node = line.map("serial");
-    if (node == nullptr) return;
+    if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
     format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
-    if (in.integer("data_bits", 7, 8) == 7) {
-        in.problem("data_bits", "data_bits must be 8: RTU needs 8, 7 is for the ASCII mode");
+    const auto data_bits = in.integer("data_bits", 0, 99).value_or(8);
+    if (data_bits == 7) {
+        in.problem("data_bits", "RTU needs 8 data bits; 7 is for ASCII mode");
+    } else if (data_bits != 8) {
+        in.problem("data_bits", "data_bits must be 8, not '" + std::to_string(data_bits) + '\'');
     }
     format.parity = in.choice<Parity>("parity", kParities).value_or(format.parity);
     format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
     in.finish();
+    return loading.problems.list().size() == before;
 }
 
 void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue) {
@@ -64,18 +70,25 @@ void load_rs485(Loading& loading, MapReader& line) {
         in.problem("mode",
                    "rs485 mode '" + std::string(kModes[*mode]) +
                        "' is not in this version; use off and an adapter that switches by itself");
+        return;  // its further keys belong to that mode
     }
     in.finish();
 }
 
-void load_device(MapReader& in, Line& line) {
+void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
+    for (const Line& other : loading.config.lines) {
+        if (line.device.device == "sim" || line.device.device.empty()) break;
+        if (other.device.device != line.device.device) continue;
+        in.problem("device", "line '" + other.name + "' has this device already");
+    }
     if (line.device.device == "sim") {
         line.kind = Line::Kind::simulated;
     } else if (line.device.device.starts_with("tcp://")) {
         in.problem("device", "RTU over TCP is not in this version; use a serial device or sim");
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
-        in.problem("device", "device must be an absolute path such as /dev/ttyUSB0, or sim");
+        in.problem("device", "device must be an absolute path such as /dev/ttyUSB0, or sim, not '" +
+                                 line.device.device + '\'');
     }
 }
 
@@ -83,22 +96,21 @@ void load_echo(MapReader& in) {
     constexpr std::array<std::string_view, 3> kModes{"auto", "on", "off"};
     if (in.choice_index("echo", kModes) == std::size_t{1}) {
         in.problem("echo",
-                   "echo: on is not in this version; use an adapter that does not hear itself");
+                   "echo: on is not in this version; use an adapter that does not hear itself, "
+                   "and auto or off");
     }
 }
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line");
     Line line;
-    line.name = in.required_text("name").value_or("");
-    if (!line.name.empty() && !is_name(line.name)) {
-        in.problem("name", "name must be of a-z, 0-9 and '-', not '" + line.name + '\'');
-    }
+    line.name = load_name(in, true).value_or("");
     for (const Line& other : loading.config.lines) {
-        if (other.name == line.name) in.problem("name", "there are two lines '" + line.name + '\'');
+        if (!line.name.empty() && other.name == line.name)
+            in.problem("name", "there are two lines '" + line.name + '\'');
     }
-    load_device(in, line);
-    load_serial(loading, in, line.device.serial);
+    load_device(loading, in, line);
+    const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in);
     load_echo(in);
@@ -110,7 +122,7 @@ Line load_line(Loading& loading, const Node& node) {
     }
     constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
     line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
-    load_stations(loading, in, line);
+    load_stations(loading, in, {line, serial_known, {}});
     in.finish();
     return line;
 }

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "loader.hpp"
-#include "panelgate/base/suggest.hpp"
 #include "panelgate/config/endpoint.hpp"
 
 namespace panelgate::config {
@@ -33,12 +32,14 @@ const Line* find_line(const Config& config, std::string_view name) {
     return found == config.lines.end() ? nullptr : &*found;
 }
 
-std::string no_line(const Config& config, const std::string& name) {
+/// nullptr, and a problem at `mark`, when there is none.
+const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name) {
+    if (const Line* line = find_line(loading.config, name)) return line;
     std::vector<std::string_view> names;
-    for (const Line& line : config.lines) names.push_back(line.name);
-    const std::string near = nearest(name, names);
-    return "there is no line '" + name + '\'' +
-           (near.empty() ? "" : "; did you mean '" + near + "'?");
+    for (const Line& line : loading.config.lines) names.push_back(line.name);
+    loading.problems.add(mark,
+                         "there is no line '" + name + '\'' + did_you_mean(name, names, "lines"));
+    return nullptr;
 }
 
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
@@ -48,13 +49,26 @@ void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& 
         return;
     }
     for (const Node& item : list->items) {
-        if (find_line(loading.config, item.scalar) == nullptr) {
-            loading.problems.add(item.mark, no_line(loading.config, item.scalar));
+        if (find_line(loading, item.mark, item.scalar) == nullptr) continue;
+        if (std::ranges::find(settings.lines, item.scalar) != settings.lines.end()) {
+            loading.problems.add(item.mark, "line '" + item.scalar + "' is listed twice");
+        } else {
+            settings.lines.push_back(item.scalar);
         }
-        settings.lines.push_back(item.scalar);
     }
     if (list->items.empty())
         in.problem("lines", "lines must name at least one line; leave it out for all");
+}
+
+/// A station of `line` by id or name; 0 is everybody on it.
+std::optional<std::uint8_t> find_station(const Line& line, const std::string& text) {
+    const auto id = yaml::parse_integer(text);
+    for (const Station& known : line.stations) {
+        if (known.name == text || (id && *id == known.id)) return known.id;
+    }
+    const bool passes = id && *id >= 0 && *id <= modbus::kMaxStation;
+    if (!passes || (*id != 0 && line.refuse_unlisted)) return std::nullopt;
+    return static_cast<std::uint8_t>(*id);
 }
 
 /// "floor1/31" or "floor1/press" -> line and station; problems at `mark`.
@@ -66,20 +80,15 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
         return std::nullopt;
     }
     const std::string name = node.scalar.substr(0, slash);
-    const std::string station = node.scalar.substr(slash + 1);
-    const Line* line = find_line(loading.config, name);
-    if (line == nullptr) {
-        loading.problems.add(node.mark, no_line(loading.config, name));
-        return std::nullopt;
-    }
-    for (const Station& known : line->stations) {
-        if (known.name == station) return tcp_server::UnitTarget{name, known.id};
-    }
-    const auto id = yaml::parse_integer(station);
-    if (id && *id >= 0 && *id <= modbus::kMaxStation) {
-        return tcp_server::UnitTarget{name, static_cast<std::uint8_t>(*id)};
-    }
-    loading.problems.add(node.mark, "line '" + name + "' has no station '" + station + '\'');
+    const std::string text = node.scalar.substr(slash + 1);
+    const Line* line = find_line(loading, node.mark, name);
+    if (line == nullptr) return std::nullopt;
+    const auto station = find_station(*line, text);
+    if (station) return tcp_server::UnitTarget{name, *station};
+    std::vector<std::string_view> names;
+    for (const Station& known : line->stations) names.push_back(known.name);
+    loading.problems.add(node.mark, "line '" + name + "' has no station '" + text + '\'' +
+                                        did_you_mean(text, names, "stations"));
     return std::nullopt;
 }
 
@@ -90,7 +99,7 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
             loading.problems.add(entry.mark,
-                                 "a unit id is from 0 to 255, not '" + entry.key + '\'');
+                                 "a unit id is a number from 0 to 255, not '" + entry.key + '\'');
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -112,12 +121,36 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
         if (line == nullptr) continue;
         for (const Station& station : line->stations) {
             const auto [first, added] = owner.emplace(station.id, name);
-            if (added || (aliased(name, station.id) && aliased(first->second, station.id)))
+            if (added || first->second == name ||
+                (aliased(name, station.id) && aliased(first->second, station.id)))
                 continue;
-            in.problem("listen",
-                       "station " + std::to_string(station.id) + " is on the lines '" +
-                           first->second + "' and '" + name +
-                           "' of this listener; give both a unit of their own in 'units'");
+            const std::string id = std::to_string(station.id);
+            loading.problems.add(in.mark(), "station " + id + " is on the lines '" + first->second +
+                                                "' and '" + name +
+                                                "' of this listener; give both a unit of their own "
+                                                "in 'units', such as units: {101: " +
+                                                first->second + '/' + id + ", 102: " + name + '/' +
+                                                id + '}');
+        }
+    }
+}
+
+/// The gateway's own unit must not hide a station; a default one gives way to an alias.
+void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+    if (!in.has("diagnostics_unit")) return;
+    settings.diagnostics_unit.reset();
+    if (in.child("diagnostics_unit") == nullptr) return;
+    const auto unit = in.integer("diagnostics_unit", 0, 255);
+    if (!unit) return;
+    settings.diagnostics_unit = static_cast<std::uint8_t>(*unit);
+    if (settings.units.contains(*settings.diagnostics_unit))
+        in.problem("diagnostics_unit", "unit " + std::to_string(*unit) + " is in 'units' already");
+    for (const std::string& name : settings.lines) {
+        const Line* line = find_line(loading.config, name);
+        for (const Station& station : line->stations) {
+            if (station.id != *unit) continue;
+            in.problem("diagnostics_unit", "diagnostics_unit " + std::to_string(*unit) +
+                                               " hides station '" + station.name + '\'');
         }
     }
 }
@@ -138,15 +171,10 @@ void load_allow(Loading& loading, MapReader& in, tcp_server::Settings& settings)
         in.problem("allow", "allow must name at least one network; leave it out for all");
 }
 
-void load_access(MapReader& in, tcp_server::Settings& settings) {
-    const Node* access = in.child("access");
-    if (access == nullptr) return;
-    if (access->kind != Node::Kind::scalar) {
-        in.problem("access", "access rules are not in this version; use read_write or read_only");
-        return;
-    }
-    constexpr std::array<std::string_view, 2> kAccess{"read_write", "read_only"};
-    settings.read_only = in.choice_index("access", kAccess) == std::size_t{1};
+void refuse_tls(MapReader& in) {
+    if (in.has("tls"))
+        in.problem("tls",
+                   "tls is not in this version; remove it and listen on a trusted network only");
 }
 
 tcp_server::Settings load_listener(Loading& loading, const Node& node) {
@@ -160,22 +188,35 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     constexpr std::array<std::pair<std::string_view, Mode>, 3> kModes{
         {{"reply", Mode::reply}, {"silent", Mode::silent}, {"deny", Mode::deny}}};
     settings.broadcast = in.choice<Mode>("broadcast", kModes).value_or(settings.broadcast);
-    if (in.has("diagnostics_unit")) {
-        settings.diagnostics_unit.reset();
-        if (in.child("diagnostics_unit") != nullptr) {
-            const auto unit = in.integer("diagnostics_unit", 1, 255);
-            if (unit) settings.diagnostics_unit = static_cast<std::uint8_t>(*unit);
-        }
-    }
-    load_access(in, settings);
+    load_diagnostics(loading, in, settings);
+    settings.read_only = load_read_only(in).value_or(false);
     load_allow(loading, in, settings);
     settings.max_connections =
         static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
-    if (in.has("tls"))
-        in.problem("tls",
-                   "tls is not in this version; remove it and listen on a trusted network only");
+    refuse_tls(in);
     in.finish();
     return settings;
+}
+
+/// A token's secret: the file's text without blanks around it.
+std::string load_secret(Loading& loading, MapReader& in) {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    const auto file = in.required_text("file");
+    if (!file) return "";
+    const auto text = loading.files.read(*file);
+    if (!text) {
+        in.problem("file", "cannot read the token file " + *file);
+        return "";
+    }
+    const std::size_t first = text->find_first_not_of(kBlanks);
+    if (first == std::string::npos) {
+        in.problem("file", "the token file " + *file + " is empty");
+        return "";
+    }
+    std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
+    if (secret.find_first_of(kBlanks) != std::string::npos)
+        in.problem("file", "the token file " + *file + " must hold one token, without blanks");
+    return secret;
 }
 
 web::Token load_token(Loading& loading, const Node& node) {
@@ -184,20 +225,23 @@ web::Token load_token(Loading& loading, const Node& node) {
     token.name = in.required_text("name").value_or("");
     constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
         {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
-    token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
-    const auto file = in.required_text("file");
-    if (file) {
-        const auto secret = loading.files.read(*file);
-        const std::size_t end = secret ? secret->find_last_not_of(" \t\r\n") : std::string::npos;
-        if (end == std::string::npos) {
-            in.problem("file",
-                       "cannot read a token from " + *file + (secret ? ": it is empty" : ""));
-        } else {
-            token.secret = secret->substr(0, end + 1);
-        }
-    }
+    if (in.required_text("role"))
+        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
+    token.secret = load_secret(loading, in);
     in.finish();
     return token;
+}
+
+void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
+    const Node* list = in.sequence("tokens");
+    if (list == nullptr) return;
+    for (const Node& node : list->items) {
+        web::Token token = load_token(loading, node);
+        if (!token.name.empty() &&
+            std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
+            loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
+        tokens.push_back(std::move(token));
+    }
 }
 
 }  // namespace
@@ -209,7 +253,7 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
         tcp_server::Settings settings = load_listener(loading, node);
         for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
             if (settings.port == 0 || other.name() != settings.name()) continue;
-            loading.problems.add(node.mark, "two listeners on " + settings.name());
+            loading.problems.add(node.mark, "there are two listeners on " + settings.name());
         }
         loading.config.modbus_tcp.push_back(std::move(settings));
     }
@@ -226,13 +270,14 @@ void load_http(Loading& loading, MapReader& root) {
          {"viewer", web::Role::viewer},
          {"operator", web::Role::operator_}}};
     settings.anonymous = in.choice<web::Role>("anonymous", kRoles).value_or(settings.anonymous);
-    if (const Node* list = in.sequence("tokens")) {
-        for (const Node& item : list->items) settings.tokens.push_back(load_token(loading, item));
-    }
-    if (in.has("tls"))
-        in.problem("tls",
-                   "tls is not in this version; remove it and listen on a trusted network only");
+    load_tokens(loading, in, settings.tokens);
+    refuse_tls(in);
     in.finish();
+    for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
+        if (settings.port == 0 || other.name() != settings.name()) continue;
+        in.problem("listen", settings.name() + " is a modbus_tcp listener already");
+        break;
+    }
     loading.config.http = std::move(settings);
 }
 

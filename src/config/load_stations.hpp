@@ -1,11 +1,36 @@
 #pragma once
 
+#include <optional>
+
 #include "loader.hpp"
 
 namespace panelgate::config {
 
+/// Timing as written; no frame_gap = auto.
+struct Timing {
+    arbiter::StationSettings settings;
+    std::optional<Duration> frame_gap;
+};
+
+/// A line while its stations are read.
+struct LineInWork {
+    Line& line;
+    /// False: its serial format had a fault, so nothing is held against it.
+    bool serial_known = true;
+    Timing timing;
+};
+
+/// `timing` of a line.
+void load_line_timing(Loading& loading, yaml::MapReader& in, LineInWork& work);
+/// `timing` of a station, over its line's; the frame gap resolved with its profile.
+arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& in,
+                                             const LineInWork& work, const Station& station);
+
 /// Reads a line's `timing`, `retries` and `stations` and resolves the timing of every station. The
-/// line's serial format is known already.
-void load_stations(Loading& loading, yaml::MapReader& in, Line& line);
+/// line's serial format has been read already.
+void load_stations(Loading& loading, yaml::MapReader& in, LineInWork work);
+
+/// `poll` and `points` of a station: their form, and a warning that nothing is polled.
+void check_points(Loading& loading, yaml::MapReader& station);
 
 }  // namespace panelgate::config

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -23,6 +26,13 @@ struct Loading {
 
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
+/// The key `name`; nothing when it is absent or not a name (then a problem).
+std::optional<std::string> load_name(yaml::MapReader& in, bool required);
+/// The key `access`: true for read_only.
+std::optional<bool> load_read_only(yaml::MapReader& in);
+/// "; did you mean 'x'?" when one of `known` is near, else "; known NOUN are a, b, c".
+std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
+                         std::string_view noun);
 
 void load_lines(Loading& loading, yaml::MapReader& root);
 void load_modbus_tcp(Loading& loading, yaml::MapReader& root);

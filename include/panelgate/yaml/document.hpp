@@ -27,11 +27,7 @@ class Problems {
   public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
     void add(Mark mark, std::string message) { list_.push_back({file_, mark, std::move(message)}); }
-    /// Those of another file that this one names; they keep their file.
-    void add(const Problems& other) {
-        list_.insert(list_.end(), other.list_.begin(), other.list_.end());
-    }
-    /// Those of another file, under their own name.
+    /// Adds those of another file that this one names; they keep their file.
     void take(const Problems& other) {
         list_.insert(list_.end(), other.list_.begin(), other.list_.end());
     }

@@ -192,7 +192,7 @@ TEST(Problems, AreSortedByPlaceWithOtherFilesLast) {
     Problems other("a.yaml");
     other.add({1, 1}, "elsewhere");
     Problems problems("z.yaml");
-    problems.add(other);
+    problems.take(other);
     problems.add({9, 1}, "last");
     problems.add({2, 7}, "second");
     problems.add({2, 3}, "first");

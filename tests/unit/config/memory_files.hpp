@@ -1,0 +1,35 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/config/config.hpp"
+
+namespace panelgate::config {
+
+/// Files from a table; directories are what their paths begin with.
+class MemoryFiles final : public Files {
+  public:
+    explicit MemoryFiles(std::map<std::string, std::string> texts) : texts_(std::move(texts)) {}
+
+    std::optional<std::string> read(const std::string& path) const override {
+        const auto found = texts_.find(path);
+        if (found == texts_.end()) return std::nullopt;
+        return found->second;
+    }
+    std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const override {
+        std::vector<std::string> paths;
+        for (const auto& [path, text] : texts_) {
+            if (path.starts_with(dir + '/')) paths.push_back(path);
+        }
+        if (paths.empty()) return std::nullopt;
+        return paths;
+    }
+
+  private:
+    std::map<std::string, std::string> texts_;
+};
+
+}  // namespace panelgate::config
