@@ -175,6 +175,7 @@ void Arbiter::count_reply(TimePoint now, const Bytes& reply) {
     counters.turnaround.observe(think);
     counters.bus_transaction.observe(now - a.started);
     station.slowest = std::max(station.slowest, think);
+    slowest_ = std::max(slowest_.value_or(think), think);
     const auto code = modbus::exception_of(reply);
     if (code) ++counters.exceptions[*code];
     const bool cheaper =

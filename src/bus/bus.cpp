@@ -18,6 +18,10 @@ namespace panelgate::bus {
 
 namespace asio = boost::asio;
 
+namespace {
+constexpr auto kRefusalPause = 1ms;
+}  // namespace
+
 ClientId next_client_id() {
     static std::atomic<ClientId> last{0};
     return ++last;
@@ -39,7 +43,8 @@ struct Bus::State final : public line::Line::Events,
           arbiter(settings.arbiter),
           counters(settings.stations),
           recorder(settings.trace_frames),
-          alarm(executor) {}
+          alarm(executor),
+          refusal_alarm(executor) {}
 
     void on_up() override;
     void on_down(const std::string& why) override;
@@ -55,6 +60,7 @@ struct Bus::State final : public line::Line::Events,
     void arm();
     void on_alarm();
     void answer(Pending pending, Answer answer);
+    void answer_soon(std::function<void()> hand_over);
 
     Settings settings;
     std::unique_ptr<line::Line> line;
@@ -63,6 +69,9 @@ struct Bus::State final : public line::Line::Events,
     FlightRecorder recorder;
     mutable LoadMeter load;
     asio::steady_timer alarm;
+    asio::steady_timer refusal_alarm;
+    std::vector<std::function<void()>>
+        refusals;  ///< at most one a request that clients may have open
     std::optional<TimePoint> armed;
     std::map<arbiter::Ticket, Pending> pending;
     bool pumping = false;
@@ -210,14 +219,28 @@ void Bus::State::on_alarm() {
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     counters.count(entry.station, entry.function, result, rt::now() - entry.arrived);
-    if (result.pdu.has_value()) {
-        if (!modbus::exception_of(*result.pdu))
-            counters.succeeded(entry.station, rt::wall_seconds());
+    const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
+    if (success) counters.succeeded(entry.station, rt::wall_seconds());
+    const bool refused = !result.pdu && !result.transmitted;
+    auto hand_over = [handler = std::move(entry.handler), result = std::move(result)]() mutable {
+        handler(std::move(result));
+    };
+    if (refused) {
+        answer_soon(std::move(hand_over));
+    } else {
+        asio::post(alarm.get_executor(), std::move(hand_over));
     }
-    asio::post(alarm.get_executor(),
-               [handler = std::move(entry.handler), result = std::move(result)]() mutable {
-                   handler(std::move(result));
-               });
+}
+
+/// Refusals go out together, a millisecond apart: who asks again at once cannot keep the loop from
+/// the wire (P4, P9).
+void Bus::State::answer_soon(std::function<void()> hand_over) {
+    refusals.push_back(std::move(hand_over));
+    if (refusals.size() > 1) return;
+    refusal_alarm.expires_after(kRefusalPause);
+    refusal_alarm.async_wait([self = shared_from_this()](boost::system::error_code) {
+        for (const auto& hand : std::exchange(self->refusals, {})) hand();
+    });
 }
 
 Bus::Bus(asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line)

@@ -103,6 +103,7 @@ class Arbiter {
         Bytes probe;             ///< the cheapest read it has answered
         Bytes last_read;         ///< what to probe with before it has answered any
         Duration slowest{};      ///< longest think time seen
+        int probes = 0;          ///< sent so far
     };
     /// Jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
     struct Group {
@@ -143,7 +144,7 @@ class Arbiter {
     std::optional<TimePoint> next_probe() const;
     std::optional<TimePoint> next_start() const;
     Bytes probe_for(const Station& station) const;
-    Duration patience(const Group& group, const Station& station) const;
+    Duration patience(const Group& group, Station& station) const;
 
     // What a transaction came to (transaction.cpp)
     void check_active(TimePoint now);
@@ -188,7 +189,8 @@ class Arbiter {
     std::uint8_t last_station_ = 0;  ///< whose gap follows quiet_since_
     int early_replies_ = 0;          ///< that began before the gap was over: no real UART
     int timely_replies_ = 0;
-    bool other_first_ = false;  ///< a retry lets one other go first
+    std::optional<Duration> slowest_;  ///< think time of all stations that have answered
+    bool other_first_ = false;         ///< a retry lets one other go first
     bool up_ = false;
     Ticket last_ticket_ = 0;
 };
