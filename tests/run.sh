@@ -21,7 +21,7 @@ failed=0
 step() {
     local name=$1 log start seconds verdict=ok count
     shift
-    log=$logs/${name// /-}.log
+    log=$logs/${name//[ \/]/-}.log
     start=$SECONDS
     printf '== %-28s ' "$name"
     "$@" >"$log" 2>&1 || verdict=FAILED
