@@ -66,7 +66,7 @@ bool is_name(std::string_view text) {
 }
 
 std::optional<std::string> load_name(MapReader& in, bool required) {
-    const auto name = required ? in.required_text("name") : in.text("name");
+    auto name = required ? in.required_text("name") : in.text("name");
     if (!name || is_name(*name)) return name;
     in.problem("name", "name must be of a-z, 0-9 and '-', not '" + *name + '\'');
     return std::nullopt;

@@ -36,6 +36,7 @@ const Line* find_line(const Config& config, std::string_view name) {
 const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name) {
     if (const Line* line = find_line(loading.config, name)) return line;
     std::vector<std::string_view> names;
+    names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
     loading.problems.add(mark,
                          "there is no line '" + name + '\'' + did_you_mean(name, names, "lines"));
@@ -86,6 +87,7 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
     const auto station = find_station(*line, text);
     if (station) return tcp_server::UnitTarget{name, *station};
     std::vector<std::string_view> names;
+    names.reserve(line->stations.size());
     for (const Station& known : line->stations) names.push_back(known.name);
     loading.problems.add(node.mark, "line '" + name + "' has no station '" + text + '\'' +
                                         did_you_mean(text, names, "stations"));
@@ -108,6 +110,16 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     }
 }
 
+std::string two_lines(std::uint8_t station, const std::string& first, const std::string& second) {
+    const std::string id = std::to_string(station);
+    std::string text = "station " + id + " is on the lines '" + first + "' and '" + second;
+    text += "' of this listener; give both a unit of their own in 'units', such as units: {101: ";
+    text += first;
+    text += '/' + id + ", 102: ";
+    text += second;
+    return text + '/' + id + '}';
+}
+
 /// A station id on two lines of one listener must be told apart by `units`.
 void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& settings) {
     std::map<int, std::string> owner;
@@ -124,13 +136,7 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
             if (added || first->second == name ||
                 (aliased(name, station.id) && aliased(first->second, station.id)))
                 continue;
-            const std::string id = std::to_string(station.id);
-            loading.problems.add(in.mark(), "station " + id + " is on the lines '" + first->second +
-                                                "' and '" + name +
-                                                "' of this listener; give both a unit of their own "
-                                                "in 'units', such as units: {101: " +
-                                                first->second + '/' + id + ", 102: " + name + '/' +
-                                                id + '}');
+            loading.problems.add(in.mark(), two_lines(station.id, first->second, name));
         }
     }
 }

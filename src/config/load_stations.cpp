@@ -93,7 +93,7 @@ std::uint8_t load_id(MapReader& in, const Line& line) {
 
 std::string load_station_name(Loading& loading, MapReader& in, const Line& line, std::uint8_t id) {
     const std::string number = std::to_string(id);
-    const std::string automatic = line.name + '-' + number;
+    std::string automatic = line.name + '-' + number;
     if (!in.has("name")) {
         const bool complete = id != 0 && !line.name.empty();
         if (complete && !loading.station_names.insert(automatic).second)

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 #include <sstream>
 #include <tuple>
 
@@ -22,6 +21,7 @@ std::string format(const Problem& problem) {
 
 std::string Problems::text() const {
     std::vector<const Problem*> sorted;
+    sorted.reserve(list_.size());
     for (const Problem& problem : list_) sorted.push_back(&problem);
     const auto place = [this](const Problem* problem) {
         return std::tuple(problem->file != file_, std::string_view(problem->file),
@@ -123,7 +123,8 @@ class Builder final : public YAML::EventHandler {
     struct Open {
         Node node;
         YAML::anchor_t anchor = YAML::NullAnchor;
-        std::optional<Entry> pending;     ///< a key that waits for its value
+        bool has_key = false;  ///< `pending` has a key and waits for its value
+        Entry pending;
         bool refused = false;             ///< that key: its value is dropped
         std::map<std::string, int> seen;  ///< key -> line
     };
@@ -158,7 +159,7 @@ class Builder final : public YAML::EventHandler {
         Open& level = stack_.back();
         if (level.node.kind == Node::Kind::sequence) {
             level.node.items.push_back(std::move(node));
-        } else if (!level.pending) {
+        } else if (!level.has_key) {
             put_key(level, node);
         } else {
             put_value(level, std::move(node));
@@ -166,6 +167,7 @@ class Builder final : public YAML::EventHandler {
     }
     void put_key(Open& level, const Node& node) {
         level.pending = Entry{node.scalar, node.mark, {}};
+        level.has_key = true;
         level.refused = true;
         if (node.kind != Node::Kind::scalar) {
             problems_.add(node.mark, "a key must be a word");
@@ -178,9 +180,9 @@ class Builder final : public YAML::EventHandler {
                                      std::to_string(first->second));
     }
     void put_value(Open& level, Node node) {
-        Entry entry = std::move(*level.pending);
-        level.pending.reset();
+        level.has_key = false;
         if (level.refused) return;
+        Entry entry = std::move(level.pending);
         // An empty value is marked at the next token, maybe lines below.
         if (node.kind == Node::Kind::null) node.mark = entry.mark;
         entry.value = std::move(node);
