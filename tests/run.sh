@@ -37,8 +37,11 @@ step() {
 
 # Without a build nothing else makes sense.
 must() {
+    local before=$failed
+    failed=0
     step "$@"
     [ $failed = 0 ] || finish
+    failed=$before
 }
 
 build() { cmake --preset "$1" && cmake --build --preset "$1"; }
