@@ -1,5 +1,7 @@
 #include "dispatch.hpp"
 
+#include <algorithm>
+
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -10,9 +12,11 @@ using modbus::ExceptionCode;
 
 Refuse refuse(Fault fault) { return Refuse{modbus::to_exception(fault)}; }
 
-Decision decide_broadcast(ByteView pdu, const Settings& settings,
+Decision decide_broadcast(ByteView pdu, const Settings& settings, const UnitMap& units,
                           std::vector<bus::BusClient*> lines) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied);
+    const auto read_only = [&](const bus::BusClient* line) { return units.holds_read_only(line); };
+    if (std::ranges::any_of(lines, read_only)) return refuse(Fault::denied);
     if (!modbus::is_broadcastable(pdu[0])) return refuse(Fault::denied);
     if (const auto checked = modbus::check_request(pdu); !checked) return refuse(checked.error());
     return Broadcast{std::move(lines)};
@@ -28,7 +32,7 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (settings.diagnostics_unit == unit && !units.is_alias(unit)) return Diagnose{};
 
     std::vector<bus::BusClient*> lines = units.broadcast_lines(unit);
-    if (!lines.empty()) return decide_broadcast(pdu, settings, std::move(lines));
+    if (!lines.empty()) return decide_broadcast(pdu, settings, units, std::move(lines));
     const Result<Target> target = units.route(unit);
     if (!target) return refuse(target.error());
     if (writes && target->read_only) return refuse(Fault::denied);

@@ -32,6 +32,9 @@ UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
         const LineInfo& line = find_line(lines, target.line);
         aliases_[unit] = Target{line.bus, target.station, is_read_only(line, target.station)};
     }
+    for (const LineInfo& line : lines) {
+        if (!line.read_only.empty()) with_read_only_.insert(line.bus);
+    }
     const std::vector<LineInfo> own = own_lines(settings, lines);
     for (const LineInfo& line : own) {
         lines_.push_back(line.bus);

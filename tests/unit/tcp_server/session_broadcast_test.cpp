@@ -1,10 +1,14 @@
+#include "dispatch.hpp"
 #include "loopback.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
 
 // TBC-02 to TBC-06.
-class SessionBroadcast : public Loopback {};
+class SessionBroadcast : public Loopback {
+  protected:
+    SessionBroadcast() { lines[0].read_only.clear(); }
+};
 
 const Bytes kWrite = "10 0064 0001 02 00ff"_hex;
 const Bytes kWritten = "10 0064 0001"_hex;
@@ -94,6 +98,17 @@ TEST_F(SessionBroadcast, DeniesBroadcastsWhenItIsAskedTo) {
     Client client = connect();
     EXPECT_EQ(client.ask(0, kWrite), "90 01"_hex);
     EXPECT_TRUE(bus1.seen.empty());
+}
+
+TEST_F(SessionBroadcast, NeverWritesToAReadOnlyStationByBroadcast) {
+    Settings wide = settings;
+    wide.lines = {"a", "b"};
+    const std::vector<LineInfo> lines{{"a", &bus1, {1}, {}, true}, {"b", &bus2, {2}, {2}, true}};
+    const Decision both = decide(0, kWrite, wide, UnitMap(wide, lines));
+    ASSERT_TRUE(std::holds_alternative<Refuse>(both));
+    EXPECT_EQ(std::get<Refuse>(both).code, modbus::ExceptionCode::illegal_function);
+    wide.lines = {"a"};
+    EXPECT_TRUE(std::holds_alternative<Broadcast>(decide(0, kWrite, wide, UnitMap(wide, lines))));
 }
 
 TEST_F(SessionBroadcast, TreatsAMappedUnitZeroAsItsStation) {
