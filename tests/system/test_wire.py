@@ -1,0 +1,49 @@
+"""The promises on a paced line, against an independent bus (skipped where its source is not there)."""
+import pathlib
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+import wire  # noqa: E402
+from harness import SANITIZED  # noqa: E402
+
+
+@unittest.skipIf(SANITIZED, "a sanitizer takes the time that is measured here")
+class Wire(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.tools = wire.build_tools(cls.folder.name)
+        if cls.tools is None:
+            raise unittest.SkipTest(f"there is no rtubus.cpp and mbload.cpp in {wire.TOOLS}")
+
+    def test_P1_no_wrong_value_with_every_fault_on(self):
+        good, wrong, violations = wire.under_faults(self.tools, self.folder.name, 38400)
+        print(f"\n  {good} good answers, {wrong} wrong values, {violations} gap violations")
+        self.assertGreater(good, 100)
+        self.assertEqual(wrong, 0)
+        self.assertEqual(violations, 0)
+
+    def test_P4_one_dead_panel_leaves_the_line_to_the_others(self):
+        share, p99 = wire.with_dead(self.tools, self.folder.name, 19200, 1)
+        print(f"\n  {share:.3f} of the limit, p99 of an offline answer {p99:.1f} ms")
+        self.assertGreaterEqual(share, 0.95)
+        self.assertLess(p99, 10)
+
+    def test_P5_the_wire_never_idles_and_no_gap_is_broken(self):
+        for baud, least in ((9600, 0.99), (38400, 0.975)):
+            share, violations, collisions = wire.utilisation(self.tools, self.folder.name, baud)
+            print(f"\n  {baud}: {share:.3f} of the limit")
+            self.assertGreaterEqual(share, least)
+            self.assertEqual((violations, collisions), (0, 0))
+
+    def test_P6_many_equal_readers_cost_as_one(self):
+        times, answers = wire.shared(self.tools, self.folder.name, 9600, 64)
+        print(f"\n  {times:.1f} times the limit, {answers:.1f} answers a transaction")
+        self.assertGreaterEqual(times, 40)
+
+
+if __name__ == "__main__":
+    unittest.main()
