@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
+#include <initializer_list>
 #include <optional>
 #include <utility>
 
@@ -51,21 +52,31 @@ std::string listed(const std::vector<T>& values, const Format& format) {
 
 std::string cited(const std::string& source) { return source.empty() ? "" : "  [" + source + ']'; }
 
+/// Those of `codes` that the profile has: "5, 15", or "none".
+std::string known_of(const PanelProfile& profile, std::initializer_list<std::uint8_t> codes) {
+    std::string text;
+    for (const std::uint8_t code : codes) {
+        if (profile.find_function(code) == nullptr) continue;
+        text += (text.empty() ? "" : ", ") + std::to_string(code);
+    }
+    return text.empty() ? "none" : text;
+}
+
 /// Functions of the profile that reach this table, for reading or writing.
 std::string functions_of(const PanelProfile& profile, Table table, bool writable) {
-    const std::uint8_t bits[] = {modbus::kWriteSingleCoil, modbus::kWriteMultipleCoils};
-    const std::uint8_t words[] = {modbus::kWriteSingleRegister, modbus::kWriteMultipleRegisters};
-    std::string reads;
-    std::string writes;
-    const std::uint8_t read = modbus::read_function(table);
-    if (profile.find_function(read) != nullptr) reads = std::to_string(read);
-    const bool can_write = writable && (table == Table::coils || table == Table::holding_registers);
-    for (const std::uint8_t code : table == Table::coils ? bits : words) {
-        if (!can_write || profile.find_function(code) == nullptr) continue;
-        writes += (writes.empty() ? "" : ", ") + std::to_string(code);
+    using namespace modbus;
+    const bool words = table == Table::holding_registers;
+    const std::string reads =
+        words ? known_of(profile, {kReadHoldingRegisters, kReadWriteMultipleRegisters})
+              : known_of(profile, {read_function(table)});
+    std::string writes = "none";
+    if (writable && words) {
+        writes = known_of(profile, {kWriteSingleRegister, kWriteMultipleRegisters,
+                                    kMaskWriteRegister, kReadWriteMultipleRegisters});
+    } else if (writable && table == Table::coils) {
+        writes = known_of(profile, {kWriteSingleCoil, kWriteMultipleCoils});
     }
-    return "read by function " + (reads.empty() ? "none" : reads) + ", written by " +
-           (writes.empty() ? "none" : writes);
+    return "read by function " + reads + ", written by " + writes;
 }
 
 /// The same memory in the profile's other notations.
@@ -108,24 +119,33 @@ std::optional<std::uint32_t> number(std::string_view text) {
     return value;
 }
 
-/// "coil/288", "holding-registers 0x64" -> table and address; nothing when it is not such a text.
-std::optional<std::pair<Table, std::uint16_t>> parse_place(std::string_view text) {
+/// "coil/288", "holding-registers 0x64" -> table and address text; nothing when it names no table.
+std::optional<std::pair<Table, std::string_view>> parse_place(std::string_view text) {
     const std::size_t cut = text.find_last_of("/ ");
     if (cut == std::string_view::npos) return std::nullopt;
     std::string table(text.substr(0, cut));
     std::replace(table.begin(), table.end(), '-', ' ');
     if (!table.empty() && table.back() == 's') table.pop_back();
-    const auto address = number(text.substr(cut + 1));
     for (const auto& [known, name] : kSingular) {
-        if (table == name && address) return std::pair(known, static_cast<std::uint16_t>(*address));
+        if (table == name) return std::pair(known, text.substr(cut + 1));
     }
     return std::nullopt;
+}
+
+std::string describe_function(const PanelProfile& profile, const FunctionRule& rule) {
+    const unsigned most = profile.max_count(rule.code);
+    std::string text = "  " + padded(std::to_string(rule.code), 3) +
+                       padded(std::string(modbus::function_name(rule.code)), 30);
+    if (most > 1) text += "up to " + std::to_string(most);
+    if (rule.broadcast) text += most > 1 ? ", broadcast" : "broadcast";
+    return text + cited(rule.source) + '\n';
 }
 
 std::string describe_area(const Area& area) {
     std::string text = "  " + padded(area.name, 8) + padded(singular(area.table), 17) +
                        padded("read " + range(area, area.readable), 30) +
                        (area.writable ? "write " + range(area, *area.writable) : "read only");
+    for (const Table table : area.also) text += ", also " + singular(table);
     if (!area.view_of.empty()) text += ", bits of " + area.view_of;
     return text + cited(area.source) + '\n';
 }
@@ -146,14 +166,13 @@ std::string describe(const PanelProfile& profile) {
             listed(profile.serial.stop_bits, count) + cited(profile.serial.source) + '\n';
     char gap[16] = {};
     std::snprintf(gap, sizeof gap, "%.1f", profile.timing.frame_gap_characters);
-    text += std::string("frame gap: ") + gap + " characters" + cited(profile.timing.source) + '\n';
+    text += std::string("frame gap: ") + gap + " characters";
+    if (profile.timing.max_gap_bits > 0)
+        text += "; a pause of " + std::to_string(profile.timing.max_gap_bits) +
+                " bit times inside a request loses it";
+    text += cited(profile.timing.source) + '\n';
     text += "functions:\n";
-    for (const FunctionRule& rule : profile.functions) {
-        text += "  " + padded(count(rule.code), 3) +
-                padded(std::string(modbus::function_name(rule.code)), 30) + "up to " +
-                std::to_string(profile.max_count(rule.code)) +
-                (rule.broadcast ? ", broadcast" : "") + cited(rule.source) + '\n';
-    }
+    for (const FunctionRule& rule : profile.functions) text += describe_function(profile, rule);
     text += "areas:\n";
     for (const Area& area : profile.areas) text += describe_area(area);
     for (const Unreachable& hint : profile.unreachable)
@@ -166,14 +185,22 @@ std::string describe(const PanelProfile& profile) {
 
 boost::system::result<std::string, NotationError> describe_address(const PanelProfile& profile,
                                                                    std::string_view what) {
-    if (const auto at = parse_place(what)) {
-        const Area* area = profile.find_area(at->first, at->second);
+    if (const auto named = parse_place(what)) {
+        const auto& [table, text] = *named;
+        const auto wanted = number(text);
+        if (!wanted) {
+            return NotationError{
+                NotationError::Kind::malformed,
+                '\'' + std::string(text) + "' is no address: 0 to 65535, or 0x0 to 0xFFFF"};
+        }
+        const auto address = static_cast<std::uint16_t>(*wanted);
+        const Area* area = profile.find_area(table, address);
         if (area == nullptr) {
             return NotationError{NotationError::Kind::out_of_range,
-                                 profile.name + " has no " + place(at->first, at->second)};
+                                 profile.name + " has no " + place(table, address)};
         }
-        return place(at->first, at->second) + " -> " + format_notation(*area, at->second) + '\n' +
-               details(profile, *area, at->second);
+        return place(table, address) + " -> " + format_notation(*area, address) + '\n' +
+               details(profile, *area, address);
     }
     const auto item = parse_notation(profile, what);
     if (!item) return item.error();

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "check_profile.hpp"
 #include "load_simulation.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -23,6 +24,7 @@ using yaml::Problems;
 using Tables = std::array<std::pair<std::string_view, modbus::Table>, 4>;
 
 constexpr std::uint32_t kLastAddress = 65535;
+constexpr int kMaxBaud = 4'000'000;
 constexpr Tables kTables{{{"coils", modbus::Table::coils},
                           {"discrete-inputs", modbus::Table::discrete_inputs},
                           {"input-registers", modbus::Table::input_registers},
@@ -38,7 +40,7 @@ std::vector<int> integers(MapReader& in, std::string_view key, int min, int max)
     const Node* list = in.sequence(key);
     if (list == nullptr) return values;
     for (const Node& item : list->items) {
-        const auto value = yaml::parse_integer(item.scalar);
+        const auto value = item.quoted ? std::nullopt : yaml::parse_integer(item.scalar);
         if (!value || *value < min || *value > max) {
             in.problems().add(item.mark, std::string(key) + " must list whole numbers from " +
                                              std::to_string(min) + " to " + std::to_string(max));
@@ -71,14 +73,30 @@ std::vector<T> choices(MapReader& in, std::string_view key,
     return values;
 }
 
+/// A list, and its absence is a problem.
+const Node* required_sequence(MapReader& in, std::string_view key, std::string_view what) {
+    const Node* list = in.sequence(key);
+    if (in.child(key) == nullptr)
+        in.problem(key, std::string(what) + " needs '" + std::string(key) + '\'');
+    if (list != nullptr && list->items.empty())
+        in.problem(key, std::string(key) + " must not be empty");
+    return list;
+}
+
 std::optional<AddressRange> range(MapReader& in, std::string_view key) {
-    if (!in.has(key)) return std::nullopt;
-    const std::vector<int> ends = integers(in, key, 0, kLastAddress);
-    if (ends.size() != 2 || ends[0] > ends[1]) {
+    const Node* list = in.sequence(key);
+    if (list == nullptr) return std::nullopt;
+    std::vector<std::uint32_t> ends;
+    for (const Node& item : list->items) {
+        const auto value = item.quoted ? std::nullopt : yaml::parse_integer(item.scalar);
+        if (value && *value >= 0 && *value <= kLastAddress)
+            ends.push_back(static_cast<std::uint32_t>(*value));
+    }
+    if (list->items.size() != 2 || ends.size() != 2 || ends[0] > ends[1]) {
         in.problem(key, std::string(key) + " must be [FIRST, LAST], two addresses from 0 to 65535");
         return std::nullopt;
     }
-    return AddressRange{static_cast<std::uint32_t>(ends[0]), static_cast<std::uint32_t>(ends[1])};
+    return AddressRange{ends[0], ends[1]};
 }
 
 void load_stations(const Node& node, PanelProfile& profile, Problems& problems) {
@@ -92,21 +110,30 @@ void load_stations(const Node& node, PanelProfile& profile, Problems& problems) 
     in.finish();
 }
 
+/// Without a default of its own, the first of what is allowed.
+void load_default(const Node* node, Serial& serial, Problems& problems) {
+    SerialFormat& f = serial.default_format;
+    if (!serial.baud.empty()) f.baud = serial.baud[0];
+    if (!serial.parity.empty()) f.parity = serial.parity[0];
+    if (!serial.stop_bits.empty()) f.stop_bits = serial.stop_bits[0];
+    if (node == nullptr) return;
+    MapReader in(*node, problems, "default");
+    f.baud = static_cast<int>(in.integer("baud", 50, kMaxBaud).value_or(f.baud));
+    f.parity = in.choice<Parity>("parity", kParities).value_or(f.parity);
+    f.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(f.stop_bits));
+    in.finish();
+}
+
 void load_serial(const Node& node, Serial& serial, Problems& problems) {
+    const std::size_t before = problems.list().size();
     MapReader in(node, problems, "serial");
-    serial.baud = integers(in, "baud", 50, 4'000'000);
+    serial.baud = integers(in, "baud", 50, kMaxBaud);
     serial.parity = choices(in, "parity", kParities);
     serial.stop_bits = integers(in, "stop_bits", 1, 2);
     serial.source = in.text("source").value_or("");
-    if (const Node* standard = in.map("default")) {
-        MapReader format(*standard, problems, "default");
-        SerialFormat& f = serial.default_format;
-        f.baud = static_cast<int>(format.integer("baud", 50, 4'000'000).value_or(f.baud));
-        f.parity = format.choice<Parity>("parity", kParities).value_or(f.parity);
-        f.stop_bits = static_cast<int>(format.integer("stop_bits", 1, 2).value_or(f.stop_bits));
-        format.finish();
-    }
+    load_default(in.map("default"), serial, problems);
     in.finish();
+    if (problems.list().size() == before) check_serial(serial, node, problems);
 }
 
 FunctionRule load_function(const Node& node, Problems& problems) {
@@ -115,9 +142,6 @@ FunctionRule load_function(const Node& node, Problems& problems) {
     rule.code = static_cast<std::uint8_t>(in.required_integer("code", 1, 127).value_or(1));
     rule.max_count = static_cast<unsigned>(in.integer("max", 1, 2040).value_or(0));
     rule.broadcast = in.boolean("broadcast").value_or(false);
-    if (rule.broadcast && !modbus::is_broadcastable(rule.code)) {
-        in.problem("broadcast", "only functions 5, 6, 15 and 16 can be broadcast");
-    }
     rule.source = in.text("source").value_or("");
     in.finish();
     return rule;
@@ -143,19 +167,20 @@ Area load_area(const Node& node, Problems& problems) {
     Area area;
     area.name = in.required_text("name").value_or("?");
     area.description = in.text("description").value_or("");
-    if (const Node* notation = in.map("notation")) {
+    if (const Node* notation = in.map("notation"))
         area.notation = load_notation(*notation, problems);
-    } else if (!in.has("notation")) {
-        problems.add(in.mark(), "an area needs 'notation'");
+    const bool is_map = node.kind == Node::Kind::map;  // what is none has been told
+    for (const std::string_view key : {"notation", "table", "readable"}) {
+        if (is_map && in.child(key) == nullptr)
+            in.problem(key, "an area needs '" + std::string(key) + '\'');
     }
-    if (!in.has("table")) problems.add(in.mark(), "an area needs 'table'");
     area.table = in.choice<modbus::Table>("table", kTables).value_or(area.table);
     area.also = choices(in, "also", kTables);
-    if (!in.has("readable")) problems.add(in.mark(), "an area needs 'readable'");
-    area.readable = range(in, "readable").value_or(AddressRange{});
+    const auto readable = range(in, "readable");
+    area.readable = readable.value_or(AddressRange{});
     area.writable = range(in, "writable");
-    if (area.writable && !(area.readable.contains(area.writable->first) &&
-                           area.readable.contains(area.writable->last))) {
+    if (readable && area.writable &&
+        !(readable->contains(area.writable->first) && readable->contains(area.writable->last))) {
         in.problem("writable", "writable must lie inside readable");
     }
     area.view_of = in.text("view_of").value_or("");
@@ -165,25 +190,11 @@ Area load_area(const Node& node, Problems& problems) {
 }
 
 void load_areas(MapReader& in, PanelProfile& profile) {
-    const Node* list = in.sequence("areas");
-    if (list == nullptr) {
-        in.problems().add(in.mark(), "a profile needs 'areas'");
-        return;
-    }
-    for (const Node& item : list->items) {
-        Area area = load_area(item, in.problems());
-        if (profile.find_area(area.name) != nullptr) {
-            in.problems().add(item.mark, "there are two areas '" + area.name + '\'');
-        }
-        profile.areas.push_back(std::move(area));
-    }
-    for (std::size_t i = 0; i < profile.areas.size(); ++i) {
-        const std::string& base = profile.areas[i].view_of;
-        const Area* words = profile.find_area(std::string_view(base));
-        if (base.empty() || (words != nullptr && !modbus::is_bit_table(words->table))) continue;
-        in.problems().add(list->items[i].mark,
-                          "view_of must name a word area, not '" + base + '\'');
-    }
+    const Node* list = required_sequence(in, "areas", "a profile");
+    if (list == nullptr) return;
+    const std::size_t before = in.problems().list().size();
+    for (const Node& item : list->items) profile.areas.push_back(load_area(item, in.problems()));
+    if (in.problems().list().size() == before) check_areas(profile, *list, in.problems());
 }
 
 void load_timing(const Node& node, Timing& timing, Problems& problems) {
@@ -226,30 +237,25 @@ void load_unreachable(MapReader& in, PanelProfile& profile) {
 }
 
 void load_functions(MapReader& in, PanelProfile& profile) {
-    const Node* list = in.sequence("functions");
-    if (list == nullptr) {
-        in.problems().add(in.mark(), "a profile needs 'functions'");
-        return;
-    }
-    for (const Node& item : list->items) {
-        FunctionRule rule = load_function(item, in.problems());
-        if (profile.find_function(rule.code) != nullptr) {
-            in.problems().add(item.mark,
-                              "function " + std::to_string(rule.code) + " is there twice");
-        }
-        profile.functions.push_back(std::move(rule));
-    }
+    const Node* list = required_sequence(in, "functions", "a profile");
+    if (list == nullptr) return;
+    const std::size_t before = in.problems().list().size();
+    for (const Node& item : list->items)
+        profile.functions.push_back(load_function(item, in.problems()));
+    if (in.problems().list().size() == before) check_functions(profile, *list, in.problems());
 }
 
 }  // namespace
 
 std::optional<PanelProfile> load_profile(std::string_view text, std::string name,
                                          Problems& problems) {
+    const std::size_t before = problems.list().size();
     const Node root = yaml::parse(text, problems);
-    if (!problems.empty()) return std::nullopt;
+    if (problems.list().size() != before) return std::nullopt;
     PanelProfile profile;
     profile.name = std::move(name);
     MapReader in(root, problems, "a profile");
+    if (problems.list().size() != before) return std::nullopt;
     profile.description = in.required_text("description").value_or("");
     profile.manual = in.required_text("manual").value_or("");
     if (const Node* stations = in.map("stations")) load_stations(*stations, profile, problems);
@@ -262,7 +268,7 @@ std::optional<PanelProfile> load_profile(std::string_view text, std::string name
     if (const Node* simulation = in.map("simulation"))
         load_simulation(*simulation, profile, problems);
     in.finish();
-    if (!problems.empty()) return std::nullopt;
+    if (problems.list().size() != before) return std::nullopt;
     return profile;
 }
 

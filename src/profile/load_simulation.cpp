@@ -1,9 +1,12 @@
 #include "load_simulation.hpp"
 
+#include <algorithm>
 #include <array>
+#include <optional>
 #include <string>
 #include <utility>
 
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::profile {
@@ -24,6 +27,7 @@ std::uint32_t place(MapReader& in, const PanelProfile& profile, std::string& are
     const auto address =
         static_cast<std::uint32_t>(in.required_integer("address", 0, 65535).value_or(0));
     const Area* area = profile.find_area(std::string_view(area_name));
+    if (area_name.empty()) return address;
     if (area == nullptr) {
         in.problem("area", "there is no area '" + area_name + '\'');
     } else if (items > 0 && !area->readable.contains(address, static_cast<std::uint32_t>(items))) {
@@ -37,16 +41,20 @@ Simulation::Cell load_cell(const Node& node, const PanelProfile& profile, Proble
     Simulation::Cell cell;
     if (const Node* values = in.sequence("values")) {
         for (const Node& item : values->items) {
-            const auto value = yaml::parse_integer(item.scalar);
+            const auto value = item.quoted ? std::nullopt : yaml::parse_integer(item.scalar);
             if (!value || *value < 0 || *value > 65535) {
                 problems.add(item.mark, "values must list whole numbers from 0 to 65535");
             }
             cell.values.push_back(static_cast<std::uint16_t>(value.value_or(0)));
         }
-    } else if (!in.has("values")) {
-        problems.add(in.mark(), "memory needs 'values'");
     }
+    if (node.kind == Node::Kind::map && in.child("values") == nullptr)
+        in.problem("values", "memory needs 'values'");
     cell.address = place(in, profile, cell.area, cell.values.size());
+    const Area* area = profile.find_area(std::string_view(cell.area));
+    const bool bits = area != nullptr && modbus::is_bit_table(area->table);
+    if (bits && std::any_of(cell.values.begin(), cell.values.end(), [](auto v) { return v > 1; }))
+        in.problem("values", "the values of " + cell.area + " are bits: 0 or 1");
     in.finish();
     return cell;
 }

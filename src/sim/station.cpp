@@ -1,10 +1,13 @@
 #include "panelgate/sim/station.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <numbers>
+#include <optional>
 #include <utility>
 
+#include "identity.hpp"
 #include "memory.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -60,6 +63,8 @@ struct Station::State {
     }
     void move(TimePoint now, std::int64_t wall);
     Bytes execute(ByteView pdu);
+    Bytes transfer(ByteView pdu, const modbus::Access& access);
+    unsigned write_limit(std::uint8_t function) const;
     const Area* readable(const modbus::Range& range) const;
     Bytes read(std::uint8_t function, const modbus::Range& range) const;
     std::optional<Bytes> refuse_write(std::uint8_t function, const modbus::Range& range) const;
@@ -72,6 +77,7 @@ struct Station::State {
     Memory memory;
     TimePoint started{};
     bool running = false;
+    std::uint16_t events = 0;  ///< what 0B counts (AP 6.9)
 };
 
 Station::Station(const profile::PanelProfile& profile, std::uint8_t id)
@@ -122,22 +128,38 @@ Bytes Station::State::execute(ByteView pdu) {
     const std::uint8_t function = pdu[0];
     if (profile->find_function(function) == nullptr)
         return refuse(function, ExceptionCode::illegal_function);
-    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide)) {
+    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide))
         return refuse(function, ExceptionCode::illegal_data_value);
-    }
     const modbus::Access access = modbus::access_of(pdu);
-    if (!access.read && !access.write) return refuse(function, ExceptionCode::illegal_function);
-    for (const auto& range : {access.read, access.write}) {
-        if (range && (range->count == 0 || range->count > profile->max_count(function))) {
-            return refuse(function, ExceptionCode::illegal_data_value);
-        }
-    }
-    if (function == modbus::kWriteSingleCoil && !((pdu[3] == 0xFF || pdu[3] == 0) && pdu[4] == 0)) {
+    const bool has_range = (access.read || access.write) && function != modbus::kReadFifoQueue;
+    Bytes reply =
+        has_range ? transfer(pdu, access) : identity_reply(profile->name, id, events, pdu);
+    const bool counts = function != modbus::kGetCommEventCounter;
+    if (counts && !modbus::exception_of(reply)) ++events;
+    return reply;
+}
+
+/// 17h: AP 6.17 lets a request write 121 registers, so that it fits a PDU, but read 125.
+unsigned Station::State::write_limit(std::uint8_t function) const {
+    constexpr unsigned kMostBesidesARead = 121;
+    const unsigned most = profile->max_count(function);
+    return function == modbus::kReadWriteMultipleRegisters ? std::min(most, kMostBesidesARead)
+                                                           : most;
+}
+
+Bytes Station::State::transfer(ByteView pdu, const modbus::Access& access) {
+    const std::uint8_t function = pdu[0];
+    const auto within = [](const std::optional<modbus::Range>& range, unsigned most) {
+        return !range || (range->count >= 1 && range->count <= most);
+    };
+    if (!within(access.read, profile->max_count(function)) ||
+        !within(access.write, write_limit(function))) {
         return refuse(function, ExceptionCode::illegal_data_value);
     }
-    if (access.read && readable(*access.read) == nullptr) {
+    if (function == modbus::kWriteSingleCoil && !((pdu[3] == 0xFF || pdu[3] == 0) && pdu[4] == 0))
+        return refuse(function, ExceptionCode::illegal_data_value);
+    if (access.read && readable(*access.read) == nullptr)
         return refuse(function, ExceptionCode::illegal_data_address);
-    }
     if (access.write) {
         if (auto refusal = refuse_write(function, *access.write)) return *refusal;
         write(pdu, *access.write);

@@ -185,9 +185,9 @@ TEST(LoadProfile, WantsANotationThatCanWriteEveryItem) {
     EXPECT_EQ(problems_of(area("{prefix: '4', digits: 4, short_digits: 4}")),
               "p.yaml:5:5: short_digits must be fewer than digits\n");
     EXPECT_EQ(problems_of(area("{prefix: B, bit: hex, digits: 4}")),
-              "p.yaml:5:73: a notation with a bit part has neither base nor digits\n");
+              "p.yaml:5:75: a notation with a bit part has neither base nor digits\n");
     EXPECT_EQ(problems_of(area("{prefix: B, bit: octal}")),
-              "p.yaml:5:73: bit must be none, hex or decimal, not 'octal'\n");
+              "p.yaml:5:75: bit must be none, hex or decimal, not 'octal'\n");
 }
 
 TEST(LoadProfile, WantsAViewOfWordsThatAreThere) {
@@ -274,6 +274,8 @@ TEST(LoadProfile, WantsSimulatedCellsThatThePanelHas) {
 
 TEST(LoadProfile, TellsBrokenYamlAndNothingElse) {
     EXPECT_EQ(problems_of("- 1\n"), "p.yaml:1:1: a profile must be a map of keys, not a list\n");
+    EXPECT_EQ(problems_of(with_areas("  - D\n")),
+              "p.yaml:5:5: an area must be a map of keys, not 'D'\n");
     EXPECT_EQ(problems_of("").substr(0, 11), "p.yaml:1:1:");
 }
 
