@@ -114,7 +114,8 @@ std::optional<std::uint32_t> number(std::string_view text) {
     if (hex) text.remove_prefix(2);
     std::uint32_t value = 0;
     const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, value, hex ? 16 : 10);
+    const auto [stop, error] =
+        std::from_chars(text.data(), text.data() + text.size(), value, hex ? 16 : 10);
     if (text.empty() || error != std::errc() || stop != end || value > 0xFFFF) return std::nullopt;
     return value;
 }

@@ -33,7 +33,7 @@ std::optional<std::uint64_t> decimal(std::string_view text) {
     constexpr std::size_t kMostDigits = 12;
     std::uint64_t value = 0;
     const char* end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (text.empty() || text.size() > kMostDigits || error != std::errc() || stop != end)
         return std::nullopt;
     return value;

@@ -163,12 +163,10 @@ Bytes Station::State::transfer(ByteView pdu, const modbus::Access& access) {
     if (access.write) {
         if (auto refusal = refuse_write(function, *access.write)) return *refusal;
         write(pdu, *access.write);
-        if (!access.read) {
-            return modbus::is_broadcastable(function) ? modbus::normal_write_reply(pdu)
-                                                      : Bytes(pdu.begin(), pdu.end());
-        }
     }
-    return read(function, *access.read);
+    if (access.read) return read(function, *access.read);
+    if (modbus::is_broadcastable(function)) return modbus::normal_write_reply(pdu);
+    return {pdu.begin(), pdu.end()};  // 16h echoes its request
 }
 
 /// The one area that holds the whole range.
@@ -181,6 +179,7 @@ Bytes Station::State::read(std::uint8_t function, const modbus::Range& range) co
     const Area& area = *readable(range);
     if (modbus::is_bit_table(range.table)) {
         std::vector<bool> bits;
+        bits.reserve(range.count);
         for (std::uint32_t i = 0; i < range.count; ++i)
             bits.push_back(memory.get(area, range.address + i) != 0);
         const Bytes packed = modbus::pack_bits(bits);
