@@ -162,6 +162,16 @@ TEST(Station, AnswersProtectedWritesAsTheProfileChooses) {
     EXPECT_EQ(gplp.ask("0F 00 EF 00 01 01 01"), "8f 02");
 }
 
+TEST(Station, RefusesAWriteThatRunsOutOfTheWritablePart) {
+    profile::PanelProfile chosen = shipped("autonics-gplp-s");
+    for (profile::Area& area : chosen.areas)
+        if (area.name == "UW") area.writable->last = 100;
+    Panel gplp(chosen);
+    EXPECT_EQ(gplp.ask("10 00 64 00 02 04 00 01 00 02"), "90 03") << "UW100 and UW101";
+    EXPECT_EQ(gplp.station().peek("UW", 100), 0);
+    EXPECT_EQ(gplp.ask("10 00 64 00 01 02 00 01"), "10 00 64 00 01");
+}
+
 TEST(Station, SharesTheMemoryOfWordsAndTheirBits) {
     Panel gplp("autonics-gplp-s");
     EXPECT_EQ(gplp.ask("03 00 12 00 01"), "03 02 00 19") << "UB180 to UB184 are bits of UW18";
@@ -324,6 +334,7 @@ TEST(GenericStation, IdentifiesItself) {
     EXPECT_EQ(any.ask("2B 0E 01 00"),
               "2b 0e 01 81 00 00 03 " + vendor + ' ' + product + ' ' + revision);
     EXPECT_EQ(any.ask("2B 0E 01 02"), "2b 0e 01 81 00 00 01 " + revision);
+    EXPECT_EQ(any.ask("2B 0E 01 07"), any.ask("2B 0E 01 00")) << "an unknown object starts over";
     EXPECT_EQ(any.ask("2B 0E 04 01"), "2b 0e 04 81 00 00 01 " + product);
     EXPECT_EQ(any.ask("2B 0E 04 03"), "ab 02");
     EXPECT_EQ(any.ask("2B 0E 05 00"), "ab 03");
