@@ -12,11 +12,18 @@ namespace panelgate::arbiter {
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     if (!up_) return Fault::line_down;
-    if (queue_.full(job.client)) return Fault::busy;
+    if (const auto ticket = answer_from_memory(now, job)) return *ticket;
+    if (queue_.full(job.client)) {
+        explain_refusal(now, job, Fault::busy);
+        return Fault::busy;
+    }
     if (job.station != kBroadcast) {
         StationHealth& health = station_of(job.station).health;
         const bool may_wake = !modbus::is_pure_read(job.pdu) && health.offline();
-        if (health.offline() && !(may_wake && health.take_half_open(now))) return Fault::offline;
+        if (health.offline() && !(may_wake && health.take_half_open(now))) {
+            explain_refusal(now, job, Fault::offline);
+            return Fault::offline;
+        }
     }
     job.ticket = ++last_ticket_;
     job.arrived = now;
@@ -36,7 +43,34 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     return ticket;
 }
 
+/// A value that was read lately, where the station's max_age allows it. Not for polls, which are to
+/// bring new ones, and not while the client has something open: it must not read older than its own
+/// write.
+std::optional<Ticket> Arbiter::answer_from_memory(TimePoint now, const Job& job) {
+    const Duration max_age = settings_of(job.station).max_age;
+    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
+    const auto span = read_span(job.station, job.pdu);
+    if (!span || has_open(job.client)) return std::nullopt;
+    auto hit = cache_.find(*span, now, max_age);
+    if (!hit) return std::nullopt;
+    Finish answer;
+    answer.ticket = ++last_ticket_;
+    answer.pdu = std::move(hit->pdu);
+    answer.age = hit->age;
+    actions_.push_back(std::move(answer));
+    return last_ticket_;
+}
+
+bool Arbiter::has_open(Client client) const {
+    const auto theirs = [&](const Job& job) { return job.client == client; };
+    const auto in = [&](const Group& group) {
+        return std::any_of(group.jobs.begin(), group.jobs.end(), theirs);
+    };
+    return queue_.has(client) || (active_ && in(active_->group)) || (retry_ && in(*retry_));
+}
+
 void Arbiter::cancel(TimePoint now, Client client) {
+    shares_.forget(client);
     const auto theirs = [&](const Job& job) { return job.client == client; };
     for (const Job& job : queue_.remove_if(theirs)) finish(job, Fault::cancelled);
     if (retry_) {
@@ -82,8 +116,25 @@ bool Arbiter::start_job(TimePoint now) {
     const Job* next = queue_.peek(now, runnable);
     if (next == nullptr || !gap_is_over(now, next->station)) return false;
     other_first_ = false;
-    start(now, gather(*queue_.pop(now, runnable)));
+    if (next->station != kBroadcast && echo_memory_.must_be_learned_before(next->pdu)) {
+        start_learning(now, *next);
+    } else {
+        start(now, gather(*queue_.pop(now, runnable)));
+    }
     return true;
+}
+
+/// P8: nobody knows yet whether this line hears itself, and what is next could be confirmed by its
+/// own echo. A read of the same station tells.
+void Arbiter::start_learning(TimePoint now, const Job& job) {
+    Group group;
+    group.station = job.station;
+    group.pdu = probe_for(station_of(job.station));
+    group.learns_for = job.ticket;
+    if (!teaches_echo(group.pdu))
+        group.pdu = modbus::encode_read(modbus::Table::holding_registers, 0, 1);
+    group.span = read_span(job.station, group.pdu);
+    start(now, std::move(group));
 }
 
 bool Arbiter::start_probe(TimePoint now) {
@@ -146,6 +197,8 @@ bool Arbiter::joins(const Group& group, const Job& job) const {
 }
 
 void Arbiter::start(TimePoint now, Group group) {
+    const Bytes held = echo_.release();
+    idle_heard_.insert(idle_heard_.end(), held.begin(), held.end());
     judge_idle(now);
     Bytes adu = modbus::encode_adu(group.station, group.pdu);
     if (++group.attempts > 1) ++counters_of(group.station).retries;
@@ -165,16 +218,28 @@ void Arbiter::start(TimePoint now, Group group) {
         wait = patience(group, station);
         what = group.probe ? "probe" : group.attempts > 1 ? "retry" : "request";
     }
+    if (group.learns_for != 0) what = "learn echo";
+    if (!modbus::is_pure_read(group.pdu)) cache_.on_write(group.station, group.pdu);
     const TimePoint longest = sent + wait +
                               2 * wire_time(settings_.serial, modbus::kMaxLongRtuAdu) +
                               settings_.end_of_frame;
-    actions_.push_back(Note{now, Note::Direction::sent, adu, what});
+    echo_ = EchoFilter(adu, echo_memory_.expect(group.pdu));
+    actions_.push_back(Note{now, Note::Direction::sent, adu, what, why(now, group)});
     actions_.push_back(Transmit{std::move(adu)});
     modbus::ReplyFramer framer(group.station, group.pdu);
     quiet_since_ = sent;
     last_station_ = group.station;
-    active_.emplace(Active{std::move(group), std::move(framer), now, sent, sent + wait, longest,
-                           sent, sent, false});
+    active_.emplace(Active{std::move(group),
+                           std::move(framer),
+                           now,
+                           sent,
+                           sent + wait,
+                           longest,
+                           sent,
+                           sent,
+                           false,
+                           true,
+                           {}});
 }
 
 /// How long to wait for a reply to begin. A probe waits only for what this line's panels have
@@ -183,7 +248,7 @@ void Arbiter::start(TimePoint now, Group group) {
 /// that has become slow on a line where a late frame would collide.
 Duration Arbiter::patience(const Group& group, Station& station) const {
     constexpr int kOneInFull = 8;
-    const Duration whole = station.settings.response_timeout;
+    const Duration whole = station.timeout();
     if (!group.probe || ++station.probes % kOneInFull == 0) return whole;
     const bool own = station.health.last_success().has_value();
     if (!own && !slowest_) return whole;
@@ -231,7 +296,9 @@ void Arbiter::expire(TimePoint now) {
     const auto first = queue_.first_expiry();
     if (!first || now < *first) return;
     for (const Job& job : queue_.remove_if([&](const Job& j) { return j.start_by <= now; })) {
-        finish(job, job.attempts > 0 ? Fault::timeout : Fault::expired);
+        const Fault fault = job.attempts > 0 ? Fault::timeout : Fault::expired;
+        explain_end(now, job, fault);
+        finish(job, fault);
     }
 }
 

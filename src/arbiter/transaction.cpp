@@ -12,7 +12,8 @@
 
 namespace panelgate::arbiter {
 
-Arbiter::Arbiter(Settings settings) : settings_(std::move(settings)), queue_(settings_.queue) {
+Arbiter::Arbiter(Settings settings)
+    : settings_(std::move(settings)), queue_(settings_.queue), echo_memory_(settings_.echo) {
     for (const StationSettings& station : settings_.stations) {
         configured_[station.id] = station;
         counters_[station.id];
@@ -29,16 +30,19 @@ void Arbiter::on_line_up(TimePoint now) {
     last_station_ = kBroadcast;
     early_replies_ = 0;
     timely_replies_ = 0;
+    echo_memory_.forget();
+    echo_ = {};
     step(now);
 }
 
 void Arbiter::on_line_down(TimePoint now) {
     up_ = false;
     idle_heard_.clear();
+    cache_.clear();
     if (active_) {
         Group group = std::move(active_->group);
         note_unused(now, active_->framer.take_unused());
-        close_active(now);
+        close_active(now, group);
         for (const Job& job : group.jobs) finish(job, Fault::line_lost);
     }
     if (retry_) {
@@ -50,76 +54,16 @@ void Arbiter::on_line_down(TimePoint now) {
     }
 }
 
-void Arbiter::on_rx(TimePoint now, ByteView bytes) {
-    if (bytes.empty() || !up_) return;
-    if (!active_ || active_->group.station == kBroadcast || is_stale(now)) {
-        hear_idle(now, bytes);
-    } else {
-        if (!active_->heard) active_->first_byte = now;
-        active_->last_byte = now;
-        active_->heard = true;
-        quiet_since_ = std::max(active_->sent, now);
-        if (auto reply = active_->framer.feed(bytes)) settle(now, *reply);
-    }
-    step(now);
-}
-
-/// No reply can begin before the request has left and the silence after it told the station so. On
-/// a real UART, or a line that has shown to behave like one, such bytes are old (P1).
-bool Arbiter::is_stale(TimePoint now) const {
-    constexpr int kEnough = 3;
-    const bool paced = settings_.paced || (timely_replies_ >= kEnough && early_replies_ == 0);
-    return paced && !active_->heard && now < active_->sent + silent_interval(settings_.serial);
-}
-
-/// Bytes that nobody asked for (MST-04): counted, never matched with a later request.
-void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
-    quiet_since_ = std::max(quiet_since_, now);
-    idle_heard_.insert(idle_heard_.end(), bytes.begin(), bytes.end());
-    if (idle_heard_.size() > modbus::ReplyFramer::kMaxHeard) judge_idle(now);
-}
-
-void Arbiter::judge_idle(TimePoint now) {
-    if (idle_heard_.empty()) return;
-    const Bytes heard = std::exchange(idle_heard_, {});
-    note_unused(now, modbus::classify_heard(heard, last_station_));
-}
-
-/// Counts and traces what was heard and is nobody's answer.
-void Arbiter::note_unused(TimePoint now, const std::vector<modbus::Unused>& parts) {
-    for (const modbus::Unused& part : parts) {
-        const bool good = part.kind != modbus::Unused::Kind::damaged;
-        const bool known = good && stations_.contains(part.station);
-        counters_of(known ? part.station : last_station_).discarded_bytes += part.bytes.size();
-        std::string_view what = good ? "foreign" : "damaged";
-        if (known && part.kind == modbus::Unused::Kind::own) what = "late";
-        if (known && stations_.at(part.station).owed > 0) what = "late";
-        if (what == "late") ++counters_of(part.station).late_frames;
-        if (what == "foreign") ++counters_of(last_station_).foreign_frames;
-        actions_.push_back(Note{now, Note::Direction::discarded, part.bytes, what});
-        if (known) on_good_frame(now, part);
-    }
-}
-
-/// A good frame of a station that we know, outside its transaction: perhaps the reply that is owed.
-void Arbiter::on_good_frame(TimePoint now, const modbus::Unused& part) {
-    Station& station = stations_.at(part.station);
-    const ByteView pdu = ByteView(part.bytes).subspan(1, part.bytes.size() - kAduOverhead);
-    if (station.owed == 0 || !modbus::answers(station.unanswered, pdu)) return;
-    --station.owed;
-    const Duration lateness = std::max(now - station.due, Duration::zero());
-    station.late.on_late(lateness);
-    actions_.push_back(StationEvent{StationEvent::Kind::late, part.station, lateness});
-    if (station.health.on_reply(now)) {
-        actions_.push_back(StationEvent{StationEvent::Kind::online, part.station, {}});
-    }
+/// Bytes are there that more bytes or silence will judge.
+bool Arbiter::is_hearing() const {
+    return active_->framer.has_pending() || echo_.pending() || !active_->collided.empty();
 }
 
 /// When the transaction on the wire must be looked at again.
 TimePoint Arbiter::active_deadline() const {
     const Active& a = *active_;
     if (a.group.station == kBroadcast) return a.sent;
-    if (!a.framer.has_pending()) return a.give_up;
+    if (!is_hearing()) return a.give_up;
     // Something is being heard: its silence decides, also after give_up, but not for ever.
     return std::min(std::max(a.sent, a.last_byte) + settings_.end_of_frame, a.longest);
 }
@@ -130,11 +74,16 @@ void Arbiter::check_active(TimePoint now) {
         check_broadcast(now);
         return;
     }
-    if (auto reply = active_->framer.on_silence()) {
-        settle(now, *reply);
+    if (!active_->collided.empty()) {
+        fail_attempt(now, Fault::damaged);
         return;
     }
-    if (active_->framer.was_damaged()) {
+    std::optional<Bytes> reply;
+    if (const Bytes held = echo_.release(); !held.empty()) reply = active_->framer.feed(held);
+    if (!reply) reply = active_->framer.on_silence();
+    if (reply) {
+        settle(now, *reply);
+    } else if (active_->framer.was_damaged()) {
         fail_attempt(now, Fault::damaged);
     } else if (now >= active_->give_up) {
         fail_attempt(now, Fault::timeout);
@@ -145,18 +94,27 @@ void Arbiter::check_active(TimePoint now) {
 void Arbiter::check_broadcast(TimePoint now) {
     const Group group = std::move(active_->group);
     const TimePoint sent = active_->sent;
-    close_active(now);
+    close_active(now, group);
     quiet_until_ = sent + settings_.broadcast_turnaround;
     for (const Job& job : group.jobs) finish(job, modbus::normal_write_reply(job.pdu));
 }
 
 void Arbiter::settle(TimePoint now, const Bytes& reply) {
     count_reply(now, reply);
-    note_unused(now, active_->framer.take_unused());
+    const std::vector<modbus::Unused> unused = active_->framer.take_unused();
+    if (!echo_.complete()) {
+        echo_memory_.on_reply_without_echo(active_->group.pdu, active_->clean && unused.empty());
+    }
+    note_unused(now, unused);
     Group group = std::move(active_->group);
-    actions_.push_back(
-        Note{now, Note::Direction::received, modbus::encode_adu(group.station, reply), "reply"});
-    close_active(now);
+    const TimePoint started = active_->started;
+    actions_.push_back(Note{
+        now, Note::Direction::received, modbus::encode_adu(group.station, reply), "reply", {}});
+    close_active(now, group);
+    if (group.span && !modbus::exception_of(reply) &&
+        settings_of(group.station).max_age > Duration::zero()) {
+        cache_.store(*group.span, reply, started);
+    }
     Station& station = station_of(group.station);
     // An earlier attempt may still be answered, too: nothing else of this shape until it cannot.
     if (station.owed > 0) station.not_before = now + station.late.value();
@@ -175,6 +133,12 @@ void Arbiter::count_reply(TimePoint now, const Bytes& reply) {
     counters.turnaround.observe(think);
     counters.bus_transaction.observe(now - a.started);
     station.slowest = std::max(station.slowest, think);
+    station.turnaround.add(think);
+    station.adaptive.on_reply();
+    if (station.drift.check(station.turnaround, station.settings.response_timeout)) {
+        actions_.push_back(StationEvent{StationEvent::Kind::drift, a.group.station,
+                                        station.turnaround.quantile(0.95)});
+    }
     slowest_ = std::max(slowest_.value_or(think), think);
     const auto code = modbus::exception_of(reply);
     if (code) ++counters.exceptions[*code];
@@ -223,28 +187,42 @@ void Arbiter::deliver(const Group& group, const Bytes& reply) {
 
 void Arbiter::fail_attempt(TimePoint now, Fault fault) {
     note_unused(now, active_->framer.take_unused());
+    if (!active_->collided.empty())
+        note_unused(now, modbus::classify_heard(active_->collided, kBroadcast));
     Group group = std::move(active_->group);
     Station& station = station_of(group.station);
     const Duration cost = now - active_->started + gap_of(group.station);
     const TimePoint sent = active_->sent;
-    close_active(now);
-    const bool offline = station.health.offline();
+    close_active(now, group);
     if (fault == Fault::damaged) {
         ++counters_of(group.station).damaged_frames;
     } else {
         ++station.owed;
         station.unanswered = group.pdu;
-        station.due = sent + station.settings.response_timeout;
-        quarantine(now, group, station);
+        station.due = sent + station.timeout();
+        quarantine(now, group, station, sent);
+        station.adaptive.on_timeout();
     }
-    if (offline) budget_.spend(now, cost);
+    if (station.health.offline()) budget_.spend(now, cost);
     if (may_retry(now, group, station)) {
         other_first_ = settings_.quarantine == Quarantine::station;
         retry_ = std::move(group);
         return;
     }
+    give_up(now, group, fault);
+}
+
+/// No further attempt: everybody is answered, and the station judged.
+void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     for (const Job& job : group.jobs) finish(job, fault);
-    if (fault == Fault::damaged && !offline) {
+    if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
+    if (group.learns_for != 0 && fault != Fault::damaged) {
+        // P8: the write never left, and its station is silent.
+        const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
+        for (const Job& job : queue_.remove_if(asked)) finish(job, fault);
+    }
+    Station& station = station_of(group.station);
+    if (fault == Fault::damaged && !station.health.offline()) {
         station.health.on_damaged();
     } else {
         went_silent(now, group, station);
@@ -252,11 +230,17 @@ void Arbiter::fail_attempt(TimePoint now, Fault fault) {
 }
 
 /// P1: until the reply can no longer come, only the same request may go again. A probe lets the
-/// others go on: its station is known to be silent, and its address tells a late reply apart.
-void Arbiter::quarantine(TimePoint now, const Group& group, Station& station) {
-    station.not_before = now + station.late.value();
+/// others go on: its station is known to be silent, and its address tells a late reply apart. A
+/// timeout that was chosen short (adaptive) frees the others early, but not this station: it may
+/// still answer within the whole one.
+void Arbiter::quarantine(TimePoint now, const Group& group, Station& station, TimePoint sent) {
+    const Duration late = station.late.value();
+    station.not_before = std::max(now, sent + station.settings.response_timeout) + late;
     if (settings_.quarantine == Quarantine::line && !group.probe) {
-        quarantined_until_ = std::max(quarantined_until_, station.not_before);
+        const TimePoint others =
+            now + std::min(late, station.settings.adaptive_timeout ? station.timeout() : late);
+        quarantined_until_ = std::max(quarantined_until_, others);
+        explain_quarantine(now, group);
     }
 }
 
@@ -277,15 +261,18 @@ bool Arbiter::may_retry(TimePoint now, const Group& group, const Station& statio
     return harmless && in_time && group.attempts <= station.settings.retries;
 }
 
-void Arbiter::close_active(TimePoint now) {
+void Arbiter::close_active(TimePoint now, const Group& group) {
     const TimePoint end =
         std::max({active_->sent, active_->last_byte, std::min(now, active_->longest)});
-    line_counters_.busy += end - active_->started + gap_of(active_->group.station);
+    const Duration busy = end - active_->started + gap_of(group.station);
+    line_counters_.busy += busy;
+    for (const Job& job : group.jobs)
+        shares_.add(job.client, busy / static_cast<int>(group.jobs.size()));
     active_.reset();
 }
 
 void Arbiter::finish(const Job& job, Result<Bytes> pdu, bool shared) {
-    actions_.push_back(Finish{job.ticket, std::move(pdu), job.attempts > 0, shared});
+    actions_.push_back(Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}});
 }
 
 std::optional<Action> Arbiter::poll_action() {
@@ -318,6 +305,11 @@ Arbiter::Station& Arbiter::station_of(std::uint8_t id) {
 StationHealth Arbiter::health(std::uint8_t id) const {
     const auto found = stations_.find(id);
     return found == stations_.end() ? StationHealth(settings_.offline) : found->second.health;
+}
+
+Duration Arbiter::response_timeout(std::uint8_t id) const {
+    const auto found = stations_.find(id);
+    return found == stations_.end() ? settings_of(id).response_timeout : found->second.timeout();
 }
 
 StationCounters& Arbiter::counters_of(std::uint8_t station) {

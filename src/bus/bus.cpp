@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "client_shares.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
@@ -43,6 +44,7 @@ struct Bus::State final : public line::Line::Events,
           arbiter(settings.arbiter),
           counters(settings.stations),
           recorder(settings.trace_frames),
+          decisions(settings.trace_decisions),
           alarm(executor),
           refusal_alarm(executor) {}
 
@@ -56,6 +58,7 @@ struct Bus::State final : public line::Line::Events,
     void act(arbiter::Transmit& transmit) { line->write(transmit.adu); }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note);
+    void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
     void arm();
     void on_alarm();
@@ -67,6 +70,8 @@ struct Bus::State final : public line::Line::Events,
     arbiter::Arbiter arbiter;
     RequestCounters counters;
     FlightRecorder recorder;
+    DecisionRecorder decisions;
+    std::map<ClientId, std::string> client_names;
     mutable LoadMeter load;
     asio::steady_timer alarm;
     asio::steady_timer refusal_alarm;
@@ -150,6 +155,10 @@ void Bus::State::act(arbiter::Finish& finish) {
     result.pdu = std::move(finish.pdu);
     result.transmitted = finish.transmitted;
     result.shared = finish.shared;
+    if (finish.age) {
+        result.source = Source::cache;
+        result.age = *finish.age;
+    }
     answer(std::move(entry), std::move(result));
 }
 
@@ -161,37 +170,55 @@ void Bus::State::act(arbiter::Note& note) {
         rt::log(rt::LogLevel::trace, "frame",
                 {{"line", settings.name},
                  {"what", std::string(note.what)},
-                 {"bytes", to_hex(note.bytes)}});
+                 {"bytes", to_hex(note.bytes)},
+                 {"why", note.why}});
     }
     TraceFrame frame;
     frame.at = note.at;
     frame.direction = kDirections[static_cast<std::size_t>(note.direction)];
     frame.bytes = std::move(note.bytes);
     frame.note = note.what;
+    frame.why = std::move(note.why);
     recorder.add(std::move(frame));
+}
+
+void Bus::State::act(arbiter::Decision& decision) {
+    if (rt::log_enabled(rt::LogLevel::trace)) {
+        rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
+    }
+    decisions.add({0, decision.at, std::move(decision.text)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
     const auto named = settings.stations.find(event.station);
     const std::string id = std::to_string(event.station);
     const std::string station = named == settings.stations.end() ? id : named->second;
+    const std::string ms = std::to_string(std::lround(to_milliseconds(event.by)));
+    const auto say = [&](rt::LogLevel level, const char* what, const std::string& hint) {
+        if (hint.empty()) {
+            rt::log(level, what, {{"line", settings.name}, {"station", station}});
+        } else {
+            rt::log(level, what, {{"line", settings.name}, {"station", station}, {"hint", hint}});
+        }
+    };
     switch (event.kind) {
         case arbiter::StationEvent::Kind::offline:
-            rt::log(rt::LogLevel::warn, "station offline",
-                    {{"line", settings.name}, {"station", station}});
-            return;
+            return say(rt::LogLevel::warn, "station offline", "");
         case arbiter::StationEvent::Kind::online:
-            rt::log(rt::LogLevel::info, "station online",
-                    {{"line", settings.name}, {"station", station}});
-            return;
-        case arbiter::StationEvent::Kind::late: {
-            const std::string ms = std::to_string(std::lround(to_milliseconds(event.late_by)));
-            rt::log(rt::LogLevel::warn, "late reply",
-                    {{"line", settings.name},
-                     {"station", station},
-                     {"hint", "raise its response_timeout by at least " + ms + "ms"}});
-            return;
-        }
+            return say(rt::LogLevel::info, "station online", "");
+        case arbiter::StationEvent::Kind::late:
+            return say(rt::LogLevel::warn, "late reply",
+                       "raise its response_timeout by at least " + ms + "ms");
+        case arbiter::StationEvent::Kind::drift:
+            return say(rt::LogLevel::warn, "station has become slow",
+                       "it takes up to " + ms + "ms, near its response_timeout; raise that");
+        case arbiter::StationEvent::Kind::collision:
+            return say(rt::LogLevel::warn, "collision",
+                       "the echo is not what was sent: is there another master, or no echo?");
+        case arbiter::StationEvent::Kind::echo:
+            return say(settings.arbiter.echo == arbiter::EchoMode::off ? rt::LogLevel::warn
+                                                                       : rt::LogLevel::info,
+                       "line hears itself", "its echo is checked and taken out");
     }
 }
 
@@ -243,8 +270,31 @@ void Bus::State::answer_soon(std::function<void()> hand_over) {
     });
 }
 
+namespace {
+
+Settings explained(Settings settings) {
+    settings.arbiter.explain = true;
+    return settings;
+}
+
+std::string_view label(arbiter::EchoMemory::State state) {
+    switch (state) {
+        case arbiter::EchoMemory::State::unknown:
+            return "unknown";
+        case arbiter::EchoMemory::State::absent:
+            return "absent";
+        case arbiter::EchoMemory::State::present:
+            return "present";
+        case arbiter::EchoMemory::State::unclear:
+            return "unclear";
+    }
+    std::abort();
+}
+
+}  // namespace
+
 Bus::Bus(asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line)
-    : state_(std::make_shared<State>(executor, std::move(settings), std::move(line))) {}
+    : state_(std::make_shared<State>(executor, explained(std::move(settings)), std::move(line))) {}
 
 Bus::~Bus() { stop(); }
 
@@ -262,8 +312,14 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::cancel(ClientId client) {
+    state_->client_names.erase(client);
     state_->arbiter.cancel(rt::now(), client);
     state_->pump();
+}
+
+void Bus::name_client(ClientId client, std::string name) {
+    if (state_->client_names.size() >= arbiter::BusShares::kClients) return;
+    state_->client_names.insert_or_assign(client, std::move(name));
 }
 
 LineStatus Bus::status() const {
@@ -274,6 +330,8 @@ LineStatus Bus::status() const {
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
+    status.echo = label(state_->arbiter.echo());
+    status.clients = client_shares(state_->arbiter.shares(), state_->client_names);
     return status;
 }
 
@@ -286,6 +344,10 @@ StationStatus Bus::station_status(std::uint8_t station) const {
 }
 
 std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }
+
+std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
+    return state_->decisions.last(last);
+}
 
 bool Bus::idle() const { return state_->arbiter.idle(); }
 

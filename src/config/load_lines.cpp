@@ -92,13 +92,11 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
-void load_echo(MapReader& in) {
-    constexpr std::array<std::string_view, 3> kModes{"auto", "on", "off"};
-    if (in.choice_index("echo", kModes) == std::size_t{1}) {
-        in.problem("echo",
-                   "echo: on is not in this version; use an adapter that does not hear itself, "
-                   "and auto or off");
-    }
+arbiter::EchoMode load_echo(MapReader& in) {
+    constexpr std::array<std::string_view, 3> kWords{"auto", "on", "off"};
+    constexpr std::array kModes{arbiter::EchoMode::automatic, arbiter::EchoMode::on,
+                                arbiter::EchoMode::off};
+    return kModes[in.choice_index("echo", kWords).value_or(0)];
 }
 
 Line load_line(Loading& loading, const Node& node) {
@@ -113,7 +111,7 @@ Line load_line(Loading& loading, const Node& node) {
     const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in);
-    load_echo(in);
+    line.arbiter.echo = load_echo(in);
     load_queue(loading, in, line.arbiter.queue);
     load_offline(loading, in, line.arbiter.offline);
     constexpr std::array<std::string_view, 2> kQuarantine{"line", "station"};

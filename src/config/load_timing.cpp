@@ -23,12 +23,22 @@ std::string at_least(Duration duration) {
 void load_response_timeout(MapReader& in, StationSettings& settings) {
     constexpr std::string_view kKey = "response_timeout";
     if (is_word(in, kKey, "adaptive")) {
-        in.problem(kKey,
-                   "response_timeout: adaptive is not in this version; give a duration such "
-                   "as 500ms");
-        return;
+        settings.adaptive_timeout = true;  // up to the line's own, or the default
+    } else if (const auto timeout = in.duration(kKey, 1ms, 2min)) {
+        settings.response_timeout = *timeout;
+        settings.adaptive_timeout = false;
     }
-    settings.response_timeout = in.duration(kKey, 1ms, 2min).value_or(settings.response_timeout);
+    Duration& floor = settings.timeout_floor;
+    floor = in.duration("adaptive_floor", 1ms, 10s).value_or(floor);
+    const auto ceiling = in.duration("adaptive_ceiling", 1ms, 2min);
+    if (!settings.adaptive_timeout) return;
+    settings.response_timeout = ceiling.value_or(settings.response_timeout);
+    if (floor > settings.response_timeout) {
+        in.problem(in.has("adaptive_floor") ? "adaptive_floor" : "adaptive_ceiling",
+                   "adaptive_floor " + yaml::format_duration(floor) +
+                       " is above the adaptive_ceiling " +
+                       yaml::format_duration(settings.response_timeout));
+    }
 }
 
 /// Nothing = auto. Less than the standard's silence is refused: the standard has no shorter frame

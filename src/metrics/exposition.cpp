@@ -103,6 +103,9 @@ constexpr std::array kWireCounters = {
     WireCounter{"panelgate_damaged_frames_total",
                 "Bytes that never became a good frame, counted once a frame.",
                 &arbiter::StationCounters::damaged_frames},
+    WireCounter{"panelgate_echo_mismatch_total",
+                "Requests whose echo was not what was sent: collisions.",
+                &arbiter::StationCounters::echo_mismatches},
     WireCounter{"panelgate_discarded_bytes_total", "Bytes received and thrown away.",
                 &arbiter::StationCounters::discarded_bytes},
 };

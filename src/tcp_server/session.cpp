@@ -240,6 +240,10 @@ void Session::serve(const modbus::Adu& adu) {
                decision);
 }
 
+void Session::use(bus::BusClient* bus) {
+    if (used_.insert(bus).second) bus->name_client(client_, "modbus_tcp " + client_name_);
+}
+
 bus::Request Session::make_request(const modbus::Adu& adu, std::uint8_t station) const {
     bus::Request request;
     request.station = station;
@@ -252,7 +256,7 @@ bus::Request Session::make_request(const modbus::Adu& adu, std::uint8_t station)
 
 void Session::forward(const modbus::Adu& adu, const Target& target) {
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
-    used_.insert(target.bus);
+    use(target.bus);
     target.bus->transact(
         make_request(adu, target.station),
         [weak = weak_from_this(), ticket, function = adu.pdu[0]](const bus::Answer& answer) {

@@ -58,6 +58,7 @@ class Session : public std::enable_shared_from_this<Session> {
     void serve(const modbus::Adu& adu);
     void forward(const modbus::Adu& adu, const Target& target);
     void broadcast(const modbus::Adu& adu, const std::vector<bus::BusClient*>& lines);
+    void use(bus::BusClient* bus);
     bus::Request make_request(const modbus::Adu& adu, std::uint8_t station) const;
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);

@@ -22,6 +22,7 @@ json::object describe(const LineEntry& line) {
     object["up"] = status.up;
     object["load_percent"] = std::round(status.load_percent * 10) / 10;
     object["queue_depth"] = status.queue_depth;
+    object["echo"] = status.echo;
     return object;
 }
 
@@ -46,7 +47,29 @@ json::object describe(const bus::TraceFrame& frame) {
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
     object["note"] = frame.note;
+    if (!frame.why.empty()) object["why"] = frame.why;
     return object;
+}
+
+json::object describe(const bus::TraceDecision& decision) {
+    json::object object;
+    object["sequence"] = decision.sequence;
+    object["at"] = to_seconds(decision.at.time_since_epoch());
+    object["text"] = decision.text;
+    return object;
+}
+
+json::array describe(const std::vector<bus::ClientShare>& clients) {
+    json::array list;
+    for (const bus::ClientShare& client : clients) {
+        json::object object;
+        object["name"] = client.name;
+        object["busy_seconds"] = to_seconds(client.busy);
+        object["percent"] = std::round(client.percent * 10) / 10;
+        object["transactions"] = client.transactions;
+        list.push_back(std::move(object));
+    }
+    return list;
 }
 
 }  // namespace
@@ -62,7 +85,9 @@ Handling get_lines(HttpRequest, const Api* api) {
 Handling get_line(HttpRequest request, const Api* api) {
     const auto line = find_line(*api, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    co_return json_response(200, describe(**line));
+    json::object body = describe(**line);
+    body["clients"] = describe((*line)->bus->status().clients);
+    co_return json_response(200, body);
 }
 
 Handling get_trace(HttpRequest request, const Api* api) {
@@ -76,6 +101,11 @@ Handling get_trace(HttpRequest request, const Api* api) {
     }
     json::object body;
     body["frames"] = std::move(frames);
+    json::array decisions;
+    for (const bus::TraceDecision& decision : (*line)->bus->decisions(*last)) {
+        decisions.push_back(describe(decision));
+    }
+    body["decisions"] = std::move(decisions);
     co_return json_response(200, body);
 }
 

@@ -43,7 +43,7 @@ void BusCaller::abandon() {
 asio::awaitable<bus::Answer> transact(std::shared_ptr<BusCaller> caller, bus::BusClient* bus,
                                       bus::Request request) {
     if (!caller->abandoned) {
-        caller->used.insert(bus);
+        if (caller->used.insert(bus).second) bus->name_client(caller->client, caller->name);
         request.client = caller->client;
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);

@@ -3,6 +3,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <memory>
 #include <set>
+#include <string>
 
 #include "panelgate/bus/bus_client.hpp"
 
@@ -11,6 +12,7 @@ namespace panelgate::web {
 /// One HTTP session as the buses see it.
 struct BusCaller {
     bus::ClientId client = bus::next_client_id();
+    std::string name = "http";
     bool abandoned = false;
     std::set<bus::BusClient*> used;
 

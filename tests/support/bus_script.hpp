@@ -120,6 +120,7 @@ class BusScript {
     std::map<arbiter::Ticket, Answer> answers;
     std::vector<arbiter::Note> notes;
     std::vector<arbiter::StationEvent> events;
+    std::vector<arbiter::Decision> decisions;
 
   private:
     void drain() {
@@ -138,6 +139,7 @@ class BusScript {
         answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
     }
     void act(const arbiter::Note& note) { notes.push_back(note); }
+    void act(const arbiter::Decision& decision) { decisions.push_back(decision); }
     void act(const arbiter::StationEvent& event) { events.push_back(event); }
 
     arbiter::Settings settings_;

@@ -61,6 +61,11 @@ class FakeBus : public bus::BusClient {
         return {frames.begin() + static_cast<std::ptrdiff_t>(skip), frames.end()};
     }
 
+    std::vector<bus::TraceDecision> decisions(std::size_t last) const override {
+        const auto skip = made.size() - std::min(last, made.size());
+        return {made.begin() + static_cast<std::ptrdiff_t>(skip), made.end()};
+    }
+
     static bus::Answer reply(Bytes pdu) {
         return {Result<Bytes>(std::move(pdu)), true, bus::Source::bus, {}};
     }
@@ -71,9 +76,10 @@ class FakeBus : public bus::BusClient {
     Script script;
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
-    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0};
+    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, "absent", {}};
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
+    std::vector<bus::TraceDecision> made;  ///< decisions
 
   private:
     using Open = std::pair<bus::ClientId, bus::AnswerHandler>;

@@ -3,17 +3,22 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "panelgate/arbiter/bus_shares.hpp"
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/late_window.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/arbiter/turnaround.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
@@ -30,6 +35,8 @@ struct Finish {
     Result<Bytes> pdu = Fault::cancelled;
     bool transmitted = false;  ///< at least once, at least partly
     bool shared = false;       ///< another job's transaction answered it too
+    /// Of a value that was read before and answers from memory (max_age).
+    std::optional<Duration> age;
 };
 /// Something was seen on the wire, for the trace.
 struct Note {
@@ -38,15 +45,28 @@ struct Note {
     Direction direction = Direction::sent;
     Bytes bytes;
     std::string_view what;  ///< a literal: "request", "reply", "foreign"…
+    std::string why;        ///< of a sent frame, with Settings::explain: why this one now
 };
-/// A station changed its health, or showed that its timeout is too short.
+/// With Settings::explain: why something is not done now, or not at all. One line.
+struct Decision {
+    TimePoint at;
+    std::string text;
+};
+/// A station changed its health, or showed something that its owner should know.
 struct StationEvent {
-    enum class Kind : std::uint8_t { offline, online, late };
+    enum class Kind : std::uint8_t {
+        offline,
+        online,
+        late,       ///< it answered `by` after the response timeout
+        drift,      ///< 95 of 100 replies take up to `by`: near the response timeout
+        collision,  ///< the echo of a request to it differed from what was sent
+        echo,       ///< a request to it came back: the line hears itself
+    };
     Kind kind = Kind::online;
     std::uint8_t station = 0;
-    Duration late_by{};  ///< Kind::late: beyond the response timeout
+    Duration by{};
 };
-using Action = std::variant<Transmit, Finish, Note, StationEvent>;
+using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent>;
 
 /// Decides what one line does. Pure: time is an argument, actions come out of poll_action();
 /// calling on_deadline early or twice is harmless.
@@ -86,16 +106,31 @@ class Arbiter {
     const std::map<std::uint8_t, StationCounters>& station_counters() const { return counters_; }
     /// Of a station that was never asked: unknown.
     StationHealth health(std::uint8_t id) const;
+    /// How long the next request to this station would wait for its reply to begin.
+    Duration response_timeout(std::uint8_t id) const;
+    const BusShares& shares() const { return shares_; }
+    EchoMemory::State echo() const { return echo_memory_.state(); }
 
   private:
     /// What is known of a station beyond its settings; made when it is first asked.
     struct Station {
         Station(const StationSettings& s, const OfflineSettings& offline)
-            : settings(s), health(offline), late(s.late_window, s.response_timeout) {}
+            : settings(s),
+              health(offline),
+              late(s.late_window, s.response_timeout),
+              adaptive(s.timeout_floor, s.response_timeout) {}
+
+        Duration timeout() const {
+            return settings.adaptive_timeout ? adaptive.value(turnaround)
+                                             : settings.response_timeout;
+        }
 
         StationSettings settings;
         StationHealth health;
         LateWindow late;
+        Turnaround turnaround;
+        AdaptiveTimeout adaptive;
+        DriftAlarm drift;
         TimePoint not_before{};  ///< its quarantine
         Bytes unanswered;        ///< the request whose replies may still come
         int owed = 0;            ///< how many of them
@@ -113,6 +148,8 @@ class Arbiter {
         std::optional<ReadSpan> span;
         int attempts = 0;
         bool probe = false;
+        /// It only finds out about the echo, for this job, which waits in the queue.
+        Ticket learns_for = 0;
     };
     /// The transaction on the wire.
     struct Active {
@@ -125,6 +162,8 @@ class Arbiter {
         TimePoint first_byte;  ///< heard in this attempt
         TimePoint last_byte;
         bool heard = false;
+        bool clean = true;  ///< nothing was heard before the reply could begin, but for the echo
+        Bytes collided;     ///< instead of the echo
     };
 
     // What happens next (schedule.cpp)
@@ -132,6 +171,7 @@ class Arbiter {
     bool start_next(TimePoint now);
     bool start_retry(TimePoint now);
     bool start_probe(TimePoint now);
+    void start_learning(TimePoint now, const Job& job);
     bool start_job(TimePoint now);
     bool may_run(TimePoint now, const Job& job) const;
     bool gap_is_over(TimePoint now, std::uint8_t station);
@@ -145,6 +185,8 @@ class Arbiter {
     std::optional<TimePoint> next_start() const;
     Bytes probe_for(const Station& station) const;
     Duration patience(const Group& group, Station& station) const;
+    std::optional<Ticket> answer_from_memory(TimePoint now, const Job& job);
+    bool has_open(Client client) const;
 
     // What a transaction came to (transaction.cpp)
     void check_active(TimePoint now);
@@ -154,22 +196,32 @@ class Arbiter {
     bool split(Group& group, const Bytes& reply);
     void count_reply(TimePoint now, const Bytes& reply);
     void fail_attempt(TimePoint now, Fault fault);
-    void quarantine(TimePoint now, const Group& group, Station& station);
+    void give_up(TimePoint now, const Group& group, Fault fault);
+    void quarantine(TimePoint now, const Group& group, Station& station, TimePoint sent);
     void went_silent(TimePoint now, const Group& group, Station& station);
     bool may_retry(TimePoint now, const Group& group, const Station& station) const;
-    void close_active(TimePoint now);
+    void close_active(TimePoint now, const Group& group);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
+    ByteView without_echo(TimePoint now, ByteView bytes);
+    void collide(TimePoint now, ByteView bytes);
     void note_unused(TimePoint now, const std::vector<modbus::Unused>& parts);
     void hear_idle(TimePoint now, ByteView bytes);
     void judge_idle(TimePoint now);
     void on_good_frame(TimePoint now, const modbus::Unused& part);
     bool is_stale(TimePoint now) const;
     TimePoint active_deadline() const;
+    bool is_hearing() const;
     Duration shortest_transaction(const Job& job) const;
     const StationSettings& settings_of(std::uint8_t station) const;
     Station& station_of(std::uint8_t station);
     StationCounters& counters_of(std::uint8_t station);
     Duration gap_of(std::uint8_t station) const;
+
+    // Why (explain.cpp): nothing is put into words when nobody wants to read it
+    std::string why(TimePoint now, const Group& group) const;
+    void explain_refusal(TimePoint now, const Job& job, Fault fault);
+    void explain_quarantine(TimePoint now, const Group& group);
+    void explain_end(TimePoint now, const Job& job, Fault fault);
 
     Settings settings_;
     std::map<std::uint8_t, StationSettings> configured_;
@@ -181,6 +233,10 @@ class Arbiter {
     std::optional<Group> retry_;           ///< an attempt failed: the same request goes again
     std::vector<ReadSpan> refused_spans_;  ///< joined reads that a panel did not take
     ProbeBudget budget_;
+    ReadCache cache_;
+    BusShares shares_;
+    EchoMemory echo_memory_;
+    EchoFilter echo_;  ///< of the frame sent last
     std::deque<Action> actions_;
     Bytes idle_heard_;               ///< unasked bytes, until silence ends them
     TimePoint quiet_since_{};        ///< the last bit seen on the line, sent or heard

@@ -15,6 +15,7 @@ struct StationCounters {
     std::uint64_t foreign_frames = 0;  ///< good frames of another station, or nobody's reply
     std::uint64_t damaged_frames = 0;  ///< bytes that never became a good frame
     std::uint64_t discarded_bytes = 0;
+    std::uint64_t echo_mismatches = 0;  ///< collisions: the echo was not what was sent
     std::map<std::uint8_t, std::uint64_t> exceptions;  ///< by code: at most 256
     Histogram bus_transaction;                         ///< first bit out to last bit in
     Histogram turnaround;                              ///< the panel's own think time

@@ -39,6 +39,8 @@ class JobQueue {
     /// Shows each client's first request.
     void each_first(const std::function<void(const Job&)>& show) const;
 
+    /// The one that was taken last went ahead of a higher class because of its age.
+    bool last_was_aged() const { return last_was_aged_; }
     bool has(Client client) const { return lanes_.contains(client); }
     std::size_t size() const { return size_; }
     bool empty() const { return size_ == 0; }

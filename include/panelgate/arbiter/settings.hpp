@@ -16,6 +16,9 @@ struct StationSettings {
     std::uint8_t id = 1;  ///< 1..247
     /// From the end of the request on the wire to the start of the reply.
     Duration response_timeout = 500ms;
+    /// Follow the turnaround that was seen, from timeout_floor up to response_timeout.
+    bool adaptive_timeout = false;
+    Duration timeout_floor = 20ms;
     /// Silence before a request to this station and after its reply; never less than t3.5.
     Duration frame_gap = 1750us;
     int retries = 1;  ///< of reads; 0..10
@@ -23,6 +26,8 @@ struct StationSettings {
     /// How long after a timeout a reply may still come; nothing = auto: the response timeout at
     /// first, then what lateness was seen.
     std::optional<Duration> late_window;
+    /// How old a value that was read before may be when it answers a client; 0 = ask the panel.
+    Duration max_age{};
     /// Items of one read, for merging: the profile's or the standard's limit.
     std::uint16_t max_registers = 125;
     std::uint16_t max_bits = 2000;
@@ -42,6 +47,13 @@ enum class Quarantine : std::uint8_t {
     station,  ///< the silent station; others may be asked, at the risk of a collision
 };
 
+/// Whether the adapter hears what it sends (P8).
+enum class EchoMode : std::uint8_t {
+    automatic,  ///< learned from reads, before the first write
+    on,
+    off,
+};
+
 struct Settings {
     SerialFormat serial;
     /// For stations without an entry in `stations`; its id is not used.
@@ -57,6 +69,10 @@ struct Settings {
     bool paced = false;
     /// Identical, contained and adjacent reads share one transaction (P6).
     bool share_reads = true;
+    /// Without a word about it, a line is taken to have none.
+    EchoMode echo = EchoMode::off;
+    /// Say why each request goes now and why one is refused.
+    bool explain = false;
 };
 
 }  // namespace panelgate::arbiter

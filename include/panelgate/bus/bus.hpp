@@ -18,6 +18,7 @@ struct Settings {
     arbiter::Settings arbiter;
     std::map<std::uint8_t, std::string> stations;  ///< names of those the configuration lists
     std::size_t trace_frames = 2000;
+    std::size_t trace_decisions = 500;
 };
 
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.
@@ -36,6 +37,8 @@ class Bus final : public BusClient {
     LineStatus status() const override;
     StationStatus station_status(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
+    std::vector<TraceDecision> decisions(std::size_t last) const override;
+    void name_client(ClientId client, std::string name) override;
 
     LineReport report() const;
     /// Nothing waits, nothing is on the wire.

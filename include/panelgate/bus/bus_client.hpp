@@ -48,6 +48,22 @@ struct TraceFrame {
     Direction direction = Direction::sent;
     Bytes bytes;
     std::string note;  ///< "reply", "late", "damaged", "broadcast"…; never empty
+    std::string why;   ///< of a sent frame: why this one at this time
+};
+
+/// Why something was not done, or not at once; one line.
+struct TraceDecision {
+    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    TimePoint at;
+    std::string text;
+};
+
+/// What one client has used of a line's time (P9).
+struct ClientShare {
+    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"; "client 12" when nobody named it
+    Duration busy{};
+    double percent = 0;  ///< of what all clients that are there have used
+    std::uint64_t transactions = 0;
 };
 
 struct LineStatus {
@@ -56,7 +72,9 @@ struct LineStatus {
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;  ///< busy share of the last seconds
+    double load_percent = 0;           ///< busy share of the last seconds
+    std::string echo;                  ///< "unknown", "absent", "present", "unclear"
+    std::vector<ClientShare> clients;  ///< the greediest first, at most 100
 };
 
 struct StationStatus {
@@ -82,6 +100,16 @@ class BusClient {
     virtual StationStatus station_status(std::uint8_t station) const = 0;
     /// The last frames, oldest first, at most `last`.
     virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;
+    /// The last decisions, oldest first, at most `last`.
+    virtual std::vector<TraceDecision> decisions(std::size_t last) const {
+        static_cast<void>(last);
+        return {};
+    }
+    /// What a client is to be called in `LineStatus::clients`, until cancel().
+    virtual void name_client(ClientId client, std::string name) {
+        static_cast<void>(client);
+        static_cast<void>(name);
+    }
 };
 
 }  // namespace panelgate::bus

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <deque>
 #include <vector>
@@ -8,27 +9,31 @@
 
 namespace panelgate::bus {
 
-/// Keeps the last frames of a line.
-class FlightRecorder {
+/// Numbers what happens on a line and keeps the last of it. Entry has a `sequence`.
+template <class Entry>
+class Recorder {
   public:
-    explicit FlightRecorder(std::size_t limit = 2000) : limit_(limit) {}
+    explicit Recorder(std::size_t limit) : limit_(limit) {}
 
-    /// Numbers the frame and forgets the oldest when full.
-    void add(TraceFrame frame) {
-        frame.sequence = ++sequence_;
-        frames_.push_back(std::move(frame));
-        if (frames_.size() > limit_) frames_.pop_front();
+    /// Forgets the oldest when full.
+    void add(Entry entry) {
+        entry.sequence = ++sequence_;
+        entries_.push_back(std::move(entry));
+        if (entries_.size() > limit_) entries_.pop_front();
     }
     /// The last ones, oldest first.
-    std::vector<TraceFrame> last(std::size_t count) const {
-        const std::size_t n = std::min(count, frames_.size());
-        return {frames_.end() - static_cast<std::ptrdiff_t>(n), frames_.end()};
+    std::vector<Entry> last(std::size_t count) const {
+        const std::size_t n = std::min(count, entries_.size());
+        return {entries_.end() - static_cast<std::ptrdiff_t>(n), entries_.end()};
     }
 
   private:
     std::size_t limit_;
-    std::deque<TraceFrame> frames_;
+    std::deque<Entry> entries_;
     std::uint64_t sequence_ = 0;
 };
+
+using FlightRecorder = Recorder<TraceFrame>;
+using DecisionRecorder = Recorder<TraceDecision>;
 
 }  // namespace panelgate::bus

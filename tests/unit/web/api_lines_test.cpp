@@ -12,9 +12,16 @@ TEST_F(ApiLines, ListsTheLines) {
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
     EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
-        "load_percent":50.0,"queue_depth":3})"));
+        "load_percent":50.0,"queue_depth":3,"echo":"absent"})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
+}
+
+TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
+    bus.line.clients = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
+    EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
+              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75.0,
+        "transactions":12}])"));
 }
 
 TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
@@ -34,16 +41,19 @@ TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
 
 TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
     using Direction = bus::TraceFrame::Direction;
-    bus.frames.push_back({1, TimePoint(1s), Direction::sent, {5, 3}, "request"});
+    bus.frames.push_back({1, TimePoint(1s), Direction::sent, {5, 3}, "request", {}});
     bus.frames.push_back({2,
                           TimePoint(2500ms),
                           Direction::sent,
                           {0x1F, 0x01, 0x01, 0x20, 0x00, 0x05, 0xFF, 0x81},
-                          "request"});
-    bus.frames.push_back({3, TimePoint(3s), Direction::discarded, {}, "damaged"});
+                          "request",
+                          "next in turn"});
+    bus.frames.push_back({3, TimePoint(3s), Direction::discarded, {}, "damaged", {}});
+    bus.made.push_back({7, TimePoint(2s), "refused"});
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
-        {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request"},
-        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}]})"));
+        {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
+        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
+        "decisions":[{"sequence":7,"at":2.0,"text":"refused"}]})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
 }

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/bytes.hpp"
+
+namespace panelgate::arbiter {
+
+/// Watches for our own frame at the front of what is heard after it was sent. One frame, pure.
+class EchoFilter {
+  public:
+    enum class Expect : std::uint8_t {
+        nothing,    ///< the line has no echo
+        perhaps,    ///< bytes that look like it are held back until they are it, or are not
+        certainly,  ///< anything else at the front is a collision
+    };
+
+    EchoFilter() = default;
+    EchoFilter(Bytes frame, Expect expect) : frame_(std::move(frame)), expect_(expect) {}
+
+    /// Takes what is heard and gives what is not echo: a part of `bytes`, or a copy that lives
+    /// until the next call.
+    ByteView feed(ByteView bytes);
+    /// The line is silent: what was held back and never became the echo.
+    Bytes release();
+
+    /// Bytes are held back that may still turn out not to be the echo.
+    bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
+    /// The whole frame came back.
+    bool complete() const { return complete_; }
+    /// An echo was certain and something else came.
+    bool mismatch() const { return mismatch_; }
+
+  private:
+    Bytes frame_;
+    Expect expect_ = Expect::nothing;
+    std::size_t matched_ = 0;  ///< of the frame, while it is being compared
+    bool complete_ = false;
+    bool mismatch_ = false;
+    Bytes released_;
+};
+
+/// The reply to this request can never be the request itself: it shows whether there is an echo.
+bool teaches_echo(ByteView request);
+
+/// What is known of a line's echo (P8): told by the configuration, or learned from reads, whose
+/// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
+class EchoMemory {
+  public:
+    enum class State : std::uint8_t {
+        unknown,
+        absent,
+        present,
+        unclear,  ///< a read was answered, but with something in front of the answer
+    };
+
+    explicit EchoMemory(EchoMode mode);
+
+    State state() const { return state_; }
+    /// The device was opened again: it may be another one.
+    void forget();
+    EchoFilter::Expect expect(ByteView request) const;
+    /// This request could be confirmed by its own echo, and nobody knows whether there is one.
+    bool must_be_learned_before(ByteView request) const;
+
+    /// The whole echo of this request came back. True when that is news.
+    bool on_echo(ByteView request);
+    /// A good reply to this request came with nothing in front, or with other bytes.
+    void on_reply_without_echo(ByteView request, bool clean);
+    /// The read that was to tell did not.
+    void on_unclear();
+    /// The echo differed: learn again, unless the configuration knows.
+    void on_mismatch();
+
+  private:
+    EchoMode mode_;
+    State state_;
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <list>
+#include <optional>
+
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+/// What reads of one line have brought, for stations that allow a client an older value (max_age).
+/// Bounded: the oldest value goes first. Pure.
+class ReadCache {
+  public:
+    static constexpr std::size_t kEntries = 256;
+
+    struct Hit {
+        Bytes pdu;  ///< the reply to the read that was asked for
+        Duration age{};
+    };
+
+    /// The normal reply to `span`, read by a request that left at `sampled` or later.
+    void store(const ReadSpan& span, Bytes reply, TimePoint sampled);
+    /// The youngest value of all these items that is not older than max_age.
+    std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
+    /// This request may change what the station holds (0: all stations), answered or not. Other
+    /// tables may show the same memory (Autonics UB and UW), so of these nothing is kept.
+    void on_write(std::uint8_t station, ByteView request);
+    void clear() { entries_.clear(); }
+    std::size_t size() const { return entries_.size(); }
+
+  private:
+    struct Entry {
+        ReadSpan span;
+        Bytes reply;
+        TimePoint sampled;
+    };
+    std::list<Entry> entries_;  ///< the youngest first
+};
+
+}  // namespace panelgate::arbiter

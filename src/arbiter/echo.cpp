@@ -1,0 +1,94 @@
+#include "panelgate/arbiter/echo.hpp"
+
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/request.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+bool teaches_echo(ByteView request) {
+    if (!modbus::is_pure_read(request)) return false;
+    const auto reply = modbus::reply_length_from_request(request);
+    return reply && *reply != request.size() + kAduOverhead;
+}
+
+ByteView EchoFilter::feed(ByteView bytes) {
+    if (expect_ == Expect::nothing) return bytes;
+    std::size_t taken = 0;
+    while (taken < bytes.size() && matched_ < frame_.size() && bytes[taken] == frame_[matched_]) {
+        ++matched_;
+        ++taken;
+    }
+    const bool certain = expect_ == Expect::certainly;
+    if (matched_ == frame_.size()) {
+        complete_ = true;
+    } else if (taken == bytes.size()) {
+        return {};
+    } else {
+        mismatch_ = certain;
+        released_.assign(frame_.begin(), frame_.begin() + static_cast<std::ptrdiff_t>(matched_));
+        released_.insert(released_.end(), bytes.begin() + static_cast<std::ptrdiff_t>(taken),
+                         bytes.end());
+    }
+    expect_ = Expect::nothing;
+    matched_ = 0;
+    return complete_ ? bytes.subspan(taken) : ByteView(released_);
+}
+
+Bytes EchoFilter::release() {
+    if (!pending()) return {};
+    expect_ = Expect::nothing;
+    return {frame_.begin(),
+            frame_.begin() + static_cast<std::ptrdiff_t>(std::exchange(matched_, 0))};
+}
+
+EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(State::unknown) { forget(); }
+
+void EchoMemory::forget() {
+    switch (mode_) {
+        case EchoMode::automatic:
+            state_ = State::unknown;
+            return;
+        case EchoMode::on:
+            state_ = State::present;
+            return;
+        case EchoMode::off:
+            state_ = State::absent;
+            return;
+    }
+    std::abort();
+}
+
+EchoFilter::Expect EchoMemory::expect(ByteView request) const {
+    if (state_ == State::present) return EchoFilter::Expect::certainly;
+    // Reads go on watching: an adapter that is said or was found to have no echo may have one.
+    if (state_ == State::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
+    return EchoFilter::Expect::perhaps;
+}
+
+bool EchoMemory::must_be_learned_before(ByteView request) const {
+    return state_ == State::unknown && !modbus::is_pure_read(request);
+}
+
+bool EchoMemory::on_echo(ByteView request) {
+    if (state_ == State::present || !teaches_echo(request)) return false;
+    state_ = State::present;
+    return true;
+}
+
+void EchoMemory::on_reply_without_echo(ByteView request, bool clean) {
+    if (state_ == State::present || state_ == State::absent || !teaches_echo(request)) return;
+    state_ = clean ? State::absent : State::unclear;
+}
+
+void EchoMemory::on_unclear() {
+    if (state_ == State::unknown) state_ = State::unclear;
+}
+
+void EchoMemory::on_mismatch() {
+    if (mode_ != EchoMode::on) forget();
+}
+
+}  // namespace panelgate::arbiter

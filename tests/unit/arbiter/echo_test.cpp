@@ -1,0 +1,253 @@
+#include "panelgate/arbiter/echo.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panelgate/modbus/exception.hpp"
+#include "support/bus_script.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::BusScript;
+using Expect = EchoFilter::Expect;
+
+const Bytes kFrame = "11 06 00 01 00 03 9A 9B"_hex;
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+const Bytes kWriteCoil = "05 00 01 FF 00"_hex;
+const Bytes kWriteRegister = "06 00 01 00 03"_hex;
+
+Bytes copy(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
+
+TEST(EchoFilter, TakesTheWholeFrameOutInAnyPieces) {
+    for (std::size_t piece = 1; piece <= kFrame.size(); ++piece) {
+        EchoFilter filter(kFrame, Expect::certainly);
+        Bytes rest;
+        Bytes all = kFrame;
+        all.insert(all.end(), {0xAA, 0xBB});
+        for (std::size_t at = 0; at < all.size(); at += piece) {
+            const auto part = ByteView(all).subspan(at, std::min(piece, all.size() - at));
+            const Bytes left = copy(filter.feed(part));
+            rest.insert(rest.end(), left.begin(), left.end());
+        }
+        EXPECT_EQ(rest, "AA BB"_hex);
+        EXPECT_TRUE(filter.complete());
+        EXPECT_FALSE(filter.mismatch());
+    }
+}
+
+TEST(EchoFilter, TellsADifferenceAndGivesBackWhatItHeld) {
+    EchoFilter sure(kFrame, Expect::certainly);
+    EXPECT_TRUE(sure.feed("11 06 00"_hex).empty());
+    EXPECT_EQ(copy(sure.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
+    EXPECT_TRUE(sure.mismatch());
+
+    EchoFilter unsure(kFrame, Expect::perhaps);
+    EXPECT_TRUE(unsure.feed("11 06 00"_hex).empty());
+    EXPECT_TRUE(unsure.pending());
+    EXPECT_EQ(copy(unsure.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
+    EXPECT_FALSE(unsure.mismatch());
+    EXPECT_FALSE(unsure.pending());
+}
+
+TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
+    EchoFilter filter(kFrame, Expect::perhaps);
+    EXPECT_TRUE(filter.feed("11 06 00"_hex).empty());
+    EXPECT_EQ(filter.release(), "11 06 00"_hex);
+    EXPECT_TRUE(filter.release().empty());
+    EXPECT_EQ(copy(filter.feed("01 00"_hex)), "01 00"_hex);
+}
+
+TEST(EchoMemory, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
+    EchoMemory memory(EchoMode::automatic);
+    EXPECT_FALSE(memory.on_echo(kWriteRegister));
+    EXPECT_EQ(memory.state(), EchoMemory::State::unknown);
+    EXPECT_FALSE(memory.on_echo("01 03 00 00 18"_hex)) << "24 coils: its reply has 8 bytes, too";
+    EXPECT_EQ(memory.state(), EchoMemory::State::unknown);
+    EXPECT_TRUE(memory.on_echo(kRead));
+    EXPECT_FALSE(memory.on_echo(kRead)) << "no news";
+    EXPECT_EQ(memory.expect(kWriteRegister), Expect::certainly);
+    memory.forget();
+    EXPECT_TRUE(memory.must_be_learned_before(kWriteRegister));
+}
+
+class Echo : public testing::Test {
+  protected:
+    static Settings settings(EchoMode mode) {
+        Settings s;
+        s.serial = {38400, 8, Parity::none, 1};
+        s.unlisted.retries = 0;
+        s.stations = {s.unlisted};
+        s.stations[0].id = 17;
+        s.echo = mode;
+        return s;
+    }
+    /// The adapter hears what was sent last; then the station answers, or not.
+    static void hear_echo(BusScript& bus) {
+        const Bytes adu = bus.sent.back().adu;
+        bus.hear_paced(adu);
+    }
+    static void reply(BusScript& bus, ByteView pdu) {
+        bus.run_for(3ms);
+        bus.hear_reply(17, pdu);
+    }
+    /// A line that has carried a read and is known to have an echo, or not to have one.
+    static void read_once(BusScript& bus, bool echo) {
+        const Ticket ticket = bus.submit(17, kRead);
+        if (echo) hear_echo(bus);
+        bus.run_to_end_of_request();
+        reply(bus, kReply);
+        ASSERT_TRUE(bus.answered(ticket));
+        EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+        bus.run_for(10ms);
+    }
+};
+
+TEST_F(Echo, P8AWriteIsNeverConfirmedByItsOwnEcho) {
+    for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
+        for (const Bytes& write : {kWriteCoil, kWriteRegister}) {
+            BusScript bus(settings(mode));
+            read_once(bus, true);
+            const Ticket ticket = bus.submit(17, write);
+            hear_echo(bus);
+            bus.run_for(2s);
+            ASSERT_TRUE(bus.answered(ticket));
+            ASSERT_FALSE(bus.answer(ticket).pdu.has_value());
+            EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+            EXPECT_TRUE(bus.answer(ticket).transmitted);
+        }
+    }
+}
+
+TEST_F(Echo, P8TheReplyBehindTheEchoConfirmsAWriteAlsoWhenGluedToIt) {
+    BusScript bus(settings(EchoMode::automatic));
+    read_once(bus, true);
+    const Ticket ticket = bus.submit(17, kWriteCoil);
+    Bytes both = bus.sent.back().adu;
+    bus.run_to_end_of_request();
+    bus.run_for(5ms);
+    const Bytes again = both;
+    both.insert(both.end(), again.begin(), again.end());
+    bus.hear(both);
+    ASSERT_TRUE(bus.answered(ticket));
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
+}
+
+TEST_F(Echo, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
+    BusScript bus(settings(EchoMode::automatic));
+    const Ticket ticket = bus.submit(17, kWriteCoil);
+    ASSERT_EQ(bus.sent.size(), 1u);
+    EXPECT_EQ(bus.sent[0].adu[1], 3);
+    bus.run_to_end_of_request();
+    reply(bus, "03 02 00 07"_hex);
+    ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
+    bus.run_to_end_of_request();
+    reply(bus, kWriteCoil);
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
+    EXPECT_EQ(bus.sent.size(), 2u);
+    // Once is enough.
+    bus.run_for(10ms);
+    bus.submit(17, kWriteRegister);
+    EXPECT_EQ(bus.sent.back().adu[1], 6);
+}
+
+TEST_F(Echo, P8AnExceptionTeachesAsWellAsAValue) {
+    BusScript bus(settings(EchoMode::automatic));
+    bus.submit(17, kWriteCoil);
+    hear_echo(bus);
+    reply(bus, "83 02"_hex);
+    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::present);
+    EXPECT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
+}
+
+TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
+    BusScript bus(settings(EchoMode::automatic));
+    const Ticket ticket = bus.submit(17, kWriteCoil);
+    bus.run_for(3s);
+    ASSERT_TRUE(bus.answered(ticket));
+    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+    EXPECT_FALSE(bus.answer(ticket).transmitted);
+    for (const auto& sent : bus.sent) EXPECT_EQ(sent.adu[1], 3);
+}
+
+TEST_F(Echo, P8ALineWhereAReadDidNotTellConfirmsNothingByOneFrame) {
+    BusScript bus(settings(EchoMode::automatic));
+    const Ticket ticket = bus.submit(17, kWriteCoil);
+    const Bytes tail(bus.sent[0].adu.begin() + 2, bus.sent[0].adu.end());
+    bus.hear(tail);  // half an echo
+    bus.run_to_end_of_request();
+    reply(bus, "03 02 00 07"_hex);
+    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::unclear);
+    ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
+    hear_echo(bus);
+    bus.run_for(2s);
+    ASSERT_TRUE(bus.answered(ticket));
+    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+}
+
+TEST_F(Echo, P8AnEchoThatDiffersIsACollision) {
+    BusScript bus(settings(EchoMode::automatic));
+    read_once(bus, true);
+    const Ticket ticket = bus.submit(17, kRead);
+    Bytes damaged = bus.sent.back().adu;
+    damaged.back() ^= 0x10;
+    bus.hear_paced(damaged);
+    reply(bus, kReply);
+    bus.run_for(1s);
+    ASSERT_TRUE(bus.answered(ticket));
+    EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged);
+    EXPECT_EQ(bus.arbiter().station_counters().at(17).echo_mismatches, 1u);
+    EXPECT_EQ(bus.events.back().kind, StationEvent::Kind::collision);
+    read_once(bus, true);  // and is learned again
+    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::present);
+}
+
+TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
+    BusScript bus(settings(EchoMode::automatic));
+    read_once(bus, true);
+    const Ticket lost = bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    reply(bus, kReply);
+    bus.run_for(1s);
+    EXPECT_EQ(bus.answer(lost).pdu.error(), Fault::damaged);
+    read_once(bus, false);
+    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::absent);
+}
+
+TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
+    BusScript bus(settings(EchoMode::off));
+    const Ticket ticket = bus.submit(17, kRead);
+    hear_echo(bus);
+    reply(bus, kReply);
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+    ASSERT_FALSE(bus.events.empty());
+    EXPECT_EQ(bus.events[0].kind, StationEvent::Kind::echo);
+    EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
+}
+
+TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurnaround) {
+    BusScript bus(settings(EchoMode::on));
+    bus.submit(0, kWriteRegister, 1);
+    const TimePoint start = bus.now();
+    hear_echo(bus);
+    bus.submit(17, kRead, 2);
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->at - start, wire_time({38400, 8, Parity::none, 1}, 8) + 100ms);
+    EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
+}
+
+TEST_F(Echo, P8TheEchoOfARequestNobodyAnswersIsNoSignOfLife) {
+    BusScript bus(settings(EchoMode::on));
+    for (int i = 0; i < 3; ++i) {
+        const Ticket ticket = bus.submit(17, kRead);
+        hear_echo(bus);
+        bus.run_for(2s);
+        EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+    }
+    EXPECT_TRUE(bus.arbiter().health(17).offline());
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,231 @@
+#include <gtest/gtest.h>
+
+#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/turnaround.hpp"
+#include "support/bus_script.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::BusScript;
+
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+
+TEST(ReadCache, AnswersWhatItHoldsWhileItIsYoungEnough) {
+    ReadCache cache;
+    const TimePoint start{1h};
+    cache.store(*read_span(17, kRead), kReply, start);
+    const auto part = *read_span(17, "03 00 6C 00 01"_hex);
+    const auto hit = cache.find(part, start + 1s, 1s);
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->pdu, "03 02 00 00"_hex);
+    EXPECT_EQ(hit->age, Duration(1s));
+    EXPECT_FALSE(cache.find(part, start + 1001ms, 1s));
+    EXPECT_FALSE(cache.find(*read_span(18, kRead), start, 1s));
+    EXPECT_FALSE(cache.find(*read_span(17, "04 00 6B 00 03"_hex), start, 1s));
+    EXPECT_FALSE(cache.find(*read_span(17, "03 00 6B 00 04"_hex), start, 1s));
+}
+
+TEST(ReadCache, P6AWriteForgetsWhatItMayChange) {
+    struct Case {
+        std::uint8_t station;
+        Bytes request;
+        bool kept;
+    };
+    for (const Case& c :
+         {Case{17, "06 00 6B 00 01"_hex, false}, Case{17, "06 00 6E 00 01"_hex, true},
+          Case{17, "10 00 69 00 02 04 00 00 00 00"_hex, true},
+          Case{17, "10 00 69 00 03 06 00 00 00 00 00 00"_hex, false},
+          Case{17, "17 00 00 00 01 00 6D 00 01 02 00 00"_hex, false},
+          Case{18, "06 00 6B 00 01"_hex, true}, Case{0, "06 00 6B 00 01"_hex, false},
+          Case{17, "05 04 00 FF 00"_hex, false}, Case{17, "41 01"_hex, false}}) {
+        ReadCache cache;
+        cache.store(*read_span(17, kRead), kReply, TimePoint{});
+        cache.on_write(c.station, c.request);
+        EXPECT_EQ(cache.size(), c.kept ? 1u : 0u) << to_hex(c.request);
+    }
+}
+
+TEST(ReadCache, IsBounded) {
+    ReadCache cache;
+    for (unsigned i = 0; i < 3 * ReadCache::kEntries; ++i) {
+        const Bytes read = Writer().u8(3).u16(10 * i).u16(1).take();
+        cache.store(*read_span(17, read), "03 02 00 00"_hex, TimePoint{});
+    }
+    EXPECT_EQ(cache.size(), ReadCache::kEntries);
+}
+
+Settings settings_with(Duration max_age) {
+    Settings settings;
+    settings.serial = {38400, 8, Parity::none, 1};
+    settings.unlisted.max_age = max_age;
+    return settings;
+}
+
+void answer(BusScript& bus, ByteView pdu) {
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, pdu);
+    bus.run_for(3ms);
+}
+
+TEST(Memory, P6AnswersAClientButNeverAPoll) {
+    BusScript bus(settings_with(1s));
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    answer(bus, kReply);
+    const Ticket cached = bus.submit(17, kRead, 1);
+    ASSERT_TRUE(bus.answered(cached));
+    EXPECT_EQ(bus.answer(cached).pdu.value(), kReply);
+    EXPECT_FALSE(bus.answer(cached).transmitted);
+    EXPECT_EQ(bus.sent.size(), 1u);
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    EXPECT_EQ(bus.sent.size(), 2u);
+    answer(bus, kReply);
+    bus.run_for(1s);
+    bus.submit(17, kRead, 1);
+    EXPECT_EQ(bus.sent.size(), 3u) << "too old";
+}
+
+TEST(Memory, IsOffUnlessTheStationAllowsIt) {
+    BusScript bus(settings_with(0s));
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    answer(bus, kReply);
+    bus.submit(17, kRead, 1);
+    EXPECT_EQ(bus.sent.size(), 2u);
+}
+
+TEST(Memory, P6AClientNeverReadsOlderThanItsOwnWriteAlsoOneThatTimedOut) {
+    BusScript bus(settings_with(1min));
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    answer(bus, kReply);
+    const Ticket write = bus.submit(17, "06 00 6B 00 05"_hex, 1);
+    const Ticket read = bus.submit(17, kRead, 1);
+    EXPECT_FALSE(bus.answered(read)) << "its own write is still open";
+    bus.run_for(490ms);  // silence; the timeout is 500 ms
+    EXPECT_FALSE(bus.answered(write));
+    bus.run_for(600ms);
+    ASSERT_TRUE(bus.answered(write));
+    EXPECT_FALSE(bus.answered(read)) << "and what was known is forgotten";
+    ASSERT_EQ(bus.sent.size(), 3u);
+    EXPECT_EQ(bus.sent.back().adu[1], 3);
+}
+
+TEST(Memory, IsEmptyAfterTheLineWasLost) {
+    BusScript bus(settings_with(1min));
+    bus.submit(17, kRead, 9, PriorityClass::poll);
+    answer(bus, kReply);
+    bus.line_down();
+    bus.line_up();
+    bus.run_for(10ms);
+    const Ticket read = bus.submit(17, kRead, 1);
+    EXPECT_FALSE(bus.answered(read));
+}
+
+TEST(Turnaround, KnowsTheQuantilesOfTheLastReplies) {
+    Turnaround seen;
+    EXPECT_FALSE(seen.known());
+    for (int i = 1; i <= 200; ++i) seen.add(i * 1ms);
+    EXPECT_TRUE(seen.known());
+    EXPECT_EQ(seen.quantile(1), Duration(200ms));
+    EXPECT_EQ(seen.quantile(0.5), Duration(169ms));
+}
+
+TEST(AdaptiveTimeout, FollowsTheTurnaroundBetweenFloorAndCeiling) {
+    AdaptiveTimeout timeout(20ms, 500ms);
+    Turnaround seen;
+    EXPECT_EQ(timeout.value(seen), Duration(500ms)) << "nothing is known yet";
+    for (int i = 0; i < 10; ++i) seen.add(5ms);
+    EXPECT_EQ(timeout.value(seen), Duration(30ms));
+    timeout.on_timeout();
+    EXPECT_EQ(timeout.value(seen), Duration(60ms));
+    for (int i = 0; i < 100; ++i) timeout.on_timeout();
+    EXPECT_EQ(timeout.value(seen), Duration(500ms));
+    timeout.on_reply();
+    EXPECT_EQ(timeout.value(seen), Duration(30ms));
+}
+
+TEST(DriftAlarm, TellsOnceUntilTheStationHasRecovered) {
+    DriftAlarm alarm;
+    Turnaround seen;
+    int told = 0;
+    const auto replies = [&](int count, Duration think) {
+        for (int i = 0; i < count; ++i) {
+            seen.add(think);
+            told += alarm.check(seen, 100ms) ? 1 : 0;
+        }
+    };
+    replies(100, 10ms);
+    EXPECT_EQ(told, 0);
+    replies(100, 85ms);
+    EXPECT_EQ(told, 1);
+    replies(100, 10ms);
+    replies(100, 85ms);
+    EXPECT_EQ(told, 2);
+}
+
+TEST(AdaptiveTimeout, OfALineAnswersTheClientEarlyAndStillWaitsForALateReply) {
+    Settings settings = settings_with(0s);
+    settings.unlisted.adaptive_timeout = true;
+    settings.unlisted.retries = 0;
+    BusScript bus(settings);
+    for (int i = 0; i < 20; ++i) {
+        bus.submit(17, kRead);
+        answer(bus, kReply);
+    }
+    EXPECT_LT(bus.arbiter().response_timeout(17), Duration(40ms));
+    const Ticket silent = bus.submit(17, kRead, 1);
+    const TimePoint start = bus.now();
+    const Ticket other = bus.submit(18, kRead, 2);
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->adu[0], 18) << "the others need not wait for the whole timeout";
+    EXPECT_LT(next->at - start, Duration(100ms));
+    EXPECT_TRUE(bus.answered(silent));
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(18, kReply);
+    EXPECT_TRUE(bus.answered(other));
+    bus.submit(17, kRead, 1);
+    EXPECT_GT(bus.next_sent()->at - start, Duration(900ms)) << "but the station itself does";
+}
+
+TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
+    Settings settings = settings_with(0s);
+    settings.explain = true;
+    settings.queue.per_client = 1;
+    settings.unlisted.retries = 0;
+    BusScript bus(settings);
+    bus.submit(17, kRead, 1);
+    bus.submit(18, kRead, 2);
+    EXPECT_FALSE(bus.try_submit(18, kRead, 2));
+    EXPECT_EQ(bus.notes[0].why,
+              "read of client 1 to station 17: next in turn after 0.0 ms, 0 wait");
+    ASSERT_EQ(bus.decisions.size(), 1u);
+    EXPECT_EQ(bus.decisions[0].text,
+              "read of client 2 to station 18 refused: 1 of 256 wait on this line, at most 1 of "
+              "one client");
+    bus.run_for(3s);
+    ASSERT_GE(bus.decisions.size(), 2u);
+    EXPECT_EQ(bus.decisions[1].text,
+              "nobody but this request for 500.0 ms: station 17 did not answer and may do so late");
+}
+
+TEST(Shares, P9TheTimeOfASharedTransactionIsSharedOut) {
+    BusScript bus(settings_with(0s));
+    bus.submit(17, kRead, 1);
+    bus.submit(17, kRead, 2);  // joins
+    answer(bus, kReply);
+    bus.submit(17, kRead, 3);
+    answer(bus, kReply);
+    const auto& shares = bus.arbiter().shares().all();
+    ASSERT_EQ(shares.size(), 3u);
+    EXPECT_EQ(shares.at(1).busy, shares.at(2).busy);
+    EXPECT_EQ(shares.at(3).busy / 2, shares.at(1).busy);
+    bus.cancel(3);
+    EXPECT_EQ(bus.arbiter().shares().all().size(), 2u);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
