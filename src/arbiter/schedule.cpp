@@ -31,7 +31,9 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     job.start_by = job.deadline - shortest_transaction(job);
     const Ticket ticket = job.ticket;
     const bool first_of_client = !queue_.has(job.client);
-    const bool request_still_leaving = active_ && now < active_->sent;
+    // Not a repeated one: an answer to the first attempt may still come, and would be too old.
+    const bool request_still_leaving =
+        active_ && now < active_->sent && active_->group.attempts == 1;
     if (request_still_leaving && first_of_client && contained_in(active_->group.span, job) &&
         active_->group.jobs.size() < settings_.queue.limit) {
         job.attempts = 1;
@@ -66,20 +68,21 @@ bool Arbiter::has_open(Client client) const {
     const auto in = [&](const Group& group) {
         return std::any_of(group.jobs.begin(), group.jobs.end(), theirs);
     };
-    return queue_.has(client) || (active_ && in(active_->group)) || (retry_ && in(*retry_));
+    return queue_.has(client) || (active_ && in(active_->group)) ||
+           std::any_of(retries_.begin(), retries_.end(), in);
 }
 
 void Arbiter::cancel(TimePoint now, Client client) {
     shares_.forget(client);
     const auto theirs = [&](const Job& job) { return job.client == client; };
     for (const Job& job : queue_.remove_if(theirs)) finish(job, Fault::cancelled);
-    if (retry_) {
-        for (const Job& job : retry_->jobs) {
+    for (Group& group : retries_) {
+        for (const Job& job : group.jobs) {
             if (theirs(job)) finish(job, Fault::cancelled);
         }
-        std::erase_if(retry_->jobs, theirs);
-        if (retry_->jobs.empty()) retry_.reset();
+        std::erase_if(group.jobs, theirs);
     }
+    forget_empty_retries();
     step(now);
 }
 
@@ -96,19 +99,36 @@ void Arbiter::step(TimePoint now) {
 /// Starts what is next when the line may be used. False when nothing can be done now.
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_until_ || now < quiet_since_ + gap_of(last_station_)) return false;
-    if (retry_ && !other_first_) return start_retry(now);
+    const bool alone = settings_.quarantine == Quarantine::line && !retries_.empty();
+    if (alone) return start_retry(now);
+    if (!other_first_ && start_retry(now)) return true;
     const auto due = next_probe();
     constexpr Duration kPatience = 1s;  // a probe waits for an idle line, but not for ever
     if (due && now >= *due + kPatience && start_probe(now)) return true;
     if (start_job(now)) return true;
-    if (retry_) return start_retry(now);
+    if (start_retry(now)) return true;
     return due && now >= *due && start_probe(now);
 }
 
 bool Arbiter::start_retry(TimePoint now) {
-    if (!gap_is_over(now, retry_->station)) return false;
-    start(now, *std::exchange(retry_, std::nullopt));
+    const auto next = std::ranges::find_if(
+        retries_, [&](const Group& group) { return repeat_from(group) <= now; });
+    if (next == retries_.end() || !gap_is_over(now, next->station)) return false;
+    Group group = std::move(*next);
+    retries_.erase(next);
+    start(now, std::move(group));
     return true;
+}
+
+/// At once when the reply that its station owes is to this very request, else behind that (P1).
+TimePoint Arbiter::repeat_from(const Group& group) const {
+    const Station& station = stations_.at(group.station);
+    const bool same = station.owed == 0 || station.unanswered == group.pdu;
+    return same ? TimePoint{} : station.not_before;
+}
+
+void Arbiter::forget_empty_retries() {
+    std::erase_if(retries_, [](const Group& group) { return group.jobs.empty(); });
 }
 
 bool Arbiter::start_job(TimePoint now) {
@@ -202,6 +222,7 @@ void Arbiter::start(TimePoint now, Group group) {
     judge_idle(now);
     Bytes adu = modbus::encode_adu(group.station, group.pdu);
     if (++group.attempts > 1) ++counters_of(group.station).retries;
+    if (group.attempts == 1) group.started = now;
     for (Job& job : group.jobs) {
         const auto rank = static_cast<std::size_t>(job.priority);
         if (job.attempts++ == 0) line_counters_.queue_wait[rank].observe(now - job.arrived);
@@ -288,11 +309,10 @@ std::optional<TimePoint> Arbiter::next_probe() const {
 }
 
 void Arbiter::expire(TimePoint now) {
-    if (active_) expire_jobs(now, active_->group.jobs);
-    if (retry_) {
-        expire_jobs(now, retry_->jobs);
-        if (retry_->jobs.empty()) retry_.reset();
-    }
+    // A broadcast that is leaving is answered when it has left.
+    if (active_ && active_->group.station != kBroadcast) expire_jobs(now, active_->group.jobs);
+    for (Group& group : retries_) expire_jobs(now, group.jobs);
+    forget_empty_retries();
     const auto first = queue_.first_expiry();
     if (!first || now < *first) return;
     for (const Job& job : queue_.remove_if([&](const Job& j) { return j.start_by <= now; })) {
@@ -304,7 +324,6 @@ void Arbiter::expire(TimePoint now) {
 
 /// Those of a transaction whose own deadline has come; the others go on waiting for its reply.
 void Arbiter::expire_jobs(TimePoint now, std::vector<Job>& jobs) {
-    if (active_ && active_->group.station == kBroadcast) return;
     for (const Job& job : jobs) {
         if (job.deadline <= now) finish(job, Fault::timeout);
     }
@@ -317,7 +336,7 @@ std::optional<TimePoint> Arbiter::next_start() const {
     const auto earlier = [&](TimePoint t) {
         next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
     };
-    if (retry_) earlier(free);
+    for (const Group& group : retries_) earlier(repeat_from(group));
     queue_.each_first([&](const Job& job) {
         const auto station = stations_.find(job.station);
         const TimePoint rested = station == stations_.end() ? free : station->second.not_before;
@@ -333,7 +352,7 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
     const auto deadlines = [&](const Group& group) {
         for (const Job& job : group.jobs) earlier(job.deadline);
     };
-    if (retry_) deadlines(*retry_);
+    for (const Group& group : retries_) deadlines(group);
     if (active_) {
         earlier(active_deadline());
         if (active_->group.station != kBroadcast) deadlines(active_->group);

@@ -12,8 +12,20 @@
 
 namespace panelgate::arbiter {
 
+namespace {
+
+/// Ageing has to work before the deadline does, or the lowest class could starve (P9).
+QueueSettings with_ageing(QueueSettings settings) {
+    settings.ageing = std::min(settings.ageing, settings.deadline / 8);
+    return settings;
+}
+
+}  // namespace
+
 Arbiter::Arbiter(Settings settings)
-    : settings_(std::move(settings)), queue_(settings_.queue), echo_memory_(settings_.echo) {
+    : settings_(std::move(settings)),
+      queue_(with_ageing(settings_.queue)),
+      echo_memory_(settings_.echo) {
     for (const StationSettings& station : settings_.stations) {
         configured_[station.id] = station;
         counters_[station.id];
@@ -45,9 +57,8 @@ void Arbiter::on_line_down(TimePoint now) {
         close_active(now, group);
         for (const Job& job : group.jobs) finish(job, Fault::line_lost);
     }
-    if (retry_) {
-        for (const Job& job : retry_->jobs) finish(job, Fault::line_lost);
-        retry_.reset();
+    for (const Group& group : std::exchange(retries_, {})) {
+        for (const Job& job : group.jobs) finish(job, Fault::line_lost);
     }
     for (const Job& job : queue_.remove_if([](const Job&) { return true; })) {
         finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
@@ -107,17 +118,17 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     }
     note_unused(now, unused);
     Group group = std::move(active_->group);
-    const TimePoint started = active_->started;
+    const TimePoint sent = active_->sent;
     actions_.push_back(Note{
         now, Note::Direction::received, modbus::encode_adu(group.station, reply), "reply", {}});
     close_active(now, group);
     if (group.span && !modbus::exception_of(reply) &&
         settings_of(group.station).max_age > Duration::zero()) {
-        cache_.store(*group.span, reply, started);
+        cache_.store(*group.span, reply, group.started);
     }
     Station& station = station_of(group.station);
-    // An earlier attempt may still be answered, too: nothing else of this shape until it cannot.
-    if (station.owed > 0) station.not_before = now + station.late.value();
+    // Each attempt may be answered, and nobody knows which one this reply was for.
+    if (station.owed > 0) expect_late(now, station, sent);
     if (!split(group, reply)) deliver(group, reply);
 }
 
@@ -193,20 +204,22 @@ void Arbiter::fail_attempt(TimePoint now, Fault fault) {
     Station& station = station_of(group.station);
     const Duration cost = now - active_->started + gap_of(group.station);
     const TimePoint sent = active_->sent;
+    const bool collided = !active_->collided.empty();
     close_active(now, group);
     if (fault == Fault::damaged) {
         ++counters_of(group.station).damaged_frames;
     } else {
-        ++station.owed;
-        station.unanswered = group.pdu;
-        station.due = sent + station.timeout();
-        quarantine(now, group, station, sent);
         station.adaptive.on_timeout();
     }
+    if (fault != Fault::damaged || collided) {
+        ++station.owed;
+        station.unanswered = group.pdu;
+    }
+    if (station.owed > 0) quarantine(now, group, station, sent);
     if (station.health.offline()) budget_.spend(now, cost);
     if (may_retry(now, group, station)) {
         other_first_ = settings_.quarantine == Quarantine::station;
-        retry_ = std::move(group);
+        retries_.push_back(std::move(group));
         return;
     }
     give_up(now, group, fault);
@@ -234,14 +247,21 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
 /// timeout that was chosen short (adaptive) frees the others early, but not this station: it may
 /// still answer within the whole one.
 void Arbiter::quarantine(TimePoint now, const Group& group, Station& station, TimePoint sent) {
-    const Duration late = station.late.value();
-    station.not_before = std::max(now, sent + station.settings.response_timeout) + late;
+    expect_late(now, station, sent);
     if (settings_.quarantine == Quarantine::line && !group.probe) {
-        const TimePoint others =
-            now + std::min(late, station.settings.adaptive_timeout ? station.timeout() : late);
-        quarantined_until_ = std::max(quarantined_until_, others);
+        const bool early = station.settings.adaptive_timeout;
+        const TimePoint others = early ? now + station.timeout() : station.not_before;
+        quarantined_until_ = std::max(quarantined_until_, std::min(others, station.not_before));
         explain_quarantine(now, group);
     }
+}
+
+/// This station owes a reply, the last one to a request that left at `sent`: nothing else of this
+/// shape until it can no longer come.
+void Arbiter::expect_late(TimePoint now, Station& station, TimePoint sent) {
+    station.due = sent + station.timeout();
+    station.not_before =
+        std::max(now, sent + station.settings.response_timeout) + station.late.value();
 }
 
 void Arbiter::went_silent(TimePoint now, const Group& group, Station& station) {

@@ -99,7 +99,7 @@ class Arbiter {
     std::size_t queue_depth() const { return queue_.size(); }
     /// Nothing waits and no client's request is on the wire.
     bool idle() const {
-        return queue_.empty() && !retry_ && (!active_ || active_->group.jobs.empty());
+        return queue_.empty() && retries_.empty() && (!active_ || active_->group.jobs.empty());
     }
     const LineCounters& counters() const { return line_counters_; }
     /// By station; those that the settings do not list share the entry 0.
@@ -147,6 +147,7 @@ class Arbiter {
         Bytes pdu;
         std::optional<ReadSpan> span;
         int attempts = 0;
+        TimePoint started{};  ///< the first attempt: what answers was not read before
         bool probe = false;
         /// It only finds out about the echo, for this job, which waits in the queue.
         Ticket learns_for = 0;
@@ -176,6 +177,8 @@ class Arbiter {
     bool may_run(TimePoint now, const Job& job) const;
     bool gap_is_over(TimePoint now, std::uint8_t station);
     void start(TimePoint now, Group group);
+    TimePoint repeat_from(const Group& group) const;
+    void forget_empty_retries();
     Group gather(Job leader);
     bool joins(const Group& group, const Job& job) const;
     void expire(TimePoint now);
@@ -198,6 +201,7 @@ class Arbiter {
     void fail_attempt(TimePoint now, Fault fault);
     void give_up(TimePoint now, const Group& group, Fault fault);
     void quarantine(TimePoint now, const Group& group, Station& station, TimePoint sent);
+    void expect_late(TimePoint now, Station& station, TimePoint sent);
     void went_silent(TimePoint now, const Group& group, Station& station);
     bool may_retry(TimePoint now, const Group& group, const Station& station) const;
     void close_active(TimePoint now, const Group& group);
@@ -230,7 +234,9 @@ class Arbiter {
     LineCounters line_counters_;
     JobQueue queue_;
     std::optional<Active> active_;
-    std::optional<Group> retry_;           ///< an attempt failed: the same request goes again
+    /// An attempt failed: the same request goes again. At most one a station that is asked between
+    /// (quarantine: station), else one.
+    std::deque<Group> retries_;
     std::vector<ReadSpan> refused_spans_;  ///< joined reads that a panel did not take
     ProbeBudget budget_;
     ReadCache cache_;

@@ -1,0 +1,334 @@
+// The checker bites: an arbiter that is broken on purpose, in each of the ways it looks for, is
+// found out.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "checker.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "plan.hpp"
+#include "subject.hpp"
+#include "world.hpp"
+
+namespace panelgate::scenario {
+namespace {
+
+using arbiter::Action;
+using arbiter::Finish;
+using arbiter::Job;
+using arbiter::Transmit;
+
+/// Changes what a good arbiter says.
+class Tampered : public Subject {
+  public:
+    using Subject::Subject;
+
+    Result<arbiter::Ticket> submit(TimePoint now, Job job) override {
+        auto ticket = Subject::submit(now, job);
+        if (ticket) jobs_[*ticket] = std::move(job);
+        return ticket;
+    }
+    std::optional<Action> poll_action(TimePoint now) override {
+        if (!extra_.empty()) {
+            Action action = std::move(extra_.front());
+            extra_.erase(extra_.begin());
+            return action;
+        }
+        while (auto action = Subject::poll_action(now)) {
+            if (auto* finish = std::get_if<Finish>(&*action)) {
+                if (!tamper(now, *finish)) continue;
+            } else if (auto* transmit = std::get_if<Transmit>(&*action)) {
+                tamper(now, *transmit);
+            }
+            return action;
+        }
+        return std::nullopt;
+    }
+
+  protected:
+    /// False: it is held back.
+    virtual bool tamper(TimePoint now, Finish& finish) {
+        static_cast<void>(now);
+        static_cast<void>(finish);
+        return true;
+    }
+    virtual void tamper(TimePoint now, Transmit& transmit) {
+        static_cast<void>(now);
+        static_cast<void>(transmit);
+    }
+    const Job& job_of(const Finish& finish) const { return jobs_.at(finish.ticket); }
+    static bool is_good(const Finish& finish) {
+        return finish.pdu && !modbus::exception_of(*finish.pdu);
+    }
+    bool is_read(const Finish& finish) const { return modbus::is_pure_read(job_of(finish).pdu); }
+
+    std::vector<Action> extra_;
+    std::map<arbiter::Ticket, Job> jobs_;
+};
+
+struct AnswersTwice : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        extra_.emplace_back(finish);
+        return true;
+    }
+};
+
+struct LosesAnAnswer : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish&) override { return ++count_ % 50 != 0; }
+    int count_ = 0;
+};
+
+struct AnswersTooLate : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (finish.pdu || held_) return true;
+        held_ = finish;
+        return false;
+    }
+    std::optional<Action> poll_action(TimePoint now) override {
+        if (held_ && now > jobs_.at(held_->ticket).arrived + 10s) {
+            return Action(*std::exchange(held_, std::nullopt));
+        }
+        return Tampered::poll_action(now);
+    }
+    Result<arbiter::Ticket> submit(TimePoint now, Job job) override {
+        job.arrived = now;
+        return Tampered::submit(now, std::move(job));
+    }
+    std::optional<Finish> held_;
+};
+
+/// Gives what the station answered the last time.
+struct GivesAnOldValue : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (!is_good(finish) || !is_read(finish)) return true;
+        const Job& job = job_of(finish);
+        const bool of_memory = job.pdu[1] * 256 + job.pdu[2] >= kMemory;
+        if (of_memory != wants_memory_) return true;
+        Bytes& known = known_[{job.station, job.pdu}];
+        if (known.empty()) known = *finish.pdu;
+        finish.pdu = std::exchange(known, *finish.pdu);
+        return true;
+    }
+    bool wants_memory_ = false;
+    std::map<std::pair<std::uint8_t, Bytes>, Bytes> known_;
+};
+
+struct GivesAnOldMemory : GivesAnOldValue {
+    explicit GivesAnOldMemory(const arbiter::Settings& settings) : GivesAnOldValue(settings) {
+        wants_memory_ = true;
+    }
+};
+
+struct GivesALongerReply : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (is_good(finish) && is_read(finish)) finish.pdu->insert(finish.pdu->end(), {0, 0});
+        return true;
+    }
+};
+
+struct InventsAnException : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (is_good(finish)) finish.pdu = Bytes{0x83, 2};
+        return true;
+    }
+};
+
+struct ConfirmsWhatTimedOut : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        const Bytes& pdu = job_of(finish).pdu;
+        if (!finish.pdu && finish.pdu.error() == Fault::timeout && !is_read(finish))
+            finish.pdu = Bytes(pdu.begin(), pdu.begin() + 5);
+        return true;
+    }
+};
+
+struct LiesAboutTransmission : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (!is_read(finish)) finish.transmitted = !finish.transmitted;
+        return true;
+    }
+};
+
+struct StarvesPolls : Tampered {
+    using Tampered::Tampered;
+    bool tamper(TimePoint, Finish& finish) override {
+        if (job_of(finish).priority == arbiter::PriorityClass::poll) finish.pdu = Fault::expired;
+        return true;
+    }
+};
+
+struct IgnoresThatClientsLeave : Tampered {
+    using Tampered::Tampered;
+    void cancel(TimePoint, arbiter::Client) override {}
+};
+
+struct AsksTwiceAtOnce : Tampered {
+    using Tampered::Tampered;
+    void tamper(TimePoint now, Transmit& transmit) override {
+        last_ = transmit.adu;
+        at_ = now + 40ms;  // long after the frame, long before the timeout
+    }
+    std::optional<Action> poll_action(TimePoint now) override {
+        auto action = Tampered::poll_action(now);
+        if (action || last_.empty() || now < at_ || last_[1] > 4 || last_[0] == 0) return action;
+        return Action(Transmit{std::exchange(last_, {})});
+    }
+    Bytes last_;
+    TimePoint at_{};
+};
+
+struct WaitsForNothing : Tampered {
+    using Tampered::Tampered;
+    std::optional<TimePoint> next_deadline() const override {
+        return jobs_.empty() ? Subject::next_deadline() : TimePoint{};
+    }
+};
+
+using Change = std::function<void(arbiter::Settings&)>;
+using Shape = std::function<void(Plan&)>;
+
+struct Mutant {
+    const char* name;
+    const char* caught_as;
+    Kind kind;
+    std::function<std::unique_ptr<Subject>(arbiter::Settings)> make;
+    Shape shape = [](Plan&) {};
+};
+
+template <class T>
+std::function<std::unique_ptr<Subject>(arbiter::Settings)> tampered() {
+    return [](const arbiter::Settings& settings) { return std::make_unique<T>(settings); };
+}
+
+/// A whole arbiter, told something else than what is true.
+std::function<std::unique_ptr<Subject>(arbiter::Settings)> misled(Change change) {
+    return [change = std::move(change)](arbiter::Settings settings) {
+        change(settings);
+        return std::make_unique<Subject>(settings);
+    };
+}
+
+void each_station(arbiter::Settings& settings, const auto& change) {
+    change(settings.unlisted);
+    for (arbiter::StationSettings& station : settings.stations) change(station);
+}
+
+void only_writes(Plan& plan) {
+    plan.echo = true;
+    plan.damaged_echo = 0;
+    for (ClientPlan& client : plan.clients) client.writes = 1;
+    for (PanelPlan& panel : plan.panels) panel.drop = 0.3;
+}
+
+void late_panels(Plan& plan) {
+    for (PanelPlan& panel : plan.panels) {
+        panel.late = 0.2;
+        panel.late_limit = 3;
+    }
+    for (ClientPlan& client : plan.clients) client.stations = {plan.panels.front().id};
+}
+
+const Mutant kMutants[] = {
+    {"AnswersTwice", "P3: answered twice", Kind::faults, tampered<AnswersTwice>()},
+    {"LosesAnAnswer", "P3: request", Kind::faults, tampered<LosesAnAnswer>()},
+    {"AnswersTooLate", "P3: answered after its deadline", Kind::faults, tampered<AnswersTooLate>()},
+    {"GivesAnOldValue", "P1: a value", Kind::faults, tampered<GivesAnOldValue>()},
+    {"GivesAnOldMemory", "P6: a value older", Kind::crowd, tampered<GivesAnOldMemory>()},
+    {"GivesALongerReply", "P1: a reply of another length", Kind::faults,
+     tampered<GivesALongerReply>()},
+    {"InventsAnException", "P1: an exception", Kind::faults, tampered<InventsAnException>()},
+    {"ConfirmsWhatTimedOut", "P8: a write was confirmed", Kind::faults,
+     tampered<ConfirmsWhatTimedOut>()},
+    {"LiesAboutTransmission", "P2: the answer to a write is wrong", Kind::faults,
+     tampered<LiesAboutTransmission>()},
+    {"StarvesPolls", "P9: a client starved", Kind::crowd, tampered<StarvesPolls>()},
+    {"IgnoresThatClientsLeave", "P2: a write was transmitted after", Kind::crowd,
+     tampered<IgnoresThatClientsLeave>()},
+    {"AsksTwiceAtOnce", "P1: transmitted while the last request was outstanding", Kind::faults,
+     tampered<AsksTwiceAtOnce>(),
+     [](Plan& plan) {
+         for (PanelPlan& panel : plan.panels) panel.drop = 0.2;
+     }},
+    {"Spins", "it spins", Kind::faults, tampered<WaitsForNothing>()},
+    {"KeepsTheGapOfAFasterLine", "P5: transmitted", Kind::faults, misled([](arbiter::Settings& s) {
+         s.serial.baud *= 4;
+         each_station(s, [](auto& station) { station.frame_gap = 0us; });
+     })},
+    {"RepeatsWrites", "P2: a write was transmitted twice", Kind::faults,
+     misled([](arbiter::Settings& s) {
+         each_station(s, [](auto& station) {
+             station.retry_writes = true;
+             station.retries = 2;
+         });
+     })},
+    {"HasNoQuarantine", "P1: a value", Kind::faults, misled([](arbiter::Settings& s) {
+         each_station(s, [](auto& station) { station.late_window = 0ms; });
+     }),
+     late_panels},
+    {"BelievesAnEcho", "P8: a write was confirmed", Kind::echo, misled([](arbiter::Settings& s) {
+         s.echo = arbiter::EchoMode::off;
+         s.paced = false;
+     }),
+     only_writes},
+    {"TakesMoreThanItsQueueHolds", "P9: more requests wait", Kind::crowd,
+     misled([](arbiter::Settings& s) {
+         s.queue.limit *= 4;
+         s.queue.per_client *= 4;
+     })},
+};
+
+class Mutation : public testing::TestWithParam<Mutant> {};
+
+TEST_P(Mutation, IsCaught) {
+    const Mutant& mutant = GetParam();
+    constexpr std::uint64_t kSeeds = 60;
+    std::string others;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+        Plan plan = draw(mutant.kind, seed);
+        mutant.shape(plan);
+        const auto subject = mutant.make(plan.settings);
+        Checker checker(plan.settings);
+        World world(plan, *subject, checker);
+        world.run();
+        if (checker.violation().starts_with(mutant.caught_as)) return;
+        if (checker.failed()) others += "\n  " + checker.violation();
+    }
+    FAIL() << "not caught in " << kSeeds << " seeds as: " << mutant.caught_as << others;
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, Mutation, testing::ValuesIn(kMutants),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+/// No setting of the arbiter exceeds the share of probes: the checker is told so directly.
+TEST(Checker, CatchesProbesThatTakeTooMuch) {
+    arbiter::Settings settings;
+    Checker checker(settings);
+    TimePoint now{1h};
+    checker.on_line(now);
+    const Bytes adu{1, 3, 0, 0, 0, 1, 0x84, 0x0A};
+    for (int second = 0; second < 60; ++second) {
+        now += 900ms;
+        checker.on_transmit(now, adu, true);
+        now += 100ms;
+        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x39}, false);
+        checker.on_answered(now + 50ms);
+    }
+    EXPECT_FALSE(checker.failed()) << checker.violation();
+    checker.at_end(now, true);
+    EXPECT_TRUE(checker.violation().starts_with("P4: probes")) << checker.violation();
+}
+
+}  // namespace
+}  // namespace panelgate::scenario
