@@ -53,6 +53,7 @@ struct Bus::State final : public line::Line::Events,
     void on_bytes(ByteView bytes) override;
 
     void transact(Request request, AnswerHandler handler);
+    std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
     void refuse(Pending pending, Fault fault);
     void pump();
     void act(arbiter::Transmit& transmit) { line->write(transmit.adu); }
@@ -113,6 +114,11 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
         return refuse(std::move(entry), Fault::denied);
     }
+    if (const auto code = guarded(request)) {
+        Answer refused;
+        refused.pdu = modbus::encode_exception(function, *code);
+        return answer(std::move(entry), std::move(refused));
+    }
     line->poll_input();
     arbiter::Job job;
     job.station = request.station;
@@ -126,6 +132,15 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (!ticket) return refuse(std::move(entry), ticket.error());
     pending.emplace(*ticket, std::move(entry));
     pump();
+}
+
+/// Why the panel's profile rules this request out, when its station is guarded.
+std::optional<modbus::ExceptionCode> Bus::State::guarded(const Request& request) const {
+    const auto guard = settings.guards.find(request.station);
+    if (guard == settings.guards.end()) return std::nullopt;
+    const auto code = guard->second(request.pdu);
+    if (!code) return std::nullopt;
+    return static_cast<modbus::ExceptionCode>(*code);
 }
 
 void Bus::State::refuse(Pending entry, Fault fault) {
@@ -248,7 +263,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     counters.count(entry.station, entry.function, result, rt::now() - entry.arrived);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
-    const bool refused = !result.pdu && !result.transmitted;
+    const bool refused = !result.transmitted && result.source == Source::bus;
     auto hand_over = [handler = std::move(entry.handler), result = std::move(result)]() mutable {
         handler(std::move(result));
     };

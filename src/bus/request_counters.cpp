@@ -12,7 +12,7 @@ std::string function_label(std::uint8_t function) {
 
 std::string outcome_of(const Answer& answer) {
     if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
-    if (modbus::exception_of(*answer.pdu)) return "exception";
+    if (modbus::exception_of(*answer.pdu)) return answer.transmitted ? "exception" : "refused";
     if (answer.source == Source::cache) return "cached";
     return answer.shared ? "shared" : "ok";
 }

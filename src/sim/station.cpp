@@ -13,6 +13,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "panelgate/profile/judge.hpp"
 
 namespace panelgate::sim {
 namespace {
@@ -64,10 +65,7 @@ struct Station::State {
     void move(TimePoint now, std::int64_t wall);
     Bytes execute(ByteView pdu);
     Bytes transfer(ByteView pdu, const modbus::Access& access);
-    unsigned write_limit(std::uint8_t function) const;
-    const Area* readable(const modbus::Range& range) const;
     Bytes read(std::uint8_t function, const modbus::Range& range) const;
-    std::optional<Bytes> refuse_write(std::uint8_t function, const modbus::Range& range) const;
     void write(ByteView pdu, const modbus::Range& range);
     std::uint16_t written(ByteView pdu, const Area& area, std::uint32_t address,
                           std::uint16_t index) const;
@@ -122,14 +120,22 @@ void Station::State::move(TimePoint now, std::int64_t wall) {
     }
 }
 
-/// In the order of the Application Protocol: function, quantity and structure, address, execution.
 Bytes Station::State::execute(ByteView pdu) {
     if (pdu.empty()) return {};
     const std::uint8_t function = pdu[0];
-    if (profile->find_function(function) == nullptr)
-        return refuse(function, ExceptionCode::illegal_function);
-    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide))
-        return refuse(function, ExceptionCode::illegal_data_value);
+    switch (profile::judge(*profile, pdu)) {
+        case profile::Judgement::illegal_function:
+            return refuse(function, ExceptionCode::illegal_function);
+        case profile::Judgement::illegal_value:
+            return refuse(function, ExceptionCode::illegal_data_value);
+        case profile::Judgement::illegal_address:
+            return refuse(function, ExceptionCode::illegal_data_address);
+        case profile::Judgement::write_protected:
+            return {static_cast<std::uint8_t>(function | modbus::kExceptionBit),
+                    profile->simulation.protected_exception};
+        case profile::Judgement::fine:
+            break;
+    }
     const modbus::Access access = modbus::access_of(pdu);
     const bool has_range = (access.read || access.write) && function != modbus::kReadFifoQueue;
     Bytes reply =
@@ -139,44 +145,15 @@ Bytes Station::State::execute(ByteView pdu) {
     return reply;
 }
 
-/// 17h: AP 6.17 lets a request write 121 registers, so that it fits a PDU, but read 125.
-unsigned Station::State::write_limit(std::uint8_t function) const {
-    constexpr unsigned kMostBesidesARead = 121;
-    const unsigned most = profile->max_count(function);
-    return function == modbus::kReadWriteMultipleRegisters ? std::min(most, kMostBesidesARead)
-                                                           : most;
-}
-
 Bytes Station::State::transfer(ByteView pdu, const modbus::Access& access) {
-    const std::uint8_t function = pdu[0];
-    const auto within = [](const std::optional<modbus::Range>& range, unsigned most) {
-        return !range || (range->count >= 1 && range->count <= most);
-    };
-    if (!within(access.read, profile->max_count(function)) ||
-        !within(access.write, write_limit(function))) {
-        return refuse(function, ExceptionCode::illegal_data_value);
-    }
-    if (function == modbus::kWriteSingleCoil && !((pdu[3] == 0xFF || pdu[3] == 0) && pdu[4] == 0))
-        return refuse(function, ExceptionCode::illegal_data_value);
-    if (access.read && readable(*access.read) == nullptr)
-        return refuse(function, ExceptionCode::illegal_data_address);
-    if (access.write) {
-        if (auto refusal = refuse_write(function, *access.write)) return *refusal;
-        write(pdu, *access.write);
-    }
-    if (access.read) return read(function, *access.read);
-    if (modbus::is_broadcastable(function)) return modbus::normal_write_reply(pdu);
+    if (access.write) write(pdu, *access.write);
+    if (access.read) return read(pdu[0], *access.read);
+    if (modbus::is_broadcastable(pdu[0])) return modbus::normal_write_reply(pdu);
     return {pdu.begin(), pdu.end()};  // 16h echoes its request
 }
 
-/// The one area that holds the whole range.
-const Area* Station::State::readable(const modbus::Range& range) const {
-    const Area* area = profile->find_area(range.table, range.address);
-    return area != nullptr && area->readable.contains(range.address, range.count) ? area : nullptr;
-}
-
 Bytes Station::State::read(std::uint8_t function, const modbus::Range& range) const {
-    const Area& area = *readable(range);
+    const Area& area = *profile::find_readable(*profile, range);
     if (modbus::is_bit_table(range.table)) {
         std::vector<bool> bits;
         bits.reserve(range.count);
@@ -189,15 +166,6 @@ Bytes Station::State::read(std::uint8_t function, const modbus::Range& range) co
     reply.u8(function).u8(2u * range.count);
     for (std::uint32_t i = 0; i < range.count; ++i) reply.u16(memory.get(area, range.address + i));
     return reply.take();
-}
-
-std::optional<Bytes> Station::State::refuse_write(std::uint8_t function,
-                                                  const modbus::Range& range) const {
-    const Area* area = readable(range);
-    if (area == nullptr) return refuse(function, ExceptionCode::illegal_data_address);
-    if (area->writable && area->writable->contains(range.address, range.count)) return std::nullopt;
-    return Bytes{static_cast<std::uint8_t>(function | modbus::kExceptionBit),
-                 profile->simulation.protected_exception};
 }
 
 /// The value that a write request carries for its `index`-th item.
@@ -226,7 +194,7 @@ std::uint16_t Station::State::written(ByteView pdu, const Area& area, std::uint3
 }
 
 void Station::State::write(ByteView pdu, const modbus::Range& range) {
-    const Area& area = *readable(range);
+    const Area& area = *profile::find_readable(*profile, range);
     for (std::uint16_t i = 0; i < range.count; ++i) {
         const std::uint32_t address = std::uint32_t{range.address} + i;
         memory.set(area, address, written(pdu, area, address, i));

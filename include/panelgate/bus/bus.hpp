@@ -1,8 +1,10 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "panelgate/arbiter/settings.hpp"
@@ -12,11 +14,15 @@
 
 namespace panelgate::bus {
 
+/// The exception code that a request is answered with instead of being transmitted, or nothing.
+using Guard = std::function<std::optional<std::uint8_t>(ByteView pdu)>;
+
 struct Settings {
     std::string name;    ///< of the line
     std::string device;  ///< as configured
     arbiter::Settings arbiter;
     std::map<std::uint8_t, std::string> stations;  ///< names of those the configuration lists
+    std::map<std::uint8_t, Guard> guards;          ///< of stations with `guard: true`
     std::size_t trace_frames = 2000;
     std::size_t trace_decisions = 500;
 };

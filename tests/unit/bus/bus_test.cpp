@@ -64,6 +64,9 @@ class BusTest : public testing::Test {
         settings.arbiter.stations = {settings.arbiter.unlisted};
         settings.arbiter.stations[0].id = 17;
         settings.stations[17] = "press";
+        settings.guards[18] = [](ByteView pdu) {
+            return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
+        };
         auto memory = std::make_unique<MemoryLine>(io);
         line = memory.get();
         bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
@@ -87,6 +90,32 @@ class BusTest : public testing::Test {
     MemoryLine* line = nullptr;
     std::unique_ptr<Bus> bus;
 };
+
+TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
+    bus->start();
+    const Answer refused = ask(18, kWrite);
+    EXPECT_EQ(refused.pdu.value(), (Bytes{0x86, 2}));
+    EXPECT_FALSE(refused.transmitted);
+    EXPECT_TRUE(line->written.empty());
+    EXPECT_EQ(bus->report().stations.front().requests.at({"6", "refused"}), 1u);
+    EXPECT_TRUE(ask(18, kRead).pdu.has_value());
+}
+
+TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
+    bus->start();
+    bus->name_client(1, "modbus_tcp 10.0.0.7:5000");
+    ask(17, kRead);
+    const auto frames = bus->trace(10);
+    ASSERT_FALSE(frames.empty());
+    EXPECT_EQ(frames[0].why.substr(0, 36), "read of client 1 to station 17: next");
+    const auto clients = bus->status().clients;
+    ASSERT_EQ(clients.size(), 1u);
+    EXPECT_EQ(clients[0].name, "modbus_tcp 10.0.0.7:5000");
+    EXPECT_EQ(clients[0].transactions, 1u);
+    EXPECT_EQ(clients[0].percent, 100);
+    bus->cancel(1);
+    EXPECT_TRUE(bus->status().clients.empty());
+}
 
 TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     bus->start();

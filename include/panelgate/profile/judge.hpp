@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+
+namespace panelgate::profile {
+
+/// What a panel's manual says to a request, before anything is executed, in the order of the
+/// Application Protocol (chapter 7): function, quantity and structure, address.
+enum class Judgement : std::uint8_t {
+    fine,
+    illegal_function,  ///< exception 01
+    illegal_value,     ///< 03: structure or quantity
+    illegal_address,   ///< 02: not all of it is memory of the panel
+    write_protected,   ///< it can be read and not written; the manuals disagree about the code
+};
+
+Judgement judge(const PanelProfile& profile, ByteView pdu);
+
+/// The one area that holds the whole range, or nullptr.
+const Area* find_readable(const PanelProfile& profile, const modbus::Range& range);
+
+}  // namespace panelgate::profile

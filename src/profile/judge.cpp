@@ -1,0 +1,51 @@
+#include "panelgate/profile/judge.hpp"
+
+#include <algorithm>
+
+namespace panelgate::profile {
+namespace {
+
+/// 17h: AP 6.17 lets a request write 121 registers, so that it fits a PDU, but read 125.
+unsigned write_limit(const PanelProfile& profile, std::uint8_t function) {
+    constexpr unsigned kMostBesidesARead = 121;
+    const unsigned most = profile.max_count(function);
+    return function == modbus::kReadWriteMultipleRegisters ? std::min(most, kMostBesidesARead)
+                                                           : most;
+}
+
+bool within(const std::optional<modbus::Range>& range, unsigned most) {
+    return !range || (range->count >= 1 && range->count <= most);
+}
+
+bool is_coil_value(ByteView pdu) {
+    return (pdu[3] == 0xFF || pdu[3] == 0) && pdu[4] == 0;  // AP 6.5
+}
+
+}  // namespace
+
+const Area* find_readable(const PanelProfile& profile, const modbus::Range& range) {
+    const Area* area = profile.find_area(range.table, range.address);
+    return area != nullptr && area->readable.contains(range.address, range.count) ? area : nullptr;
+}
+
+Judgement judge(const PanelProfile& profile, ByteView pdu) {
+    if (pdu.empty() || profile.find_function(pdu[0]) == nullptr) return Judgement::illegal_function;
+    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide)) return Judgement::illegal_value;
+    if (pdu[0] == modbus::kReadFifoQueue) return Judgement::fine;
+    const modbus::Access access = modbus::access_of(pdu);
+    if (!within(access.read, profile.max_count(pdu[0])) ||
+        !within(access.write, write_limit(profile, pdu[0]))) {
+        return Judgement::illegal_value;
+    }
+    if (pdu[0] == modbus::kWriteSingleCoil && !is_coil_value(pdu)) return Judgement::illegal_value;
+    if (access.read && find_readable(profile, *access.read) == nullptr)
+        return Judgement::illegal_address;
+    if (!access.write) return Judgement::fine;
+    const Area* area = find_readable(profile, *access.write);
+    if (area == nullptr) return Judgement::illegal_address;
+    const bool may =
+        area->writable && area->writable->contains(access.write->address, access.write->count);
+    return may ? Judgement::fine : Judgement::write_protected;
+}
+
+}  // namespace panelgate::profile
