@@ -27,7 +27,11 @@ constexpr Duration kTick = 1ms;  // reply bytes are handed over at this grain, t
 
 struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     State(const asio::any_io_executor& executor, Settings s, std::vector<Station> all)
-        : settings(s), stations(std::move(all)), descriptor(executor), timer(executor) {
+        : settings(std::move(s)),
+          stations(std::move(all)),
+          descriptor(executor),
+          timer(executor),
+          chance(settings.seed) {
         descriptor.assign(::dup(pty.master()));
     }
 
@@ -45,7 +49,9 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     asio::posix::stream_descriptor descriptor;
     asio::steady_timer timer;
     Bytes request;
-    TimePoint request_end;  ///< wire time of its last bit
+    TimePoint request_end;     ///< wire time of its last bit
+    Duration longest_pause{};  ///< inside it
+    std::mt19937 chance;
     Bytes reply;
     std::size_t sent = 0;
     TimePoint reply_start;
@@ -70,6 +76,7 @@ void SimulatedBus::State::read_all() {
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     if (!reply.empty()) return;  // a collision: neither side understands the other
     const bool first = request.empty();
+    longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
     const std::size_t room = kMaxRequest - std::min(kMaxRequest, request.size());
@@ -87,10 +94,17 @@ void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
 
 void SimulatedBus::State::request_ended() {
     const Bytes adu = std::exchange(request, {});
-    reply = reply_to(adu);
+    if (settings.echo && ::write(descriptor.native_handle(), adu.data(), adu.size()) < 0) return;
+    Spoken spoken{reply_to(adu), {}};
+    if (const auto found = settings.faults.find(adu.empty() ? std::uint8_t{0} : adu[0]);
+        found != settings.faults.end()) {
+        spoken = misbehave(found->second, std::move(spoken.adu), chance);
+    }
+    reply = std::move(spoken.adu);
     if (reply.empty()) return;
     sent = 0;
-    reply_start = request_end + silent_interval(settings.serial) + settings.think_time;
+    reply_start =
+        request_end + silent_interval(settings.serial) + settings.think_time + spoken.delay;
     at(reply_start, &State::send_some);
 }
 
@@ -103,6 +117,9 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
     const std::int64_t wall = rt::local_wall_seconds();
     Bytes answer;
     for (Station& station : stations) {
+        const auto faults = settings.faults.find(station.id());
+        const bool dead = faults != settings.faults.end() && faults->second.dead;
+        if (dead || station.minds_pause(longest_pause, settings.serial)) continue;
         if (adu[0] == 0) station.broadcast(now, wall, pdu);
         if (adu[0] == station.id())
             answer = modbus::encode_adu(station.id(), station.handle(now, wall, pdu));
@@ -138,6 +155,19 @@ SimulatedBus::SimulatedBus(asio::any_io_executor executor, Settings settings,
 SimulatedBus::~SimulatedBus() { stop(); }
 
 const std::string& SimulatedBus::device() const { return state_->pty.path(); }
+
+bool SimulatedBus::has(std::uint8_t station) const {
+    return std::ranges::find(state_->stations, station, &Station::id) != state_->stations.end();
+}
+
+void SimulatedBus::set_faults(std::uint8_t station, const Misbehaviour& faults) {
+    state_->settings.faults[station] = faults;
+}
+
+Misbehaviour SimulatedBus::faults(std::uint8_t station) const {
+    const auto found = state_->settings.faults.find(station);
+    return found == state_->settings.faults.end() ? Misbehaviour{} : found->second;
+}
 
 void SimulatedBus::start() { state_->wait_readable(); }
 

@@ -112,6 +112,11 @@ void Station::broadcast(TimePoint now, std::int64_t wall, ByteView pdu) {
     state_->execute(pdu);
 }
 
+bool Station::minds_pause(Duration pause, const SerialFormat& format) const {
+    const unsigned bits = state_->profile->timing.max_gap_bits;
+    return bits > 0 && pause > std::chrono::nanoseconds(1s) * bits / format.baud;
+}
+
 void Station::State::move(TimePoint now, std::int64_t wall) {
     if (!std::exchange(running, true)) started = now;
     for (const Motion& motion : profile->simulation.motion) {

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
 #include "panelgate/sim/station.hpp"
 
 namespace panelgate::sim {
@@ -14,11 +17,15 @@ namespace panelgate::sim {
 struct Settings {
     SerialFormat serial;
     Duration think_time = 1ms;  ///< of a panel, after the silence that ends the request
+    bool echo = false;          ///< the adapter hears what the gateway sends
+    std::map<std::uint8_t, Misbehaviour> faults;  ///< by station
+    std::uint32_t seed = 1;                       ///< of the faults' chance
 };
 
 /// Panels on one RS-485 line behind a pseudo-terminal, paced at the line's baud: a request is whole
 /// after its wire time and t3.5 of silence, the reply's bytes arrive when a real line would bring
-/// them. What is sent while a reply is under way collides and is lost, as on a real line.
+/// them. A pause inside a request is noticed by panels that mind it (GT: 24 bit times). What is
+/// sent while a reply is under way collides and is lost, as on a real line.
 class SimulatedBus {
   public:
     /// Throws std::system_error when there is no pty left. The stations' profiles must outlive it.
@@ -30,6 +37,11 @@ class SimulatedBus {
     const std::string& device() const;
     void start();
     void stop();
+
+    bool has(std::uint8_t station) const;
+    /// From the next request on.
+    void set_faults(std::uint8_t station, const Misbehaviour& faults);
+    Misbehaviour faults(std::uint8_t station) const;
 
   private:
     struct State;

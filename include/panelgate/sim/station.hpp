@@ -27,6 +27,10 @@ class Station {
     /// A broadcast: executed when the profile lets the function be broadcast, never answered.
     void broadcast(TimePoint now, std::int64_t wall, ByteView pdu);
 
+    /// The panel ignores a request with such a pause between two of its characters (GT: more than
+    /// 24 bit times, ARCT1F501E 1.2).
+    bool minds_pause(Duration pause, const SerialFormat& format) const;
+
     /// Memory by area name; bits are 0 or 1. The area and the address must be the profile's.
     std::uint16_t peek(const std::string& area, std::uint32_t address) const;
     void poke(const std::string& area, std::uint32_t address, std::uint16_t value);

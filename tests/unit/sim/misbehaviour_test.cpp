@@ -1,0 +1,72 @@
+#include "panelgate/sim/misbehaviour.hpp"
+
+#include <gtest/gtest.h>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "panelgate/sim/station.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::sim {
+namespace {
+
+const Bytes kReply = modbus::encode_adu(20, "03 02 00 07"_hex);
+
+Spoken once(const Misbehaviour& faults) {
+    std::mt19937 chance(1);
+    return misbehave(faults, kReply, chance);
+}
+
+TEST(Misbehaviour, NoneLeavesTheReplyAsItIs) {
+    EXPECT_EQ(once({}).adu, kReply);
+    EXPECT_EQ(once({}).delay, Duration::zero());
+}
+
+TEST(Misbehaviour, EachFaultDoesWhatItsNameSays) {
+    Misbehaviour faults;
+    faults.dead = true;
+    EXPECT_TRUE(once(faults).adu.empty());
+    faults = {};
+    faults.drop = 1;
+    EXPECT_TRUE(once(faults).adu.empty());
+    faults = {};
+    faults.slow = 20ms;
+    faults.late = 1;
+    faults.late_by = 600ms;
+    EXPECT_EQ(once(faults).delay, Duration(620ms));
+    EXPECT_EQ(once(faults).adu, kReply);
+    faults = {};
+    faults.damage = 1;
+    EXPECT_FALSE(modbus::crc_ok(once(faults).adu));
+    EXPECT_EQ(once(faults).adu.size(), kReply.size());
+    faults = {};
+    faults.truncate = 1;
+    EXPECT_EQ(once(faults).adu, Bytes(kReply.begin(), kReply.begin() + 4));
+    faults = {};
+    faults.foreign_id = 1;
+    EXPECT_EQ(once(faults).adu[0], 21);
+    EXPECT_TRUE(modbus::crc_ok(once(faults).adu));
+}
+
+TEST(Misbehaviour, AShareIsOfManyAnswers) {
+    Misbehaviour faults;
+    faults.drop = 0.25;
+    std::mt19937 chance(7);
+    int silent = 0;
+    for (int i = 0; i < 10'000; ++i) silent += misbehave(faults, kReply, chance).adu.empty();
+    EXPECT_NEAR(silent, 2500, 200);
+}
+
+TEST(Misbehaviour, OnlyThePanasonicMindsAPauseOfMoreThan24BitTimes) {
+    const profile::Catalogue shipped = profile::Catalogue::shipped();
+    const SerialFormat format{9600, 8, Parity::none, 1};
+    const Duration bits24 = Duration(1s) * 24 / 9600;
+    const Station gt(*shipped.find("panasonic-gt"), 20);
+    EXPECT_FALSE(gt.minds_pause(bits24, format));
+    EXPECT_TRUE(gt.minds_pause(bits24 + 1us, format));
+    const Station gp(*shipped.find("autonics-gplp-s"), 31);
+    EXPECT_FALSE(gp.minds_pause(1s, format));
+}
+
+}  // namespace
+}  // namespace panelgate::sim
