@@ -37,10 +37,14 @@ def echo_address(frame):
 
 
 class RtuBus:
-    """panels: {station: function(frame) -> reply PDU | Raw(bytes) | None for silence}"""
+    """panels: {station: function(frame) -> reply PDU | Raw(bytes) | None for silence}
+    echo: function(frame) -> what the adapter hears of the frame that it sends; glued: in one piece
+    with the reply"""
 
-    def __init__(self, link, panels):
+    def __init__(self, link, panels, echo=None, glued=False):
         self._panels = panels
+        self._echo = echo or (lambda frame: b"")
+        self._glued = glued
         self._frames = []
         self._changed = threading.Condition()
         self._error = None
@@ -109,10 +113,12 @@ class RtuBus:
             self._changed.notify_all()
         panel = self._panels.get(frame[0])
         reply = panel(frame) if panel else None
-        if isinstance(reply, Raw):
-            os.write(self._master, reply)
-        elif reply is not None:
-            os.write(self._master, harness.rtu(frame[0], reply))
+        if reply is not None and not isinstance(reply, Raw):
+            reply = harness.rtu(frame[0], reply)
+        pieces = [self._echo(frame), reply or b""]
+        for piece in [b"".join(pieces)] if self._glued else pieces:
+            if piece:
+                os.write(self._master, piece)
 
 
 class Raw(bytes):
