@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 """How much of a paced RS-485 line the gateway uses: the figures behind promises P1, P4, P5 and P6.
 
-usage: tests/bench/wire.py [TOOLS]
-
 TOOLS is a folder with rtubus.cpp, an independent paced bus with faults, and mbload.cpp, a load
 generator (default: $PANELGATE_TOOLS, else ../shared/tools beside this tree). Prints one table with
 machine and date; all ratios come from one run on one machine.
 """
+import argparse
+import concurrent.futures
 import datetime
 import json
 import os
@@ -15,10 +15,11 @@ import platform
 import subprocess
 import sys
 import tempfile
+import time
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
-from harness import Program  # noqa: E402
+from harness import Output, Program  # noqa: E402
 
 TOOLS = pathlib.Path(os.environ.get("PANELGATE_TOOLS", HERE.parents[3] / "shared/tools"))
 RATES = (9600, 19200, 38400, 115200)
@@ -49,13 +50,19 @@ def wire_limit(baud, registers=10):
 class Bus:
     """rtubus with stations 1 to 8, and a gateway on it."""
 
-    def __init__(self, tools, folder, baud, faults=(), settings=""):
+    def __init__(self, tools, folder, baud, faults=(), settings="", log=False):
         self.tools = tools
         link = f"{folder}/tty{baud}-{id(self)}"
         command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8"]
         for fault in faults:
             command += ["--fault", fault]
-        self.bus = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        read, write = os.pipe()
+        if log:
+            command += ["--log", f"/dev/fd/{write}"]
+        self.bus = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                                    pass_fds=[write])
+        os.close(write)
+        self.log = Output(os.fdopen(read))  # a line for every frame: START END BUS KIND hex...
         self.bus.stdout.readline()
         stations = ", ".join(f"{{id: {i}}}" for i in range(1, 9))
         config = pathlib.Path(f"{link}.yaml")
@@ -78,13 +85,20 @@ class Bus:
         self.bus.stdin.flush()
         return self.bus.stdout.readline()
 
+    def stats(self):
+        return json.loads(self.tell("stats"))[0]
+
+    def start_load(self, *options):
+        port = str(self.gateway.modbus_port())
+        return subprocess.Popen([self.tools["mbload"], "--port", port, *map(str, options)],
+                                stdout=subprocess.PIPE, text=True)
+
     def load(self, *options):
         """What mbload saw, and what the bus saw meanwhile (its warm-up included)."""
-        port = str(self.gateway.modbus_port())
         self.tell("reset")
-        out = subprocess.run([self.tools["mbload"], "--port", port, *map(str, options)],
-                             stdout=subprocess.PIPE, text=True, check=True).stdout
-        return json.loads(out), json.loads(self.tell("stats"))[0]
+        with self.start_load(*options) as load:
+            seen = json.loads(load.communicate()[0])
+        return seen, self.stats()
 
 
 def wrong_values(seen):
@@ -98,13 +112,14 @@ def utilisation(tools, folder, baud, seconds=4):
     return seen["all"]["tps"] / wire_limit(baud), wire["gap_violations"], wire["collisions"]
 
 
-def with_dead(tools, folder, baud, dead, seconds=8):
+def with_dead(tools, folder, baud, dead, seconds=8, timeout=0.5):
     """(share of the wire's limit for the healthy ones, p99 in ms of the answers for the dead ones)."""
     faults = [f"{i}:drop=1" for i in range(9 - dead, 9)]
-    with Bus(tools, folder, baud, faults) as bus:
+    settings = f"    timing: {{response_timeout: {round(timeout * 1000)}ms}}\n"
+    with Bus(tools, folder, baud, faults, settings) as bus:
         # The warm-up is long enough for three silent transactions of each dead one.
         seen, _ = bus.load("--conns", 8, "--units", "1-8", "--live", f"1-{8 - dead}",
-                           "--time", seconds, "--warm", 5 * dead + 1)
+                           "--time", seconds, "--warm", 10 * timeout * dead + 1)
     return seen["live"]["tps"] / wire_limit(baud), seen["dead"]["lat_ms"]["p99"]
 
 
@@ -129,23 +144,69 @@ def under_faults(tools, folder, baud, seconds=10):
     return seen["all"]["ok"], wrong_values(seen), wire["gap_violations"]
 
 
+# The same faults on a short response timeout: replies come in time, late, and in the quarantine.
+QUICK_FAULTS = ("1:delay=5,delayto=14,delayevery=3", "2:delay=6,delayto=18,delayevery=4", *FAULTS[2:])
+
+
+def many_under_faults(tools, folder, baud, transactions):
+    """(transactions, good answers, wrong values) of one line with every fault on."""
+    settings = ("    timing: {response_timeout: 10ms}\n    queue: {deadline: 4s}\n"
+                "    offline: {probe_min: 10ms, probe_max: 20ms}\n")
+    sent = good = wrong = 0
+    with Bus(tools, folder, baud, QUICK_FAULTS, settings) as bus:
+        while sent < transactions:
+            seen, wire = bus.load("--conns", 16, "--units", "1-8", "--mix", "--time", 20, "--warm", 0)
+            sent += wire["frames"]
+            good += seen["all"]["ok"]
+            wrong += wrong_values(seen)
+    return sent, good, wrong
+
+
+def print_many(tools, folder, baud, transactions, lines):
+    """Shares the transactions out to several lines, each with its own bus and gateway."""
+    began = time.monotonic()
+    with concurrent.futures.ThreadPoolExecutor(lines) as pool:
+        share = -(-transactions // lines)
+        runs = [pool.submit(many_under_faults, tools, folder, baud, share) for _ in range(lines)]
+        sent, good, wrong = map(sum, zip(*(run.result() for run in runs)))
+    print(f"every fault on, {lines} lines at {baud} baud: {sent} transactions, {good} good answers, "
+          f"{wrong} wrong values, {time.monotonic() - began:.0f} s", flush=True)
+    return wrong
+
+
+def print_table(tools, folder):
+    print("baud    of the limit  one dead  three dead  64 equal readers  wrong values of")
+    for baud in RATES:
+        used, violations, _ = utilisation(tools, folder, baud)
+        one, _ = with_dead(tools, folder, baud, 1)
+        three, _ = with_dead(tools, folder, baud, 3)
+        times, _ = shared(tools, folder, baud, 64)
+        good, wrong, more = under_faults(tools, folder, baud)
+        print(f"{baud:<7} {used:<13.3f} {one:<9.3f} {three:<11.3f} {times:<17.1f} {wrong} of {good}"
+              f"{'' if violations + more == 0 else f'  {violations + more} gap violations'}", flush=True)
+
+
 def main():
-    tools_folder = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else TOOLS
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tools", nargs="?", type=pathlib.Path, default=TOOLS)
+    parser.add_argument("--transactions", type=int, metavar="N",
+                        help="instead of the table: N transactions with every fault on (P1)")
+    parser.add_argument("--baud", type=int, default=57600,
+                        help="of these transactions (%(default)s; above it the second copy of a reply "
+                             "comes when the next one is due, and cannot be told apart)")
+    parser.add_argument("--lines", type=int, default=16, help="that share them (%(default)s)")
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        tools = build_tools(folder, tools_folder)
+        tools = build_tools(folder, options.tools)
         if tools is None:
-            sys.exit(f"wire.py: there is no rtubus.cpp and mbload.cpp in {tools_folder}")
+            sys.exit(f"wire.py: there is no rtubus.cpp and mbload.cpp in {options.tools}")
         print(f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}, "
               f"{datetime.date.today()}")
-        print("baud    of the limit  one dead  three dead  64 equal readers  wrong values of")
-        for baud in RATES:
-            used, violations, _ = utilisation(tools, folder, baud)
-            one, _ = with_dead(tools, folder, baud, 1)
-            three, _ = with_dead(tools, folder, baud, 3)
-            times, _ = shared(tools, folder, baud, 64)
-            good, wrong, more = under_faults(tools, folder, baud)
-            print(f"{baud:<7} {used:<13.3f} {one:<9.3f} {three:<11.3f} {times:<17.1f} {wrong} of {good}"
-                  f"{'' if violations + more == 0 else f'  {violations + more} gap violations'}", flush=True)
+        if options.transactions is None:
+            print_table(tools, folder)
+        elif print_many(tools, folder, options.baud, options.transactions, options.lines):
+            sys.exit(1)
 
 
 if __name__ == "__main__":
