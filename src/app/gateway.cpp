@@ -23,6 +23,25 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
     return bus;
 }
 
+namespace {
+
+/// How REST reaches the faults of a simulated panel; null for a real one. The bus outlives it.
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bus,
+                                                           std::uint8_t station) {
+    if (bus == nullptr || !bus->has(station)) return nullptr;
+    web::SimulatedPanel panel;
+    panel.faults = [bus, station] { return sim::to_numbers(bus->faults(station)); };
+    panel.set_faults = [bus, station](const sim::FaultNumbers& numbers) {
+        sim::Misbehaviour faults;
+        auto wrong = sim::from_numbers(numbers, faults);
+        if (!wrong) bus->set_faults(station, faults);
+        return wrong;
+    };
+    return std::make_shared<const web::SimulatedPanel>(std::move(panel));
+}
+
+}  // namespace
+
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
     : executor_(std::move(executor)), config_(std::move(config)) {
     for (const config::Line& line : config_.lines) add_line(line, simulate);
@@ -39,17 +58,18 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         settings.stations[station.id] = station.name;
 
     line::Settings device = line.device;
-    if (simulate || line.kind == config::Line::Kind::simulated) {
+    const bool simulates = simulate || line.kind == config::Line::Kind::simulated;
+    if (simulates) {
         simulated_.push_back(simulate_line(executor_, line));
         device.device = simulated_.back()->device();
         settings.device = "sim";
     }
     auto tty = line::make_tty_line(executor_, std::move(device));
     buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(tty)));
-    add_stations(line, *buses_.back());
+    add_stations(line, *buses_.back(), simulates ? simulated_.back().get() : nullptr);
 }
 
-void Gateway::add_stations(const config::Line& line, bus::Bus& bus) {
+void Gateway::add_stations(const config::Line& line, bus::Bus& bus, sim::SimulatedBus* simulated) {
     tcp_server::LineInfo info;
     info.name = line.name;
     info.bus = &bus;
@@ -64,6 +84,7 @@ void Gateway::add_stations(const config::Line& line, bus::Bus& bus) {
         entry.profile = station.profile;
         entry.read_only = station.read_only;
         entry.bus = &bus;
+        entry.simulated = simulated_panel(simulated, station.id);
         directory_.stations.push_back(std::move(entry));
     }
     lines_.push_back(std::move(info));

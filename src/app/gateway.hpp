@@ -38,7 +38,7 @@ class Gateway {
 
   private:
     void add_line(const config::Line& line, bool simulate);
-    void add_stations(const config::Line& line, bus::Bus& bus);
+    void add_stations(const config::Line& line, bus::Bus& bus, sim::SimulatedBus* simulated);
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
     std::string metrics_text() const;

@@ -1,10 +1,85 @@
 #include "panelgate/sim/misbehaviour.hpp"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::sim {
+
+namespace {
+
+constexpr double kLongest = 600'000;  // ms
+
+struct Fault {
+    const char* name;
+    double most;
+    double (*get)(const Misbehaviour&);
+    void (*set)(Misbehaviour&, double);
+};
+
+Duration from_ms(double ms) {
+    return std::chrono::duration_cast<Duration>(std::chrono::duration<double, std::milli>(ms));
+}
+
+template <double Misbehaviour::* Share>
+constexpr Fault share(const char* name) {
+    return {name, 1, [](const Misbehaviour& m) { return m.*Share; },
+            [](Misbehaviour& m, double v) { m.*Share = v; }};
+}
+template <Duration Misbehaviour::* Time>
+constexpr Fault time(const char* name) {
+    return {name, kLongest, [](const Misbehaviour& m) { return to_milliseconds(m.*Time); },
+            [](Misbehaviour& m, double v) { m.*Time = from_ms(v); }};
+}
+
+constexpr Fault kFaults[] = {
+    {"dead", 1, [](const Misbehaviour& m) { return m.dead ? 1.0 : 0.0; },
+     [](Misbehaviour& m, double v) { m.dead = v != 0; }},
+    time<&Misbehaviour::slow>("slow_ms"),
+    time<&Misbehaviour::late_by>("late_by_ms"),
+    share<&Misbehaviour::late>("late"),
+    share<&Misbehaviour::drop>("drop"),
+    share<&Misbehaviour::damage>("damage"),
+    share<&Misbehaviour::truncate>("truncate"),
+    share<&Misbehaviour::foreign_id>("foreign_id"),
+};
+
+std::string number(double value) {
+    std::string text = std::to_string(value);
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.back() == '.') text.pop_back();
+    return text;
+}
+
+}  // namespace
+
+FaultNumbers to_numbers(const Misbehaviour& faults) {
+    FaultNumbers numbers;
+    for (const Fault& fault : kFaults) numbers[fault.name] = fault.get(faults);
+    return numbers;
+}
+
+std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviour& faults) {
+    Misbehaviour made;
+    for (const auto& [name, value] : numbers) {
+        const auto known =
+            std::ranges::find_if(kFaults, [&](const Fault& fault) { return fault.name == name; });
+        if (known == std::end(kFaults)) {
+            std::string all;
+            for (const Fault& fault : kFaults)
+                all += (all.empty() ? "" : ", ") + std::string(fault.name);
+            return "there is no fault '" + name + "'; faults are " + all;
+        }
+        if (!(value >= 0 && value <= known->most)) {
+            return name + " must be from 0 to " + number(known->most) + ", not " + number(value);
+        }
+        known->set(made, value);
+    }
+    faults = made;
+    return std::nullopt;
+}
 
 Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance) {
     const auto happens = [&](double share) {

@@ -35,6 +35,9 @@ Handling get_stations(HttpRequest request, const Api* api);
 Handling get_station(HttpRequest request, const Api* api);
 Handling get_table(HttpRequest request, const Api* api);
 Handling put_table(HttpRequest request, const Api* api);
+Handling get_simulated(HttpRequest request, const Api* api);
+Handling put_simulated(HttpRequest request, const Api* api);
+
 Handling get_device(HttpRequest request, const Api* api);
 Handling put_device(HttpRequest request, const Api* api);
 

@@ -30,6 +30,8 @@ constexpr Route kRoutes[] = {
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange},
     {"GET", "/api/v1/stations", get_stations, kSee},
     {"GET", "/api/v1/stations/{}", get_station, kSee},
+    {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
+    {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
     // Before the tables: "devices" is none of them.
     {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee},
     {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange},

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <random>
+#include <string>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
@@ -20,6 +23,12 @@ struct Misbehaviour {
     double foreign_id = 0;  ///< the reply carries another address
     friend bool operator==(const Misbehaviour&, const Misbehaviour&) = default;
 };
+
+/// The faults as numbers by name, times in milliseconds: {"dead": 1, "slow_ms": 20, "drop": 0.1}.
+using FaultNumbers = std::map<std::string, double>;
+FaultNumbers to_numbers(const Misbehaviour& faults);
+/// What is not named is off. Nothing, or what is wrong and would be right.
+std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviour& faults);
 
 /// What a misbehaving panel makes of a good reply ADU. Pure, but for the chance it is given.
 struct Spoken {

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,6 +21,13 @@ struct LineEntry {
     bool pass_unlisted_stations = true;
 };
 
+/// The faults of a simulated panel, in numbers by name.
+struct SimulatedPanel {
+    std::function<std::map<std::string, double>()> faults;
+    /// What is not named is off. Nothing, or what is wrong.
+    std::function<std::optional<std::string>(const std::map<std::string, double>&)> set_faults;
+};
+
 struct StationEntry {
     std::string name;  ///< "LINE:ID" for a station that the configuration does not list
     std::string line;
@@ -26,6 +36,7 @@ struct StationEntry {
     bool read_only = false;
     std::optional<int> unit;        ///< the unit id that Modbus/TCP clients use, when there is one
     bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
+    std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 
 /// What the API serves. Filled at load; may be changed between requests of the one thread.

@@ -57,6 +57,23 @@ TEST(Misbehaviour, AShareIsOfManyAnswers) {
     EXPECT_NEAR(silent, 2500, 200);
 }
 
+TEST(Misbehaviour, IsGivenAndToldInNumbers) {
+    Misbehaviour faults;
+    const FaultNumbers numbers{{"dead", 1}, {"slow_ms", 20}, {"late_by_ms", 600}, {"late", 0.5}};
+    EXPECT_FALSE(from_numbers(numbers, faults));
+    EXPECT_TRUE(faults.dead);
+    EXPECT_EQ(faults.late_by, Duration(600ms));
+    const FaultNumbers told = to_numbers(faults);
+    EXPECT_EQ(told.size(), 8u);
+    for (const auto& [name, value] : numbers) EXPECT_EQ(told.at(name), value) << name;
+    EXPECT_EQ(from_numbers({{"drop", 1.5}}, faults), "drop must be from 0 to 1, not 1.5");
+    EXPECT_EQ(
+        from_numbers({{"dread", 1}}, faults),
+        "there is no fault 'dread'; faults are dead, slow_ms, late_by_ms, late, drop, damage, "
+        "truncate, foreign_id");
+    EXPECT_TRUE(faults.dead) << "a bad set changes nothing";
+}
+
 TEST(Misbehaviour, OnlyThePanasonicMindsAPauseOfMoreThan24BitTimes) {
     const profile::Catalogue shipped = profile::Catalogue::shipped();
     const SerialFormat format{9600, 8, Parity::none, 1};
