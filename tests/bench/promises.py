@@ -181,7 +181,7 @@ def polite_beside_a_flooder(tools, folder, baud, seconds=3):
     return percentile([a.seconds for a in polite], 0.95) * wire_limit(baud), len(polite)
 
 
-def writes_beside_readers(tools, folder, baud, seconds=3):
+def writes_beside_readers(tools, folder, baud, seconds=2):
     """P9: for each write, beside the same two: the requests that started after it had been sent
     and before it started itself."""
     dice = random.Random(1)
