@@ -2,6 +2,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -11,11 +12,14 @@
 #include "panelgate/rt/log.hpp"
 #include "pty_link.hpp"
 #include "run_loop.hpp"
+#include "tcp_bridge.hpp"
 
 namespace panelgate::app {
 namespace {
 
-/// NAME=PTY-LINK texts by line name; false (and told) when one is wrong.
+constexpr std::string_view kTcp = "tcp://";
+
+/// NAME=PTY-LINK and NAME=tcp://ADDR:PORT texts by line name; false (and told) when one is wrong.
 bool parse_links(const std::vector<std::string>& texts, const config::Config& config,
                  std::map<std::string, std::string>& links) {
     for (const std::string& text : texts) {
@@ -24,13 +28,15 @@ bool parse_links(const std::vector<std::string>& texts, const config::Config& co
         bool known = false;
         for (const config::Line& line : config.lines) known = known || line.name == name;
         if (equals == std::string::npos || equals + 1 == text.size()) {
-            std::cerr << "panelgate: --line '" << text << "' is not NAME=PTY-LINK\n";
+            std::cerr << "panelgate: --line '" << text
+                      << "' is not NAME=PTY-LINK or NAME=tcp://ADDR:PORT\n";
         } else if (!known) {
             std::cerr << "panelgate: --line '" << text << "': the configuration has no line '"
                       << name << "'\n";
-        } else if (text.compare(equals + 1, 6, "tcp://") == 0) {
+        } else if (text.compare(equals + 1, kTcp.size(), kTcp) == 0 &&
+                   !config::parse_endpoint(text.substr(equals + 1 + kTcp.size()))) {
             std::cerr << "panelgate: --line '" << text
-                      << "': RTU over TCP is not in this version; give a path\n";
+                      << "' is not NAME=tcp://ADDR:PORT with an IP address and a port\n";
         } else {
             links[name] = text.substr(equals + 1);
             continue;
@@ -52,13 +58,24 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     boost::asio::io_context io(1);
     std::vector<std::unique_ptr<sim::SimulatedBus>> buses;
     std::vector<std::unique_ptr<PtyLink>> made;
+    std::vector<std::unique_ptr<TcpBridge>> bridges;
     try {
         for (const config::Line& line : loaded.config->lines) {
             buses.push_back(simulate_line(io.get_executor(), line));
             buses.back()->start();
             const auto link = links.find(line.name);
             if (link == links.end()) continue;
-            made.push_back(std::make_unique<PtyLink>(link->second, buses.back()->device()));
+            if (!link->second.starts_with(kTcp)) {
+                made.push_back(std::make_unique<PtyLink>(link->second, buses.back()->device()));
+                continue;
+            }
+            const auto endpoint = config::parse_endpoint(link->second.substr(kTcp.size()));
+            bridges.push_back(
+                std::make_unique<TcpBridge>(io.get_executor(), *endpoint, buses.back()->device()));
+            rt::log(rt::LogLevel::info, "listening",
+                    {{"line", line.name},
+                     {"rtu_over_tcp",
+                      endpoint->address + ':' + std::to_string(bridges.back()->port())}});
         }
     } catch (const std::system_error& error) {
         std::cerr << "panelgate: " << error.what() << '\n';
@@ -66,6 +83,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     }
     run_until_signal(io, {[] {}, [] { return true; },
                           [&] {
+                              bridges.clear();
                               for (const auto& bus : buses) bus->stop();
                           }});
     return kFine;

@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/metrics/process.hpp"
@@ -64,8 +65,10 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         device.device = simulated_.back()->device();
         settings.device = "sim";
     }
-    auto tty = line::make_tty_line(executor_, std::move(device));
-    buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(tty)));
+    const bool remote = line.kind == config::Line::Kind::tcp && !simulates;
+    auto wire = remote ? line::make_tcp_line(executor_, std::move(device))
+                       : line::make_tty_line(executor_, std::move(device));
+    buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(wire)));
     add_stations(line, *buses_.back(), simulates ? simulated_.back().get() : nullptr);
 }
 

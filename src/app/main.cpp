@@ -45,7 +45,9 @@ int run_command(int argc, char** argv) {
     std::vector<std::string> links;
     CLI::App* simulate_cli = cli.add_subcommand("simulate", "only the simulated panels, on ptys");
     simulate_cli->add_option("-c,--config", file, "configuration file")->capture_default_str();
-    simulate_cli->add_option("--line", links, "NAME=PTY-LINK: a link to the line's pty");
+    simulate_cli->add_option(
+        "--line", links,
+        "NAME=PTY-LINK, a link to the line's pty, or NAME=tcp://ADDR:PORT, RTU over TCP");
     simulate_cli->callback([&] { code = simulate(file, links); });
 
     std::string profile;

@@ -236,7 +236,7 @@ void Arbiter::start(TimePoint now, Group group) {
         Station& station = station_of(group.station);
         if (now >= station.not_before) station.owed = 0;  // its late window has passed
         if (group.span) station.last_read = group.pdu;
-        wait = patience(group, station);
+        wait = patience(group, station) + latency_;
         what = group.probe ? "probe" : group.attempts > 1 ? "retry" : "request";
     }
     if (group.learns_for != 0) what = "learn echo";

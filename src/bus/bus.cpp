@@ -56,7 +56,10 @@ struct Bus::State final : public line::Line::Events,
     std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
     void refuse(Pending pending, Fault fault);
     void pump();
-    void act(arbiter::Transmit& transmit) { line->write(transmit.adu); }
+    void act(arbiter::Transmit& transmit) {
+        line->write(transmit.adu);
+        arbiter.set_latency(line->latency());
+    }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note);
     void act(arbiter::Decision& decision);

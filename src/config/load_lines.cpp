@@ -5,6 +5,7 @@
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/line/settings.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -85,10 +86,16 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     if (line.device.device == "sim") {
         line.kind = Line::Kind::simulated;
     } else if (line.device.device.starts_with("tcp://")) {
-        in.problem("device", "RTU over TCP is not in this version; use a serial device or sim");
+        line.kind = Line::Kind::tcp;
+        if (!line::parse_tcp_device(line.device.device))
+            in.problem("device",
+                       "device must be tcp://HOST:PORT with a port from 1 to 65535, not '" +
+                           line.device.device + '\'');
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
-        in.problem("device", "device must be an absolute path such as /dev/ttyUSB0, or sim, not '" +
-                                 line.device.device + '\'');
+        in.problem(
+            "device",
+            "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT or sim, not '" +
+                line.device.device + '\'');
     }
 }
 

@@ -92,6 +92,10 @@ class Arbiter {
     void on_line_up(TimePoint now);
     void on_line_down(TimePoint now);
 
+    /// What the way to the wire and back adds to every answer (RTU over TCP), from the next
+    /// request on.
+    void set_latency(Duration latency) { latency_ = latency; }
+
     std::optional<Action> poll_action();
     /// When to call on_deadline next; nothing when only an event can change anything.
     std::optional<TimePoint> next_deadline() const;
@@ -254,6 +258,7 @@ class Arbiter {
     std::optional<Duration> slowest_;  ///< think time of all stations that have answered
     bool other_first_ = false;         ///< a retry lets one other go first
     bool up_ = false;
+    Duration latency_{};
     Ticket last_ticket_ = 0;
 };
 

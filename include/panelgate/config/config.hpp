@@ -24,7 +24,7 @@ struct Station {
 };
 
 struct Line {
-    enum class Kind : std::uint8_t { serial, simulated };
+    enum class Kind : std::uint8_t { serial, tcp, simulated };
     std::string name;
     Kind kind = Kind::serial;
     line::Settings device;

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/line/counters.hpp"
 
 namespace panelgate::line {
@@ -30,6 +31,8 @@ class Line {
     /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
     virtual const Counters& counters() const = 0;
+    /// What the way to the wire and back adds to every answer, now: nothing for a device here.
+    virtual Duration latency() { return {}; }
 };
 
 }  // namespace panelgate::line

@@ -1,0 +1,144 @@
+#include "descriptor_line.hpp"
+
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace panelgate::line {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+DescriptorLine::DescriptorLine(const asio::any_io_executor& executor, Settings settings)
+    : settings_(std::move(settings)),
+      descriptor_(executor),
+      timer_(executor),
+      reopen_(settings_.reopen_min, settings_.reopen_max) {}
+
+void DescriptorLine::start(Events& events) {
+    events_ = &events;
+    alive_ = std::make_shared<bool>(true);
+    begin_open();
+}
+
+void DescriptorLine::stop() {
+    if (alive_) *alive_ = false;
+    events_ = nullptr;
+    timer_.cancel();
+    cancel_open();
+    close();
+}
+
+void DescriptorLine::poll_input() {
+    if (descriptor_.is_open()) read_all();
+}
+
+ssize_t DescriptorLine::put(ByteView bytes) {
+    return ::write(descriptor_.native_handle(), bytes.data(), bytes.size());
+}
+
+std::string DescriptorLine::adopt(int fd) {
+    error_code error;
+    descriptor_.assign(fd, error);
+    if (!error) return {};
+    ::close(fd);
+    return error.message();
+}
+
+void DescriptorLine::open_failed(const std::string& why) {
+    close();
+    if (events_ == nullptr) return;
+    if (why != last_error_) events_->on_down(why);
+    last_error_ = why;
+    if (events_ != nullptr) retry_later();
+}
+
+void DescriptorLine::opened() {
+    if (openings_++ > 0) ++counters_.reopens;
+    last_error_.clear();
+    reopen_.succeeded();
+    wait_readable();
+    events_->on_up();
+}
+
+void DescriptorLine::lost(const std::string& why) {
+    close();
+    last_error_ = settings_.device + " is gone: " + why;
+    if (events_ != nullptr) events_->on_down(last_error_);
+    if (events_ != nullptr) retry_later();
+}
+
+void DescriptorLine::retry_later() {
+    timer_.expires_after(reopen_.next_pause());
+    timer_.async_wait([this, alive = alive_](error_code error) {
+        if (!error && *alive) begin_open();
+    });
+}
+
+void DescriptorLine::close() {
+    unsent_.clear();
+    error_code ignored;  // close() itself may fail on an unplugged device
+    descriptor_.close(ignored);
+}
+
+void DescriptorLine::wait_readable() {
+    descriptor_.async_wait(asio::posix::stream_descriptor::wait_read,
+                           [this, alive = alive_, opening = openings_](error_code error) {
+                               const auto current = [&] {
+                                   return *alive && opening == openings_ && descriptor_.is_open();
+                               };
+                               if (error == asio::error::operation_aborted || !current()) return;
+                               read_all();
+                               if (current()) wait_readable();
+                           });
+}
+
+void DescriptorLine::read_all() {
+    std::array<std::uint8_t, 1024> buffer;
+    constexpr int kMaxReads = 16;  // a babbling line must not keep the loop from the others
+    for (int i = 0; i < kMaxReads; ++i) {
+        const ssize_t n = ::read(descriptor_.native_handle(), buffer.data(), buffer.size());
+        if (n > 0) {
+            counters_.bytes_received += static_cast<std::uint64_t>(n);
+            events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
+            if (events_ == nullptr || !descriptor_.is_open()) return;
+            if (static_cast<std::size_t>(n) < buffer.size()) return;
+            continue;
+        }
+        if (n < 0 && (errno == EAGAIN || errno == EINTR)) return;
+        lost(n == 0 ? "hang-up" : std::strerror(errno));
+        return;
+    }
+}
+
+void DescriptorLine::write(ByteView bytes) {
+    if (!descriptor_.is_open()) return;
+    counters_.bytes_sent += bytes.size();
+    unsent_.insert(unsent_.end(), bytes.begin(), bytes.end());
+    flush();
+}
+
+void DescriptorLine::flush() {
+    while (!unsent_.empty()) {
+        const ssize_t n = put(unsent_);
+        if (n > 0) {
+            unsent_.erase(unsent_.begin(), unsent_.begin() + n);
+            continue;
+        }
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0 && errno == EAGAIN) break;
+        lost(n == 0 ? "hang-up" : std::strerror(errno));
+        return;
+    }
+    if (unsent_.empty()) return;
+    descriptor_.async_wait(
+        asio::posix::stream_descriptor::wait_write,
+        [this, alive = alive_, opening = openings_](error_code error) {
+            if (!error && *alive && opening == openings_ && descriptor_.is_open()) flush();
+        });
+}
+
+}  // namespace panelgate::line

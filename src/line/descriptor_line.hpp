@@ -1,0 +1,68 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <memory>
+#include <string>
+
+#include "panelgate/line/line.hpp"
+#include "panelgate/line/reopen.hpp"
+#include "panelgate/line/settings.hpp"
+
+namespace panelgate::line {
+
+/// What lines on a non-blocking descriptor have in common: one read loop, writes in one piece,
+/// closing at the first sign of loss and opening again with back-off. How to open is the derived
+/// class's: begin_open() ends, at once or later, in opened() or open_failed().
+class DescriptorLine : public Line {
+  public:
+    DescriptorLine(const boost::asio::any_io_executor& executor, Settings settings);
+
+    void start(Events& events) final;
+    void stop() final;
+    void poll_input() final;
+    void write(ByteView bytes) final;
+    const Counters& counters() const final { return counters_; }
+
+  protected:
+    virtual void begin_open() = 0;
+    /// As ::write.
+    virtual ssize_t put(ByteView bytes);
+    /// stop() and a loss cancel an attempt that is under way.
+    virtual void cancel_open() {}
+
+    /// Takes the descriptor over. An error text when it cannot be watched; it is closed then.
+    std::string adopt(int fd);
+    void opened();
+    void open_failed(const std::string& why);
+
+    const Settings& settings() const { return settings_; }
+    int fd() { return descriptor_.native_handle(); }
+    bool is_open() const { return descriptor_.is_open(); }
+    /// Completions outlive the line: they ask here first.
+    std::shared_ptr<bool> alive() const { return alive_; }
+    boost::asio::any_io_executor executor() { return timer_.get_executor(); }
+
+  private:
+    void lost(const std::string& why);
+    void retry_later();
+    void close();
+    void wait_readable();
+    void read_all();
+    void flush();
+
+    Settings settings_;
+    boost::asio::posix::stream_descriptor descriptor_;
+    boost::asio::steady_timer timer_;
+    Reopen reopen_;
+    Events* events_ = nullptr;
+    std::shared_ptr<bool> alive_;
+    Counters counters_;
+    Bytes unsent_;                ///< what the driver did not take at once; at most one frame
+    std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
+    std::string last_error_;
+};
+
+}  // namespace panelgate::line
