@@ -100,6 +100,7 @@ void Arbiter::note_unused(TimePoint now, const std::vector<modbus::Unused>& part
 void Arbiter::on_good_frame(TimePoint now, const modbus::Unused& part) {
     Station& station = stations_.at(part.station);
     const ByteView pdu = ByteView(part.bytes).subspan(1, part.bytes.size() - kAduOverhead);
+    if (station.owed == 0) station.copies.on_unasked(now, pdu);
     if (station.owed == 0 || !modbus::answers(station.unanswered, pdu)) return;
     --station.owed;
     const Duration lateness = std::max(now - station.due, Duration::zero());

@@ -103,7 +103,9 @@ bool Arbiter::start_next(TimePoint now) {
     if (alone) return start_retry(now);
     if (!other_first_ && start_retry(now)) return true;
     const auto due = next_probe();
-    constexpr Duration kPatience = 1s;  // a probe waits for an idle line, but not for ever
+    // A probe is of the lowest class, but a busy line must not keep a station dead: its budget
+    // bounds what it takes.
+    constexpr Duration kPatience = 20ms;
     if (due && now >= *due + kPatience && start_probe(now)) return true;
     if (start_job(now)) return true;
     if (start_retry(now)) return true;

@@ -129,6 +129,8 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     Station& station = station_of(group.station);
     // Each attempt may be answered, and nobody knows which one this reply was for.
     if (station.owed > 0) expect_late(now, station, sent);
+    station.copies.on_reply(now, reply);
+    station.not_before = std::max(station.not_before, now + station.copies.hold());
     if (!split(group, reply)) deliver(group, reply);
 }
 

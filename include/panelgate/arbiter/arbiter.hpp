@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/bus_shares.hpp"
+#include "panelgate/arbiter/copy_guard.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
@@ -135,6 +136,7 @@ class Arbiter {
         Turnaround turnaround;
         AdaptiveTimeout adaptive;
         DriftAlarm drift;
+        CopyGuard copies;
         TimePoint not_before{};  ///< its quarantine
         Bytes unanswered;        ///< the request whose replies may still come
         int owed = 0;            ///< how many of them

@@ -498,6 +498,30 @@ TEST_F(ArbiterTest, AForeignFrameIsSteppedOverAndDoesNotExtendTheDeadline) {
     EXPECT_EQ(bus.arbiter().station_counters().at(17).foreign_frames, 1u);
 }
 
+TEST_F(ArbiterTest, P1AStationThatSaysItsRepliesTwiceIsLeftAloneUntilTheSecondHasPassed) {
+    const auto ask = [&](Client client) {
+        bus.submit(17, kRead, client);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear_reply(17, kReply);
+        return bus.now();
+    };
+    ask(1);
+    bus.run_for(5ms);
+    bus.hear_reply(17, kReply);  // the copy
+    bus.run_for(100ms);
+    const TimePoint replied = ask(1);
+    bus.submit(17, read_at(5), 1);
+    bus.submit(18, kRead, 2);
+    EXPECT_EQ(bus.next_sent()->adu[0], 18) << "the others need not wait";
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(18, kReply);
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_GE(next->at - replied, Duration(7500us));
+}
+
 TEST_F(ArbiterTest, P1AReplyOfAnotherLengthIsNotTaken) {
     const Ticket ticket = bus.submit(17, kRead);
     bus.run_to_end_of_request();
