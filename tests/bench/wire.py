@@ -50,10 +50,11 @@ def wire_limit(baud, registers=10):
 class Bus:
     """rtubus with stations 1 to 8, and a gateway on it."""
 
-    def __init__(self, tools, folder, baud, faults=(), settings="", log=False):
+    def __init__(self, tools, folder, baud, faults=(), settings="", log=False, echo=0):
         self.tools = tools
         link = f"{folder}/tty{baud}-{id(self)}"
-        command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8"]
+        command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8",
+                   "--echo", str(echo)]
         for fault in faults:
             command += ["--fault", fault]
         read, write = os.pipe()
@@ -105,9 +106,10 @@ def wrong_values(seen):
     return sum(seen["mismatch"].values())
 
 
-def utilisation(tools, folder, baud, seconds=4):
-    """(share of the wire's limit, gap violations, collisions) with eight clients."""
-    with Bus(tools, folder, baud) as bus:
+def utilisation(tools, folder, baud, seconds=4, echo=0):
+    """(share of the wire's limit, gap violations, collisions) with eight clients. `echo`: the
+    adapter hears itself (1)."""
+    with Bus(tools, folder, baud, echo=echo) as bus:
         seen, wire = bus.load("--conns", 8, "--units", "1-8", "--time", seconds, "--warm", 1)
     return seen["all"]["tps"] / wire_limit(baud), wire["gap_violations"], wire["collisions"]
 
