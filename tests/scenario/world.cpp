@@ -204,6 +204,7 @@ void World::ask(std::size_t index) {
     if (is_over()) return;
     Customer& customer = customers_[index];
     arbiter::Job job;
+    const unsigned writes = last_write_;
     job.pdu = draw_request(customer, job.station);
     job.client = customer.id;
     const bool read = modbus::is_pure_read(job.pdu);
@@ -214,7 +215,9 @@ void World::ask(std::size_t index) {
     const auto ticket = subject_.submit(now_, job);
     checker_.on_queue_depth(before, subject_.queue_depth());
     if (!ticket) {
-        // Refused at once: it comes again after a pause, not in the same instant.
+        // Refused at once: it comes again after a pause, not in the same instant. The number of
+        // the write is free again: there are 65536.
+        last_write_ = writes;
         at(now_ + random_.between(1ms, 50ms), [this, index] { ask(index); });
         return;
     }
