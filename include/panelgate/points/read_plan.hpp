@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+
+namespace panelgate::points {
+
+/// Items [address, address + count) of one table, 0-based as on the wire.
+struct Span {
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint32_t address = 0;
+    std::uint32_t count = 1;
+
+    std::uint32_t end() const { return address + count; }  ///< one past the last item
+    bool contains(const Span& other) const {
+        return table == other.table && address <= other.address && other.end() <= end();
+    }
+    friend bool operator==(const Span&, const Span&) = default;
+};
+
+/// Items that somebody wants together (all registers of a 32-bit value) this often.
+struct Want {
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint32_t address = 0;
+    std::uint32_t count = 1;  ///< above 0; address + count is at most 65536
+    Duration every = 1s;      ///< above 0
+
+    Span span() const { return {table, address, count}; }
+};
+
+/// What the panel can do with one table.
+struct TableLimits {
+    std::uint32_t max_items = 0;                  ///< of one read; 0 = this table cannot be read
+    std::vector<profile::AddressRange> readable;  ///< what a read may cross without being asked to
+};
+
+/// What bounds the reads of one station, and what they cost.
+struct PlanLimits {
+    SerialFormat serial;
+    Duration gap = 1750us;              ///< silence before the request and after the reply
+    Duration think_time = 1ms;          ///< of the panel, after the silence that ends the request
+    std::array<TableLimits, 4> tables;  ///< by modbus::Table
+    /// Learned from exceptions 02 and 03: no read may contain one of these whole. The caller bounds
+    /// how many there are.
+    std::vector<Span> refused;
+
+    TableLimits& of(modbus::Table table) { return tables[static_cast<std::size_t>(table)]; }
+    const TableLimits& of(modbus::Table table) const {
+        return tables[static_cast<std::size_t>(table)];
+    }
+};
+
+/// The profile's limits within the standard's (AP 6.1 to 6.4: 2000 bits, 125 registers) and its
+/// readable areas. A function that the profile does not list makes a table unreadable; a profile
+/// without functions has the standard's.
+PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFormat& serial,
+                            Duration gap);
+
+/// One request of the plan.
+struct PlannedRead {
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint32_t address = 0;
+    std::uint32_t count = 0;
+    Duration every{};                ///< the shortest interval of its wants
+    std::vector<std::size_t> wants;  ///< indices of what it serves, ascending
+    /// It contains a refused span, because what is wanted does: expect an exception.
+    bool refused = false;
+
+    Span span() const { return {table, address, count}; }
+};
+
+/// How long a read of `count` items keeps the line from everybody else (contract 9): request of 8
+/// bytes, gap, think time, reply of 5 bytes and the data, gap.
+Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
+
+/// Few reads that serve every want, at the least wire time for each interval, sorted by table and
+/// address. A want lies in one read, whole; one that is larger than a read may be is cut, and
+/// several reads name it. Every item of a read is in a want or readable by the profile. A read
+/// contains a refused span only if it is exactly one want (or a piece of a cut one), with `refused`
+/// set: nothing else is read with it. A want is also served by a read of a shorter interval that
+/// contains it, and reads of different intervals are joined where this is not dearer per second.
+/// Wants that break their contract, or whose table cannot be read, are not planned.
+/// Work: O(n log n + n * max_items).
+std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits);
+
+/// After exception 02 or 03: two reads that share the wants of this one, cut at its widest hole, or
+/// in the middle when there is none. Nothing when all its wants are the same items: then this span
+/// itself is what the panel refuses. `wants` are those that the plan was made of.
+std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& read,
+                                                          std::span<const Want> wants);
+
+/// When both halves of a bisected read succeed, what the panel refuses lies between them: the
+/// smallest span that no read may contain then. Nothing when the halves overlap: then only the read
+/// that was bisected is known to be refused.
+std::optional<Span> seam(const PlannedRead& left, const PlannedRead& right);
+
+}  // namespace panelgate::points

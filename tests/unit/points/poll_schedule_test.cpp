@@ -1,0 +1,175 @@
+#include "panelgate/points/poll_schedule.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+
+namespace panelgate::points {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+const TimePoint kStart{1000s};
+
+PollSchedule make_schedule(const std::vector<Duration>& intervals, std::size_t outstanding = 1000,
+                           Duration first_within = 24h) {
+    return {intervals, kStart, {.max_outstanding = outstanding, .first_within = first_within}};
+}
+
+/// Runs in virtual time; every entry is done `taking` after it began, one after the other. Gives
+/// when each began.
+std::map<std::size_t, std::vector<Duration>> run(PollSchedule& schedule, Duration until,
+                                                 Duration taking = 0ms) {
+    std::map<std::size_t, std::vector<Duration>> begun;
+    TimePoint now = kStart;
+    while (schedule.next_due() && *schedule.next_due() < kStart + until) {
+        now = std::max(now, *schedule.next_due());
+        for (const std::size_t entry : schedule.take_due(now)) {
+            begun[entry].push_back(now - kStart);
+            now += taking;
+            schedule.on_done(entry, now);
+        }
+    }
+    return begun;
+}
+
+TEST(PollSchedule, SpreadsEntriesOfOneIntervalEvenlyOverIt) {
+    PollSchedule schedule = make_schedule({1s, 1s, 1s, 1s});
+    const auto begun = run(schedule, 2s);
+    EXPECT_THAT(begun.at(0), ElementsAre(0ms, 1000ms));
+    EXPECT_THAT(begun.at(1), ElementsAre(250ms, 1250ms));
+    EXPECT_THAT(begun.at(2), ElementsAre(500ms, 1500ms));
+    EXPECT_THAT(begun.at(3), ElementsAre(750ms, 1750ms));
+}
+
+TEST(PollSchedule, KeepsIntervalsThatDivideEachOtherApart) {
+    PollSchedule schedule = make_schedule({1s, 2s, 4s, 8s});
+    while (*schedule.next_due() < kStart + 100s) {
+        const TimePoint now = *schedule.next_due();
+        const auto due = schedule.take_due(now);
+        ASSERT_THAT(due, SizeIs(1));
+        schedule.on_done(due[0], now);
+    }
+    EXPECT_EQ(schedule.counters().missed, 0u);
+}
+
+TEST(PollSchedule, PollsEveryIntervalAtItsOwnRate) {
+    PollSchedule schedule = make_schedule({100ms, 1s, 7s});
+    const auto begun = run(schedule, 70s);
+    EXPECT_THAT(begun.at(0), SizeIs(700));
+    EXPECT_THAT(begun.at(1), SizeIs(70));
+    EXPECT_THAT(begun.at(2), SizeIs(10));
+}
+
+TEST(PollSchedule, DoesNotDriftOverTenThousandPeriods) {
+    PollSchedule schedule = make_schedule({1s, 1s});
+    std::minstd_rand random(7);
+    TimePoint now = kStart;
+    std::size_t polls = 0;
+    while (*schedule.next_due() < kStart + 10'000s) {
+        const TimePoint due = *schedule.next_due();
+        now = due + (random() % 300) * 1ms;  // whoever calls comes late
+        for (const std::size_t entry : schedule.take_due(now)) {
+            ASSERT_EQ((due - kStart) % 1s, entry * 500ms);
+            schedule.on_done(entry, now + (random() % 100) * 1ms);
+            ++polls;
+        }
+    }
+    EXPECT_EQ(polls, 20'000u);
+    EXPECT_EQ(schedule.counters().missed + schedule.counters().skipped, 0u);
+}
+
+TEST(PollSchedule, AfterAStallEveryEntryIsDueOnceAndKeepsItsPhase) {
+    PollSchedule schedule = make_schedule({1s, 1s});
+    const TimePoint late = kStart + 60'200ms;
+    EXPECT_THAT(schedule.take_due(late), ElementsAre(0, 1));
+    EXPECT_EQ(schedule.counters().missed, 60u + 59u);
+    EXPECT_THAT(schedule.take_due(late), IsEmpty());
+    schedule.on_done(0, late);
+    schedule.on_done(1, late);
+    EXPECT_THAT(schedule.take_due(late), IsEmpty());
+    EXPECT_EQ(*schedule.next_due(), kStart + 60'500ms);
+    EXPECT_THAT(schedule.take_due(kStart + 60'500ms), ElementsAre(1));
+    EXPECT_THAT(schedule.take_due(kStart + 61s), ElementsAre(0));
+}
+
+TEST(PollSchedule, GivesWhatIsDueInTheOrderInWhichItBecameDue) {
+    PollSchedule schedule = make_schedule({1s, 1s, 1s});
+    schedule.take_due(kStart);
+    schedule.on_done(0, kStart);
+    EXPECT_THAT(schedule.take_due(kStart + 1s), ElementsAre(1, 2, 0));
+}
+
+TEST(PollSchedule, DoesNotStartAnEntryThatIsStillUnderWay) {
+    PollSchedule schedule = make_schedule({1s});
+    EXPECT_THAT(schedule.take_due(kStart), ElementsAre(0));
+    EXPECT_THAT(schedule.take_due(kStart + 1s), IsEmpty());
+    EXPECT_THAT(schedule.take_due(kStart + 1500ms), IsEmpty());
+    EXPECT_EQ(schedule.counters().skipped, 1u);
+    EXPECT_EQ(*schedule.next_due(), kStart + 2s);
+    schedule.on_done(0, kStart + 3500ms);
+    EXPECT_EQ(schedule.counters().skipped, 3u);
+    EXPECT_EQ(*schedule.next_due(), kStart + 4s);
+    EXPECT_THAT(schedule.take_due(kStart + 4s), ElementsAre(0));
+    EXPECT_EQ(schedule.counters().missed, 0u);
+}
+
+TEST(PollSchedule, HoldsBackWhatExceedsTheLimitUntilSomethingIsDone) {
+    PollSchedule schedule = make_schedule({1s, 1s, 1s}, 2);
+    const TimePoint late = kStart + 900ms;
+    EXPECT_THAT(schedule.take_due(late), ElementsAre(0, 1));
+    EXPECT_EQ(schedule.outstanding(), 2u);
+    EXPECT_FALSE(schedule.next_due().has_value());
+    EXPECT_THAT(schedule.take_due(late), IsEmpty());
+    schedule.on_done(0, late);
+    ASSERT_TRUE(schedule.next_due().has_value());
+    EXPECT_LE(*schedule.next_due(), late);
+    EXPECT_THAT(schedule.take_due(late), ElementsAre(2));
+}
+
+TEST(PollSchedule, SharesALineThatIsTooSlowFairly) {
+    PollSchedule schedule = make_schedule({100ms, 100ms, 100ms, 1s}, 1);
+    const auto begun = run(schedule, 100s, 70ms);
+    const std::size_t fast = begun.at(0).size();
+    EXPECT_GT(fast, 400u);  // the line does 14 a second, of 31 wanted
+    EXPECT_NEAR(static_cast<double>(begun.at(1).size()), static_cast<double>(fast), 20);
+    EXPECT_NEAR(static_cast<double>(begun.at(2).size()), static_cast<double>(fast), 20);
+    EXPECT_GE(begun.at(3).size(), 98u);
+    EXPECT_GT(schedule.counters().missed + schedule.counters().skipped, 1000u);
+}
+
+TEST(PollSchedule, GivesASlowEntryItsFirstTurnSoon) {
+    PollSchedule schedule = make_schedule({60s, 60s, 60s, 60s}, 1000, 4s);
+    const auto begun = run(schedule, 120s);
+    EXPECT_THAT(begun.at(0), ElementsAre(0s, 60s));
+    EXPECT_THAT(begun.at(1), ElementsAre(1s, 15s, 75s));
+    EXPECT_THAT(begun.at(3), ElementsAre(3s, 45s, 105s));
+    EXPECT_EQ(schedule.counters().missed, 0u);
+}
+
+TEST(PollSchedule, CallsThatAreEarlyRepeatedOrStrangeAreHarmless) {
+    PollSchedule schedule = make_schedule({1s, 1s});
+    EXPECT_THAT(schedule.take_due(kStart - 5s), IsEmpty());
+    schedule.on_done(0, kStart);
+    schedule.on_done(9, kStart);
+    EXPECT_EQ(schedule.outstanding(), 0u);
+    EXPECT_EQ(*schedule.next_due(), kStart);
+    EXPECT_THAT(schedule.take_due(kStart), ElementsAre(0));
+    schedule.on_done(0, kStart);
+    schedule.on_done(0, kStart);
+    EXPECT_EQ(schedule.outstanding(), 0u);
+    PollSchedule none = make_schedule({});
+    EXPECT_FALSE(none.next_due().has_value());
+    EXPECT_THAT(none.take_due(kStart), IsEmpty());
+    PollSchedule shortest = make_schedule({0s}, 0);
+    EXPECT_THAT(shortest.take_due(kStart), ElementsAre(0));
+    shortest.on_done(0, kStart);
+    EXPECT_EQ(*shortest.next_due(), kStart + PollSchedule::kShortest);
+}
+
+}  // namespace
+}  // namespace panelgate::points

@@ -1,0 +1,213 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <random>
+#include <string>
+
+#include "panelgate/points/read_plan.hpp"
+
+namespace panelgate::points {
+namespace {
+
+using modbus::Table;
+
+constexpr Table kRegisters = Table::holding_registers;
+
+/// Makes stations: a few wants in a small memory, small limits.
+struct Random {
+    explicit Random(unsigned seed) : engine(seed) {}
+    std::uint32_t below(std::uint32_t bound) {
+        return static_cast<std::uint32_t>(engine()) % bound;
+    }
+
+    PlanLimits limits() {
+        PlanLimits made;
+        made.serial.baud = below(2) == 0 ? 9600 : 115200;
+        made.think_time = below(3) * 1ms;
+        for (TableLimits& table : made.tables) {
+            table.max_items = 1 + below(24);
+            for (std::uint32_t i = below(3); i > 0; --i) {
+                const std::uint32_t first = below(80);
+                table.readable.push_back({first, first + below(40)});
+            }
+        }
+        for (std::uint32_t i = below(3); i > 0; --i)
+            made.refused.push_back({table(), below(80), 1 + below(6)});
+        return made;
+    }
+    Table table() { return below(4) == 0 ? Table::coils : kRegisters; }
+    Want any_want(std::uint32_t max_count, std::uint32_t intervals) {
+        const Duration every = std::array<Duration, 3>{1s, 2s, 10s}[below(intervals)];
+        return {table(), below(80), 1 + below(below(4) == 0 ? max_count : 3), every};
+    }
+    std::vector<Want> wants(std::uint32_t most, std::uint32_t max_count, std::uint32_t intervals) {
+        std::vector<Want> made(1 + below(most));
+        for (Want& one : made) one = any_want(max_count, intervals);
+        return made;
+    }
+
+    std::minstd_rand engine;
+};
+
+using Items = std::bitset<160>;  // of one table: random stations have no more
+
+Items items_of(std::uint32_t first, std::uint32_t count) {
+    return (~Items() >> (Items().size() - count)) << first;
+}
+
+/// What is in a want or readable.
+Items open_items(Table table, const std::vector<Want>& wants, const PlanLimits& limits) {
+    Items open;
+    for (const profile::AddressRange& range : limits.of(table).readable)
+        open |= items_of(range.first, range.last + 1 - range.first);
+    for (const Want& one : wants)
+        if (one.table == table) open |= items_of(one.address, one.count);
+    return open;
+}
+
+bool crosses_hole(const Span& read, const std::vector<Want>& wants, const PlanLimits& limits) {
+    return (items_of(read.address, read.count) & ~open_items(read.table, wants, limits)).any();
+}
+
+bool contains_refused(const Span& read, const PlanLimits& limits) {
+    return std::any_of(limits.refused.begin(), limits.refused.end(),
+                       [&](const Span& span) { return read.contains(span); });
+}
+
+/// The items of a want that a read brings.
+Span part_of(const Want& one, const PlannedRead& read) {
+    const std::uint32_t first = std::max(one.address, read.address);
+    const std::uint32_t end = std::min(one.span().end(), read.span().end());
+    return {one.table, first, end > first ? end - first : 0};
+}
+
+/// What is wrong with a read, or "".
+std::string judge(const PlannedRead& read, const std::vector<Want>& wants,
+                  const PlanLimits& limits) {
+    if (read.count == 0 || read.count > limits.of(read.table).max_items) return "beyond a limit";
+    if (crosses_hole(read.span(), wants, limits)) return "crosses a hole";
+    if (read.wants.empty()) return "nobody wants it";
+    if (contains_refused(read.span(), limits) != read.refused) return "refused is wrong";
+    for (const std::size_t index : read.wants) {
+        const Want& one = wants[index];
+        if (one.table != read.table || part_of(one, read).count == 0) return "serves a stranger";
+        if (read.refused && part_of(one, read) != read.span()) return "refused with others";
+        if (one.count <= limits.of(one.table).max_items && !read.span().contains(one.span()))
+            return "a want is torn";
+        if (read.every > one.every) return "too rarely";
+    }
+    return "";
+}
+
+std::string judge(const std::vector<PlannedRead>& plan, const std::vector<Want>& wants,
+                  const PlanLimits& limits) {
+    std::vector<Items> missing;
+    for (const Want& one : wants) missing.push_back(items_of(one.address, one.count));
+    for (const PlannedRead& read : plan) {
+        if (std::string fault = judge(read, wants, limits); !fault.empty()) return fault;
+        for (const std::size_t index : read.wants)
+            missing[index] &= ~items_of(read.address, read.count);
+    }
+    const bool whole =
+        std::all_of(missing.begin(), missing.end(), [](const Items& left) { return left.none(); });
+    return whole ? "" : "a want is not covered";
+}
+
+TEST(RandomReadPlan, KeepsItsPromisesForAHundredThousandStations) {
+    Random random(20261121);
+    for (int i = 0; i < 100'000; ++i) {
+        const PlanLimits limits = random.limits();
+        const std::vector<Want> wants = random.wants(10, 40, 3);
+        const std::string fault = judge(plan_reads(wants, limits), wants, limits);
+        ASSERT_EQ(fault, "") << "station " << i;
+    }
+}
+
+/// Least load (share of the wire) over all partitions of the wants into reads, tried one by one.
+class ExhaustiveSearch {
+  public:
+    ExhaustiveSearch(const std::vector<Want>& wants, const PlanLimits& limits)
+        : wants_(wants), limits_(limits) {
+        place(0);
+    }
+    double best() const { return best_; }
+
+  private:
+    void place(std::size_t index) {
+        if (index == wants_.size()) {
+            best_ = std::min(best_, total());
+            return;
+        }
+        for (std::size_t i = 0; i < parts_.size(); ++i) {
+            parts_[i].push_back(wants_[index]);
+            if (load(parts_[i]) >= 0) place(index + 1);
+            parts_[i].pop_back();
+        }
+        parts_.push_back({wants_[index]});
+        place(index + 1);
+        parts_.pop_back();
+    }
+    /// -1 when these may not be read together. A want inside a longer read is no reason to refuse.
+    double load(const std::vector<Want>& part) const {
+        Span box = part.front().span();
+        Duration every = part.front().every;
+        for (const Want& one : part) {
+            if (one.table != box.table) return -1;
+            const std::uint32_t end = std::max(box.end(), one.span().end());
+            box.address = std::min(box.address, one.address);
+            box.count = end - box.address;
+            every = std::min(every, one.every);
+        }
+        const bool same = std::all_of(part.begin(), part.end(),
+                                      [&](const Want& one) { return one.span() == box; });
+        if (!same && (box.count > limits_.of(box.table).max_items ||
+                      crosses_hole(box, wants_, limits_) || contains_refused(box, limits_)))
+            return -1;
+        return to_seconds(read_cost(limits_, box.table, box.count)) / to_seconds(every);
+    }
+    double total() const {
+        double sum = 0;
+        for (const std::vector<Want>& part : parts_) sum += load(part);
+        return sum;
+    }
+
+    const std::vector<Want>& wants_;
+    const PlanLimits& limits_;
+    std::vector<std::vector<Want>> parts_;
+    double best_ = 1e9;
+};
+
+double load_of(const std::vector<PlannedRead>& plan, const PlanLimits& limits) {
+    double sum = 0;
+    for (const PlannedRead& read : plan)
+        sum += to_seconds(read_cost(limits, read.table, read.count)) / to_seconds(read.every);
+    return sum;
+}
+
+/// The plan's load over the least load, at worst, over random stations.
+double worst_ratio(int stations, std::uint32_t intervals, unsigned seed) {
+    Random random(seed);
+    double worst = 1;
+    for (int i = 0; i < stations; ++i) {
+        PlanLimits limits = random.limits();
+        for (TableLimits& table : limits.tables) table.max_items = 8 + random.below(24);
+        if (i % 2 == 0) limits.of(kRegisters).readable = {{0, 119}};
+        const std::vector<Want> wants = random.wants(i % 10 == 0 ? 8 : 6, 8, intervals);
+        const double best = ExhaustiveSearch(wants, limits).best();
+        worst = std::max(worst, load_of(plan_reads(wants, limits), limits) / best);
+    }
+    return worst;
+}
+
+TEST(RandomReadPlan, IsTheBestPlanWhereAllIntervalsAreTheSame) {
+    EXPECT_LE(worst_ratio(3000, 1, 1), 1 + 1e-9);
+}
+
+TEST(RandomReadPlan, IsNearTheBestPlanWhereIntervalsDiffer) {
+    EXPECT_LE(worst_ratio(3000, 3, 2), 1.10);
+}
+
+}  // namespace
+}  // namespace panelgate::points
