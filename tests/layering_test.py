@@ -15,7 +15,7 @@ COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "tc
 SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "rt/settings.hpp",
             "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}
 EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim",
-              "metrics", "web", "config", "app"}
+              "metrics", "points", "web", "config", "app"}
 TABLE = {
     "base": (set(), RESULT),
     "yaml": ({"base"}, RESULT),
@@ -25,16 +25,21 @@ TABLE = {
     "rt": ({"base"}, ASIO + ("spdlog/", "fmt/")),
     "line": ({"base", "rt"}, ASIO),
     "bus": ({"base", "rt", "modbus", "arbiter", "line"}, ASIO),
+    "points": ({"base", "rt", "modbus", "profile", "bus", "arbiter"}, RESULT),
     "tcp_server": ({"base", "rt", "modbus", "bus"}, ASIO),
     "sim": ({"base", "rt", "modbus", "profile", "line"}, ASIO),
     "metrics": ({"base", "modbus"} | COUNTERS, ("prometheus/",)),
-    "web": ({"base", "rt", "modbus", "profile", "bus", "metrics"},
+    "web": ({"base", "rt", "modbus", "profile", "bus", "points", "metrics"},
             ASIO + ("boost/beast/", "boost/json", "boost/optional")),
     "config": ({"base", "modbus", "profile", "yaml"} | SETTINGS, RESULT),
     "app": (EVERYTHING, ASIO + ("CLI/", "boost/json")),
 }
 # Files with a rule of their own: path in the tree -> third-party prefixes instead of the module's.
 FILES = {
+    "include/panelgate/points/poller.hpp": ASIO,
+    "src/points/poller.cpp": ASIO,
+    "include/panelgate/points/relays.hpp": ASIO,
+    "src/points/relays.cpp": ASIO,
     "src/yaml/document.cpp": ("yaml-cpp/",),
     "src/rt/asio_impl.cpp": ASIO + ("boost/beast/src.hpp",),
     "src/sim/station.cpp": (),

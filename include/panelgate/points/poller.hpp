@@ -1,0 +1,48 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/points/station_polls.hpp"
+
+namespace panelgate::points {
+
+/// What one station of a line is asked for.
+struct PolledStation {
+    std::uint8_t id = 1;
+    std::vector<Want> wants;
+    PlanLimits limits;
+};
+
+/// Runs the polls of one line through its bus, as requests of the class `poll`: one under way a
+/// station. One thread; the bus outlives it.
+class Poller {
+  public:
+    /// Called after each answer, with the station's index and its wants that were read or failed.
+    using Update = std::function<void(std::size_t station, const std::vector<std::size_t>& wants)>;
+
+    Poller(boost::asio::any_io_executor executor, bus::BusClient& bus,
+           std::vector<PolledStation> stations);
+    ~Poller();
+    Poller(const Poller&) = delete;
+    Poller& operator=(const Poller&) = delete;
+
+    void on_update(Update update);
+    void start();
+    /// Takes what waits back from the bus.
+    void stop();
+
+    std::size_t size() const;
+    /// By the order of the constructor's list.
+    const StationPolls& station(std::size_t index) const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;  ///< shared with answers that are still under way
+};
+
+}  // namespace panelgate::points

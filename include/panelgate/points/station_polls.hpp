@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/points/poll_schedule.hpp"
+#include "panelgate/points/read_plan.hpp"
+
+namespace panelgate::points {
+
+/// What is known of the items that somebody wants.
+struct Reading {
+    std::vector<std::uint16_t> values;  ///< bits are 0 or 1; empty until the first success
+    /// When the request for the oldest of them left the gateway's hands; nothing before all of them
+    /// were read once.
+    std::optional<TimePoint> sampled;
+    bool failing = false;                   ///< the last attempt failed
+    std::optional<std::uint8_t> exception;  ///< … with this exception of the panel
+    std::uint64_t good = 0;
+    std::uint64_t failed = 0;
+};
+
+enum class Quality : std::uint8_t { good, stale, bad };
+std::string_view label(Quality quality);
+/// Good: read within two intervals, and the last attempt succeeded. Bad: never read, or not for ten
+/// intervals and ten seconds. Stale: in between; the value is shown with its age.
+Quality quality_of(const Reading& reading, Duration every, TimePoint now);
+
+/// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.
+class StationPolls {
+  public:
+    struct Due {
+        std::size_t read = 0;  ///< to be given to on_answer(), once
+        Bytes pdu;
+    };
+
+    /// Wants that the panel cannot serve are never read and stay bad.
+    StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start);
+
+    std::vector<Due> take_due(TimePoint now);
+    std::optional<TimePoint> next_due() const { return schedule_.next_due(); }
+    /// `sampled`: when the request left. Gives the wants that this read was for. A read that the
+    /// panel refuses with 02 or 03 is cut in two, until the item that it does not have stands
+    /// alone.
+    std::vector<std::size_t> on_answer(TimePoint now, std::size_t read, const Result<Bytes>& pdu,
+                                       TimePoint sampled);
+
+    const std::vector<Want>& wants() const { return wants_; }
+    const Reading& reading(std::size_t want) const { return readings_[want]; }
+    const std::vector<PlannedRead>& plan() const { return plan_; }
+    const ScheduleCounters& counters() const { return schedule_.counters(); }
+
+  private:
+    void take(const PlannedRead& read, ByteView reply, TimePoint sampled);
+    void fail(const PlannedRead& read, std::optional<std::uint8_t> exception);
+    bool split(TimePoint now, std::size_t read);
+
+    std::vector<Want> wants_;
+    std::vector<Reading> readings_;
+    /// Of wants that take several reads: when each of them was done, by its first address.
+    std::map<std::size_t, std::map<std::uint32_t, TimePoint>> pieces_;
+    std::vector<PlannedRead> plan_;
+    PollSchedule schedule_;
+};
+
+}  // namespace panelgate::points

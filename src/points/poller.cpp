@@ -1,0 +1,116 @@
+#include "panelgate/points/poller.hpp"
+
+#include <boost/asio/steady_timer.hpp>
+#include <optional>
+#include <utility>
+
+#include "panelgate/rt/asio_clock.hpp"
+
+namespace panelgate::points {
+
+namespace asio = boost::asio;
+
+struct Poller::State : std::enable_shared_from_this<Poller::State> {
+    struct Station {
+        std::uint8_t id = 0;
+        bus::ClientId client = bus::next_client_id();  ///< of its own: stations take turns
+        StationPolls polls;
+    };
+
+    State(const asio::any_io_executor& executor, bus::BusClient& b) : bus(b), timer(executor) {}
+
+    void ask_all();
+    void ask(std::size_t index, StationPolls::Due due);
+    void on_answer(std::size_t index, std::size_t read, const bus::Answer& answer, TimePoint asked);
+    void arm();
+
+    bus::BusClient& bus;
+    asio::steady_timer timer;
+    std::vector<Station> stations;
+    Update update;
+    bool running = false;
+};
+
+void Poller::State::ask_all() {
+    const TimePoint now = rt::now();
+    for (std::size_t i = 0; i < stations.size(); ++i) {
+        for (StationPolls::Due& due : stations[i].polls.take_due(now)) ask(i, std::move(due));
+    }
+    arm();
+}
+
+void Poller::State::ask(std::size_t index, StationPolls::Due due) {
+    bus::Request request;
+    request.station = stations[index].id;
+    request.pdu = std::move(due.pdu);
+    request.client = stations[index].client;
+    request.priority = arbiter::PriorityClass::poll;
+    request.quantity = modbus::QuantityCheck::wide;
+    bus.transact(std::move(request), [weak = weak_from_this(), index, read = due.read,
+                                      asked = rt::now()](const bus::Answer& answer) {
+        const auto self = weak.lock();
+        if (self && self->running) self->on_answer(index, read, answer, asked);
+    });
+}
+
+void Poller::State::on_answer(std::size_t index, std::size_t read, const bus::Answer& answer,
+                              TimePoint asked) {
+    // Asked is the safe side: the value is at most as old as that.
+    const auto wants = stations[index].polls.on_answer(rt::now(), read, answer.pdu, asked);
+    if (update && !wants.empty()) update(index, wants);
+    arm();
+}
+
+void Poller::State::arm() {
+    std::optional<TimePoint> next;
+    for (const Station& station : stations) {
+        const auto due = station.polls.next_due();
+        if (due && (!next || *due < *next)) next = due;
+    }
+    if (!next) {
+        timer.cancel();
+        return;
+    }
+    timer.expires_at(*next);
+    timer.async_wait([weak = weak_from_this()](boost::system::error_code error) {
+        const auto self = weak.lock();
+        if (!error && self && self->running) self->ask_all();
+    });
+}
+
+Poller::Poller(asio::any_io_executor executor, bus::BusClient& bus,
+               std::vector<PolledStation> stations)
+    : state_(std::make_shared<State>(executor, bus)) {
+    const TimePoint now = rt::now();
+    for (PolledStation& station : stations) {
+        state_->stations.push_back(
+            {station.id, bus::next_client_id(),
+             StationPolls(std::move(station.wants), std::move(station.limits), now)});
+    }
+}
+
+Poller::~Poller() { stop(); }
+
+void Poller::on_update(Update update) { state_->update = std::move(update); }
+
+void Poller::start() {
+    state_->running = true;
+    for (const State::Station& station : state_->stations) {
+        state_->bus.name_client(station.client, "poll of station " + std::to_string(station.id));
+    }
+    state_->arm();
+}
+
+void Poller::stop() {
+    if (!std::exchange(state_->running, false)) return;
+    state_->timer.cancel();
+    for (const State::Station& station : state_->stations) state_->bus.cancel(station.client);
+}
+
+std::size_t Poller::size() const { return state_->stations.size(); }
+
+const StationPolls& Poller::station(std::size_t index) const {
+    return state_->stations[index].polls;
+}
+
+}  // namespace panelgate::points

@@ -1,0 +1,137 @@
+#include "panelgate/points/station_polls.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::points {
+namespace {
+
+std::vector<Duration> intervals_of(const std::vector<PlannedRead>& plan) {
+    std::vector<Duration> intervals;
+    for (const PlannedRead& read : plan) intervals.push_back(read.every);
+    return intervals;
+}
+
+PollSchedule schedule_of(const std::vector<PlannedRead>& plan, TimePoint start) {
+    return PollSchedule(intervals_of(plan), start, PollSchedule::Settings());
+}
+
+std::vector<std::uint16_t> items_of(const PlannedRead& read, ByteView reply) {
+    if (!modbus::is_bit_table(read.table)) return modbus::registers_of(reply);
+    const std::vector<bool> bits = modbus::bits_of(reply, read.count);
+    return {bits.begin(), bits.end()};
+}
+
+}  // namespace
+
+std::string_view label(Quality quality) {
+    switch (quality) {
+        case Quality::good:
+            return "good";
+        case Quality::stale:
+            return "stale";
+        case Quality::bad:
+            return "bad";
+    }
+    std::abort();
+}
+
+Quality quality_of(const Reading& reading, Duration every, TimePoint now) {
+    if (!reading.sampled) return Quality::bad;
+    const Duration age = now - *reading.sampled;
+    if (age > std::max<Duration>(10 * every, 10s)) return Quality::bad;
+    return reading.failing || age > 2 * every + 1s ? Quality::stale : Quality::good;
+}
+
+StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start)
+    : wants_(std::move(wants)),
+      readings_(wants_.size()),
+      plan_(plan_reads(wants_, limits)),
+      schedule_(schedule_of(plan_, start)) {
+    std::vector<int> reads(wants_.size());
+    for (const PlannedRead& read : plan_) {
+        for (const std::size_t want : read.wants) {
+            if (++reads[want] > 1) pieces_[want];
+        }
+    }
+}
+
+std::vector<StationPolls::Due> StationPolls::take_due(TimePoint now) {
+    std::vector<Due> due;
+    for (const std::size_t read : schedule_.take_due(now)) {
+        const PlannedRead& planned = plan_[read];
+        due.push_back(
+            {read, modbus::encode_read(planned.table, static_cast<std::uint16_t>(planned.address),
+                                       static_cast<std::uint16_t>(planned.count))});
+    }
+    return due;
+}
+
+std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read,
+                                                 const Result<Bytes>& pdu, TimePoint sampled) {
+    schedule_.on_done(read, now);
+    const PlannedRead planned = plan_[read];
+    const auto exception = pdu ? modbus::exception_of(*pdu) : std::nullopt;
+    if (pdu && !exception) {
+        take(planned, *pdu, sampled);
+    } else {
+        const bool about_range = exception && (*exception == 2 || *exception == 3);
+        if (about_range && split(now, read)) return {};
+        fail(planned, exception);
+    }
+    return planned.wants;
+}
+
+void StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {
+    const std::vector<std::uint16_t> items = items_of(read, reply);
+    for (const std::size_t index : read.wants) {
+        const Want& want = wants_[index];
+        Reading& reading = readings_[index];
+        reading.values.resize(want.count);
+        const std::uint32_t first = std::max(want.address, read.address);
+        const std::uint32_t end = std::min(want.span().end(), read.span().end());
+        for (std::uint32_t i = first; i < end; ++i)
+            reading.values[i - want.address] = items[i - read.address];
+        reading.failing = false;
+        reading.exception.reset();
+        ++reading.good;
+        const auto pieces = pieces_.find(index);
+        if (pieces == pieces_.end()) {
+            reading.sampled = sampled;
+            continue;
+        }
+        pieces->second[first] = sampled;
+        std::size_t needed = 0;
+        for (const PlannedRead& other : plan_)
+            needed += std::ranges::count(other.wants, index) > 0 ? 1u : 0u;
+        if (pieces->second.size() < needed) continue;
+        const auto oldest =
+            std::ranges::min_element(pieces->second, {}, [](const auto& p) { return p.second; });
+        reading.sampled = oldest->second;
+    }
+}
+
+void StationPolls::fail(const PlannedRead& read, std::optional<std::uint8_t> exception) {
+    for (const std::size_t index : read.wants) {
+        readings_[index].failing = true;
+        readings_[index].exception = exception;
+        ++readings_[index].failed;
+    }
+}
+
+/// False when this read is for one want only.
+bool StationPolls::split(TimePoint now, std::size_t read) {
+    auto halves = bisect(plan_[read], wants_);
+    if (!halves) return false;
+    plan_[read] = std::move(halves->first);
+    plan_.push_back(std::move(halves->second));
+    schedule_ = schedule_of(plan_, now);
+    return true;
+}
+
+}  // namespace panelgate::points

@@ -1,0 +1,61 @@
+#include "panelgate/points/poller.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+
+#include "support/fake_bus.hpp"
+
+namespace panelgate::points {
+namespace {
+
+using modbus::Table;
+
+class PollerTest : public testing::Test {
+  protected:
+    PollerTest() {
+        bus.script = [](const bus::Request& request) {
+            if (request.station == 9)
+                return std::optional(test::FakeBus::fault(Fault::timeout, true));
+            return std::optional(test::FakeBus::reply({3, 2, 0, 42}));
+        };
+        std::vector<PolledStation> stations(2);
+        stations[0] = {5, {{Table::holding_registers, 100, 1, 1ms}}, limits()};
+        stations[1] = {9, {{Table::holding_registers, 7, 1, 1ms}}, limits()};
+        poller = std::make_unique<Poller>(io.get_executor(), bus, std::move(stations));
+        poller->on_update([this](std::size_t station, const std::vector<std::size_t>& wants) {
+            updates[station] += wants.size();
+        });
+    }
+    static PlanLimits limits() {
+        return make_plan_limits(profile::PanelProfile(), SerialFormat{}, 2ms);
+    }
+
+    boost::asio::io_context io{1};
+    test::FakeBus bus{io.get_executor()};
+    std::unique_ptr<Poller> poller;
+    std::map<std::size_t, std::size_t> updates;
+};
+
+TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
+    poller->start();
+    while (updates[0] < 3 || updates[1] < 3) io.run_one();
+    EXPECT_EQ(poller->station(0).reading(0).values, std::vector<std::uint16_t>{42});
+    EXPECT_TRUE(poller->station(1).reading(0).failing);
+    for (const bus::Request& request : bus.requests)
+        EXPECT_EQ(request.priority, arbiter::PriorityClass::poll);
+    EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
+}
+
+TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {
+    bus.script = [](const bus::Request&) { return std::nullopt; };
+    poller->start();
+    while (bus.open() < 2) io.run_one();
+    poller->stop();
+    EXPECT_EQ(bus.cancelled.size(), 2u);
+    io.run();
+    EXPECT_EQ(updates[0] + updates[1], 0u);
+}
+
+}  // namespace
+}  // namespace panelgate::points
