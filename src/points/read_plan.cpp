@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <tuple>
 
@@ -17,169 +18,221 @@ constexpr std::array kTables = {modbus::Table::coils, modbus::Table::discrete_in
 struct Piece {
     std::uint32_t first = 0;
     std::uint32_t end = 0;
+    Duration every{};
     std::size_t want = 0;
 };
 
 void cut(const Want& want, std::size_t index, std::uint32_t max_items, std::vector<Piece>& out) {
     const std::uint32_t end = want.address + want.count;
     for (std::uint32_t first = want.address; first < end; first += max_items)
-        out.push_back({first, std::min(end, first + max_items), index});
+        out.push_back({first, std::min(end, first + max_items), want.every, index});
 }
 
 void sort_by_start(std::vector<Piece>& pieces) {
     std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
-        return std::tie(a.first, b.end, a.want) < std::tie(b.first, a.end, b.want);
+        return std::tie(a.first, b.end, a.every, a.want) <
+               std::tie(b.first, a.end, b.every, b.want);
     });
 }
 
-/// Plans one table, interval after interval from the shortest.
+/// A read before it is known whom it serves.
+struct Box {
+    std::uint32_t first = 0;
+    std::uint32_t end = 0;
+    Duration every{};
+
+    bool serves(const Piece& piece) const {
+        return first <= piece.first && piece.end <= end && every <= piece.every;
+    }
+};
+
+void sort_by_start(std::vector<Box>& boxes) {
+    std::sort(boxes.begin(), boxes.end(), [](const Box& a, const Box& b) {
+        return std::tie(a.first, b.end, a.every) < std::tie(b.first, a.end, b.every);
+    });
+}
+
+/// Plans one table.
 class TablePlanner {
   public:
     TablePlanner(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table)
         : limits_(limits), table_(table), map_(wants, limits, table) {
-        for (std::size_t i = 0; i < wants.size(); ++i) {
-            if (wants[i].table != table || !is_plannable(wants[i])) continue;
-            cut(wants[i], i, limits.of(table).max_items, by_interval_[wants[i].every]);
-        }
+        const std::uint32_t max_items = limits.of(table).max_items;
+        for (std::uint32_t count = 0; count <= max_items; ++count)
+            seconds_.push_back(to_seconds(read_cost(limits, table, count)));
+        std::vector<Piece> all;
+        for (std::size_t i = 0; i < wants.size(); ++i)
+            if (wants[i].table == table && is_plannable(wants[i])) cut(wants[i], i, max_items, all);
+        sort_by_start(all);
+        for (const Piece& piece : all)
+            (piece.end <= map_.reach(piece.first) ? pieces_ : refused_).push_back(piece);
     }
 
-    std::vector<PlannedRead> run() {
-        for (auto& [every, pieces] : by_interval_) plan_interval(every, std::move(pieces));
-        join_intervals();
-        for (PlannedRead& read : refused_) reads_.push_back(std::move(read));
-        for (PlannedRead& read : reads_) {
+    std::vector<PlannedRead> run() const {
+        std::vector<Box> boxes = interval_after_interval();
+        if (has_intervals()) {
+            std::vector<Box> together = plan_runs(pieces_);
+            if (load(together) < load(boxes)) boxes = std::move(together);
+        }
+        std::vector<PlannedRead> reads = serve(std::move(boxes));
+        add_refused(reads);
+        for (PlannedRead& read : reads) {
             std::sort(read.wants.begin(), read.wants.end());
             read.wants.erase(std::unique(read.wants.begin(), read.wants.end()), read.wants.end());
         }
-        sort_by_address(reads_);
-        return std::move(reads_);
-    }
-
-  private:
-    static void sort_by_address(std::vector<PlannedRead>& reads) {
         std::sort(reads.begin(), reads.end(), [](const PlannedRead& a, const PlannedRead& b) {
             return std::tie(a.address, b.count, a.every) < std::tie(b.address, a.count, b.every);
         });
+        return reads;
     }
 
-    void plan_interval(Duration every, std::vector<Piece> pieces) {
-        std::erase_if(pieces, [&](const Piece& piece) { return plan_refused(every, piece); });
-        sort_by_start(pieces);
-        serve_by_faster(pieces);
-        // Without those that lie in another, starts and ends both ascend. Then the best partition
-        // is one into runs: what a read of a run may contain, each of its parts may.
-        std::vector<Piece> outer;
-        for (const Piece& piece : pieces)
-            if (outer.empty() || piece.end > outer.back().end) outer.push_back(piece);
-        const std::size_t planned = reads_.size();
-        plan_runs(every, outer);
-        std::size_t at = planned;
-        for (const Piece& piece : pieces) {
-            while (piece.end > reads_[at].address + reads_[at].count) ++at;
-            reads_[at].wants.push_back(piece.want);
-        }
-    }
-
-    /// A piece with a refused span in it is asked for alone; pieces of the same items share it.
-    bool plan_refused(Duration every, const Piece& piece) {
-        if (piece.end <= map_.reach(piece.first)) return false;
-        const std::uint32_t count = piece.end - piece.first;
-        const auto same =
-            std::find_if(refused_.begin(), refused_.end(), [&](const PlannedRead& read) {
-                return read.address == piece.first && read.count == count;
-            });
-        if (same != refused_.end())
-            same->wants.push_back(piece.want);
-        else
-            refused_.push_back({table_, piece.first, count, every, {piece.want}, true});
-        return true;
-    }
-
-    /// Takes out the pieces that the reads of shorter intervals contain.
-    void serve_by_faster(std::vector<Piece>& pieces) {
-        sort_by_address(reads_);
-        std::size_t next = 0;
-        std::size_t widest = reads_.size();  // of those that start at or before the piece
-        std::erase_if(pieces, [&](const Piece& piece) {
-            for (; next < reads_.size() && reads_[next].address <= piece.first; ++next)
-                if (widest == reads_.size() ||
-                    reads_[next].span().end() > reads_[widest].span().end())
-                    widest = next;
-            if (widest == reads_.size() || piece.end > reads_[widest].span().end()) return false;
-            reads_[widest].wants.push_back(piece.want);
-            return true;
+  private:
+    bool has_intervals() const {
+        return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
+            return piece.every != pieces_.front().every;
         });
     }
 
-    /// Shortest path over the pieces: best[i] is the least cost of all pieces from i.
-    void plan_runs(Duration every, const std::vector<Piece>& pieces) {
-        std::vector<Duration> best(pieces.size() + 1, Duration::max());
+    double load(const Box& box) const {
+        return seconds_[box.end - box.first] / to_seconds(box.every);
+    }
+    double load(const std::vector<Box>& boxes) const {
+        double sum = 0;
+        for (const Box& box : boxes) sum += load(box);
+        return sum;
+    }
+
+    /// The cheapest partition of sorted pieces into runs: best[i] is the least load of all pieces
+    /// from i. Of pieces of one interval this is the cheapest of all partitions: without those that
+    /// lie in another, starts and ends both ascend, and what a read may contain, its parts may.
+    std::vector<Box> plan_runs(const std::vector<Piece>& sorted) const {
+        const std::vector<Piece> pieces = without_contained(sorted);
+        std::vector<double> best(pieces.size() + 1, std::numeric_limits<double>::infinity());
+        std::vector<Box> first_box(pieces.size());
         std::vector<std::size_t> next(pieces.size());
-        best[pieces.size()] = Duration::zero();
+        best[pieces.size()] = 0;
         for (std::size_t i = pieces.size(); i-- > 0;) {
             const std::uint32_t reach = map_.reach(pieces[i].first);
+            Box box{pieces[i].first, pieces[i].end, pieces[i].every};
             for (std::size_t j = i; j < pieces.size() && pieces[j].end <= reach; ++j) {
-                const Duration cost =
-                    read_cost(limits_, table_, pieces[j].end - pieces[i].first) + best[j + 1];
-                if (cost > best[i]) continue;
-                best[i] = cost;
+                box.end = std::max(box.end, pieces[j].end);
+                box.every = std::min(box.every, pieces[j].every);
+                const double total = load(box) + best[j + 1];
+                if (total > best[i]) continue;
+                best[i] = total;
+                first_box[i] = box;
                 next[i] = j + 1;
             }
         }
-        for (std::size_t i = 0; i < pieces.size(); i = next[i]) {
-            const std::uint32_t first = pieces[i].first;
-            reads_.push_back({table_, first, pieces[next[i] - 1].end - first, every, {}, false});
+        std::vector<Box> boxes;
+        for (std::size_t i = 0; i < pieces.size(); i = next[i]) boxes.push_back(first_box[i]);
+        return boxes;
+    }
+
+    /// Leaves out what lies in another piece that is wanted as often.
+    static std::vector<Piece> without_contained(const std::vector<Piece>& sorted) {
+        std::vector<Piece> kept;
+        std::map<Duration, std::uint32_t> furthest;  // end so far, by interval
+        for (const Piece& piece : sorted) {
+            const auto slower = furthest.upper_bound(piece.every);
+            if (std::any_of(furthest.begin(), slower,
+                            [&](const auto& faster) { return faster.second >= piece.end; }))
+                continue;
+            furthest[piece.every] = piece.end;
+            kept.push_back(piece);
         }
+        return kept;
     }
 
-    double load(const PlannedRead& read) const {
-        return to_seconds(read_cost(limits_, table_, read.count)) / to_seconds(read.every);
+    /// Intervals by themselves from the shortest, without what is served already; then joined.
+    std::vector<Box> interval_after_interval() const {
+        std::map<Duration, std::vector<Piece>> intervals;
+        for (const Piece& piece : pieces_) intervals[piece.every].push_back(piece);
+        std::vector<Box> boxes;
+        for (auto& [every, pieces] : intervals) {
+            sort_by_start(boxes);
+            std::erase_if(pieces, [&](const Piece& piece) {
+                return find_server(boxes, piece) != boxes.end();
+            });
+            const std::vector<Box> added = plan_runs(pieces);
+            boxes.insert(boxes.end(), added.begin(), added.end());
+        }
+        sort_by_start(boxes);
+        return join(boxes);
     }
 
-    /// Both as one read, when that is allowed and not dearer per second.
-    std::optional<PlannedRead> joined(const PlannedRead& low, const PlannedRead& high) const {
-        const std::uint32_t end = std::max(low.span().end(), high.span().end());
-        if (end > map_.reach(low.address)) return std::nullopt;
-        PlannedRead both{table_,    low.address, end - low.address, std::min(low.every, high.every),
-                         low.wants, false};
-        if (load(both) > load(low) + load(high)) return std::nullopt;
-        both.wants.insert(both.wants.end(), high.wants.begin(), high.wants.end());
-        return both;
+    /// The last of sorted boxes that serves this piece.
+    std::vector<Box>::const_iterator find_server(const std::vector<Box>& boxes,
+                                                 const Piece& piece) const {
+        auto box = std::upper_bound(
+            boxes.begin(), boxes.end(), piece.first,
+            [](std::uint32_t first, const Box& candidate) { return first < candidate.first; });
+        while (box != boxes.begin()) {
+            --box;
+            if (box->serves(piece)) return box;
+            if (box->first + limits_.of(table_).max_items < piece.end) break;
+        }
+        return boxes.end();
     }
 
-    void join_intervals() {
-        if (by_interval_.size() < 2) return;
-        sort_by_address(reads_);
-        std::vector<PlannedRead> kept;
-        for (PlannedRead& read : reads_) {
-            PlannedRead last = std::move(read);
-            while (!kept.empty()) {
-                std::optional<PlannedRead> both = joined(kept.back(), last);
-                if (!both) break;
-                last = std::move(*both);
-                kept.pop_back();
+    /// Neighbours as one read, where that is allowed and not dearer per second.
+    std::vector<Box> join(const std::vector<Box>& boxes) const {
+        std::vector<Box> kept;
+        for (Box last : boxes) {
+            for (; !kept.empty(); kept.pop_back()) {
+                const Box& low = kept.back();
+                const Box both{low.first, std::max(low.end, last.end),
+                               std::min(low.every, last.every)};
+                if (both.end > map_.reach(low.first) || load(both) > load(low) + load(last)) break;
+                last = both;
             }
-            kept.push_back(std::move(last));
+            kept.push_back(last);
         }
-        reads_ = std::move(kept);
+        return kept;
+    }
+
+    /// Gives every piece to a read; reads that nobody needs any more are left out.
+    std::vector<PlannedRead> serve(std::vector<Box> boxes) const {
+        sort_by_start(boxes);
+        std::vector<PlannedRead> reads;
+        reads.reserve(boxes.size());
+        for (const Box& box : boxes)
+            reads.push_back({table_, box.first, box.end - box.first, box.every, {}, false});
+        for (const Piece& piece : pieces_) {
+            const auto index = find_server(boxes, piece) - boxes.cbegin();
+            reads[static_cast<std::size_t>(index)].wants.push_back(piece.want);
+        }
+        std::erase_if(reads, [](const PlannedRead& read) { return read.wants.empty(); });
+        return reads;
+    }
+
+    /// Pieces with a refused span in them are asked for alone; those of the same items share it.
+    void add_refused(std::vector<PlannedRead>& reads) const {
+        const Piece* before = nullptr;
+        for (const Piece& piece : refused_) {
+            if (before == nullptr || before->first != piece.first || before->end != piece.end)
+                reads.push_back(
+                    {table_, piece.first, piece.end - piece.first, piece.every, {}, true});
+            reads.back().wants.push_back(piece.want);
+            before = &piece;
+        }
     }
 
     const PlanLimits& limits_;
     modbus::Table table_;
     TableMap map_;
-    std::map<Duration, std::vector<Piece>> by_interval_;
-    std::vector<PlannedRead> reads_;
-    std::vector<PlannedRead> refused_;
+    std::vector<double> seconds_;  ///< cost of a read, by its items
+    std::vector<Piece> pieces_;    ///< sorted; none has a refused span in it
+    std::vector<Piece> refused_;   ///< sorted; all others
 };
 
 /// The read of exactly these pieces.
-PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces,
-                    std::span<const Want> wants) {
+PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces) {
     PlannedRead read{whole.table, pieces.front().first, 0, Duration::max(), {}, false};
     std::uint32_t end = 0;
     for (const Piece& piece : pieces) {
         end = std::max(end, piece.end);
-        read.every = std::min(read.every, wants[piece.want].every);
+        read.every = std::min(read.every, piece.every);
         read.wants.push_back(piece.want);
     }
     read.count = end - read.address;
@@ -241,7 +294,9 @@ Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t 
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits) {
     std::vector<PlannedRead> plan;
     for (const modbus::Table table : kTables) {
-        if (limits.of(table).max_items == 0) continue;
+        const bool wanted = std::any_of(wants.begin(), wants.end(),
+                                        [&](const Want& want) { return want.table == table; });
+        if (!wanted || limits.of(table).max_items == 0) continue;
         std::vector<PlannedRead> reads = TablePlanner(wants, limits, table).run();
         std::move(reads.begin(), reads.end(), std::back_inserter(plan));
     }
@@ -253,15 +308,15 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
     std::vector<Piece> pieces;
     for (const std::size_t index : read.wants) {
         const Span want = wants[index].span();
-        pieces.push_back(
-            {std::max(want.address, read.address), std::min(want.end(), read.span().end()), index});
+        pieces.push_back({std::max(want.address, read.address),
+                          std::min(want.end(), read.span().end()), wants[index].every, index});
     }
     if (pieces.empty()) return std::nullopt;
     sort_by_start(pieces);
     const std::size_t at = cut_index(pieces);
     if (at == 0) return std::nullopt;
     const std::span<const Piece> all(pieces);
-    return std::pair(read_of(read, all.first(at), wants), read_of(read, all.subspan(at), wants));
+    return std::pair(read_of(read, all.first(at)), read_of(read, all.subspan(at)));
 }
 
 std::optional<Span> seam(const PlannedRead& left, const PlannedRead& right) {

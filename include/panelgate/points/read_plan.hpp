@@ -83,14 +83,16 @@ struct PlannedRead {
 /// bytes, gap, think time, reply of 5 bytes and the data, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
 
-/// Few reads that serve every want, at the least wire time for each interval, sorted by table and
-/// address. A want lies in one read, whole; one that is larger than a read may be is cut, and
-/// several reads name it. Every item of a read is in a want or readable by the profile. A read
-/// contains a refused span only if it is exactly one want (or a piece of a cut one), with `refused`
-/// set: nothing else is read with it. A want is also served by a read of a shorter interval that
-/// contains it, and reads of different intervals are joined where this is not dearer per second.
-/// Wants that break their contract, or whose table cannot be read, are not planned.
-/// Work: O(n log n + n * max_items).
+/// Few reads that serve every want, sorted by table and address. Where all intervals are the same
+/// this is the least wire time that is possible; where they differ it is the better of two plans
+/// (interval after interval, then joined where that is not dearer per second; or all at once),
+/// which is seldom more than the least. A want lies in one read, whole; one that is larger than a
+/// read may be is cut, and several reads name it. Every item of a read is in a want or readable by
+/// the profile. A read contains a refused span only if it is exactly one want (or a piece of a cut
+/// one), with `refused` set: nothing else is read with it. A want may be served by a read of a
+/// shorter interval that contains it. Wants that break their contract, or whose table cannot be
+/// read, are not planned. Work: O(n log n + n * max_items), some milliseconds for thousands of
+/// points.
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits);
 
 /// After exception 02 or 03: two reads that share the wants of this one, cut at its widest hole, or

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <boost/system/result.hpp>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/points/point.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+
+namespace panelgate::points {
+
+using Value = std::variant<bool, std::int64_t, std::uint64_t, double, std::string>;
+
+/// Why something cannot be written: one sentence for the user.
+struct WriteRefusal {
+    std::string message;
+};
+[[noreturn]] void throw_exception_from_error(const WriteRefusal& refusal,
+                                             const boost::source_location& where);
+template <class T>
+using Encoded = boost::system::result<T, WriteRefusal>;
+
+/// The value in these items (registers, or bits as 0 and 1), as many as point.count(). Nothing for
+/// a raw value that means none, a number that is not finite, and digits that are no BCD. Without
+/// scale and offset integers stay exact.
+std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> items);
+/// The name of this raw value, where the point has one.
+std::optional<std::string> label_of(const Point& point, std::span<const std::uint16_t> items);
+
+/// The items that hold this value: the inverse of decode, rounded to the nearest raw number.
+/// Refused outside the type's range or the point's min and max. A label stands for its raw value.
+Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& value);
+
+/// The one request that writes it: 05 or 15 a coil, 06 or 16 registers, 22 or the bit view of the
+/// panel a bit of a word. Never a read and a write: what changed in between would be lost.
+Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& point,
+                             const Value& value);
+
+std::string to_string(const Value& value);
+
+/// One block of registers understood in one way.
+struct Interpretation {
+    Type type = Type::u16;
+    WordOrder order = WordOrder::abcd;
+    std::vector<std::string> values;  ///< one after the other, "" where there is none
+};
+/// … in every way that fits: for finding out how a panel stores its numbers.
+std::vector<Interpretation> interpretations(std::span<const std::uint16_t> registers);
+
+}  // namespace panelgate::points
