@@ -12,7 +12,8 @@ import tempfile
 ASIO = ("boost/asio/", "boost/system/")
 RESULT = ("boost/system/result.hpp",)
 COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "tcp_server/counters.hpp"}
-SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "rt/settings.hpp",
+SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "points/settings.hpp", "rt/settings.hpp",
+            "points/point.hpp",
             "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}
 EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim",
               "metrics", "points", "web", "config", "app"}

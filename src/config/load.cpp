@@ -110,9 +110,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     load_modbus_tcp(loading, root);
     load_http(loading, root);
     load_log(loading, root);
-    if (const yaml::Node* relays = root.child("relays")) {
-        problems.add(relays->mark, "relays are not in this version; remove them");
-    }
+    load_relays(loading, root);
     const yaml::Node* listeners = root.child("modbus_tcp");
     const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
                                                    listeners->items.empty());

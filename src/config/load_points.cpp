@@ -1,47 +1,208 @@
+#include <algorithm>
 #include <array>
+#include <set>
 
 #include "load_stations.hpp"
+#include "panelgate/points/settings.hpp"
+#include "panelgate/profile/notation.hpp"
 
 namespace panelgate::config {
 namespace {
 
+using points::Point;
+using points::Type;
 using yaml::MapReader;
 using yaml::Node;
 
-void check_poll(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a poll");
-    in.required_text("read");
-    in.integer("count", 1, 2040);  // the largest read of any panel: GT, ARCT1F501E 1.3.1
-    in.duration("every", 1ms, 24h);
-    in.finish();
+constexpr Duration kSlowest = 24h;
+
+std::vector<std::string_view> type_words() {
+    std::vector<std::string_view> words;
+    for (const Type type : points::kTypes) words.push_back(label(type));
+    return words;
 }
 
-void check_point(Loading& loading, const Node& node) {
+void load_type(MapReader& in, Point& point) {
+    const bool bits = modbus::is_bit_table(point.table);
+    const auto bit = in.integer("bit", 0, 15);
+    if (bit && bits) in.problem("bit", point.at + " is a bit already; remove bit");
+    if (bit && !bits) point.bit = static_cast<unsigned>(*bit);
+    point.type = bits || point.bit ? Type::boolean : Type::u16;
+    const auto words = type_words();
+    if (const auto chosen = in.choice_index("type", words)) {
+        const Type type = points::kTypes[*chosen];
+        if (point.type == Type::boolean && type != Type::boolean) {
+            in.problem("type", point.at + (bits ? " is a bit" : " with bit: is one bit") +
+                                   ": its type is bool, not " + std::string(label(type)));
+        } else if (point.type != Type::boolean && type == Type::boolean) {
+            in.problem("type", point.at + " is a register: give bit: 0 to 15 for one of its bits");
+        } else {
+            point.type = type;
+        }
+    }
+    const auto length = in.integer("length", 1, 250);
+    if (point.type == Type::string && !in.has("length"))
+        in.problem("type", "a string needs its length: add length: 1 to 250 characters");
+    if (point.type != Type::string && length)
+        in.problem("length", "length is for type: string only");
+    if (point.type == Type::string) point.length = static_cast<unsigned>(length.value_or(1));
+    constexpr std::array<std::string_view, 4> kWords{"ABCD", "BADC", "CDAB", "DCBA"};
+    point.word_order = points::kOrders[in.choice_index("word_order", kWords).value_or(0)];
+}
+
+void load_scale(MapReader& in, Point& point) {
+    point.scale = in.number("scale").value_or(1);
+    point.offset = in.number("offset").value_or(0);
+    const bool number = point.type != Type::boolean && point.type != Type::string;
+    for (const std::string_view key : {"scale", "offset"}) {
+        if (in.has(key) && !number)
+            in.problem(key, std::string(key) + " is for numbers, not for type " +
+                                std::string(label(point.type)));
+    }
+    if (point.scale == 0) {
+        in.problem("scale", "scale must not be 0");
+        point.scale = 1;
+    }
+    point.min = in.number("min");
+    point.max = in.number("max");
+    if (point.min && point.max && *point.min > *point.max)
+        in.problem("min", "min is above max: nothing could be written");
+}
+
+void load_labels(MapReader& in, Point& point) {
+    if (const Node* labels = in.map("labels")) {
+        for (const yaml::Entry& entry : labels->entries) {
+            const auto raw = yaml::parse_integer(entry.key);
+            if (!raw || entry.value.kind != Node::Kind::scalar) {
+                in.problems().add(entry.mark, "labels are RAW-NUMBER: text, such as 1: running");
+                continue;
+            }
+            point.labels[*raw] = entry.value.scalar;
+        }
+        if (!is_integer(point.type))
+            in.problem("labels",
+                       "labels are for integers, not for type " + std::string(label(point.type)));
+    }
+    const Node* list = in.sequence("no_value");
+    if (list == nullptr) return;
+    for (const Node& item : list->items) {
+        const auto raw =
+            item.kind == Node::Kind::scalar ? yaml::parse_integer(item.scalar) : std::nullopt;
+        if (!raw) {
+            in.problems().add(item.mark, "no_value is a list of raw numbers, such as [-32768]");
+            continue;
+        }
+        point.no_value.push_back(*raw);
+    }
+}
+
+/// All of the value has to be where the panel can be read, and written when it is to be.
+void check_area(MapReader& in, const Point& point, const profile::Area& area) {
+    const std::uint32_t count = point.count();
+    if (!area.readable.contains(point.address, count)) {
+        in.problem("at", std::to_string(count) + " registers from " + point.at +
+                             " reach beyond the end of " + area.name + ", " +
+                             format_notation(area, static_cast<std::uint16_t>(area.readable.last)));
+    }
+    if (!point.writable) return;
+    if (!area.writable) {
+        in.problem("writable", point.at + " cannot be written (" + area.source + ')');
+    } else if (!area.writable->contains(point.address, count)) {
+        in.problem("writable",
+                   point.at + " cannot be written: " + area.name + " takes writes from " +
+                       format_notation(area, static_cast<std::uint16_t>(area.writable->first)) +
+                       " to " +
+                       format_notation(area, static_cast<std::uint16_t>(area.writable->last)));
+    }
+}
+
+bool is_point_name(std::string_view text) {
+    constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-_";
+    return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+void load_point(Loading& loading, const Node& node, Station& station) {
     MapReader in(node, loading.problems, "a point");
-    in.required_text("name");
-    in.required_text("at");
-    in.text("type");
-    in.number("scale");
-    in.text("unit");
-    constexpr std::array<std::string_view, 4> kOrders{"ABCD", "BADC", "CDAB", "DCBA"};
-    in.choice_index("word_order", kOrders);
-    in.boolean("writable");
-    in.number("min");
-    in.number("max");
+    Point point;
+    point.name = in.required_text("name").value_or("");
+    if (!point.name.empty() && !is_point_name(point.name))
+        in.problem("name", "name must be of a-z, 0-9, '-' and '_', not '" + point.name + '\'');
+    if (!point.name.empty() &&
+        std::ranges::find(station.points, point.name, &Point::name) != station.points.end()) {
+        in.problem("name", "there are two points '" + point.name + "' of this station");
+    }
+    const auto item = load_notation(in, "at", *station.profile);
+    point.at = in.text("at").value_or("");
+    if (item) {
+        point.table = item->area->table;
+        point.address = item->address;
+    }
+    load_type(in, point);
+    load_scale(in, point);
+    point.unit = in.text("unit").value_or("");
+    point.writable = in.boolean("writable").value_or(false);
+    if (point.writable && station.read_only)
+        in.problem("writable", "station '" + station.name + "' is read_only");
+    load_labels(in, point);
+    point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
+    if (item) check_area(in, point, *item->area);
     in.finish();
+    if (item) station.points.push_back(std::move(point));
+}
+
+void load_poll(Loading& loading, const Node& node, Station& station) {
+    MapReader in(node, loading.problems, "a poll");
+    points::Poll poll;
+    const auto item = load_notation(in, "read", *station.profile);
+    poll.read = in.text("read").value_or("");
+    constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
+    poll.count = static_cast<std::uint32_t>(in.integer("count", 1, kLargest).value_or(1));
+    poll.every = in.duration("every", 1ms, kSlowest).value_or(1s);
+    if (item) {
+        poll.table = item->area->table;
+        poll.address = item->address;
+        const profile::Area& area = *item->area;
+        if (!area.readable.contains(poll.address, poll.count)) {
+            in.problem("count",
+                       std::to_string(poll.count) + " from " + poll.read +
+                           " reach beyond the end of " + area.name + ", " +
+                           format_notation(area, static_cast<std::uint16_t>(area.readable.last)));
+        }
+    }
+    in.finish();
+    if (item) station.polls.push_back(std::move(poll));
+}
+
+template <class Load>
+void load_list(Loading& loading, MapReader& in, std::string_view key, std::size_t most,
+               const Load& load) {
+    const Node* list = in.sequence(key);
+    if (list == nullptr) return;
+    if (list->items.size() > most) {
+        in.problem(key, "at most " + std::to_string(most) + ' ' + std::string(key) +
+                            " of one station, not " + std::to_string(list->items.size()));
+        return;
+    }
+    for (const Node& item : list->items) load(loading, item);
 }
 
 }  // namespace
 
-void check_points(Loading& loading, MapReader& station) {
-    if (const Node* list = station.sequence("poll")) {
-        for (const Node& item : list->items) check_poll(loading, item);
-        loading.warn(station.mark("poll"), "poll is read but nothing is polled in this version");
-    }
-    if (const Node* list = station.sequence("points")) {
-        for (const Node& item : list->items) check_point(loading, item);
-        loading.warn(station.mark("points"), "points are read but not polled in this version");
-    }
+std::optional<profile::Item> load_notation(MapReader& in, std::string_view key,
+                                           const profile::PanelProfile& profile) {
+    const auto text = in.required_text(key);
+    if (!text) return std::nullopt;
+    const auto item = profile::parse_notation(profile, *text);
+    if (item) return *item;
+    in.problem(key, item.error().message);
+    return std::nullopt;
+}
+
+void load_points(Loading& loading, MapReader& in, Station& station) {
+    load_list(loading, in, "poll", points::kMaxPolls,
+              [&](Loading& l, const Node& node) { load_poll(l, node, station); });
+    load_list(loading, in, "points", points::kMaxPoints,
+              [&](Loading& l, const Node& node) { load_point(l, node, station); });
 }
 
 }  // namespace panelgate::config

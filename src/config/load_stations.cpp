@@ -112,17 +112,6 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
     return *name;
 }
 
-void load_later_keys(Loading& loading, MapReader& in) {
-    if (in.boolean("guard").value_or(false)) {
-        in.problem("guard", "guard: true is not in this version; remove it");
-    }
-    if (in.duration("max_age", 0ms, 24h).value_or(0ms) > 0ms) {
-        loading.warn(in.mark("max_age"),
-                     "max_age has no effect in this version: every read asks the panel");
-    }
-    check_points(loading, in);
-}
-
 /// Items that every read of these functions may have: the panel's limit within the standard's.
 std::uint16_t read_limit(const PanelProfile& profile, std::initializer_list<std::uint8_t> functions,
                          unsigned standard) {
@@ -159,7 +148,9 @@ Station load_station(Loading& loading, const Node& node, const LineInWork& work)
     settings.max_registers =
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
-    load_later_keys(loading, in);
+    settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
+    station.guard = in.boolean("guard").value_or(false);
+    load_points(loading, in, station);
     in.finish();
     work.line.arbiter.stations.push_back(settings);
     return station;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "loader.hpp"
+#include "panelgate/profile/notation.hpp"
 
 namespace panelgate::config {
 
@@ -30,7 +31,10 @@ arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& 
 /// line's serial format has been read already.
 void load_stations(Loading& loading, yaml::MapReader& in, LineInWork work);
 
-/// `poll` and `points` of a station: their form, and a warning that nothing is polled.
-void check_points(Loading& loading, yaml::MapReader& station);
+/// `poll` and `points` of a station.
+void load_points(Loading& loading, yaml::MapReader& in, Station& station);
+/// The item that a required key names in the panel's notation.
+std::optional<profile::Item> load_notation(yaml::MapReader& in, std::string_view key,
+                                           const profile::PanelProfile& profile);
 
 }  // namespace panelgate::config

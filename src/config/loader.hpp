@@ -35,6 +35,7 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
                          std::string_view noun);
 
 void load_lines(Loading& loading, yaml::MapReader& root);
+void load_relays(Loading& loading, yaml::MapReader& root);
 void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
 void load_http(Loading& loading, yaml::MapReader& root);
 

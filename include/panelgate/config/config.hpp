@@ -8,6 +8,7 @@
 
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/line/settings.hpp"
+#include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
@@ -21,6 +22,9 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
+    bool guard = false;  ///< what the profile rules out is refused without using the bus
+    std::vector<points::Point> points;
+    std::vector<points::Poll> polls;
 };
 
 struct Line {
@@ -37,6 +41,7 @@ struct Line {
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
     std::vector<Line> lines;
+    std::vector<points::Relay> relays;
     std::vector<tcp_server::Settings> modbus_tcp;
     std::optional<web::Settings> http;
     rt::LogSettings log;

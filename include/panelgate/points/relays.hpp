@@ -1,0 +1,59 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/points/settings.hpp"
+
+namespace panelgate::points {
+
+/// A relay with its ends found.
+struct RelayRoute {
+    Relay relay;
+    bus::BusClient* from = nullptr;  ///< outlive the relays
+    bus::BusClient* to = nullptr;
+    std::uint8_t from_station = 0;
+    std::uint8_t to_station = 0;
+    bool to_has_multiple = true;  ///< the target takes functions 15 and 16
+};
+
+struct RelayStatus {
+    std::string name;
+    /// "waiting" before the first transfer, "ok", "source failing: …", "target failing: …"
+    std::string state = "waiting";
+    std::uint64_t reads = 0;
+    std::uint64_t writes = 0;
+    std::uint64_t read_failures = 0;
+    std::uint64_t write_failures = 0;
+    std::optional<TimePoint> last_write;
+};
+
+/// Copies blocks between stations, over lines too. One request of each relay is open at a time, of
+/// the class `poll`: a relay whose panel is silent keeps nobody waiting. It writes only what it has
+/// read just before. One thread.
+class Relays {
+  public:
+    using Changed = std::function<void(const RelayStatus&)>;
+
+    Relays(boost::asio::any_io_executor executor, std::vector<RelayRoute> routes);
+    ~Relays();
+    Relays(const Relays&) = delete;
+    Relays& operator=(const Relays&) = delete;
+
+    /// Called when the state of a relay becomes another one.
+    void on_state(Changed changed);
+    void start();
+    void stop();
+    std::vector<RelayStatus> status() const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;
+};
+
+}  // namespace panelgate::points

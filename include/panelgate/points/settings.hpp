@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "panelgate/points/point.hpp"
+
+namespace panelgate::points {
+
+inline constexpr std::size_t kMaxPoints = 4096;  ///< of one station
+inline constexpr std::size_t kMaxPolls = 256;    ///< of one station
+inline constexpr std::size_t kMaxRelays = 256;
+
+/// A block that is read without being named point by point: it feeds the memory of `max_age`.
+struct Poll {
+    std::string read;  ///< the notation it was configured with
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint16_t address = 0;
+    std::uint32_t count = 1;
+    Duration every = 1s;
+};
+
+/// One end of a relay.
+struct RelayEnd {
+    std::string station;  ///< its name
+    std::string at;       ///< the notation
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint16_t address = 0;
+};
+
+/// Copies a block from one station to another (the manuals' 1:1:N and N:1:N systems).
+struct Relay {
+    RelayEnd from;
+    RelayEnd to;
+    std::uint32_t count = 1;
+    Duration every = 1s;
+    bool on_change = false;  ///< write only when what was read differs from what was written
+
+    /// "press/UW100 to oven/GDT200"
+    std::string name() const {
+        return from.station + '/' + from.at + " to " + to.station + '/' + to.at;
+    }
+};
+
+}  // namespace panelgate::points

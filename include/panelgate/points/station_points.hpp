@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/points/settings.hpp"
+#include "panelgate/points/station_polls.hpp"
+#include "panelgate/points/value.hpp"
+
+namespace panelgate::points {
+
+/// What a point is, now. Never an old value as a new one (P10).
+struct PointReading {
+    std::optional<Value> value;        ///< nothing when it is bad, or a value that means none
+    std::optional<std::string> label;  ///< the name of its raw value
+    Quality quality = Quality::bad;
+    std::optional<Duration> age;  ///< nothing when it was never read
+};
+
+/// What has to be polled for a station: its points first, in their order, then its poll blocks.
+std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls);
+
+/// The points of one station over what its polls have brought. Pure; what it refers to outlives it.
+class StationPoints {
+  public:
+    StationPoints(const std::vector<Point>& points, const StationPolls& polls)
+        : points_(&points), polls_(&polls) {}
+
+    const std::vector<Point>& points() const { return *points_; }
+    const Point* find(std::string_view name) const;
+    PointReading read(const Point& point, TimePoint now) const;
+
+  private:
+    const std::vector<Point>* points_;
+    const StationPolls* polls_;
+};
+
+}  // namespace panelgate::points

@@ -1,0 +1,176 @@
+#include "panelgate/points/relays.hpp"
+
+#include <boost/asio/steady_timer.hpp>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+
+namespace panelgate::points {
+
+namespace asio = boost::asio;
+
+namespace {
+
+/// Why an answer is none; empty when it is one.
+std::string failure_of(const bus::Answer& answer) {
+    if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
+    const auto code = modbus::exception_of(*answer.pdu);
+    return code ? "exception " + std::to_string(*code) : std::string();
+}
+
+/// The request that writes what this reply holds.
+Bytes write_of(const RelayRoute& route, ByteView reply) {
+    const std::uint16_t address = route.relay.to.address;
+    const bool single = route.relay.count == 1 && !route.to_has_multiple;
+    if (modbus::is_bit_table(route.relay.to.table)) {
+        const std::vector<bool> bits = modbus::bits_of(reply, route.relay.count);
+        return single ? modbus::encode_write_coil(address, bits[0])
+                      : modbus::encode_write_coils(address, bits);
+    }
+    const std::vector<std::uint16_t> words = modbus::registers_of(reply);
+    return single ? modbus::encode_write_register(address, words[0])
+                  : modbus::encode_write_registers(address, words);
+}
+
+}  // namespace
+
+struct Relays::State : std::enable_shared_from_this<Relays::State> {
+    struct Entry {
+        Entry(const asio::any_io_executor& executor, RelayRoute r)
+            : route(std::move(r)), timer(executor) {
+            status.name = route.relay.name();
+        }
+        RelayRoute route;
+        asio::steady_timer timer;
+        TimePoint due;
+        RelayStatus status;
+        bus::ClientId client = bus::next_client_id();
+        Bytes written;  ///< the last write that was confirmed
+    };
+    using Then = void (State::*)(Entry&, const bus::Answer&);
+
+    void arm(Entry& entry);
+    void read(Entry& entry);
+    void on_read(Entry& entry, const bus::Answer& answer);
+    void on_written(Entry& entry, const bus::Answer& answer);
+    void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
+    void set(Entry& entry, std::string state);
+
+    std::vector<std::unique_ptr<Entry>> entries;
+    Changed changed;
+    bool running = false;
+};
+
+/// The next turn that is still to come: what a slow panel has missed is missed.
+void Relays::State::arm(Entry& entry) {
+    const TimePoint now = rt::now();
+    const Duration every = entry.route.relay.every;
+    while (entry.due <= now) entry.due += every * ((now - entry.due) / every + 1);
+    entry.timer.expires_at(entry.due);
+    entry.timer.async_wait([weak = weak_from_this(), &entry](boost::system::error_code error) {
+        const auto self = weak.lock();
+        if (!error && self && self->running) self->read(entry);
+    });
+}
+
+void Relays::State::ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then) {
+    request.client = entry.client;
+    request.priority = arbiter::PriorityClass::poll;
+    request.quantity = modbus::QuantityCheck::wide;
+    bus.transact(std::move(request),
+                 [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
+                     const auto self = weak.lock();
+                     if (self && self->running) (self.get()->*then)(entry, answer);
+                 });
+}
+
+void Relays::State::read(Entry& entry) {
+    const Relay& relay = entry.route.relay;
+    bus::Request request;
+    request.station = entry.route.from_station;
+    request.pdu = modbus::encode_read(relay.from.table, relay.from.address,
+                                      static_cast<std::uint16_t>(relay.count));
+    ask(entry, *entry.route.from, std::move(request), &State::on_read);
+}
+
+void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
+    if (const std::string why = failure_of(answer); !why.empty()) {
+        ++entry.status.read_failures;
+        set(entry, "source failing: " + why);
+        arm(entry);
+        return;
+    }
+    ++entry.status.reads;
+    bus::Request request;
+    request.station = entry.route.to_station;
+    request.pdu = write_of(entry.route, *answer.pdu);
+    if (entry.route.relay.on_change && request.pdu == entry.written) {
+        set(entry, "ok");
+        arm(entry);
+        return;
+    }
+    entry.written = request.pdu;
+    ask(entry, *entry.route.to, std::move(request), &State::on_written);
+}
+
+void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
+    if (const std::string why = failure_of(answer); !why.empty()) {
+        entry.written.clear();  // whatever the target holds now: it is written again
+        ++entry.status.write_failures;
+        set(entry, "target failing: " + why);
+    } else {
+        ++entry.status.writes;
+        entry.status.last_write = rt::now();
+        set(entry, "ok");
+    }
+    arm(entry);
+}
+
+void Relays::State::set(Entry& entry, std::string state) {
+    if (entry.status.state == state) return;
+    entry.status.state = std::move(state);
+    if (changed) changed(entry.status);
+}
+
+Relays::Relays(asio::any_io_executor executor, std::vector<RelayRoute> routes)
+    : state_(std::make_shared<State>()) {
+    for (RelayRoute& route : routes)
+        state_->entries.push_back(std::make_unique<State::Entry>(executor, std::move(route)));
+}
+
+Relays::~Relays() { stop(); }
+
+void Relays::on_state(Changed changed) { state_->changed = std::move(changed); }
+
+void Relays::start() {
+    state_->running = true;
+    const TimePoint now = rt::now();
+    const auto count = static_cast<Duration::rep>(state_->entries.size());
+    Duration::rep index = 0;
+    for (const auto& entry : state_->entries) {
+        entry->due = now + entry->route.relay.every * index++ / count;  // spread
+        for (bus::BusClient* bus : {entry->route.from, entry->route.to})
+            bus->name_client(entry->client, "relay " + entry->status.name);
+        state_->arm(*entry);
+    }
+}
+
+void Relays::stop() {
+    if (!std::exchange(state_->running, false)) return;
+    for (const auto& entry : state_->entries) {
+        entry->timer.cancel();
+        entry->route.from->cancel(entry->client);
+        entry->route.to->cancel(entry->client);
+    }
+}
+
+std::vector<RelayStatus> Relays::status() const {
+    std::vector<RelayStatus> all;
+    for (const auto& entry : state_->entries) all.push_back(entry->status);
+    return all;
+}
+
+}  // namespace panelgate::points

@@ -1,0 +1,34 @@
+#include "panelgate/points/station_points.hpp"
+
+#include <algorithm>
+
+namespace panelgate::points {
+
+std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls) {
+    std::vector<Want> wants;
+    for (const Point& point : points)
+        wants.push_back({point.table, point.address, point.count(), point.every});
+    for (const Poll& poll : polls)
+        wants.push_back({poll.table, poll.address, poll.count, poll.every});
+    return wants;
+}
+
+const Point* StationPoints::find(std::string_view name) const {
+    const auto found = std::ranges::find(*points_, name, &Point::name);
+    return found == points_->end() ? nullptr : &*found;
+}
+
+PointReading StationPoints::read(const Point& point, TimePoint now) const {
+    const auto index = static_cast<std::size_t>(&point - points_->data());
+    const Reading& reading = polls_->reading(index);
+    PointReading made;
+    made.quality = quality_of(reading, point.every, now);
+    if (reading.sampled) made.age = now - *reading.sampled;
+    if (made.quality == Quality::bad) return made;
+    made.value = decode(point, reading.values);
+    made.label = label_of(point, reading.values);
+    if (!made.value) made.quality = Quality::bad;
+    return made;
+}
+
+}  // namespace panelgate::points

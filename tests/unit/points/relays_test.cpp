@@ -1,0 +1,98 @@
+#include "panelgate/points/relays.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+
+#include "support/fake_bus.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::points {
+namespace {
+
+class RelaysTest : public testing::Test {
+  protected:
+    void make(bool on_change) {
+        RelayRoute route;
+        route.relay.from = {"press", "UW100", modbus::Table::holding_registers, 100};
+        route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, 200};
+        route.relay.count = 2;
+        route.relay.every = 1ms;
+        route.relay.on_change = on_change;
+        route.from = &from;
+        route.to = &to;
+        route.from_station = 31;
+        route.to_station = 20;
+        from.script = [this](const bus::Request&) { return source; };
+        to.script = [this](const bus::Request&) { return target; };
+        relays = std::make_unique<Relays>(io.get_executor(), std::vector{route});
+        relays->on_state([this](const RelayStatus& status) { states.push_back(status.state); });
+        relays->start();
+    }
+    void run_until(const std::function<bool()>& done) {
+        while (!done()) io.run_one();
+    }
+    RelayStatus status() { return relays->status().at(0); }
+
+    boost::asio::io_context io{1};
+    test::FakeBus from{io.get_executor()};
+    test::FakeBus to{io.get_executor()};
+    std::optional<bus::Answer> source = test::FakeBus::reply("03 04 00 01 00 02"_hex);
+    std::optional<bus::Answer> target = test::FakeBus::reply("10 00 C8 00 02"_hex);
+    std::vector<std::string> states;
+    std::unique_ptr<Relays> relays;
+};
+
+TEST_F(RelaysTest, WritesWhatItHasJustRead) {
+    make(false);
+    run_until([&] { return status().writes >= 3; });
+    EXPECT_EQ(from.requests[0].pdu, "03 00 64 00 02"_hex);
+    EXPECT_EQ(to.requests[0].pdu, "10 00 C8 00 02 04 00 01 00 02"_hex);
+    EXPECT_EQ(to.requests[0].station, 20);
+    EXPECT_EQ(to.requests[0].priority, arbiter::PriorityClass::poll);
+    EXPECT_EQ(states, std::vector<std::string>{"ok"});
+    EXPECT_EQ(status().name, "press/UW100 to oven/GDT200");
+}
+
+TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
+    make(true);
+    run_until([&] { return status().reads >= 5; });
+    EXPECT_EQ(to.requests.size(), 1u);
+    source = test::FakeBus::reply("03 04 00 01 00 03"_hex);
+    run_until([&] { return to.requests.size() == 2; });
+    EXPECT_EQ(to.requests[1].pdu, "10 00 C8 00 02 04 00 01 00 03"_hex);
+}
+
+TEST_F(RelaysTest, WithoutAFreshValueNothingIsWritten) {
+    source = test::FakeBus::fault(Fault::timeout, true);
+    make(false);
+    run_until([&] { return status().read_failures >= 3; });
+    EXPECT_TRUE(to.requests.empty());
+    EXPECT_EQ(states, std::vector<std::string>{"source failing: timeout"});
+    source = test::FakeBus::reply("83 02"_hex);
+    run_until([&] { return states.size() == 2; });
+    EXPECT_EQ(states[1], "source failing: exception 2");
+}
+
+TEST_F(RelaysTest, AWriteThatFailedIsTriedAgainThoughNothingChanged) {
+    target = test::FakeBus::fault(Fault::offline, false);
+    make(true);
+    run_until([&] { return status().write_failures >= 2; });
+    EXPECT_EQ(states, std::vector<std::string>{"target failing: offline"});
+    target = test::FakeBus::reply("10 00 C8 00 02"_hex);
+    run_until([&] { return status().writes == 1; });
+    EXPECT_EQ(status().state, "ok");
+}
+
+TEST_F(RelaysTest, StopsWithWhatItHasOpen) {
+    source.reset();
+    make(false);
+    run_until([&] { return from.open() == 1; });
+    relays->stop();
+    EXPECT_EQ(from.cancelled.size(), 1u);
+    io.run();
+    EXPECT_TRUE(to.requests.empty());
+}
+
+}  // namespace
+}  // namespace panelgate::points
