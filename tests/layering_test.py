@@ -11,7 +11,8 @@ import tempfile
 # module -> (our modules, or single headers, that it may include; third-party prefixes)
 ASIO = ("boost/asio/", "boost/system/")
 RESULT = ("boost/system/result.hpp",)
-COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "tcp_server/counters.hpp"}
+COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "points/counters.hpp",
+            "tcp_server/counters.hpp"}
 SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "points/settings.hpp", "rt/settings.hpp",
             "points/point.hpp",
             "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}

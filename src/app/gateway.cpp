@@ -1,12 +1,17 @@
 #include "gateway.hpp"
 
+#include <algorithm>
+#include <cstdlib>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/profile/judge.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::app {
@@ -41,11 +46,48 @@ std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bu
     return std::make_shared<const web::SimulatedPanel>(std::move(panel));
 }
 
+/// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
+bus::Guard guard_of(const profile::PanelProfile& profile) {
+    return [&profile](ByteView pdu) -> std::optional<std::uint8_t> {
+        switch (profile::judge(profile, pdu)) {
+            case profile::Judgement::fine:
+                return std::nullopt;
+            case profile::Judgement::illegal_function:
+                return std::uint8_t{1};
+            case profile::Judgement::illegal_address:
+            case profile::Judgement::write_protected:
+                return std::uint8_t{2};
+            case profile::Judgement::illegal_value:
+                return std::uint8_t{3};
+        }
+        std::abort();
+    };
+}
+
+Duration frame_gap(const config::Line& line, std::uint8_t station) {
+    for (const arbiter::StationSettings& settings : line.arbiter.stations) {
+        if (settings.id == station) return settings.frame_gap;
+    }
+    return line.arbiter.unlisted.frame_gap;
+}
+
+std::optional<double> number_of(const points::Value& value) {
+    if (std::holds_alternative<std::string>(value)) return std::nullopt;
+    return std::visit(
+        [](const auto& v) {
+            if constexpr (std::is_arithmetic_v<std::decay_t<decltype(v)>>)
+                return static_cast<double>(v);
+            return 0.0;
+        },
+        value);
+}
+
 }  // namespace
 
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
     : executor_(std::move(executor)), config_(std::move(config)) {
     for (const config::Line& line : config_.lines) add_line(line, simulate);
+    add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
     if (config_.http) add_http(*config_.http);
 }
@@ -55,8 +97,10 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     settings.name = line.name;
     settings.device = line.device.device;
     settings.arbiter = line.arbiter;
-    for (const config::Station& station : line.stations)
+    for (const config::Station& station : line.stations) {
         settings.stations[station.id] = station.name;
+        if (station.guard) settings.guards[station.id] = guard_of(*station.profile);
+    }
 
     line::Settings device = line.device;
     const bool simulates = simulate || line.kind == config::Line::Kind::simulated;
@@ -70,6 +114,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
                        : line::make_tty_line(executor_, std::move(device));
     buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(wire)));
     add_stations(line, *buses_.back(), simulates ? simulated_.back().get() : nullptr);
+    add_points(line, *buses_.back());
 }
 
 void Gateway::add_stations(const config::Line& line, bus::Bus& bus, sim::SimulatedBus* simulated) {
@@ -94,6 +139,58 @@ void Gateway::add_stations(const config::Line& line, bus::Bus& bus, sim::Simulat
     directory_.lines.push_back({line.name, bus.status().device, &bus, !line.refuse_unlisted});
 }
 
+/// One poller a line. What it reads answers clients too, where a station's max_age allows it.
+void Gateway::add_points(const config::Line& line, bus::Bus& bus) {
+    std::vector<points::PolledStation> polled;
+    std::vector<const config::Station*> configured;
+    for (const config::Station& station : line.stations) {
+        if (station.points.empty() && station.polls.empty()) continue;
+        points::PolledStation entry;
+        entry.id = station.id;
+        entry.wants = points::wants_of(station.points, station.polls);
+        entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
+                                                frame_gap(line, station.id));
+        polled.push_back(std::move(entry));
+        configured.push_back(&station);
+    }
+    if (polled.empty()) return;
+    pollers_.push_back(std::make_unique<points::Poller>(executor_, bus, std::move(polled)));
+    for (std::size_t i = 0; i < configured.size(); ++i) {
+        points_.emplace_back(configured[i]->points, pollers_.back()->station(i));
+        for (web::StationEntry& entry : directory_.stations) {
+            if (entry.name == configured[i]->name) entry.points = &points_.back();
+        }
+    }
+}
+
+void Gateway::add_relays() {
+    const auto find = [&](const std::string& name) {
+        return *std::ranges::find(directory_.stations, name, &web::StationEntry::name);
+    };
+    std::vector<points::RelayRoute> routes;
+    for (const points::Relay& relay : config_.relays) {
+        const web::StationEntry from = find(relay.from.station);
+        const web::StationEntry to = find(relay.to.station);
+        points::RelayRoute route;
+        route.relay = relay;
+        route.from = from.bus;
+        route.from_station = from.id;
+        route.to = to.bus;
+        route.to_station = to.id;
+        const auto multiple = modbus::is_bit_table(relay.to.table)
+                                  ? modbus::kWriteMultipleCoils
+                                  : modbus::kWriteMultipleRegisters;
+        route.to_has_multiple =
+            to.profile->functions.empty() || to.profile->find_function(multiple) != nullptr;
+        routes.push_back(std::move(route));
+    }
+    relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
+    relays_->on_state([](const points::RelayStatus& relay) {
+        const auto level = relay.state == "ok" ? rt::LogLevel::info : rt::LogLevel::warn;
+        rt::log(level, "relay", {{"relay", relay.name}, {"state", relay.state}});
+    });
+}
+
 void Gateway::add_listener(const tcp_server::Settings& settings) {
     tcp_server::UnitMap units(settings, lines_);
     // What unit id reaches a station is shown by REST: the first listener that has one wins.
@@ -116,12 +213,16 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.metrics_text = [this] { return metrics_text(); };
     providers.ready = [this] { return ready_; };
     providers.version = PANELGATE_VERSION;
+    providers.now = rt::now;
+    providers.relays = [this] { return relays_->status(); };
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }
 
 void Gateway::start() {
     for (const auto& simulated : simulated_) simulated->start();
     for (const auto& bus : buses_) bus->start();
+    for (const auto& poller : pollers_) poller->start();
+    relays_->start();
     for (std::size_t i = 0; i < listeners_.size(); ++i) {
         listeners_[i]->start();
         const std::string address =
@@ -154,14 +255,44 @@ bool Gateway::drained() const {
 void Gateway::stop() {
     for (const auto& listener : listeners_) listener->close_now();
     http_.reset();
+    relays_->stop();
+    for (const auto& poller : pollers_) poller->stop();
     for (const auto& bus : buses_) bus->stop();
     for (const auto& simulated : simulated_) simulated->stop();
+}
+
+std::vector<points::PointSample> Gateway::point_samples() const {
+    std::vector<points::PointSample> samples;
+    const TimePoint now = rt::now();
+    for (const web::StationEntry& station : directory_.stations) {
+        if (station.points == nullptr) continue;
+        for (const points::Point& point : station.points->points()) {
+            const points::PointReading reading = station.points->read(point, now);
+            points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
+            if (reading.value && reading.quality == points::Quality::good)
+                sample.value = number_of(*reading.value);
+            if (reading.age) sample.age = to_seconds(*reading.age);
+            samples.push_back(std::move(sample));
+        }
+    }
+    return samples;
+}
+
+std::vector<points::RelaySample> Gateway::relay_samples() const {
+    std::vector<points::RelaySample> samples;
+    for (const points::RelayStatus& relay : relays_->status()) {
+        samples.push_back({relay.name, relay.state == "ok", relay.reads, relay.writes,
+                           relay.read_failures, relay.write_failures});
+    }
+    return samples;
 }
 
 std::string Gateway::metrics_text() const {
     metrics::Snapshot snapshot;
     for (const auto& bus : buses_) snapshot.lines.push_back(bus->report());
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
+    snapshot.points = point_samples();
+    snapshot.relays = relay_samples();
     snapshot.version = PANELGATE_VERSION;
     snapshot.process = metrics::read_process_facts();
     return metrics::exposition(snapshot);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -8,6 +9,10 @@
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/points/counters.hpp"
+#include "panelgate/points/poller.hpp"
+#include "panelgate/points/relays.hpp"
+#include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/directory.hpp"
@@ -41,12 +46,19 @@ class Gateway {
     void add_stations(const config::Line& line, bus::Bus& bus, sim::SimulatedBus* simulated);
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
+    void add_points(const config::Line& line, bus::Bus& bus);
+    void add_relays();
+    std::vector<points::PointSample> point_samples() const;
+    std::vector<points::RelaySample> relay_samples() const;
     std::string metrics_text() const;
 
     boost::asio::any_io_executor executor_;
     config::Config config_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
+    std::vector<std::unique_ptr<points::Poller>> pollers_;
+    std::deque<points::StationPoints> points_;  ///< referred to by the directory
+    std::unique_ptr<points::Relays> relays_;
     std::vector<tcp_server::LineInfo> lines_;
     web::Directory directory_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;

@@ -353,6 +353,8 @@ LineStatus Bus::status() const {
     return status;
 }
 
+bool Bus::is_up() const { return state_->up; }
+
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;

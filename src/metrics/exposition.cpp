@@ -10,6 +10,7 @@
 
 #include "families.hpp"
 #include "panelgate/base/fault.hpp"
+#include "point_families.hpp"
 
 namespace panelgate::metrics {
 namespace {
@@ -252,6 +253,8 @@ std::string exposition(const Snapshot& snapshot) {
     add_line_counters(families, snapshot);
     add_line_state(families, snapshot);
     add_station_state(families, snapshot);
+    add_points(families, snapshot);
+    add_relays(families, snapshot);
     add_listeners(families, snapshot);
     add_process(families, snapshot);
     std::erase_if(families, [](const auto& family) { return family.metric.empty(); });

@@ -56,6 +56,7 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void read(Entry& entry);
     void on_read(Entry& entry, const bus::Answer& answer);
     void on_written(Entry& entry, const bus::Answer& answer);
+    void check_target(Entry& entry);
     void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
     void set(Entry& entry, std::string state);
 
@@ -108,12 +109,22 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     request.station = entry.route.to_station;
     request.pdu = write_of(entry.route, *answer.pdu);
     if (entry.route.relay.on_change && request.pdu == entry.written) {
-        set(entry, "ok");
+        check_target(entry);
         arm(entry);
         return;
     }
     entry.written = request.pdu;
     ask(entry, *entry.route.to, std::move(request), &State::on_written);
+}
+
+/// Nothing has to be written; but a target that has gone may come back with something else.
+void Relays::State::check_target(Entry& entry) {
+    const bool line_up = entry.route.to->is_up();
+    const bool offline =
+        line_up && entry.route.to->station_status(entry.route.to_station).state == "offline";
+    if (line_up && !offline) return set(entry, "ok");
+    entry.written.clear();
+    set(entry, std::string("target failing: ") + (line_up ? "offline" : "line_down"));
 }
 
 void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {

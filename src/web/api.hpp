@@ -35,6 +35,12 @@ Handling get_stations(HttpRequest request, const Api* api);
 Handling get_station(HttpRequest request, const Api* api);
 Handling get_table(HttpRequest request, const Api* api);
 Handling put_table(HttpRequest request, const Api* api);
+Handling get_points(HttpRequest request, const Api* api);
+Handling get_point(HttpRequest request, const Api* api);
+Handling put_point(HttpRequest request, const Api* api);
+Handling get_interpretations(HttpRequest request, const Api* api);
+Handling get_relays(HttpRequest request, const Api* api);
+
 Handling get_simulated(HttpRequest request, const Api* api);
 Handling put_simulated(HttpRequest request, const Api* api);
 

@@ -4,6 +4,7 @@
 #include "items.hpp"
 #include "json_util.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "write_answer.hpp"
 #include "write_plan.hpp"
 
 namespace panelgate::web {
@@ -59,6 +60,16 @@ Parsed<bus::Request> write_request(const HttpRequest& request, Items items) {
     return made;
 }
 
+Handling write_items(HttpRequest request, Items items) {
+    auto planned = write_request(request, items);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    bus::Answer answer = co_await transact(request.caller, items.station.bus, std::move(made));
+    co_return write_answer(answer, items.station.profile);
+}
+
+}  // namespace
+
 HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile* profile) {
     if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
     if (const auto code = modbus::exception_of(*answer.pdu)) {
@@ -69,16 +80,6 @@ HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile
     body["confirmed"] = true;
     return json_response(200, body);
 }
-
-Handling write_items(HttpRequest request, Items items) {
-    auto planned = write_request(request, items);
-    if (!planned) co_return to_response(planned.error());
-    bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await transact(request.caller, items.station.bus, std::move(made));
-    co_return write_answer(answer, items.station.profile);
-}
-
-}  // namespace
 
 Handling put_table(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api);

@@ -32,6 +32,11 @@ constexpr Route kRoutes[] = {
     {"GET", "/api/v1/stations/{}", get_station, kSee},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
+    {"GET", "/api/v1/relays", get_relays, kSee},
+    {"GET", "/api/v1/stations/{}/points", get_points, kSee},
+    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee},
+    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange},
+    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee},
     // Before the tables: "devices" is none of them.
     {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee},
     {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange},

@@ -97,6 +97,8 @@ class BusClient {
     virtual void cancel(ClientId client) = 0;
 
     virtual LineStatus status() const = 0;
+    /// status().up, for who asks often.
+    virtual bool is_up() const { return status().up; }
     virtual StationStatus station_status(std::uint8_t station) const = 0;
     /// The last frames, oldest first, at most `last`.
     virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;

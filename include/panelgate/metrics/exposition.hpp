@@ -6,6 +6,7 @@
 
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/points/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 
 namespace panelgate::metrics {
@@ -14,6 +15,8 @@ namespace panelgate::metrics {
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<tcp_server::Counters> listeners;
+    std::vector<points::PointSample> points;
+    std::vector<points::RelaySample> relays;
     std::string version;
     ProcessFacts process;
 };

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/points/relay_status.hpp"
 #include "panelgate/points/settings.hpp"
 
 namespace panelgate::points {
@@ -20,17 +21,6 @@ struct RelayRoute {
     std::uint8_t from_station = 0;
     std::uint8_t to_station = 0;
     bool to_has_multiple = true;  ///< the target takes functions 15 and 16
-};
-
-struct RelayStatus {
-    std::string name;
-    /// "waiting" before the first transfer, "ok", "source failing: …", "target failing: …"
-    std::string state = "waiting";
-    std::uint64_t reads = 0;
-    std::uint64_t writes = 0;
-    std::uint64_t read_failures = 0;
-    std::uint64_t write_failures = 0;
-    std::optional<TimePoint> last_write;
 };
 
 /// Copies blocks between stations, over lines too. One request of each relay is open at a time, of

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/points/station_points.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::web {
@@ -36,6 +37,7 @@ struct StationEntry {
     bool read_only = false;
     std::optional<int> unit;        ///< the unit id that Modbus/TCP clients use, when there is one
     bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
+    const points::StationPoints* points = nullptr;    ///< null without any; outlives the directory
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 

@@ -7,7 +7,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "panelgate/base/time.hpp"
+#include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/directory.hpp"
 #include "panelgate/web/settings.hpp"
 
@@ -18,6 +21,8 @@ struct Providers {
     std::function<std::string()> metrics_text;  ///< of metrics::kContentType
     std::function<bool()> ready;                ///< do configuration and listeners stand?
     std::string version;
+    std::function<TimePoint()> now;  ///< the machine's monotonic clock
+    std::function<std::vector<points::RelayStatus>()> relays;
 };
 
 /// HTTP/1.1: probes, metrics and the REST API of contract section 5. Lives in the one thread that

@@ -63,6 +63,19 @@ TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
     EXPECT_EQ(to.requests[1].pdu, "10 00 C8 00 02 04 00 01 00 03"_hex);
 }
 
+TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItIsBack) {
+    make(true);
+    run_until([&] { return status().writes == 1; });
+    to.line.up = false;
+    run_until([&] { return states.size() == 2; });
+    EXPECT_EQ(states[1], "target failing: line_down");
+    to.line.up = true;
+    run_until([&] { return status().writes >= 2; });
+    run_until([&] { return states.back() == "ok"; });
+    to.stations[20] = {"offline", {}};
+    run_until([&] { return states.back() == "target failing: offline"; });
+}
+
 TEST_F(RelaysTest, WithoutAFreshValueNothingIsWritten) {
     source = test::FakeBus::fault(Fault::timeout, true);
     make(false);

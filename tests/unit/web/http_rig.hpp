@@ -124,6 +124,8 @@ class HttpRig : public ::testing::Test {
         providers.metrics_text = [] { return "up 1\n"; };
         providers.ready = [this] { return ready; };
         providers.version = "1.2.3";
+        providers.now = [this] { return now; };
+        providers.relays = [this] { return relays; };
         server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
         EXPECT_FALSE(server->start());
         return *server;
@@ -166,6 +168,8 @@ class HttpRig : public ::testing::Test {
     profile::PanelProfile panel;
     Directory directory;
     Settings settings;
+    TimePoint now{1h};
+    std::vector<points::RelayStatus> relays;
     bool ready = true;
     std::unique_ptr<Server> server;
 };

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace panelgate::points {
+
+/// One point at a scrape.
+struct PointSample {
+    std::string line;
+    std::string station;
+    std::string point;
+    std::string unit;
+    std::optional<double> value;  ///< nothing when the last attempt to read it failed
+    std::optional<double> age;    ///< s; nothing when it was never read
+};
+
+/// One relay at a scrape.
+struct RelaySample {
+    std::string relay;
+    bool ok = false;  ///< the last transfer succeeded
+    std::uint64_t reads = 0;
+    std::uint64_t writes = 0;
+    std::uint64_t read_failures = 0;
+    std::uint64_t write_failures = 0;
+};
+
+}  // namespace panelgate::points

@@ -1,0 +1,177 @@
+"""Points, polls, the memory of max_age, guards and relays, on the real program."""
+import contextlib
+import pathlib
+import re
+import struct
+import tempfile
+import threading
+import unittest
+
+import harness
+from harness import read_registers
+from rtu_bus import RtuBus, echo_address
+
+PRESS = """
+lines:
+  - name: floor1
+    device: sim
+    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
+    timing: {response_timeout: 100ms}
+    offline: {probe_min: 100ms, probe_max: 200ms}
+    stations:
+      - id: 31
+        name: press
+        profile: autonics-gplp-s
+        guard: true
+        max_age: 10s
+        points:
+          - {name: level, at: UW100, type: i16, scale: 0.1, unit: celsius, writable: true, max: 400, every: 20ms}
+          - {name: total, at: UW102, type: u32, word_order: CDAB, writable: true, every: 20ms}
+          - {name: running, at: UB1632, writable: true, every: 20ms}
+          - {name: mode, at: UW105, labels: {0: stopped, 1: running}, writable: true, every: 20ms}
+        poll:
+          - {read: UW0, count: 5, every: 20ms}
+modbus_tcp: [{listen: "127.0.0.1:0"}]
+http: {listen: "127.0.0.1:0", anonymous: operator}
+"""
+POINT = "/api/v1/stations/press/points/"
+
+
+def until(what, patience=harness.PATIENCE):
+    """Asks again and again until it is true; each time costs a request to the program."""
+    done = threading.Event()
+    timer = threading.Timer(patience, done.set)
+    timer.start()
+    try:
+        while not done.is_set():
+            result = what()
+            if result:
+                return result
+    finally:
+        timer.cancel()
+    raise AssertionError(f"never true: {what}")
+
+
+def quality(program, point):
+    return program.get(POINT + point)[1]["quality"]
+
+
+class Points(unittest.TestCase):
+    def test_points_are_polled_written_and_shown(self):
+        with harness.configured(PRESS) as program:
+            until(lambda: quality(program, "total") == "good")
+            self.assertEqual(program.rest("PUT", POINT + "level", {"value": 21.5}),
+                             (200, {"transmitted": True, "confirmed": True}))
+            level = until(lambda: (lambda p: p if p["value"] == 21.5 else None)(
+                program.get(POINT + "level")[1]))
+            self.assertEqual((level["unit"], level["quality"], level["at"]),
+                             ("celsius", "good", "UW100"))
+            self.assertEqual(program.values("/api/v1/stations/press/devices/UW100"), [215])
+            self.assertEqual(program.rest("PUT", POINT + "total", {"value": 0x01020304})[0], 200)
+            self.assertEqual(program.rest("PUT", POINT + "running", {"value": True})[0], 200)
+            self.assertEqual(program.rest("PUT", POINT + "mode", {"value": "running"})[0], 200)
+            until(lambda: program.get(POINT + "mode")[1].get("label") == "running")
+            until(lambda: program.get(POINT + "total")[1]["value"] == 0x01020304)
+            until(lambda: program.get(POINT + "running")[1]["value"] is True)
+            # The same words, read as they lie: UW102 holds the low one.
+            self.assertEqual(program.values("/api/v1/stations/press/devices/UW102?count=2"),
+                             [0x0304, 0x0102])
+            metrics = program.get("/metrics")[1]
+            self.assertRegex(metrics, r'panelgate_point_value\{line="floor1",station="press",'
+                                      r'point="level",unit="celsius"\} 21\.5')
+            self.assertIn('panelgate_point_age_seconds{', metrics)
+
+    def test_what_cannot_be_written_says_why(self):
+        with harness.configured(PRESS) as program:
+            for point, value, status, text in (
+                    ("level", 400.5, 422, "level must be at most 400"),
+                    ("total", -1, 422, "total must be from 0 to 4294967295"),
+                    ("mode", "walking", 422, "mode has no label 'walking'"),
+                    ("level", None, 400, "value must be"), ("pressure", 1, 404, "no point")):
+                got, body = program.rest("PUT", POINT + point, {"value": value})
+                self.assertEqual(got, status, body)
+                self.assertIn(text, body["detail"])
+
+    def test_P10_a_dead_panel_is_stale_then_absent_and_its_age_grows(self):
+        with harness.configured(PRESS) as program:
+            until(lambda: quality(program, "level") == "good")
+            program.rest("PUT", "/api/v1/simulator/press", {"dead": True})
+            until(lambda: quality(program, "level") == "stale")
+            first = program.get(POINT + "level")[1]["age_ms"]
+            self.assertNotIn("panelgate_point_value{", program.get("/metrics")[1])
+            until(lambda: program.get(POINT + "level")[1]["age_ms"] > first)
+            program.rest("PUT", "/api/v1/simulator/press", {})
+            until(lambda: quality(program, "level") == "good")
+
+    def test_P6_polled_values_answer_clients_for_max_age(self):
+        with harness.configured(PRESS) as program, program.client() as client:
+            until(lambda: 'outcome="cached"} 1' in program.get("/metrics")[1] or not
+                  client.ask(31, read_registers(0, 5)))
+            body = program.get("/api/v1/stations/press/devices/UW0?count=5")[1]
+            self.assertEqual((body["source"], body["values"]), ("cache", [10, 20, 30, 40, 50]))
+
+    def test_a_guarded_station_is_not_asked_what_its_profile_rules_out(self):
+        with harness.configured(PRESS) as program, program.client() as client:
+            self.assertEqual(client.ask(31, b"\x17\0\0\0\1\0\0\0\1\2\0\0"), b"\x97\x01")
+            self.assertEqual(client.ask(31, read_registers(0xFFF0)), b"\x83\x02")
+            self.assertEqual(client.ask(31, struct.pack(">BHHBH", 16, 0, 1, 2, 1)), b"\x90\x02")
+            sent = [frame[:6] for way, frame in program.trace("floor1", 1000) if way == "sent"]
+            self.assertNotIn(bytes([31]) + read_registers(0xFFF0), sent)
+            self.assertEqual(client.ask(31, struct.pack(">BHH", 6, 0, 1)), b"\x86\x01")
+
+    def test_one_block_in_every_type_and_order(self):
+        with harness.configured(PRESS) as program:
+            program.rest("PUT", POINT + "total", {"value": 0x01020304})
+            status, body = program.get(
+                "/api/v1/stations/press/holding-registers/102/interpretations?count=2")
+            self.assertEqual(status, 200, body)
+            shown = {(i["type"], i["word_order"]): i["values"] for i in body["interpretations"]}
+            self.assertEqual(shown["u32", "CDAB"], [str(0x01020304)])
+            self.assertEqual(shown["u32", "ABCD"], [str(0x03040102)])
+
+
+OVEN_LINE = """
+  - name: floor2
+    device: %s
+    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
+    timing: {response_timeout: 100ms}
+    stations: [{id: 20, name: oven, profile: panasonic-gt}]
+relays:
+  - {from: press/UW100, count: 8, to: oven/GDT200, every: 20ms, on_change: true}
+"""
+
+
+class Relay(unittest.TestCase):
+    def test_a_relay_over_two_lines_with_one_unplugged_meanwhile(self):
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            text = PRESS.replace("modbus_tcp:", OVEN_LINE.strip("\n") % link + "\nmodbus_tcp:")
+            with contextlib.ExitStack() as stack:
+                oven = RtuBus(link, {20: echo_address})
+                program = stack.enter_context(harness.configured(text))
+                client = stack.enter_context(program.client())
+                with oven:
+                    self.assertEqual(program.rest("PUT", POINT + "level", {"value": 30})[0], 200)
+                    until(lambda: any(struct.pack(">HH", 300, 0) in f.bytes
+                                      for f in oven.frames(20)))
+                    writes = [f.bytes for f in oven.frames(20) if f.bytes[1] == 16]
+                    self.assertEqual(writes[-1][2:6], struct.pack(">HH", 200, 8))
+                    self.assertEqual(len(writes), len(set(writes)), "on change only")
+                # Unplugged: the relay says so, the press is as before.
+                relay = until(lambda: (lambda r: r if r["state"].startswith("target failing") else
+                                       None)(program.get("/api/v1/relays")[1]["relays"][0]))
+                self.assertEqual(relay["name"], "press/UW100 to oven/GDT200")
+                self.assertEqual(client.ask(31, read_registers(0))[0], 3)
+                until(lambda: quality(program, "level") == "good")
+                self.assertRegex(program.get("/metrics")[1], r"panelgate_relay_up\{relay=.*\} 0")
+                program.log.wait_for("relay.*state=\"?target failing")
+                # Back again: what is there now is written, though nothing has changed.
+                with RtuBus(link, {20: echo_address}) as again:
+                    again.wait_for(1, 20)
+                    until(lambda: program.get("/api/v1/relays")[1]["relays"][0]["state"] == "ok")
+                    self.assertIsNotNone(re.search(r"panelgate_relay_up\{relay=.*\} 1",
+                                                   program.get("/metrics")[1]))
+
+
+if __name__ == "__main__":
+    unittest.main()
