@@ -9,6 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "text.hpp"
+
 namespace panelgate::points {
 namespace {
 
@@ -94,22 +96,46 @@ std::optional<Raw> raw_of(Type type, std::uint64_t bits) {
 
 bool is_plain(const Point& point) { return point.scale == 1 && point.offset == 0; }
 
+/// n when the scale is 1/n. Dividing by n gives the double nearest to the decimal number, 0.3;
+/// multiplying by 0.1 gives 0.30000000000000004.
+std::optional<double> divisor_of(double scale) {
+    const double inverse = std::round(1 / scale);
+    if (std::abs(scale) >= 1 || 1 / inverse != scale) return std::nullopt;
+    return inverse;
+}
+
+double from_raw(const Point& point, double raw) {
+    const auto divisor = divisor_of(point.scale);
+    return (divisor ? raw / *divisor : raw * point.scale) + point.offset;
+}
+
+double to_raw(const Point& point, double value) {
+    const auto divisor = divisor_of(point.scale);
+    return divisor ? (value - point.offset) * *divisor : (value - point.offset) / point.scale;
+}
+
+/// As many low bits count as the type has: -1 and 65535 are the same u16.
+bool means_none(const Point& point, std::uint64_t number) {
+    const unsigned unused = 64 - 16 * registers_of(point.type);
+    return std::ranges::any_of(point.no_value, [&](std::int64_t none) {
+        return (static_cast<std::uint64_t>(none) ^ number) << unused == 0;
+    });
+}
+
+bool means_none(const Point& point, double number) {
+    return std::ranges::any_of(
+        point.no_value, [&](std::int64_t none) { return static_cast<double>(none) == number; });
+}
+
 std::optional<Value> scaled(const Point& point, double raw) {
-    const double value = raw * point.scale + point.offset;
+    const double value = from_raw(point, raw);
     if (!std::isfinite(value)) return std::nullopt;
     return Value(value);
 }
 
-std::string text_of(const Words& words) {
-    std::string text;
-    for (const std::uint16_t word : words) {
-        text.push_back(static_cast<char>(word >> 8));
-        text.push_back(static_cast<char>(word & 0xFF));
-    }
-    const std::size_t end = text.find('\0');
-    if (end != text.npos) text.resize(end);
-    while (!text.empty() && text.back() == ' ') text.pop_back();
-    return text;
+std::optional<Value> decode_float(const Point& point, double raw) {
+    if (means_none(point, raw)) return std::nullopt;
+    return scaled(point, raw);
 }
 
 std::string number_text(double value) {
@@ -155,6 +181,22 @@ Limits limits_of(Type type) {
     std::abort();
 }
 
+std::string range_text(const Point& point) {
+    const Limits limits = limits_of(point.type);
+    std::string low = number_text(from_raw(point, limits.low));
+    std::string high = number_text(from_raw(point, limits.high));
+    if (point.scale < 0) std::swap(low, high);
+    if (is_plain(point) && point.type == Type::u64) high = "18446744073709551615";
+    if (is_plain(point) && point.type == Type::i64) {
+        low = "-9223372036854775808";
+        high = "9223372036854775807";
+    }
+    std::string type(label(point.type));
+    if (point.scale != 1) type += ", scale " + number_text(point.scale);
+    if (point.offset != 0) type += ", offset " + number_text(point.offset);
+    return low + " to " + high + " (" + type + ')';
+}
+
 std::uint64_t bits_of(Type type, double raw) {
     if (type == Type::f32) return std::bit_cast<std::uint32_t>(static_cast<float>(raw));
     if (type == Type::f64) return std::bit_cast<std::uint64_t>(raw);
@@ -191,12 +233,9 @@ Encoded<Words> encode_text(const Point& point, const std::string& text) {
         return refusal(point.name + " holds " + std::to_string(point.length) + " characters, not " +
                        std::to_string(text.size()));
     }
-    Words words(point.count());
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        const auto byte = static_cast<std::uint8_t>(text[i]);
-        words[i / 2] = static_cast<std::uint16_t>(words[i / 2] | (i % 2 == 0 ? byte << 8 : byte));
-    }
-    return reordered(words, point.word_order, true);
+    if (text.find('\0') != text.npos)
+        return refusal(point.name + " takes no text with a NUL: it would end there");
+    return reordered(text_to_words(text, point.count()), point.word_order, true);
 }
 
 /// The raw value behind a label.
@@ -207,26 +246,60 @@ std::optional<std::int64_t> raw_of_label(const Point& point, const std::string& 
     return std::nullopt;
 }
 
-/// `exact`: the raw number is known and fits; a double may not hold it.
-Encoded<double> checked_raw(const Point& point, double value, bool exact) {
-    if (!std::isfinite(value)) return refusal(point.name + " takes finite numbers only");
-    const double low = point.min.value_or(-std::numeric_limits<double>::infinity());
-    const double high = point.max.value_or(std::numeric_limits<double>::infinity());
-    if (value < low || value > high) {
-        const std::string range = point.min && point.max
-                                      ? "from " + number_text(low) + " to " + number_text(high)
-                                  : point.min ? "at least " + number_text(low)
-                                              : "at most " + number_text(high);
-        return refusal(point.name + " must be " + range + ", not " + number_text(value));
-    }
-    double raw = (value - point.offset) / point.scale;
-    if (is_integer(point.type) || point.type == Type::boolean) raw = std::round(raw);
+/// "; its labels are stopped, running"
+std::string labels_of(const Point& point) {
+    std::string list;
+    for (const auto& [raw, name] : point.labels)
+        list += (list.empty() ? "; its labels are " : ", ") + name;
+    return list;
+}
+
+std::optional<WriteRefusal> judge_limits(const Point& point, double number, const Value& value) {
+    const bool below = point.min && number < *point.min;
+    const bool above = point.max && number > *point.max;
+    if (!below && !above) return std::nullopt;
+    std::string range = point.min ? "at least " + number_text(*point.min)
+                                  : "at most " + number_text(point.max.value_or(0));
+    if (point.min && point.max)
+        range = "from " + number_text(*point.min) + " to " + number_text(*point.max);
+    return refusal(point.name + " must be " + range + ", not " + to_string(value));
+}
+
+/// The raw value, rounded where the type is whole. `exact`: it is known and fits, a double may not
+/// hold it.
+Encoded<double> checked_raw(const Point& point, const Value& value, bool exact) {
+    const double number = *number_of(value);
+    if (!std::isfinite(number)) return refusal(point.name + " takes finite numbers only");
+    if (auto refused = judge_limits(point, number, value)) return std::move(*refused);
+    double raw = to_raw(point, number);
+    if (is_integer(point.type)) raw = std::round(raw);
     const Limits limits = limits_of(point.type);
-    if (!exact && (raw < limits.low || raw > limits.high)) {
-        return refusal(number_text(value) + " does not fit " + point.name + ", which is " +
-                       std::string(label(point.type)));
+    if (!exact && !(raw >= limits.low && raw <= limits.high)) {
+        return refusal(point.name + " must be from " + range_text(point) + ", not " +
+                       to_string(value));
     }
     return raw;
+}
+
+Encoded<Words> encode_bit(const Point& point, const Value& value) {
+    const double number = *number_of(value);
+    if (number == 0 || number == 1) return Words{static_cast<std::uint16_t>(number)};
+    return refusal(point.name + " takes true or false, not " + to_string(value));
+}
+
+Encoded<Words> encode_number(const Point& point, const Value& value) {
+    const auto exact = exact_bits(point, value);
+    const auto raw = checked_raw(point, value, exact.has_value());
+    if (!raw) return raw.error();
+    const std::uint64_t bits = exact ? *exact : bits_of(point.type, *raw);
+    const bool is_bcd = point.type == Type::bcd16 || point.type == Type::bcd32;
+    const bool none = is_integer(point.type) && !is_bcd ? means_none(point, bits)
+                      : point.type == Type::f32
+                          ? means_none(point, static_cast<double>(static_cast<float>(*raw)))
+                          : means_none(point, *raw);
+    if (none)
+        return refusal(point.name + " cannot be " + to_string(value) + ": that means no value");
+    return reordered(parted(bits, point.count()), point.word_order, false);
 }
 
 }  // namespace
@@ -241,13 +314,13 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
     if (point.bit) return Value((items[0] >> *point.bit & 1) != 0);
     const Words words =
         reordered(items.first(point.count()), point.word_order, point.type == Type::string);
-    if (point.type == Type::string) return Value(text_of(words));
+    if (point.type == Type::string) return Value(text_of_words(words, point.length));
     const std::uint64_t bits = joined(words);
     if (point.type == Type::f32)
-        return scaled(point, std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
-    if (point.type == Type::f64) return scaled(point, std::bit_cast<double>(bits));
+        return decode_float(point, std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
+    if (point.type == Type::f64) return decode_float(point, std::bit_cast<double>(bits));
     const auto raw = raw_of(point.type, bits);
-    if (!raw || std::ranges::count(point.no_value, raw->number) > 0) return std::nullopt;
+    if (!raw || means_none(point, static_cast<std::uint64_t>(raw->number))) return std::nullopt;
     if (point.type == Type::boolean) return Value(raw->number != 0);
     if (!is_plain(point)) {
         return scaled(point, raw->is_unsigned ? static_cast<double>(raw->large)
@@ -273,19 +346,17 @@ Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& valu
         if (text == nullptr) return refusal(point.name + " takes a text");
         return encode_text(point, *text);
     }
+    Value given = value;
     if (text != nullptr) {
         const auto raw = raw_of_label(point, *text);
-        if (!raw) return refusal(point.name + " has no label '" + *text + '\'');
-        return reordered(parted(static_cast<std::uint64_t>(*raw), point.count()), point.word_order,
-                         false);
+        if (!raw) return refusal(point.name + " has no label '" + *text + '\'' + labels_of(point));
+        given = *raw;  // raw, so it has to become a value first where there is a scale
+        if (!is_plain(point)) given = from_raw(point, static_cast<double>(*raw));
     }
-    const auto exact = exact_bits(point, value);
-    const auto raw = checked_raw(point, *number_of(value), exact.has_value());
-    if (!raw) return raw.error();
-    if (modbus::is_bit_table(point.table) || point.bit)
-        return Words{static_cast<std::uint16_t>(*raw != 0 ? 1 : 0)};
-    const std::uint64_t bits = exact ? *exact : bits_of(point.type, *raw);
-    return reordered(parted(bits, point.count()), point.word_order, false);
+    if (point.type == Type::boolean) return encode_bit(point, given);
+    if (std::holds_alternative<bool>(given))
+        return refusal(point.name + " takes a number, not " + to_string(given));
+    return encode_number(point, given);
 }
 
 std::string to_string(const Value& value) {

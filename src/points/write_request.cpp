@@ -12,10 +12,14 @@ bool has(const profile::PanelProfile& profile, std::uint8_t function) {
     return profile.functions.empty() || profile.find_function(function) != nullptr;
 }
 
-Encoded<Bytes> write_coil(const profile::PanelProfile& profile, std::uint16_t address, bool on) {
+bool writes_coils(const profile::PanelProfile& profile) {
+    return has(profile, modbus::kWriteSingleCoil) || has(profile, modbus::kWriteMultipleCoils);
+}
+
+/// The panel has one of the two functions.
+Bytes write_coil(const profile::PanelProfile& profile, std::uint16_t address, bool on) {
     if (has(profile, modbus::kWriteSingleCoil)) return modbus::encode_write_coil(address, on);
-    if (has(profile, modbus::kWriteMultipleCoils)) return modbus::encode_write_coils(address, {on});
-    return refusal(profile.name + " has no function that writes coils");
+    return modbus::encode_write_coils(address, {on});
 }
 
 /// The panel's own view of this word's bits, when it can be written (Autonics UB over UW).
@@ -25,50 +29,74 @@ const profile::Area* bit_view(const profile::PanelProfile& profile, const Point&
     const std::uint32_t bit = point.address * 16u + *point.bit;
     for (const profile::Area& area : profile.areas) {
         if (area.view_of == words->name && area.table == modbus::Table::coils && area.writable &&
-            area.writable->contains(bit)) {
+            area.writable->contains(bit) && writes_coils(profile)) {
             return &area;
         }
     }
     return nullptr;
 }
 
-Encoded<Bytes> write_bit(const profile::PanelProfile& profile, const Point& point, bool on) {
+/// The panel has one of the two ways.
+Bytes write_bit(const profile::PanelProfile& profile, const Point& point, bool on) {
     if (bit_view(profile, point) != nullptr) {
         const auto coil = static_cast<std::uint16_t>(point.address * 16u + *point.bit);
         return write_coil(profile, coil, on);
     }
-    if (has(profile, modbus::kMaskWriteRegister)) {
-        const unsigned mask = 1u << *point.bit;
-        return Writer()
-            .u8(modbus::kMaskWriteRegister)
-            .u16(point.address)
-            .u16(~mask & 0xFFFFu)
-            .u16(on ? mask : 0)
-            .take();
-    }
-    return refusal(profile.name + " can write no single bit of " + point.at +
-                   ": it has neither function 22 nor a bit view of it, and reading, changing and "
-                   "writing the word would undo what changes in between");
+    const unsigned mask = 1u << *point.bit;
+    return Writer()
+        .u8(modbus::kMaskWriteRegister)
+        .u16(point.address)
+        .u16(~mask & 0xFFFFu)
+        .u16(on ? mask : 0)
+        .take();
+}
+
+std::optional<std::string> why_no_bit(const profile::PanelProfile& profile, const Point& point) {
+    if (bit_view(profile, point) != nullptr) return std::nullopt;
+    if (has(profile, modbus::kMaskWriteRegister)) return std::nullopt;
+    return profile.name + " can write no single bit of " + point.at +
+           ": it has neither function 22 nor a bit view of it, and reading, changing and writing "
+           "the word would undo what changes in between";
+}
+
+std::optional<std::string> why_no_registers(const profile::PanelProfile& profile, unsigned count) {
+    if (count == 1 && has(profile, modbus::kWriteSingleRegister)) return std::nullopt;
+    const bool several = has(profile, modbus::kWriteMultipleRegisters);
+    const unsigned most = several ? profile.max_count(modbus::kWriteMultipleRegisters) : 0;
+    if (count <= most) return std::nullopt;
+    if (several)
+        return profile.name + " takes at most " + std::to_string(most) +
+               " registers in one write, not " + std::to_string(count);
+    return profile.name + " has no function that writes " + std::to_string(count) +
+           (count == 1 ? " register" : " registers at once");
 }
 
 }  // namespace
 
+std::optional<std::string> why_unwritable(const profile::PanelProfile& profile,
+                                          const Point& point) {
+    if (point.table == modbus::Table::coils) {
+        if (writes_coils(profile)) return std::nullopt;
+        return profile.name + " has no function that writes coils";
+    }
+    if (point.table != modbus::Table::holding_registers)
+        return point.at + " is in a table that cannot be written";
+    if (point.bit) return why_no_bit(profile, point);
+    return why_no_registers(profile, point.count());
+}
+
 Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& point,
                              const Value& value) {
     if (!point.writable) return refusal(point.name + " is not writable");
+    if (auto why = why_unwritable(profile, point)) return refusal(std::move(*why));
     const auto items = encode(point, value);
     if (!items) return items.error();
     if (point.table == modbus::Table::coils)
         return write_coil(profile, point.address, items->front() != 0);
-    if (point.table != modbus::Table::holding_registers)
-        return refusal(point.at + " is in a table that cannot be written");
     if (point.bit) return write_bit(profile, point, items->front() != 0);
     if (items->size() == 1 && has(profile, modbus::kWriteSingleRegister))
         return modbus::encode_write_register(point.address, items->front());
-    if (has(profile, modbus::kWriteMultipleRegisters))
-        return modbus::encode_write_registers(point.address, *items);
-    return refusal(profile.name + " has no function that writes " + std::to_string(items->size()) +
-                   " registers at once");
+    return modbus::encode_write_registers(point.address, *items);
 }
 
 std::vector<Interpretation> interpretations(std::span<const std::uint16_t> registers) {

@@ -10,6 +10,10 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
 
+namespace panelgate::profile {
+struct PanelProfile;
+}
+
 namespace panelgate::points {
 
 /// How the registers of a point are to be understood.
@@ -69,5 +73,9 @@ struct Point {
     /// Items of the table: bits or registers.
     unsigned count() const;
 };
+
+/// Why no request of this panel could write the point, whatever the value: one sentence for the
+/// user. Nothing when there is a way. Whether the area is writable is not asked.
+std::optional<std::string> why_unwritable(const profile::PanelProfile& profile, const Point& point);
 
 }  // namespace panelgate::points

@@ -139,8 +139,8 @@ TEST(Value, WhatDoesNotFitIsRefusedWithTheRange) {
         return encoded ? std::string("accepted") : encoded.error().message;
     };
     Point point = point_of(Type::u16);
-    EXPECT_EQ(refused(point, std::int64_t{65536}), "65536 does not fit x, which is u16");
-    EXPECT_EQ(refused(point, std::int64_t{-1}), "-1 does not fit x, which is u16");
+    EXPECT_EQ(refused(point, std::int64_t{65536}), "x must be from 0 to 65535 (u16), not 65536");
+    EXPECT_EQ(refused(point, std::int64_t{-1}), "x must be from 0 to 65535 (u16), not -1");
     EXPECT_EQ(refused(point, std::numeric_limits<double>::quiet_NaN()),
               "x takes finite numbers only");
     EXPECT_EQ(refused(point, std::string("on")), "x has no label 'on'");
@@ -150,11 +150,12 @@ TEST(Value, WhatDoesNotFitIsRefusedWithTheRange) {
     point.max.reset();
     EXPECT_EQ(refused(point, -0.5), "x must be at least 0, not -0.5");
     EXPECT_EQ(refused(point_of(Type::bcd16), std::int64_t{10000}),
-              "10000 does not fit x, which is bcd16");
+              "x must be from 0 to 9999 (bcd16), not 10000");
     EXPECT_EQ(refused(point_of(Type::string), std::string("ABCDEFG")),
               "x holds 6 characters, not 7");
     EXPECT_EQ(refused(point_of(Type::string), true), "x takes a text");
-    EXPECT_EQ(refused(point_of(Type::f32), 1e39), "1e+39 does not fit x, which is f32");
+    EXPECT_EQ(refused(point_of(Type::f32), 1e39),
+              "x must be from -3.4028234663852886e+38 to 3.4028234663852886e+38 (f32), not 1e+39");
 }
 
 TEST(Value, LabelsNameRawValues) {

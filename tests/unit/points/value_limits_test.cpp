@@ -1,0 +1,231 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "panelgate/points/value.hpp"
+#include "panelgate/profile/load_profile.hpp"
+
+namespace panelgate::points {
+namespace {
+
+using Words = std::vector<std::uint16_t>;
+
+Point point_of(Type type, WordOrder order = WordOrder::abcd) {
+    Point point;
+    point.name = "x";
+    point.at = "R20";
+    point.address = 20;
+    point.type = type;
+    point.word_order = order;
+    point.writable = true;
+    if (type == Type::string) point.length = 5;
+    return point;
+}
+
+std::string refused(const Point& point, const Value& value) {
+    const auto encoded = encode(point, value);
+    return encoded ? "accepted" : encoded.error().message;
+}
+
+constexpr std::uint64_t kMostU64 = std::numeric_limits<std::uint64_t>::max();
+constexpr std::int64_t kLeastI64 = std::numeric_limits<std::int64_t>::min();
+
+TEST(Value, ALabelIsHeldAgainstTheSameLimitsAsItsNumber) {
+    Point point = point_of(Type::u16);
+    point.labels = {{1, "one"}, {70000, "much"}};
+    EXPECT_EQ(refused(point, std::string("much")), "x must be from 0 to 65535 (u16), not 70000");
+    EXPECT_EQ(refused(point, std::string("two")), "x has no label 'two'; its labels are one, much");
+    point.max = 0;
+    EXPECT_EQ(refused(point, std::string("one")), "x must be at most 0, not 1");
+}
+
+TEST(Value, ALabelStandsForTheRawNumberAlsoOfBcdAndWithAScale) {
+    Point point = point_of(Type::bcd16);
+    point.labels = {{25, "quarter"}};
+    EXPECT_EQ(*encode(point, std::string("quarter")), Words{0x0025});
+    point = point_of(Type::u16);
+    point.scale = 0.1;
+    point.labels = {{25, "quarter"}};
+    EXPECT_EQ(*encode(point, std::string("quarter")), Words{25});
+}
+
+TEST(Value, NoValueCountsTheBitsOfTheType) {
+    Point point = point_of(Type::u16);
+    point.no_value = {-1};
+    EXPECT_FALSE(decode(point, Words{0xFFFF}));
+    EXPECT_TRUE(decode(point, Words{0xFFFE}));
+    point = point_of(Type::i16);
+    point.no_value = {65535, 32768};
+    EXPECT_FALSE(decode(point, Words{0xFFFF}));
+    EXPECT_FALSE(decode(point, Words{0x8000}));
+    point = point_of(Type::u64);
+    point.no_value = {-1};
+    EXPECT_FALSE(decode(point, Words{0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF}));
+    EXPECT_TRUE(decode(point, Words{0, 0, 0, 0xFFFF}));
+}
+
+TEST(Value, NoValueOfAFloatIsItsNumberBeforeTheScale) {
+    Point point = point_of(Type::f32);
+    point.scale = 2;
+    point.no_value = {-9999};
+    EXPECT_FALSE(decode(point, Words{0xC61C, 0x3C00}));
+    EXPECT_EQ(decode(point, Words{0xC61C, 0x4000}), Value(-20000.0));
+}
+
+TEST(Value, WhatMeansNoValueCannotBeWritten) {
+    Point point = point_of(Type::u16);
+    point.no_value = {-1};
+    EXPECT_EQ(refused(point, std::int64_t{65535}), "x cannot be 65535: that means no value");
+    EXPECT_EQ(refused(point, std::int64_t{65534}), "accepted");
+    point = point_of(Type::f32);
+    point.no_value = {-9999};
+    EXPECT_EQ(refused(point, -9999.0), "x cannot be -9999: that means no value");
+    point = point_of(Type::bcd16);
+    point.no_value = {9999};
+    EXPECT_FALSE(decode(point, Words{0x9999}));
+    EXPECT_EQ(refused(point, std::int64_t{9999}), "x cannot be 9999: that means no value");
+}
+
+TEST(Value, ADecimalScaleGivesTheNearestDecimalNumber) {
+    Point point = point_of(Type::i16);
+    point.scale = 0.1;
+    EXPECT_EQ(decode(point, Words{3}), Value(0.3)) << "not 0.30000000000000004";
+    point.scale = 0.01;
+    for (int raw = -32768; raw <= 32767; ++raw) {
+        const auto value = std::get<double>(*decode(point, Words{static_cast<std::uint16_t>(raw)}));
+        ASSERT_EQ(value, std::stod(std::to_string(raw) + "e-2"));
+    }
+}
+
+TEST(Value, SixtyFourBitsAreExactUpToTheirEnds) {
+    const Point wide = point_of(Type::u64);
+    EXPECT_EQ(*encode(wide, kMostU64), (Words{0xFFFF, 0xFFFF, 0xFFFF, 0xFFFF}));
+    EXPECT_EQ(decode(wide, *encode(wide, kMostU64)), Value(kMostU64));
+    EXPECT_EQ(refused(wide, std::int64_t{-1}),
+              "x must be from 0 to 18446744073709551615 (u64), not -1");
+    EXPECT_NE(refused(wide, 18446744073709551616.0), "accepted");
+    const Point narrow = point_of(Type::i64);
+    EXPECT_EQ(*encode(narrow, kLeastI64), (Words{0x8000, 0, 0, 0}));
+    EXPECT_EQ(refused(narrow, std::uint64_t{1} << 63),
+              "x must be from -9223372036854775808 to 9223372036854775807 (i64), not "
+              "9223372036854775808");
+    EXPECT_NE(refused(narrow, 9223372036854775808.0), "accepted");
+}
+
+TEST(Value, TheRangeIsToldInTheUnitOfTheValue) {
+    Point point = point_of(Type::i16);
+    point.scale = 0.1;
+    EXPECT_EQ(refused(point, std::int64_t{4000}),
+              "x must be from -3276.8 to 3276.7 (i16, scale 0.1), not 4000");
+    point.scale = -2;
+    point.offset = 10;
+    EXPECT_EQ(refused(point, std::int64_t{70000}),
+              "x must be from -65524 to 65546 (i16, scale -2, offset 10), not 70000");
+}
+
+TEST(Value, TypesAreNotMixed) {
+    EXPECT_EQ(refused(point_of(Type::u16), true), "x takes a number, not true");
+    EXPECT_EQ(refused(point_of(Type::f64), std::numeric_limits<double>::infinity()),
+              "x takes finite numbers only");
+    Point bit = point_of(Type::boolean);
+    bit.bit = 3;
+    EXPECT_EQ(refused(bit, 0.4), "x takes true or false, not 0.4");
+    EXPECT_EQ(refused(bit, std::int64_t{2}), "x takes true or false, not 2");
+    EXPECT_EQ(*encode(bit, std::int64_t{1}), Words{1});
+    EXPECT_EQ(*encode(bit, 0.0), Words{0});
+}
+
+TEST(Value, ATextIsAlwaysUtf8) {
+    const Point point = point_of(Type::string);
+    EXPECT_EQ(decode(point, Words{0xFF41, 0x4200, 0}), Value(std::string("\xEF\xBF\xBD"
+                                                                         "AB")));
+    EXPECT_EQ(decode(point, Words{0xC3A9, 0xE282, 0xAC00}),
+              Value(std::string("\xC3\xA9\xE2\x82\xAC")));
+    EXPECT_EQ(decode(point, Words{0xC080, 0x4100, 0}), Value(std::string("\xEF\xBF\xBD\xEF\xBF\xBD"
+                                                                         "A")))
+        << "an overlong NUL";
+    EXPECT_EQ(decode(point, Words{0xE282, 0, 0}), Value(std::string("\xEF\xBF\xBD\xEF\xBF\xBD")))
+        << "cut off";
+}
+
+TEST(Value, ATextEndsAtItsLengthItsFirstNulAndBeforeItsPadding) {
+    const Point point = point_of(Type::string);
+    EXPECT_EQ(decode(point, Words{0x4142, 0x4344, 0x4546}), Value(std::string("ABCDE")));
+    EXPECT_EQ(decode(point, Words{0x4142, 0x0044, 0x4500}), Value(std::string("AB")));
+    EXPECT_EQ(decode(point, Words{0x4120, 0x2020, 0x2020}), Value(std::string("A")));
+    EXPECT_EQ(decode(point, Words{0, 0, 0}), Value(std::string()));
+    EXPECT_EQ(refused(point, std::string("a\0b", 3)),
+              "x takes no text with a NUL: it would end there");
+}
+
+TEST(Value, TextsRoundTripInEveryOrder) {
+    std::mt19937_64 random(11);
+    for (const WordOrder order : kOrders) {
+        Point point = point_of(Type::string, order);
+        for (int i = 0; i < 500; ++i) {
+            point.length = 1 + static_cast<unsigned>(random() % 40);
+            std::string text(random() % (point.length + 1), ' ');
+            for (char& c : text) c = static_cast<char>('!' + random() % 90);
+            const auto words = encode(point, text);
+            ASSERT_TRUE(words.has_value());
+            ASSERT_EQ(words->size(), (point.length + 1) / 2);
+            ASSERT_EQ(decode(point, *words), Value(text));
+        }
+    }
+}
+
+TEST(Value, ScaledValuesRoundTripForEveryWholeTypeAndOrder) {
+    std::mt19937_64 random(5);
+    for (const Type type : {Type::u16, Type::i16, Type::u32, Type::i32, Type::bcd16, Type::bcd32}) {
+        for (const WordOrder order : kOrders) {
+            Point point = point_of(type, order);
+            for (const double scale : {0.001, 0.1, 0.3, 1.0, 7.5, -0.25, -4.0}) {
+                point.scale = scale;
+                point.offset = static_cast<double>(random() % 2001) / 8 - 125;
+                for (int i = 0; i < 200; ++i) {
+                    Words words(point.count());
+                    for (auto& word : words) word = static_cast<std::uint16_t>(random());
+                    const auto value = decode(point, words);
+                    if (!value) continue;  // no BCD
+                    ASSERT_EQ(*encode(point, *value), words) << label(type) << " scale " << scale;
+                }
+            }
+        }
+    }
+}
+
+TEST(WriteRequest, ATextLongerThanOneWriteIsRefusedAndNotCut) {
+    const profile::Catalogue shipped = profile::Catalogue::shipped();
+    Point point = point_of(Type::string);
+    point.length = 248;
+    const auto refused = write_request(*shipped.find("generic"), point, std::string("a"));
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_EQ(refused.error().message, "generic takes at most 123 registers in one write, not 124");
+    EXPECT_EQ(why_unwritable(*shipped.find("generic"), point), refused.error().message);
+    EXPECT_EQ(why_unwritable(*shipped.find("panasonic-gt"), point), std::nullopt);
+    point.length = 246;
+    EXPECT_TRUE(write_request(*shipped.find("generic"), point, std::string("a")).has_value());
+}
+
+TEST(WriteRequest, APanelWithoutTheFunctionIsToldBeforeAnythingIsWritten) {
+    profile::PanelProfile panel;
+    panel.name = "reader";
+    for (const std::uint8_t code : {modbus::kReadHoldingRegisters, modbus::kWriteSingleRegister}) {
+        profile::FunctionRule rule;
+        rule.code = code;
+        panel.functions.push_back(rule);
+    }
+    EXPECT_EQ(why_unwritable(panel, point_of(Type::u16)), std::nullopt);
+    EXPECT_EQ(why_unwritable(panel, point_of(Type::f32)),
+              "reader has no function that writes 2 registers at once");
+    Point coil = point_of(Type::boolean);
+    coil.table = modbus::Table::coils;
+    EXPECT_EQ(why_unwritable(panel, coil), "reader has no function that writes coils");
+    coil.table = modbus::Table::discrete_inputs;
+    EXPECT_EQ(why_unwritable(panel, coil), "R20 is in a table that cannot be written");
+}
+
+}  // namespace
+}  // namespace panelgate::points
