@@ -13,6 +13,7 @@
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/event_text.hpp"
 
 namespace panelgate::app {
 
@@ -44,6 +45,25 @@ std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bu
         return wrong;
     };
     return std::make_shared<const web::SimulatedPanel>(std::move(panel));
+}
+
+void publish(web::EventHub& hub, const std::string& line,
+             const std::map<std::uint8_t, std::string>& names, const bus::BusEvent& event) {
+    if (hub.is_idle()) return;
+    const auto named = names.find(event.station);
+    const std::string station = event.station == 0     ? ""
+                                : named != names.end() ? named->second
+                                                       : std::to_string(event.station);
+    switch (event.kind) {
+        case bus::BusEvent::Kind::line:
+            return hub.publish("line", web::line_event(line, event.what, event.why));
+        case bus::BusEvent::Kind::station:
+            return hub.publish("station", web::station_event(line, station, event.what));
+        case bus::BusEvent::Kind::transaction:
+            return hub.publish("transaction", web::transaction_event(line, station, event.function,
+                                                                     event.what, event.took));
+    }
+    std::abort();
 }
 
 /// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
@@ -102,6 +122,9 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         if (station.guard) settings.guards[station.id] = guard_of(*station.profile);
     }
 
+    settings.observe = [this, name = line.name, names = settings.stations](
+                           const bus::BusEvent& event) { publish(events_, name, names, event); };
+
     line::Settings device = line.device;
     const bool simulates = simulate || line.kind == config::Line::Kind::simulated;
     if (simulates) {
@@ -155,11 +178,29 @@ void Gateway::add_points(const config::Line& line, bus::Bus& bus) {
     }
     if (polled.empty()) return;
     pollers_.push_back(std::make_unique<points::Poller>(executor_, bus, std::move(polled)));
+    pollers_.back()->on_update(
+        [this, first = points_.size()](std::size_t station, const auto& wants) {
+            publish_points(first, wants, station);
+        });
     for (std::size_t i = 0; i < configured.size(); ++i) {
         points_.emplace_back(configured[i]->points, pollers_.back()->station(i));
         for (web::StationEntry& entry : directory_.stations) {
             if (entry.name == configured[i]->name) entry.points = &points_.back();
         }
+    }
+}
+
+/// What the points that these wants are have become. `first`: of the poller's stations in points_.
+void Gateway::publish_points(std::size_t first, const std::vector<std::size_t>& wants,
+                             std::size_t station) {
+    if (events_.is_idle()) return;
+    const points::StationPoints& points = points_[first + station];
+    const auto entry = std::ranges::find(directory_.stations, &points, &web::StationEntry::points);
+    const TimePoint now = rt::now();
+    for (const std::size_t want : wants) {
+        if (want >= points.points().size()) continue;  // a poll block
+        const points::Point& point = points.points()[want];
+        events_.publish("point", web::point_event(*entry, point, points.read(point, now)));
     }
 }
 
@@ -214,6 +255,7 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.ready = [this] { return ready_; };
     providers.version = PANELGATE_VERSION;
     providers.now = rt::now;
+    providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }
@@ -241,6 +283,7 @@ void Gateway::start() {
 
 void Gateway::stop_accepting() {
     ready_ = false;
+    events_.end();
     open_listeners_ = listeners_.size();
     for (const auto& listener : listeners_) {
         listener->stop([this] { --open_listeners_; });

@@ -48,6 +48,8 @@ class Gateway {
     void add_http(const web::Settings& settings);
     void add_points(const config::Line& line, bus::Bus& bus);
     void add_relays();
+    void publish_points(std::size_t first, const std::vector<std::size_t>& wants,
+                        std::size_t station);
     std::vector<points::PointSample> point_samples() const;
     std::vector<points::RelaySample> relay_samples() const;
     std::string metrics_text() const;
@@ -60,6 +62,7 @@ class Gateway {
     std::deque<points::StationPoints> points_;  ///< referred to by the directory
     std::unique_ptr<points::Relays> relays_;
     std::vector<tcp_server::LineInfo> lines_;
+    web::EventHub events_;
     web::Directory directory_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
     std::unique_ptr<web::Server> http_;

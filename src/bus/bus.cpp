@@ -21,6 +21,24 @@ namespace asio = boost::asio;
 
 namespace {
 constexpr auto kRefusalPause = 1ms;
+
+std::string_view label(arbiter::StationEvent::Kind kind) {
+    switch (kind) {
+        case arbiter::StationEvent::Kind::offline:
+            return "offline";
+        case arbiter::StationEvent::Kind::online:
+            return "online";
+        case arbiter::StationEvent::Kind::late:
+            return "late";
+        case arbiter::StationEvent::Kind::drift:
+            return "drift";
+        case arbiter::StationEvent::Kind::collision:
+            return "collision";
+        case arbiter::StationEvent::Kind::echo:
+            return "echo";
+    }
+    std::abort();
+}
 }  // namespace
 
 ClientId next_client_id() {
@@ -67,6 +85,9 @@ struct Bus::State final : public line::Line::Events,
     void arm();
     void on_alarm();
     void answer(Pending pending, Answer answer);
+    void observe(const BusEvent& event) const {
+        if (settings.observe) settings.observe(event);
+    }
     void answer_soon(std::function<void()> hand_over);
 
     Settings settings;
@@ -91,6 +112,7 @@ struct Bus::State final : public line::Line::Events,
 void Bus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
+    observe({BusEvent::Kind::line, "up", {}, 0, 0, {}});
     arbiter.on_line_up(rt::now());
     pump();
 }
@@ -99,6 +121,7 @@ void Bus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
+    observe({BusEvent::Kind::line, "down", why, 0, 0, {}});
     arbiter.on_line_down(rt::now());
     pump();
 }
@@ -219,6 +242,7 @@ void Bus::State::act(arbiter::StationEvent& event) {
             rt::log(level, what, {{"line", settings.name}, {"station", station}, {"hint", hint}});
         }
     };
+    observe({BusEvent::Kind::station, label(event.kind), {}, event.station, 0, {}});
     switch (event.kind) {
         case arbiter::StationEvent::Kind::offline:
             return say(rt::LogLevel::warn, "station offline", "");
@@ -263,7 +287,12 @@ void Bus::State::on_alarm() {
 
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
-    counters.count(entry.station, entry.function, result, rt::now() - entry.arrived);
+    const Duration took = rt::now() - entry.arrived;
+    counters.count(entry.station, entry.function, result, took);
+    if (settings.observe) {
+        const std::string outcome = outcome_of(result);
+        observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
+    }
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
     const bool refused = !result.transmitted && result.source == Source::bus;

@@ -10,14 +10,14 @@ std::string function_label(std::uint8_t function) {
     return modbus::is_known(function) ? std::to_string(function) : "other";
 }
 
+}  // namespace
+
 std::string outcome_of(const Answer& answer) {
     if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
     if (modbus::exception_of(*answer.pdu)) return answer.transmitted ? "exception" : "refused";
     if (answer.source == Source::cache) return "cached";
     return answer.shared ? "shared" : "ok";
 }
-
-}  // namespace
 
 RequestCounters::RequestCounters(const std::map<std::uint8_t, std::string>& stations) {
     stations_[0].station = "other";

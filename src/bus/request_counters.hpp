@@ -10,6 +10,9 @@
 
 namespace panelgate::bus {
 
+/// The word of {outcome} for an answer (contract 6).
+std::string outcome_of(const Answer& answer);
+
 /// Counts requests by station, function and outcome. Stations the configuration does not list share
 /// one entry, functions outside Table A one label: no client can add a series (P10).
 class RequestCounters {

@@ -39,6 +39,7 @@ Handling get_points(HttpRequest request, const Api* api);
 Handling get_point(HttpRequest request, const Api* api);
 Handling put_point(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
+Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);
 
 Handling get_simulated(HttpRequest request, const Api* api);

@@ -1,5 +1,4 @@
 #include <boost/json/array.hpp>
-#include <cmath>
 
 #include "api.hpp"
 #include "items.hpp"
@@ -8,6 +7,7 @@
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "point_json.hpp"
 #include "write_answer.hpp"
 
 namespace panelgate::web {
@@ -17,23 +17,8 @@ namespace {
 using points::Point;
 using points::Value;
 
-json::value to_json(const Value& value) {
-    return std::visit([](const auto& v) { return json::value(v); }, value);
-}
-
 json::object describe(const Api& api, const points::StationPoints& station, const Point& point) {
-    const points::PointReading reading = station.read(point, api.providers.now());
-    json::object object;
-    object["name"] = point.name;
-    object["value"] = nullptr;
-    if (reading.value) object["value"] = to_json(*reading.value);
-    if (reading.label) object["label"] = *reading.label;
-    object["unit"] = point.unit;
-    object["quality"] = label(reading.quality);
-    object["age_ms"] = nullptr;
-    if (reading.age)
-        object["age_ms"] =
-            std::chrono::duration_cast<std::chrono::milliseconds>(*reading.age).count();
+    json::object object = point_json(point, station.read(point, api.providers.now()));
     object["at"] = point.at;
     object["type"] = label(point.type);
     object["writable"] = point.writable;

@@ -5,6 +5,7 @@
 #include <array>
 #include <boost/asio/error.hpp>
 #include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/http/empty_body.hpp>
@@ -114,7 +115,10 @@ asio::awaitable<bool> HttpSession::serve_one() {
         response = to_response(problem(400, "the request target cannot be understood"));
     }
     bool more = false;
-    if (!caller_->abandoned) {
+    if (!caller_->abandoned && response.events && !head) {
+        asio::awaitable<void> sending = send_events(std::move(response.events));
+        co_await std::move(sending);
+    } else if (!caller_->abandoned) {
         asio::awaitable<bool> sending = send(std::move(response), head, keep_alive && !stopping_);
         more = co_await std::move(sending);
     }
@@ -203,6 +207,34 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     co_return !error && keep_alive;
 }
 
+/// Until the client goes away or the server stops. A comment every 15 s keeps middle boxes from
+/// forgetting the connection, and notices a client that has gone.
+asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
+    constexpr Duration kHeartbeat = 15s;
+    asio::steady_timer bell(stream_.get_executor());
+    listener->wake = [&bell] { bell.cancel(); };
+    listener_ = listener;
+    std::string text =
+        "HTTP/1.1 200 OK\r\nServer: panelgate/" + api_->providers.version +
+        "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
+        "X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n: panelgate\n\n";
+    ErrorCode error;
+    while (!error) {
+        stream_.expires_after(api_->settings.request_timeout);
+        co_await asio::async_write(stream_, asio::buffer(text),
+                                   asio::redirect_error(asio::use_awaitable, error));
+        if (error || listener->ended() || stopping_) break;
+        text = listener->take();
+        if (!text.empty()) continue;
+        ErrorCode rung;
+        bell.expires_after(kHeartbeat);
+        co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
+        text = rung ? listener->take() : ": \n\n";
+    }
+    listener->wake = nullptr;
+    listener_.reset();
+}
+
 /// Reads on after a refusal: closing with unread bytes would reset the connection, and the client
 /// would lose the answer.
 asio::awaitable<void> HttpSession::drain() {
@@ -240,11 +272,13 @@ bool HttpSession::client_has_left() {
 
 void HttpSession::stop() {
     stopping_ = true;
+    if (listener_ && listener_->wake) listener_->wake();
     if (!busy_) close();
 }
 
 void HttpSession::abandon() {
     stopping_ = true;
+    if (listener_ && listener_->wake) listener_->wake();
     caller_->abandon();
     close();
 }

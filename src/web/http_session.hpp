@@ -36,6 +36,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<HttpResponse> handle(HttpRequest request);
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
+    boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
     boost::asio::awaitable<void> drain();
     void watch_for_departure();
     bool client_has_left();
@@ -46,6 +47,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::shared_ptr<BusCaller> caller_ = std::make_shared<BusCaller>();
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
+    std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
     bool busy_ = false;  ///< a whole request is here and not yet answered
     bool stopping_ = false;
     bool watching_ = false;  ///< an async_wait of watch_for_departure() is pending

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "bus_caller.hpp"
+#include "panelgate/web/event_hub.hpp"
 #include "panelgate/web/settings.hpp"
 
 namespace panelgate::web {
@@ -29,6 +30,8 @@ struct HttpResponse {
     std::string content_type = "application/json";
     std::string body;
     std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
+    /// Not null: there is no body, events follow for as long as the client listens.
+    std::shared_ptr<EventHub::Listener> events;
 };
 
 }  // namespace panelgate::web

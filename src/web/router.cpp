@@ -32,6 +32,7 @@ constexpr Route kRoutes[] = {
     {"GET", "/api/v1/stations/{}", get_station, kSee},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
+    {"GET", "/api/v1/events", get_events, kSee},
     {"GET", "/api/v1/relays", get_relays, kSee},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee},

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/bus/bus_client.hpp"
@@ -17,12 +18,24 @@ namespace panelgate::bus {
 /// The exception code that a request is answered with instead of being transmitted, or nothing.
 using Guard = std::function<std::optional<std::uint8_t>(ByteView pdu)>;
 
+/// Something happened that others may want to know.
+struct BusEvent {
+    enum class Kind : std::uint8_t { line, station, transaction };
+    Kind kind = Kind::line;
+    std::string_view what;  ///< "up", "down"; "online", "late"…; the outcome of a transaction
+    std::string why;        ///< of a line that is down
+    std::uint8_t station = 0;
+    std::uint8_t function = 0;
+    Duration took{};  ///< arrival to answer
+};
+
 struct Settings {
     std::string name;    ///< of the line
     std::string device;  ///< as configured
     arbiter::Settings arbiter;
     std::map<std::uint8_t, std::string> stations;  ///< names of those the configuration lists
     std::map<std::uint8_t, Guard> guards;          ///< of stations with `guard: true`
+    std::function<void(const BusEvent&)> observe;  ///< may be empty; called from inside the bus
     std::size_t trace_frames = 2000;
     std::size_t trace_decisions = 500;
 };

@@ -12,6 +12,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/directory.hpp"
+#include "panelgate/web/event_hub.hpp"
 #include "panelgate/web/settings.hpp"
 
 namespace panelgate::web {
@@ -23,6 +24,7 @@ struct Providers {
     std::string version;
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<std::vector<points::RelayStatus>()> relays;
+    EventHub* events = nullptr;  ///< never null; outlives the server
 };
 
 /// HTTP/1.1: probes, metrics and the REST API of contract section 5. Lives in the one thread that

@@ -108,7 +108,8 @@ class HttpRig : public ::testing::Test {
         settings.anonymous = Role::operator_;
         directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
         directory.lines.push_back({"floor2", "/dev/ttyUSB1", &bus, false});
-        directory.stations.push_back({"press", "floor1", 31, &panel, false, 101, &bus});
+        directory.stations.push_back(
+            {"press", "floor1", 31, &panel, false, 101, &bus, nullptr, {}});
         bus.script = [](const bus::Request& request) { return answer_from_addresses(request); };
     }
     ~HttpRig() override {
@@ -117,7 +118,8 @@ class HttpRig : public ::testing::Test {
     }
 
     void add_meter() {
-        directory.stations.push_back({"meter", "floor1", 5, nullptr, true, std::nullopt, &bus});
+        directory.stations.push_back(
+            {"meter", "floor1", 5, nullptr, true, std::nullopt, &bus, nullptr, {}});
     }
     Server& start() {
         Providers providers;
@@ -126,6 +128,7 @@ class HttpRig : public ::testing::Test {
         providers.version = "1.2.3";
         providers.now = [this] { return now; };
         providers.relays = [this] { return relays; };
+        providers.events = &events;
         server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
         EXPECT_FALSE(server->start());
         return *server;
@@ -170,6 +173,7 @@ class HttpRig : public ::testing::Test {
     Settings settings;
     TimePoint now{1h};
     std::vector<points::RelayStatus> relays;
+    EventHub events;
     bool ready = true;
     std::unique_ptr<Server> server;
 };

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <boost/json/object.hpp>
+
+#include "panelgate/points/station_points.hpp"
+
+namespace panelgate::web {
+
+/// {"name","value","label","unit","quality","age_ms"} (contract 5).
+boost::json::object point_json(const points::Point& point, const points::PointReading& reading);
+
+}  // namespace panelgate::web
