@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
-#include <set>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
 
 #include "load_stations.hpp"
 #include "panelgate/points/settings.hpp"
@@ -48,13 +50,15 @@ void load_type(MapReader& in, Point& point) {
     if (point.type == Type::string) point.length = static_cast<unsigned>(length.value_or(1));
     constexpr std::array<std::string_view, 4> kWords{"ABCD", "BADC", "CDAB", "DCBA"};
     point.word_order = points::kOrders[in.choice_index("word_order", kWords).value_or(0)];
+    if (point.type == Type::boolean && in.has("word_order"))
+        in.problem("word_order", "word_order is for values of registers, not for type bool");
 }
 
 void load_scale(MapReader& in, Point& point) {
     point.scale = in.number("scale").value_or(1);
     point.offset = in.number("offset").value_or(0);
     const bool number = point.type != Type::boolean && point.type != Type::string;
-    for (const std::string_view key : {"scale", "offset"}) {
+    for (const std::string_view key : {"scale", "offset", "min", "max"}) {
         if (in.has(key) && !number)
             in.problem(key, std::string(key) + " is for numbers, not for type " +
                                 std::string(label(point.type)));
@@ -69,41 +73,136 @@ void load_scale(MapReader& in, Point& point) {
         in.problem("min", "min is above max: nothing could be written");
 }
 
-void load_labels(MapReader& in, Point& point) {
-    if (const Node* labels = in.map("labels")) {
-        for (const yaml::Entry& entry : labels->entries) {
-            const auto raw = yaml::parse_integer(entry.key);
-            if (!raw || entry.value.kind != Node::Kind::scalar) {
-                in.problems().add(entry.mark, "labels are RAW-NUMBER: text, such as 1: running");
-                continue;
-            }
-            point.labels[*raw] = entry.value.scalar;
-        }
-        if (!is_integer(point.type))
-            in.problem("labels",
-                       "labels are for integers, not for type " + std::string(label(point.type)));
+/// What the raw number of a whole type may be written as: signed or unsigned.
+struct RawRange {
+    std::int64_t low = 0;
+    std::int64_t high = 0;
+    bool contains(std::int64_t raw) const { return raw >= low && raw <= high; }
+    std::string text() const { return std::to_string(low) + " to " + std::to_string(high); }
+};
+
+RawRange signed_range(unsigned bits) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    const std::int64_t high = bits >= 64 ? kMost : (std::int64_t{1} << (bits - 1)) - 1;
+    return {-high - 1, high};
+}
+
+RawRange unsigned_range(unsigned bits) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    return {0, bits >= 63 ? kMost : (std::int64_t{1} << bits) - 1};
+}
+
+RawRange label_range(Type type) {
+    switch (type) {
+        case Type::bcd16:
+            return {0, 9'999};
+        case Type::bcd32:
+            return {0, 99'999'999};
+        case Type::i16:
+        case Type::i32:
+        case Type::i64:
+            return signed_range(16 * points::registers_of(type));
+        case Type::u16:
+        case Type::u32:
+        case Type::u64:
+            return unsigned_range(16 * points::registers_of(type));
+        case Type::boolean:
+        case Type::f32:
+        case Type::f64:
+        case Type::string:
+            return signed_range(64);
     }
+    std::abort();
+}
+
+/// Of no_value: 65535 and -1 are the same register.
+RawRange no_value_range(Type type) {
+    RawRange range = label_range(type);
+    const bool is_bcd = type == Type::bcd16 || type == Type::bcd32;
+    if (!is_integer(type) || is_bcd) return range;
+    range.low = signed_range(16 * points::registers_of(type)).low;
+    range.high = unsigned_range(16 * points::registers_of(type)).high;
+    return range;
+}
+
+void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
+    const auto raw = yaml::parse_integer(entry.key);
+    if (!raw || entry.value.kind != Node::Kind::scalar || entry.value.scalar.empty()) {
+        in.problems().add(entry.mark, "labels are RAW-NUMBER: text, such as 1: running");
+        return;
+    }
+    if (const RawRange range = label_range(point.type); !range.contains(*raw)) {
+        in.problems().add(entry.mark, "a label of type " + std::string(label(point.type)) +
+                                          " is for a raw number from " + range.text() + ", not " +
+                                          entry.key);
+    }
+    for (const auto& [other, text] : point.labels) {
+        if (text != entry.value.scalar) continue;
+        in.problems().add(entry.value.mark, "two labels '" + text + "': of " +
+                                                std::to_string(other) + " and of " + entry.key +
+                                                "; a write could mean either");
+    }
+    point.labels[*raw] = entry.value.scalar;
+}
+
+void load_labels(MapReader& in, Point& point) {
+    const Node* labels = in.map("labels");
+    if (labels == nullptr) return;
+    if (!is_integer(point.type)) {
+        in.problem("labels",
+                   "labels are for integers, not for type " + std::string(label(point.type)));
+        return;
+    }
+    if (labels->entries.size() > points::kMaxLabels) {
+        in.problem("labels", "at most " + std::to_string(points::kMaxLabels) +
+                                 " labels of one point, not " +
+                                 std::to_string(labels->entries.size()));
+        return;
+    }
+    for (const yaml::Entry& entry : labels->entries) load_label(in, entry, point);
+}
+
+void load_no_value(MapReader& in, Point& point) {
     const Node* list = in.sequence("no_value");
     if (list == nullptr) return;
+    if (point.type == Type::boolean || point.type == Type::string) {
+        in.problem("no_value",
+                   "no_value is for numbers, not for type " + std::string(label(point.type)));
+        return;
+    }
+    if (list->items.size() > points::kMaxNoValues) {
+        in.problem("no_value", "at most " + std::to_string(points::kMaxNoValues) +
+                                   " values that mean none, not " +
+                                   std::to_string(list->items.size()));
+        return;
+    }
+    const RawRange range = no_value_range(point.type);
     for (const Node& item : list->items) {
-        const auto raw =
-            item.kind == Node::Kind::scalar ? yaml::parse_integer(item.scalar) : std::nullopt;
+        const bool plain = item.kind == Node::Kind::scalar && !item.quoted;
+        const auto raw = plain ? yaml::parse_integer(item.scalar) : std::nullopt;
         if (!raw) {
             in.problems().add(item.mark, "no_value is a list of raw numbers, such as [-32768]");
-            continue;
+        } else if (!range.contains(*raw)) {
+            in.problems().add(item.mark, "no_value of type " + std::string(label(point.type)) +
+                                             " must be from " + range.text() + ", not " +
+                                             item.scalar);
+        } else {
+            point.no_value.push_back(*raw);
         }
-        point.no_value.push_back(*raw);
     }
 }
 
 /// All of the value has to be where the panel can be read, and written when it is to be.
-void check_area(MapReader& in, const Point& point, const profile::Area& area) {
+void check_area(MapReader& in, const Point& point, const profile::Area& area,
+                const profile::PanelProfile& profile) {
     const std::uint32_t count = point.count();
     if (!area.readable.contains(point.address, count)) {
         in.problem("at", std::to_string(count) + " registers from " + point.at +
                              " reach beyond the end of " + area.name + ", " +
                              format_notation(area, static_cast<std::uint16_t>(area.readable.last)));
     }
+    // Read in two pieces, half of it could be older than the other.
+    if (point.type == Type::string) check_read_count(in, "length", profile, point.table, count);
     if (!point.writable) return;
     if (!area.writable) {
         in.problem("writable", point.at + " cannot be written (" + area.source + ')');
@@ -113,6 +212,8 @@ void check_area(MapReader& in, const Point& point, const profile::Area& area) {
                        format_notation(area, static_cast<std::uint16_t>(area.writable->first)) +
                        " to " +
                        format_notation(area, static_cast<std::uint16_t>(area.writable->last)));
+    } else if (const auto why = points::why_unwritable(profile, point)) {
+        in.problem("writable", *why);
     }
 }
 
@@ -144,8 +245,9 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     if (point.writable && station.read_only)
         in.problem("writable", "station '" + station.name + "' is read_only");
     load_labels(in, point);
+    load_no_value(in, point);
     point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
-    if (item) check_area(in, point, *item->area);
+    if (item) check_area(in, point, *item->area, *station.profile);
     in.finish();
     if (item) station.points.push_back(std::move(point));
 }
@@ -168,6 +270,7 @@ void load_poll(Loading& loading, const Node& node, Station& station) {
                            " reach beyond the end of " + area.name + ", " +
                            format_notation(area, static_cast<std::uint16_t>(area.readable.last)));
         }
+        check_read_count(in, "count", *station.profile, poll.table, poll.count);
     }
     in.finish();
     if (item) station.polls.push_back(std::move(poll));
@@ -196,6 +299,15 @@ std::optional<profile::Item> load_notation(MapReader& in, std::string_view key,
     if (item) return *item;
     in.problem(key, item.error().message);
     return std::nullopt;
+}
+
+void check_read_count(MapReader& in, std::string_view key, const profile::PanelProfile& profile,
+                      modbus::Table table, std::uint32_t count) {
+    const unsigned most = profile.max_count(modbus::read_function(table));
+    if (count <= most) return;
+    in.problem(key, profile.name + " gives at most " + std::to_string(most) +
+                        (modbus::is_bit_table(table) ? " bits" : " registers") +
+                        " in one read, not " + std::to_string(count));
 }
 
 void load_points(Loading& loading, MapReader& in, Station& station) {

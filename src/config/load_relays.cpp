@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <functional>
+#include <set>
+#include <vector>
 
 #include "load_stations.hpp"
 #include "panelgate/points/settings.hpp"
@@ -17,6 +19,25 @@ struct End {
     RelayEnd end;
     const Station* station = nullptr;
     const profile::Area* area = nullptr;
+};
+
+/// Where items really are, in bits: a panel may show the same memory as words and as bits.
+struct Memory {
+    const Station* station = nullptr;
+    modbus::Table table = modbus::Table::holding_registers;
+    std::uint32_t first = 0;
+    std::uint32_t end = 0;
+
+    bool overlaps(const Memory& other) const {
+        return station == other.station && table == other.table && first < other.end &&
+               other.first < end;
+    }
+};
+
+struct Route {
+    Relay relay;
+    Memory from;
+    Memory to;
 };
 
 const Station* find_station(const Config& config, std::string_view name) {
@@ -66,11 +87,7 @@ void check_source(MapReader& in, const End& from, std::uint32_t count) {
                                " reach beyond the end of " + from.area->name);
         return;
     }
-    const unsigned most = from.station->profile->max_count(modbus::read_function(from.end.table));
-    if (count > most) {
-        in.problem("count", from.station->profile->name + " gives at most " + std::to_string(most) +
-                                " in one read, not " + std::to_string(count));
-    }
+    check_read_count(in, "count", *from.station->profile, from.end.table, count);
 }
 
 void check_target(MapReader& in, const End& to, std::uint32_t count) {
@@ -81,52 +98,59 @@ void check_target(MapReader& in, const End& to, std::uint32_t count) {
         return;
     }
     if (to.station->read_only) in.problem("to", "station '" + to.station->name + "' is read_only");
-    const auto function = bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters;
-    const unsigned most = to.station->profile->find_function(function) != nullptr ||
-                                  to.station->profile->functions.empty()
-                              ? to.station->profile->max_count(function)
-                              : 1;
-    if (count > most) {
-        in.problem("count", to.station->profile->name + " takes at most " + std::to_string(most) +
+    const profile::PanelProfile& profile = *to.station->profile;
+    const auto has = [&](std::uint8_t function) {
+        return profile.functions.empty() || profile.find_function(function) != nullptr;
+    };
+    const auto one = bits ? modbus::kWriteSingleCoil : modbus::kWriteSingleRegister;
+    const auto several = bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters;
+    const unsigned most = has(several) ? profile.max_count(several) : has(one) ? 1 : 0;
+    if (most == 0) {
+        in.problem("to", profile.name + " has no function that writes " + to.area->name);
+    } else if (count > most) {
+        in.problem("count", profile.name + " takes at most " + std::to_string(most) +
                                 " in one write, not " + std::to_string(count));
     }
 }
 
-bool overlap(const RelayEnd& a, std::uint32_t a_count, const RelayEnd& b, std::uint32_t b_count) {
-    return a.station == b.station && a.table == b.table && a.address < b.address + b_count &&
-           b.address < a.address + a_count;
+Memory memory_of(const End& end, std::uint32_t count) {
+    const profile::Area* words =
+        end.station->profile->find_area(std::string_view(end.area->view_of));
+    const modbus::Table table = words != nullptr ? words->table : end.area->table;
+    const std::uint32_t width = modbus::is_bit_table(end.area->table) ? 1 : 16;
+    return {end.station, table, end.end.address * width, (end.end.address + count) * width};
 }
 
 /// Two relays that write the same items: nobody could say which value they hold.
-void check_overlap(MapReader& in, const Relay& relay, const std::vector<Relay>& others) {
-    for (const Relay& other : others) {
-        if (!overlap(relay.to, relay.count, other.to, other.count)) continue;
-        in.problem("to", "overlaps what the relay " + other.name() + " writes");
+void check_overlap(MapReader& in, const Route& route, const std::vector<Route>& others) {
+    for (const Route& other : others) {
+        if (!route.to.overlaps(other.to)) continue;
+        in.problem("to", "overlaps what the relay " + other.relay.name() + " writes");
         return;
     }
 }
 
 /// A chain of relays that ends where it began.
-void check_loop(MapReader& in, const Relay& relay, const std::vector<Relay>& others) {
-    std::vector<const Relay*> chain{&relay};
-    const std::function<bool(const Relay&)> leads_back = [&](const Relay& from) {
-        if (overlap(from.to, from.count, relay.from, relay.count)) return true;
-        for (const Relay& next : others) {
-            if (std::ranges::find(chain, &next) != chain.end()) continue;
-            if (!overlap(from.to, from.count, next.from, next.count)) continue;
+void check_loop(MapReader& in, const Route& route, const std::vector<Route>& others) {
+    std::vector<const Route*> chain{&route};
+    std::set<const Route*> seen;
+    const std::function<bool(const Route&)> leads_back = [&](const Route& last) {
+        if (last.to.overlaps(route.from)) return true;
+        for (const Route& next : others) {
+            if (!last.to.overlaps(next.from) || !seen.insert(&next).second) continue;
             chain.push_back(&next);
             if (leads_back(next)) return true;
             chain.pop_back();
         }
         return false;
     };
-    if (!leads_back(relay)) return;
+    if (!leads_back(route)) return;
     std::string text;
-    for (const Relay* step : chain) text += (text.empty() ? "" : ", then ") + step->name();
+    for (const Route* step : chain) text += (text.empty() ? "" : ", then ") + step->relay.name();
     in.problem("to", "relays in a circle: " + text);
 }
 
-void load_relay(Loading& loading, const Node& node) {
+void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) {
     MapReader in(node, loading.problems, "a relay");
     const auto from = load_end(loading, in, "from");
     const auto to = load_end(loading, in, "to");
@@ -145,8 +169,10 @@ void load_relay(Loading& loading, const Node& node) {
     }
     check_source(in, *from, relay.count);
     check_target(in, *to, relay.count);
-    check_overlap(in, relay, loading.config.relays);
-    check_loop(in, relay, loading.config.relays);
+    const Route route{relay, memory_of(*from, relay.count), memory_of(*to, relay.count)};
+    check_overlap(in, route, routes);
+    check_loop(in, route, routes);
+    routes.push_back(route);
     loading.config.relays.push_back(std::move(relay));
 }
 
@@ -160,7 +186,8 @@ void load_relays(Loading& loading, MapReader& root) {
                                    std::to_string(list->items.size()));
         return;
     }
-    for (const Node& node : list->items) load_relay(loading, node);
+    std::vector<Route> routes;
+    for (const Node& node : list->items) load_relay(loading, node, routes);
 }
 
 }  // namespace panelgate::config

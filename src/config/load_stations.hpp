@@ -36,5 +36,9 @@ void load_points(Loading& loading, yaml::MapReader& in, Station& station);
 /// The item that a required key names in the panel's notation.
 std::optional<profile::Item> load_notation(yaml::MapReader& in, std::string_view key,
                                            const profile::PanelProfile& profile);
+/// A problem at `key` when the panel does not give so many items in one read.
+void check_read_count(yaml::MapReader& in, std::string_view key,
+                      const profile::PanelProfile& profile, modbus::Table table,
+                      std::uint32_t count);
 
 }  // namespace panelgate::config

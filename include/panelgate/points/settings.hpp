@@ -12,6 +12,8 @@ namespace panelgate::points {
 inline constexpr std::size_t kMaxPoints = 4096;  ///< of one station
 inline constexpr std::size_t kMaxPolls = 256;    ///< of one station
 inline constexpr std::size_t kMaxRelays = 256;
+inline constexpr std::size_t kMaxLabels = 256;   ///< of a point
+inline constexpr std::size_t kMaxNoValues = 16;  ///< of a point
 
 /// A block that is read without being named point by point: it feeds the memory of `max_age`.
 struct Poll {
