@@ -1,0 +1,61 @@
+#include "station_events.hpp"
+
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::bus {
+
+std::string_view label(arbiter::StationEvent::Kind kind) {
+    switch (kind) {
+        case arbiter::StationEvent::Kind::offline:
+            return "offline";
+        case arbiter::StationEvent::Kind::online:
+            return "online";
+        case arbiter::StationEvent::Kind::late:
+            return "late";
+        case arbiter::StationEvent::Kind::drift:
+            return "drift";
+        case arbiter::StationEvent::Kind::collision:
+            return "collision";
+        case arbiter::StationEvent::Kind::echo:
+            return "echo";
+    }
+    std::abort();
+}
+void log_event(const Settings& settings, const arbiter::StationEvent& event) {
+    const auto named = settings.stations.find(event.station);
+    const std::string id = std::to_string(event.station);
+    const std::string station = named == settings.stations.end() ? id : named->second;
+    const std::string ms = std::to_string(std::lround(to_milliseconds(event.by)));
+    const auto say = [&](rt::LogLevel level, const char* what, const std::string& hint) {
+        if (hint.empty()) {
+            rt::log(level, what, {{"line", settings.name}, {"station", station}});
+        } else {
+            rt::log(level, what, {{"line", settings.name}, {"station", station}, {"hint", hint}});
+        }
+    };
+    switch (event.kind) {
+        case arbiter::StationEvent::Kind::offline:
+            return say(rt::LogLevel::warn, "station offline", "");
+        case arbiter::StationEvent::Kind::online:
+            return say(rt::LogLevel::info, "station online", "");
+        case arbiter::StationEvent::Kind::late:
+            return say(rt::LogLevel::warn, "late reply",
+                       "raise its response_timeout by at least " + ms + "ms");
+        case arbiter::StationEvent::Kind::drift:
+            return say(rt::LogLevel::warn, "station has become slow",
+                       "it takes up to " + ms + "ms, near its response_timeout; raise that");
+        case arbiter::StationEvent::Kind::collision:
+            return say(rt::LogLevel::warn, "collision",
+                       "the echo is not what was sent: is there another master, or no echo?");
+        case arbiter::StationEvent::Kind::echo:
+            return say(settings.arbiter.echo == arbiter::EchoMode::off ? rt::LogLevel::warn
+                                                                       : rt::LogLevel::info,
+                       "line hears itself", "its echo is checked and taken out");
+    }
+}
+
+}  // namespace panelgate::bus
