@@ -178,6 +178,11 @@ std::string describe(const PanelProfile& profile) {
     for (const Area& area : profile.areas) text += describe_area(area);
     for (const Unreachable& hint : profile.unreachable)
         text += "  " + padded(hint.prefix, 8) + hint.reason + '\n';
+    if (!profile.identification.empty()) text += "identified by:\n";
+    for (const Identification& i : profile.identification) {
+        text += "  " + to_hex(i.request) + " -> " + to_hex(i.reply) + " ...  " + i.means +
+                (i.source.empty() ? "" : "  [" + i.source + ']') + '\n';
+    }
     if (!profile.exceptions.empty()) text += "exceptions:\n";
     for (const ExceptionMeaning& e : profile.exceptions)
         text += "  " + padded(count(e.code), 3) + e.meaning + '\n';

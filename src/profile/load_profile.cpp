@@ -9,6 +9,7 @@
 #include "check_profile.hpp"
 #include "load_simulation.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::profile {
@@ -236,6 +237,33 @@ void load_unreachable(MapReader& in, PanelProfile& profile) {
     }
 }
 
+std::optional<Bytes> load_pdu(MapReader& in, std::string_view key) {
+    const auto text = in.required_text(key);
+    if (!text) return std::nullopt;
+    auto pdu = from_hex(*text);
+    if (pdu && !pdu->empty() && pdu->size() <= modbus::kMaxPdu) return pdu;
+    in.problem(key,
+               std::string(key) + " must be a PDU in pairs of hex digits, not '" + *text + '\'');
+    return std::nullopt;
+}
+
+void load_identification(MapReader& in, PanelProfile& profile) {
+    const Node* list = in.sequence("identification");
+    if (list == nullptr) return;
+    for (const Node& item : list->items) {
+        MapReader entry(item, in.problems(), "an identification");
+        Identification made;
+        made.request = load_pdu(entry, "request").value_or(Bytes());
+        made.reply = load_pdu(entry, "reply").value_or(Bytes());
+        made.means = entry.required_text("means").value_or("");
+        made.source = entry.text("source").value_or("");
+        if (!made.request.empty() && !modbus::is_pure_read(made.request))
+            entry.problem("request", "a panel is identified by reads only");
+        entry.finish();
+        profile.identification.push_back(std::move(made));
+    }
+}
+
 void load_functions(MapReader& in, PanelProfile& profile) {
     const Node* list = required_sequence(in, "functions", "a profile");
     if (list == nullptr) return;
@@ -265,6 +293,7 @@ std::optional<PanelProfile> load_profile(std::string_view text, std::string name
     if (const Node* timing = in.map("timing")) load_timing(*timing, profile.timing, problems);
     load_exceptions(in, profile);
     load_unreachable(in, profile);
+    load_identification(in, profile);
     if (const Node* simulation = in.map("simulation"))
         load_simulation(*simulation, profile, problems);
     in.finish();

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -88,6 +89,14 @@ struct Unreachable {
     std::string reason;
 };
 
+/// A read that tells this panel from others, for a scanner.
+struct Identification {
+    Bytes request;      ///< PDU; only reads
+    Bytes reply;        ///< how the panel's reply PDU begins; an exception counts
+    std::string means;  ///< what that shows
+    std::string source;
+};
+
 /// Values a simulated panel starts with, and which of them move.
 struct Simulation {
     struct Cell {
@@ -124,6 +133,7 @@ struct PanelProfile {
     Timing timing;
     std::vector<ExceptionMeaning> exceptions;
     std::vector<Unreachable> unreachable;
+    std::vector<Identification> identification;
     Simulation simulation;
 
     const FunctionRule* find_function(std::uint8_t code) const;

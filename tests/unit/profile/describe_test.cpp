@@ -110,9 +110,10 @@ TEST(Describe, HasALineForEveryFunctionAndAreaOfEveryShippedProfile) {
     for (const auto& [name, profile] : catalogue.all()) {
         const std::string text = describe(profile);
         // Description, manual, stations, serial, gap and the headings of functions and areas.
+        const auto list = [](std::size_t entries) { return entries == 0 ? 0 : entries + 1; };
         const std::size_t lines = 7 + profile.functions.size() + profile.areas.size() +
-                                  profile.unreachable.size() + profile.exceptions.size() +
-                                  (profile.exceptions.empty() ? 0 : 1);
+                                  profile.unreachable.size() + list(profile.exceptions.size()) +
+                                  list(profile.identification.size());
         EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), lines) << text;
     }
 }

@@ -272,6 +272,20 @@ TEST(LoadProfile, WantsSimulatedCellsThatThePanelHas) {
     EXPECT_EQ(problems_of(with_areas(bits)), "p.yaml:6:53: the values of B are bits: 0 or 1\n");
 }
 
+TEST(LoadProfile, IdentifiesPanelsByReadsOnly) {
+    const auto ask = [](const std::string& entry) {
+        return problems_of(whole("identification: [" + entry + "]\n"));
+    };
+    EXPECT_EQ(ask("{request: 04 00 00 00 01, reply: 84 01, means: x}"), "");
+    EXPECT_NE(ask("{request: 06 00 00 00 01, reply: 06, means: x}")
+                  .find("a panel is identified by reads only"),
+              std::string::npos);
+    EXPECT_NE(ask("{request: read it, reply: 84 01, means: x}")
+                  .find("request must be a PDU in pairs of hex digits, not 'read it'"),
+              std::string::npos);
+    EXPECT_NE(ask("{request: 04 00 00 00 01, means: x}").find("needs 'reply'"), std::string::npos);
+}
+
 TEST(LoadProfile, TellsBrokenYamlAndNothingElse) {
     EXPECT_EQ(problems_of("- 1\n"), "p.yaml:1:1: a profile must be a map of keys, not a list\n");
     EXPECT_EQ(problems_of(with_areas("  - D\n")),
