@@ -183,7 +183,8 @@ void Gateway::add_points(const config::Line& line, bus::Bus& bus) {
             publish_points(first, wants, station);
         });
     for (std::size_t i = 0; i < configured.size(); ++i) {
-        points_.emplace_back(configured[i]->points, pollers_.back()->station(i));
+        points_.emplace_back(configured[i]->points, configured[i]->polls,
+                             pollers_.back()->station(i));
         for (web::StationEntry& entry : directory_.stations) {
             if (entry.name == configured[i]->name) entry.points = &points_.back();
         }

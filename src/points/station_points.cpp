@@ -18,6 +18,11 @@ const Point* StationPoints::find(std::string_view name) const {
     return found == points_->end() ? nullptr : &*found;
 }
 
+const Reading& StationPoints::reading(const Poll& block) const {
+    const auto index = static_cast<std::size_t>(&block - blocks_->data());
+    return polls_->reading(points_->size() + index);
+}
+
 PointReading StationPoints::read(const Point& point, TimePoint now) const {
     const auto index = static_cast<std::size_t>(&point - points_->data());
     const Reading& reading = polls_->reading(index);

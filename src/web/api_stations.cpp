@@ -3,6 +3,7 @@
 #include "api.hpp"
 #include "items.hpp"
 #include "json_util.hpp"
+#include "panelgate/points/station_points.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -28,6 +29,32 @@ json::object describe(const StationEntry& station) {
     return object;
 }
 
+json::object describe(const points::StationPoints& points, const points::Poll& block,
+                      TimePoint now) {
+    const points::Reading& reading = points.reading(block);
+    const auto ms = [](Duration duration) {
+        return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
+    };
+    json::object object;
+    object["read"] = block.read;
+    object["count"] = block.count;
+    object["every_ms"] = ms(block.every);
+    object["quality"] = label(points::quality_of(reading, block.every, now));
+    object["age_ms"] = nullptr;
+    if (reading.sampled) object["age_ms"] = ms(now - *reading.sampled);
+    object["good"] = reading.good;
+    object["failed"] = reading.failed;
+    return object;
+}
+
+json::array describe_polls(const points::StationPoints* points, TimePoint now) {
+    json::array polls;
+    if (points == nullptr) return polls;
+    for (const points::Poll& block : points->blocks())
+        polls.push_back(describe(*points, block, now));
+    return polls;
+}
+
 }  // namespace
 
 Handling get_stations(HttpRequest, const Api* api) {
@@ -43,7 +70,9 @@ Handling get_stations(HttpRequest, const Api* api) {
 Handling get_station(HttpRequest request, const Api* api) {
     const auto station = find_station(*api, request.arguments[0]);
     if (!station) co_return to_response(station.error());
-    co_return json_response(200, describe(*station));
+    json::object body = describe(*station);
+    body["polls"] = describe_polls(station->points, api->providers.now());
+    co_return json_response(200, body);
 }
 
 }  // namespace panelgate::web

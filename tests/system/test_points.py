@@ -109,6 +109,9 @@ class Points(unittest.TestCase):
                   client.ask(31, read_registers(0, 5)))
             body = program.get("/api/v1/stations/press/devices/UW0?count=5")[1]
             self.assertEqual((body["source"], body["values"]), ("cache", [10, 20, 30, 40, 50]))
+            [poll] = program.get("/api/v1/stations/press")[1]["polls"]
+            self.assertEqual((poll["read"], poll["every_ms"], poll["quality"]), ("UW0", 20, "good"))
+            self.assertGreater(poll["good"], 0)
 
     def test_a_guarded_station_is_not_asked_what_its_profile_rules_out(self):
         with harness.configured(PRESS) as program, program.client() as client:

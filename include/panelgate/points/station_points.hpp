@@ -26,15 +26,21 @@ std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<P
 /// The points of one station over what its polls have brought. Pure; what it refers to outlives it.
 class StationPoints {
   public:
-    StationPoints(const std::vector<Point>& points, const StationPolls& polls)
-        : points_(&points), polls_(&polls) {}
+    /// `polls` are those of wants_of(points, blocks).
+    StationPoints(const std::vector<Point>& points, const std::vector<Poll>& blocks,
+                  const StationPolls& polls)
+        : points_(&points), blocks_(&blocks), polls_(&polls) {}
 
     const std::vector<Point>& points() const { return *points_; }
     const Point* find(std::string_view name) const;
     PointReading read(const Point& point, TimePoint now) const;
+    const std::vector<Poll>& blocks() const { return *blocks_; }
+    /// What has become of one of the blocks.
+    const Reading& reading(const Poll& block) const;
 
   private:
     const std::vector<Point>* points_;
+    const std::vector<Poll>* blocks_;
     const StationPolls* polls_;
 };
 

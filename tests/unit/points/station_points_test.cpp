@@ -18,14 +18,15 @@ TEST(StationPoints, ShowsValuesWithQualityAndAge) {
     Poll poll;
     poll.address = 300;
     poll.count = 8;
-    const auto wants = wants_of(points, {poll});
+    const std::vector<Poll> blocks{poll};
+    const auto wants = wants_of(points, blocks);
     ASSERT_EQ(wants.size(), 3u);
     EXPECT_EQ(wants[2].count, 8u);
 
     const TimePoint start{1h};
     StationPolls polls(wants, make_plan_limits(profile::PanelProfile(), SerialFormat{}, 2ms),
                        start);
-    const StationPoints station(points, polls);
+    const StationPoints station(points, blocks, polls);
     const Point& temperature = *station.find("temperature");
     EXPECT_EQ(station.read(temperature, start).quality, Quality::bad);
     EXPECT_FALSE(station.read(temperature, start).age);
@@ -48,6 +49,8 @@ TEST(StationPoints, ShowsValuesWithQualityAndAge) {
     EXPECT_EQ(*reading.value, Value(21.5));
     EXPECT_GE(*reading.age, Duration(500ms));
     EXPECT_EQ(station.read(*station.find("state"), now).label, "running");
+    EXPECT_EQ(station.reading(blocks[0]).good, 1u);
+    EXPECT_EQ(station.reading(blocks[0]).values.size(), 8u);
     EXPECT_EQ(station.read(temperature, now + 5s).quality, Quality::stale);
     EXPECT_TRUE(station.read(temperature, now + 5s).value) << "shown with its age";
     EXPECT_FALSE(station.read(temperature, now + 60s).value) << "P10: never old as new";
