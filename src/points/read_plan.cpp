@@ -73,6 +73,7 @@ class TablePlanner {
         if (has_intervals()) {
             std::vector<Box> together = plan_runs(pieces_);
             if (load(together) < load(boxes)) boxes = std::move(together);
+            if (pieces_.size() <= kFew) try_all(boxes);
         }
         std::vector<PlannedRead> reads = serve(std::move(boxes));
         add_refused(reads);
@@ -91,6 +92,37 @@ class TablePlanner {
         return std::any_of(pieces_.begin(), pieces_.end(), [&](const Piece& piece) {
             return piece.every != pieces_.front().every;
         });
+    }
+
+    static constexpr std::size_t kFew = 8;  ///< pieces: at most 4140 partitions
+
+    /// Takes the cheapest of all partitions when it is cheaper than `best`. A read only becomes
+    /// dearer by what joins it, so that what costs as much already is not followed.
+    void try_all(std::vector<Box>& best) const {
+        std::vector<Box> boxes;
+        double least = load(best);
+        add_piece(0, boxes, least, best);
+    }
+    void add_piece(std::size_t index, std::vector<Box>& boxes, double& least,
+                   std::vector<Box>& best) const {
+        const double now = load(boxes);
+        if (now >= least) return;
+        if (index == pieces_.size()) {
+            least = now;
+            best = boxes;
+            return;
+        }
+        const Piece& piece = pieces_[index];
+        for (std::size_t i = 0; i < boxes.size(); ++i) {
+            const Box before = boxes[i];
+            boxes[i].end = std::max(before.end, piece.end);  // pieces come sorted by start
+            boxes[i].every = std::min(before.every, piece.every);
+            if (boxes[i].end <= map_.reach(before.first)) add_piece(index + 1, boxes, least, best);
+            boxes[i] = before;
+        }
+        boxes.push_back({piece.first, piece.end, piece.every});
+        add_piece(index + 1, boxes, least, best);
+        boxes.pop_back();
     }
 
     double load(const Box& box) const {

@@ -189,8 +189,6 @@ double load_of(const std::vector<PlannedRead>& plan, const PlanLimits& limits) {
 /// The plan's load over the least load, over random stations.
 struct Ratios {
     double worst = 1;
-    double mean = 0;
-    int above_a_tenth = 0;  ///< stations with more than 1.10
 };
 
 Ratios compare(int stations, std::uint32_t intervals, unsigned seed) {
@@ -204,8 +202,6 @@ Ratios compare(int stations, std::uint32_t intervals, unsigned seed) {
         const double best = ExhaustiveSearch(wants, limits).best();
         const double ratio = load_of(plan_reads(wants, limits), limits) / best;
         result.worst = std::max(result.worst, ratio);
-        result.mean += ratio / stations;
-        result.above_a_tenth += ratio > 1.10 ? 1 : 0;
     }
     return result;
 }
@@ -214,11 +210,8 @@ TEST(RandomReadPlan, IsTheBestPlanWhereAllIntervalsAreTheSame) {
     EXPECT_LE(compare(5000, 1, 1).worst, 1 + 1e-9);
 }
 
-TEST(RandomReadPlan, IsSeldomFarFromTheBestPlanWhereIntervalsDiffer) {
-    // A slow want around a fast one may be better read with a third: the plan tries runs only.
-    const Ratios ratios = compare(10'000, 3, 2);
-    EXPECT_LE(ratios.mean, 1.001);
-    EXPECT_LE(ratios.above_a_tenth, 5);
+TEST(RandomReadPlan, IsTheBestPlanOfFewWantsWhereIntervalsDiffer) {
+    EXPECT_LE(compare(10'000, 3, 2).worst, 1 + 1e-9);
 }
 
 }  // namespace
