@@ -24,6 +24,9 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
         stations.emplace_back(*station.profile, station.id);
     sim::Settings settings;
     settings.serial = line.device.serial;
+    settings.echo = line.simulated_echo;
+    for (const config::Station& station : line.stations)
+        settings.faults[station.id] = station.faults;
     auto bus =
         std::make_unique<sim::SimulatedBus>(std::move(executor), settings, std::move(stations));
     rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});

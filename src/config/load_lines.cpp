@@ -127,6 +127,11 @@ Line load_line(Loading& loading, const Node& node) {
     }
     constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
     line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
+    if (const Node* faults = in.map("simulate")) {
+        MapReader simulate(*faults, loading.problems, "simulate");
+        line.simulated_echo = simulate.boolean("echo").value_or(false);
+        simulate.finish();
+    }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
     return line;

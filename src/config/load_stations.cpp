@@ -112,6 +112,28 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
     return *name;
 }
 
+/// `simulate` of a station: what its simulated panel does wrong.
+void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults) {
+    const Node* node = station.map("simulate");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "simulate");
+    faults.dead = in.boolean("dead").value_or(false);
+    faults.slow = in.duration("slow", 0ms, 10min).value_or(0ms);
+    faults.late_by = in.duration("late_by", 0ms, 10min).value_or(0ms);
+    const auto share = [&](std::string_view key, double& value) {
+        value = in.number(key).value_or(0);
+        if (value >= 0 && value <= 1) return;
+        in.problem(key, std::string(key) + " must be a share from 0 to 1");
+        value = 0;
+    };
+    share("late", faults.late);
+    share("drop", faults.drop);
+    share("damage", faults.damage);
+    share("truncate", faults.truncate);
+    share("foreign_id", faults.foreign_id);
+    in.finish();
+}
+
 /// Items that every read of these functions may have: the panel's limit within the standard's.
 std::uint16_t read_limit(const PanelProfile& profile, std::initializer_list<std::uint8_t> functions,
                          unsigned standard) {
@@ -150,6 +172,7 @@ Station load_station(Loading& loading, const Node& node, const LineInWork& work)
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
     settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
     station.guard = in.boolean("guard").value_or(false);
+    load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
     work.line.arbiter.stations.push_back(settings);

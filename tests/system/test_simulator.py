@@ -31,6 +31,25 @@ class Simulator(unittest.TestCase):
                 self.assertEqual(program.rest("PUT", PRESS, {})[0], 200)
                 self.assertEqual(program.values(UW0), [10], fault)
 
+    def test_the_configuration_can_say_so_too(self):
+        text = """
+lines:
+  - name: floor1
+    device: /dev/never-opened
+    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
+    timing: {response_timeout: 60ms}
+    simulate: {echo: true}
+    stations:
+      - {id: 31, name: press, profile: autonics-gplp-s, simulate: {slow: 5ms, late: 0.5, late_by: 10ms}}
+      - {id: 20, name: oven, profile: panasonic-gt, simulate: {dead: true}}
+http: {listen: "127.0.0.1:0", anonymous: operator}
+"""
+        with harness.configured(text, "--simulate") as program:
+            self.assertEqual(program.values(UW0), [10])
+            self.assertEqual(program.get("/api/v1/stations/oven/devices/GDT0")[0], 504)
+            self.assertEqual(program.get("/api/v1/lines/floor1")[1]["echo"], "present")
+            self.assertEqual(program.get(PRESS)[1]["faults"]["late"], 0.5)
+
     def test_what_is_no_fault_is_refused(self):
         with harness.demo() as program:
             for body in ({"dread": 1}, {"drop": 2}, {"drop": "often"}):

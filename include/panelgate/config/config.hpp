@@ -11,6 +11,7 @@
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/rt/settings.hpp"
+#include "panelgate/sim/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/settings.hpp"
 #include "panelgate/yaml/document.hpp"
@@ -22,7 +23,8 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
-    bool guard = false;  ///< what the profile rules out is refused without using the bus
+    bool guard = false;        ///< what the profile rules out is refused without using the bus
+    sim::Misbehaviour faults;  ///< of the simulated panel
     std::vector<points::Point> points;
     std::vector<points::Poll> polls;
 };
@@ -34,6 +36,7 @@ struct Line {
     line::Settings device;
     arbiter::Settings arbiter;  ///< every station's timing resolved
     bool refuse_unlisted = false;
+    bool simulated_echo = false;  ///< the simulated adapter hears itself
     std::vector<Station> stations;
 };
 

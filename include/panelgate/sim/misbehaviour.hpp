@@ -8,21 +8,9 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/sim/settings.hpp"
 
 namespace panelgate::sim {
-
-/// Faults of one simulated panel. Shares are of its answers, 0 (never) to 1 (always).
-struct Misbehaviour {
-    bool dead = false;   ///< neither executes nor answers
-    Duration slow{};     ///< more think time, always
-    Duration late_by{};  ///< more think time, for the share `late`
-    double late = 0;
-    double drop = 0;        ///< executes and does not answer
-    double damage = 0;      ///< one bit of the reply is wrong
-    double truncate = 0;    ///< half of the reply
-    double foreign_id = 0;  ///< the reply carries another address
-    friend bool operator==(const Misbehaviour&, const Misbehaviour&) = default;
-};
 
 /// The faults as numbers by name, times in milliseconds: {"dead": 1, "slow_ms": 20, "drop": 0.1}.
 using FaultNumbers = std::map<std::string, double>;

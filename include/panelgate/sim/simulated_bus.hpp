@@ -14,14 +14,6 @@
 
 namespace panelgate::sim {
 
-struct Settings {
-    SerialFormat serial;
-    Duration think_time = 1ms;  ///< of a panel, after the silence that ends the request
-    bool echo = false;          ///< the adapter hears what the gateway sends
-    std::map<std::uint8_t, Misbehaviour> faults;  ///< by station
-    std::uint32_t seed = 1;                       ///< of the faults' chance
-};
-
 /// Panels on one RS-485 line behind a pseudo-terminal, paced at the line's baud: a request is whole
 /// after its wire time and t3.5 of silence, the reply's bytes arrive when a real line would bring
 /// them. A pause inside a request is noticed by panels that mind it (GT: 24 bit times). What is
