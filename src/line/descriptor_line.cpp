@@ -2,10 +2,13 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
 #include <utility>
+
+#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::line {
 
@@ -48,6 +51,12 @@ std::string DescriptorLine::adopt(int fd) {
     return error.message();
 }
 
+void DescriptorLine::wait_to_open() {
+    timer_.async_wait([this, alive = alive_](error_code error) {
+        if (!error && *alive && !descriptor_.is_open()) begin_open();
+    });
+}
+
 void DescriptorLine::open_failed(const std::string& why) {
     close();
     if (events_ == nullptr) return;
@@ -68,18 +77,32 @@ void DescriptorLine::lost(const std::string& why) {
     close();
     last_error_ = settings_.device + " is gone: " + why;
     if (events_ != nullptr) events_->on_down(last_error_);
-    if (events_ != nullptr) retry_later();
+    if (events_ == nullptr) return;
+    retry_later();
+    open_soon();  // it may be there again already
 }
 
 void DescriptorLine::retry_later() {
+    waiting();
     timer_.expires_after(reopen_.next_pause());
-    timer_.async_wait([this, alive = alive_](error_code error) {
-        if (!error && *alive) begin_open();
-    });
+    wait_to_open();
+}
+
+/// A device that comes changes its folder several times (node, owner, link): one attempt each
+/// 20 ms is enough, and the last change must not be missed.
+void DescriptorLine::open_soon() {
+    if (events_ == nullptr || descriptor_.is_open()) return;
+    constexpr Duration kPause = 20ms;
+    const TimePoint now = rt::now();
+    const TimePoint when = std::max(now, next_try_);
+    next_try_ = when + kPause;
+    timer_.expires_at(when);
+    wait_to_open();
 }
 
 void DescriptorLine::close() {
     unsent_.clear();
+    if (descriptor_.is_open()) before_close();
     error_code ignored;  // close() itself may fail on an unplugged device
     descriptor_.close(ignored);
 }

@@ -28,10 +28,17 @@ class DescriptorLine : public Line {
 
   protected:
     virtual void begin_open() = 0;
+    /// A pause before the next attempt begins.
+    virtual void waiting() {}
     /// As ::write.
     virtual ssize_t put(ByteView bytes);
     /// stop() and a loss cancel an attempt that is under way.
     virtual void cancel_open() {}
+
+    /// The device is open and about to be closed.
+    virtual void before_close() {}
+    /// Something may be there now: tries, unless it is open or was tried a moment ago.
+    void open_soon();
 
     /// Takes the descriptor over. An error text when it cannot be watched; it is closed then.
     std::string adopt(int fd);
@@ -48,6 +55,7 @@ class DescriptorLine : public Line {
   private:
     void lost(const std::string& why);
     void retry_later();
+    void wait_to_open();
     void close();
     void wait_readable();
     void read_all();
@@ -63,6 +71,7 @@ class DescriptorLine : public Line {
     Bytes unsent_;                ///< what the driver did not take at once; at most one frame
     std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
     std::string last_error_;
+    TimePoint next_try_{};  ///< open_soon() before this has to wait
 };
 
 }  // namespace panelgate::line
