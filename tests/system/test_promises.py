@@ -1,32 +1,12 @@
 """Deadlines, return of the dead, gaps, shared reads and fairness on a paced line, against an
 independent bus (skipped where its source is not there)."""
-import pathlib
-import sys
-import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
-import promises  # noqa: E402
-import wire  # noqa: E402
-from harness import SANITIZED  # noqa: E402
-from test_wire import best_of_three  # noqa: E402
+from paced import PacedBus, best_of_three, lowest_of_three, wire
+import promises  # found by paced, in tests/bench
 
 
-def lowest_of_three(measure, most):
-    """A time: what else the machine does can only lengthen it, so the shortest run counts."""
-    return -best_of_three(lambda: (-measure(),), -most)[0]
-
-
-@unittest.skipIf(SANITIZED, "a sanitizer takes the time that is measured here")
-class Promises(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.tools = wire.build_tools(cls.folder.name)
-        if cls.tools is None:
-            raise unittest.SkipTest(f"there is no rtubus.cpp and mbload.cpp in {wire.TOOLS}")
-
+class Promises(PacedBus):
     def measure(self, what, *arguments, **options):
         return what(self.tools, self.folder.name, *arguments, **options)
 

@@ -1,35 +1,10 @@
 """The promises on a paced line, against an independent bus (skipped where its source is not there)."""
-import pathlib
-import sys
-import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
-import wire  # noqa: E402
-from harness import SANITIZED  # noqa: E402
+from paced import PacedBus, best_of_three, wire
 
 
-def best_of_three(measure, least):
-    """A share of the wire: what else the machine does can only lower it, so the best run counts."""
-    best = None
-    for _ in range(3):
-        result = measure()
-        best = result if best is None else max(best, result)
-        if best[0] >= least:
-            break
-    return best
-
-
-@unittest.skipIf(SANITIZED, "a sanitizer takes the time that is measured here")
-class Wire(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.tools = wire.build_tools(cls.folder.name)
-        if cls.tools is None:
-            raise unittest.SkipTest(f"there is no rtubus.cpp and mbload.cpp in {wire.TOOLS}")
-
+class Wire(PacedBus):
     def test_P1_no_wrong_value_with_every_fault_on(self):
         good, wrong, violations = wire.under_faults(self.tools, self.folder.name, 38400)
         print(f"\n  {good} good answers, {wrong} wrong values, {violations} gap violations")
