@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <system_error>
-#include <type_traits>
 #include <utility>
 
 #include "panelgate/line/tcp_line.hpp"
@@ -92,17 +91,6 @@ Duration frame_gap(const config::Line& line, std::uint8_t station) {
         if (settings.id == station) return settings.frame_gap;
     }
     return line.arbiter.unlisted.frame_gap;
-}
-
-std::optional<double> number_of(const points::Value& value) {
-    if (std::holds_alternative<std::string>(value)) return std::nullopt;
-    return std::visit(
-        [](const auto& v) {
-            if constexpr (std::is_arithmetic_v<std::decay_t<decltype(v)>>)
-                return static_cast<double>(v);
-            return 0.0;
-        },
-        value);
 }
 
 }  // namespace
@@ -225,8 +213,7 @@ void Gateway::add_relays() {
         const auto multiple = modbus::is_bit_table(relay.to.table)
                                   ? modbus::kWriteMultipleCoils
                                   : modbus::kWriteMultipleRegisters;
-        route.to_has_multiple =
-            to.profile->functions.empty() || to.profile->find_function(multiple) != nullptr;
+        route.to_has_multiple = to.profile->has_function(multiple);
         routes.push_back(std::move(route));
     }
     relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
@@ -317,7 +304,7 @@ std::vector<points::PointSample> Gateway::point_samples() const {
             const points::PointReading reading = station.points->read(point, now);
             points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
             if (reading.value && reading.quality == points::Quality::good)
-                sample.value = number_of(*reading.value);
+                sample.value = points::number_of(*reading.value);
             if (reading.age) sample.age = to_seconds(*reading.age);
             samples.push_back(std::move(sample));
         }

@@ -56,13 +56,13 @@ class Gateway {
 
     boost::asio::any_io_executor executor_;
     config::Config config_;
+    web::EventHub events_;  ///< buses publish to it to their end
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     std::deque<points::StationPoints> points_;  ///< referred to by the directory
     std::unique_ptr<points::Relays> relays_;
     std::vector<tcp_server::LineInfo> lines_;
-    web::EventHub events_;
     web::Directory directory_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
     std::unique_ptr<web::Server> http_;

@@ -243,11 +243,9 @@ void Bus::State::on_alarm() {
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     const Duration took = rt::now() - entry.arrived;
-    counters.count(entry.station, entry.function, result, took);
-    if (settings.observe) {
-        const std::string outcome = outcome_of(result);
-        observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
-    }
+    const std::string outcome = outcome_of(result);
+    counters.count(entry.station, entry.function, outcome, took);
+    observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
     const bool refused = !result.transmitted && result.source == Source::bus;
@@ -333,11 +331,12 @@ LineStatus Bus::status() const {
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
     status.echo = label(state_->arbiter.echo());
-    status.clients = client_shares(state_->arbiter.shares(), state_->client_names);
     return status;
 }
 
-bool Bus::is_up() const { return state_->up; }
+std::vector<ClientShare> Bus::clients() const {
+    return client_shares(state_->arbiter.shares(), state_->client_names);
+}
 
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);

@@ -32,10 +32,10 @@ StationReport& RequestCounters::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[0] : found->second;
 }
 
-void RequestCounters::count(std::uint8_t station, std::uint8_t function, const Answer& answer,
+void RequestCounters::count(std::uint8_t station, std::uint8_t function, const std::string& outcome,
                             Duration took) {
     StationReport& report = of(station);
-    ++report.requests[{function_label(function), outcome_of(answer)}];
+    ++report.requests[{function_label(function), outcome}];
     report.request_duration.observe(took);
 }
 

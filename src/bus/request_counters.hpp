@@ -19,7 +19,8 @@ class RequestCounters {
   public:
     explicit RequestCounters(const std::map<std::uint8_t, std::string>& stations);
 
-    void count(std::uint8_t station, std::uint8_t function, const Answer& answer, Duration took);
+    void count(std::uint8_t station, std::uint8_t function, const std::string& outcome,
+               Duration took);
     void succeeded(std::uint8_t station, double wall);
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;

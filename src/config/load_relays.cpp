@@ -99,12 +99,11 @@ void check_target(MapReader& in, const End& to, std::uint32_t count) {
     }
     if (to.station->read_only) in.problem("to", "station '" + to.station->name + "' is read_only");
     const profile::PanelProfile& profile = *to.station->profile;
-    const auto has = [&](std::uint8_t function) {
-        return profile.functions.empty() || profile.find_function(function) != nullptr;
-    };
     const auto one = bits ? modbus::kWriteSingleCoil : modbus::kWriteSingleRegister;
     const auto several = bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters;
-    const unsigned most = has(several) ? profile.max_count(several) : has(one) ? 1 : 0;
+    const unsigned most = profile.has_function(several) ? profile.max_count(several)
+                          : profile.has_function(one)   ? 1
+                                                        : 0;
     if (most == 0) {
         in.problem("to", profile.name + " has no function that writes " + to.area->name);
     } else if (count > most) {

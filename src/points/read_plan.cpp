@@ -302,7 +302,7 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
     limits.gap = gap;
     for (const modbus::Table table : kTables) {
         const modbus::Function function = modbus::read_function(table);
-        if (!profile.functions.empty() && profile.find_function(function) == nullptr) continue;
+        if (!profile.has_function(function)) continue;
         limits.of(table).max_items =
             std::min(profile.max_count(function), standard.max_count(function));
     }

@@ -119,7 +119,7 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
 
 /// Nothing has to be written; but a target that has gone may come back with something else.
 void Relays::State::check_target(Entry& entry) {
-    const bool line_up = entry.route.to->is_up();
+    const bool line_up = entry.route.to->status().up;
     const bool offline =
         line_up && entry.route.to->station_status(entry.route.to_station).state == "offline";
     if (line_up && !offline) return set(entry, "ok");

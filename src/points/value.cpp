@@ -206,14 +206,6 @@ std::uint64_t bits_of(Type type, double raw) {
     return static_cast<std::uint64_t>(std::llround(raw));
 }
 
-std::optional<double> number_of(const Value& value) {
-    if (const bool* b = std::get_if<bool>(&value)) return *b ? 1 : 0;
-    if (const auto* i = std::get_if<std::int64_t>(&value)) return static_cast<double>(*i);
-    if (const auto* u = std::get_if<std::uint64_t>(&value)) return static_cast<double>(*u);
-    if (const double* d = std::get_if<double>(&value)) return *d;
-    return std::nullopt;
-}
-
 /// An integer that a 64-bit type takes as it is, without a detour over a double.
 std::optional<std::uint64_t> exact_bits(const Point& point, const Value& value) {
     if (!is_plain(point)) return std::nullopt;
@@ -306,6 +298,14 @@ Encoded<Words> encode_number(const Point& point, const Value& value) {
 
 void throw_exception_from_error(const WriteRefusal& refusal, const boost::source_location&) {
     throw std::invalid_argument(refusal.message);
+}
+
+std::optional<double> number_of(const Value& value) {
+    if (const bool* b = std::get_if<bool>(&value)) return *b ? 1 : 0;
+    if (const auto* i = std::get_if<std::int64_t>(&value)) return static_cast<double>(*i);
+    if (const auto* u = std::get_if<std::uint64_t>(&value)) return static_cast<double>(*u);
+    if (const double* d = std::get_if<double>(&value)) return *d;
+    return std::nullopt;
 }
 
 std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> items) {

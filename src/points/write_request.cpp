@@ -8,17 +8,15 @@ namespace {
 
 WriteRefusal refusal(std::string message) { return {std::move(message)}; }
 
-bool has(const profile::PanelProfile& profile, std::uint8_t function) {
-    return profile.functions.empty() || profile.find_function(function) != nullptr;
-}
-
 bool writes_coils(const profile::PanelProfile& profile) {
-    return has(profile, modbus::kWriteSingleCoil) || has(profile, modbus::kWriteMultipleCoils);
+    return profile.has_function(modbus::kWriteSingleCoil) ||
+           profile.has_function(modbus::kWriteMultipleCoils);
 }
 
 /// The panel has one of the two functions.
 Bytes write_coil(const profile::PanelProfile& profile, std::uint16_t address, bool on) {
-    if (has(profile, modbus::kWriteSingleCoil)) return modbus::encode_write_coil(address, on);
+    if (profile.has_function(modbus::kWriteSingleCoil))
+        return modbus::encode_write_coil(address, on);
     return modbus::encode_write_coils(address, {on});
 }
 
@@ -53,15 +51,15 @@ Bytes write_bit(const profile::PanelProfile& profile, const Point& point, bool o
 
 std::optional<std::string> why_no_bit(const profile::PanelProfile& profile, const Point& point) {
     if (bit_view(profile, point) != nullptr) return std::nullopt;
-    if (has(profile, modbus::kMaskWriteRegister)) return std::nullopt;
+    if (profile.has_function(modbus::kMaskWriteRegister)) return std::nullopt;
     return profile.name + " can write no single bit of " + point.at +
            ": it has neither function 22 nor a bit view of it, and reading, changing and writing "
            "the word would undo what changes in between";
 }
 
 std::optional<std::string> why_no_registers(const profile::PanelProfile& profile, unsigned count) {
-    if (count == 1 && has(profile, modbus::kWriteSingleRegister)) return std::nullopt;
-    const bool several = has(profile, modbus::kWriteMultipleRegisters);
+    if (count == 1 && profile.has_function(modbus::kWriteSingleRegister)) return std::nullopt;
+    const bool several = profile.has_function(modbus::kWriteMultipleRegisters);
     const unsigned most = several ? profile.max_count(modbus::kWriteMultipleRegisters) : 0;
     if (count <= most) return std::nullopt;
     if (several)
@@ -94,7 +92,7 @@ Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& 
     if (point.table == modbus::Table::coils)
         return write_coil(profile, point.address, items->front() != 0);
     if (point.bit) return write_bit(profile, point, items->front() != 0);
-    if (items->size() == 1 && has(profile, modbus::kWriteSingleRegister))
+    if (items->size() == 1 && profile.has_function(modbus::kWriteSingleRegister))
         return modbus::encode_write_register(point.address, items->front());
     return modbus::encode_write_registers(point.address, *items);
 }

@@ -86,7 +86,7 @@ Handling get_line(HttpRequest request, const Api* api) {
     const auto line = find_line(*api, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::object body = describe(**line);
-    body["clients"] = describe((*line)->bus->status().clients);
+    body["clients"] = describe((*line)->bus->clients());
     co_return json_response(200, body);
 }
 

@@ -157,9 +157,7 @@ Handling get_relays(HttpRequest, const Api* api) {
         object["write_failures"] = relay.write_failures;
         object["last_write_ms"] = nullptr;
         if (relay.last_write) {
-            object["last_write_ms"] =
-                std::chrono::duration_cast<std::chrono::milliseconds>(now - *relay.last_write)
-                    .count();
+            object["last_write_ms"] = whole_ms(now - *relay.last_write);
         }
         list.push_back(std::move(object));
     }

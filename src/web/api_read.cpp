@@ -77,7 +77,7 @@ json::object describe(const Items& items, Reading reading) {
     body["notation"] = nullptr;
     if (!notation.empty()) body["notation"] = notation;
     body["values"] = std::move(reading.values);
-    body["age_ms"] = std::chrono::duration_cast<std::chrono::milliseconds>(reading.age).count();
+    body["age_ms"] = whole_ms(reading.age);
     body["source"] = reading.cached ? "cache" : "bus";
     if (reading.transactions > 1) body["transactions"] = reading.transactions;
     return body;

@@ -23,8 +23,7 @@ json::object describe(const StationEntry& station) {
     object["read_only"] = station.read_only;
     object["last_success_ms"] = nullptr;
     if (status.last_success) {
-        object["last_success_ms"] =
-            std::chrono::duration_cast<std::chrono::milliseconds>(*status.last_success).count();
+        object["last_success_ms"] = whole_ms(*status.last_success);
     }
     return object;
 }
@@ -32,16 +31,13 @@ json::object describe(const StationEntry& station) {
 json::object describe(const points::StationPoints& points, const points::Poll& block,
                       TimePoint now) {
     const points::Reading& reading = points.reading(block);
-    const auto ms = [](Duration duration) {
-        return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
-    };
     json::object object;
     object["read"] = block.read;
     object["count"] = block.count;
-    object["every_ms"] = ms(block.every);
+    object["every_ms"] = whole_ms(block.every);
     object["quality"] = label(points::quality_of(reading, block.every, now));
     object["age_ms"] = nullptr;
-    if (reading.sampled) object["age_ms"] = ms(now - *reading.sampled);
+    if (reading.sampled) object["age_ms"] = whole_ms(now - *reading.sampled);
     object["good"] = reading.good;
     object["failed"] = reading.failed;
     return object;

@@ -2,6 +2,7 @@
 
 #include <boost/json/serialize.hpp>
 
+#include "json_util.hpp"
 #include "point_json.hpp"
 
 namespace panelgate::web {
@@ -18,8 +19,7 @@ json::object point_json(const points::Point& point, const points::PointReading& 
     object["quality"] = label(reading.quality);
     object["age_ms"] = nullptr;
     if (reading.age) {
-        object["age_ms"] =
-            std::chrono::duration_cast<std::chrono::milliseconds>(*reading.age).count();
+        object["age_ms"] = whole_ms(*reading.age);
     }
     return object;
 }

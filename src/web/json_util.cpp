@@ -46,6 +46,10 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
 
 }  // namespace
 
+std::int64_t whole_ms(Duration duration) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
+}
+
 HttpResponse json_response(unsigned status, const json::value& body) {
     HttpResponse response;
     response.status = status;

@@ -7,10 +7,14 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "problem.hpp"
 
 namespace panelgate::web {
+
+/// For members that end in _ms: rounded towards zero.
+std::int64_t whole_ms(Duration duration);
 
 HttpResponse json_response(unsigned status, const boost::json::value& body);
 

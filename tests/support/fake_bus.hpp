@@ -66,6 +66,8 @@ class FakeBus : public bus::BusClient {
         return {made.begin() + static_cast<std::ptrdiff_t>(skip), made.end()};
     }
 
+    std::vector<bus::ClientShare> clients() const override { return shares; }
+
     static bus::Answer reply(Bytes pdu) {
         return {Result<Bytes>(std::move(pdu)), true, bus::Source::bus, {}};
     }
@@ -76,7 +78,8 @@ class FakeBus : public bus::BusClient {
     Script script;
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
-    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, "absent", {}};
+    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, "absent"};
+    std::vector<bus::ClientShare> shares;
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
     std::vector<bus::TraceDecision> made;  ///< decisions

@@ -54,7 +54,7 @@ class Bus final : public BusClient {
     void transact(Request request, AnswerHandler handler) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
-    bool is_up() const override;
+    std::vector<ClientShare> clients() const override;
     StationStatus station_status(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
     std::vector<TraceDecision> decisions(std::size_t last) const override;

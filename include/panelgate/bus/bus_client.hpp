@@ -72,9 +72,8 @@ struct LineStatus {
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;           ///< busy share of the last seconds
-    std::string echo;                  ///< "unknown", "absent", "present", "unclear"
-    std::vector<ClientShare> clients;  ///< the greediest first, at most 100
+    double load_percent = 0;  ///< busy share of the last seconds
+    std::string echo;         ///< "unknown", "absent", "present", "unclear"
 };
 
 struct StationStatus {
@@ -97,8 +96,8 @@ class BusClient {
     virtual void cancel(ClientId client) = 0;
 
     virtual LineStatus status() const = 0;
-    /// status().up, for who asks often.
-    virtual bool is_up() const { return status().up; }
+    /// What each client has used of the line: the greediest first, at most 100.
+    virtual std::vector<ClientShare> clients() const { return {}; }
     virtual StationStatus station_status(std::uint8_t station) const = 0;
     /// The last frames, oldest first, at most `last`.
     virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;
@@ -107,7 +106,7 @@ class BusClient {
         static_cast<void>(last);
         return {};
     }
-    /// What a client is to be called in `LineStatus::clients`, until cancel().
+    /// What a client is to be called in clients(), until cancel().
     virtual void name_client(ClientId client, std::string name) {
         static_cast<void>(client);
         static_cast<void>(name);

@@ -43,6 +43,8 @@ Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& 
                              const Value& value);
 
 std::string to_string(const Value& value);
+/// Bits as 0 and 1; nothing for a text.
+std::optional<double> number_of(const Value& value);
 
 /// One block of registers understood in one way.
 struct Interpretation {

@@ -137,6 +137,10 @@ struct PanelProfile {
     Simulation simulation;
 
     const FunctionRule* find_function(std::uint8_t code) const;
+    /// The panel takes this function; a profile that lists none takes all.
+    bool has_function(std::uint8_t code) const {
+        return functions.empty() || find_function(code) != nullptr;
+    }
     const Area* find_area(std::string_view name) const;
     /// The first area that reaches this item through `table`, or nullptr.
     const Area* find_area(modbus::Table table, std::uint32_t address) const;

@@ -108,13 +108,13 @@ TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
     const auto frames = bus->trace(10);
     ASSERT_FALSE(frames.empty());
     EXPECT_EQ(frames[0].why.substr(0, 36), "read of client 1 to station 17: next");
-    const auto clients = bus->status().clients;
+    const auto clients = bus->clients();
     ASSERT_EQ(clients.size(), 1u);
     EXPECT_EQ(clients[0].name, "modbus_tcp 10.0.0.7:5000");
     EXPECT_EQ(clients[0].transactions, 1u);
     EXPECT_EQ(clients[0].percent, 100);
     bus->cancel(1);
-    EXPECT_TRUE(bus->status().clients.empty());
+    EXPECT_TRUE(bus->clients().empty());
 }
 
 TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {

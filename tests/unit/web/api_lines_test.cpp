@@ -18,7 +18,7 @@ TEST_F(ApiLines, ListsTheLines) {
 }
 
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
-    bus.line.clients = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
+    bus.shares = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
               json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75.0,
         "transactions":12}])"));
