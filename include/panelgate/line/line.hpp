@@ -3,6 +3,7 @@
 #include <string>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/line/counters.hpp"
 
@@ -31,6 +32,12 @@ class Line {
     /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
     virtual const Counters& counters() const = 0;
+    /// Other characters from now on, while it is up and nothing is being sent. False when this end
+    /// does not decide that (RTU over TCP), or the device refuses (then it is down).
+    virtual bool set_format(const SerialFormat& format) {
+        static_cast<void>(format);
+        return false;
+    }
     /// What the way to the wire and back adds to every answer, now: nothing for a device here.
     virtual Duration latency() { return {}; }
 };
