@@ -5,6 +5,7 @@
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "panelgate/line/line.hpp"
@@ -23,8 +24,11 @@ class DescriptorLine : public Line {
     void start(Events& events) final;
     void stop() final;
     void poll_input() final;
-    void write(ByteView bytes) final;
-    const Counters& counters() const final { return counters_; }
+    void write(ByteView bytes) override;
+    const Counters& counters() const final {
+        counters_.uart = uart_errors();
+        return counters_;
+    }
 
   protected:
     virtual void begin_open() = 0;
@@ -37,6 +41,8 @@ class DescriptorLine : public Line {
 
     /// The device is open and about to be closed.
     virtual void before_close() {}
+    /// What the driver has counted, also while the device is closed.
+    virtual std::optional<UartErrors> uart_errors() const { return {}; }
     /// Something may be there now: tries, unless it is open or was tried a moment ago.
     void open_soon();
 
@@ -44,16 +50,19 @@ class DescriptorLine : public Line {
     std::string adopt(int fd);
     void opened();
     void open_failed(const std::string& why);
+    /// The open device cannot be used any more.
+    void lost(const std::string& why);
+    /// For every opening from now on.
+    void remember(const SerialFormat& format) { settings_.serial = format; }
 
     const Settings& settings() const { return settings_; }
-    int fd() { return descriptor_.native_handle(); }
+    int fd() const { return fd_; }
     bool is_open() const { return descriptor_.is_open(); }
     /// Completions outlive the line: they ask here first.
     std::shared_ptr<bool> alive() const { return alive_; }
     boost::asio::any_io_executor executor() { return timer_.get_executor(); }
 
   private:
-    void lost(const std::string& why);
     void retry_later();
     void wait_to_open();
     void close();
@@ -63,11 +72,12 @@ class DescriptorLine : public Line {
 
     Settings settings_;
     boost::asio::posix::stream_descriptor descriptor_;
+    int fd_ = -1;  ///< of descriptor_
     boost::asio::steady_timer timer_;
     Reopen reopen_;
     Events* events_ = nullptr;
     std::shared_ptr<bool> alive_;
-    Counters counters_;
+    mutable Counters counters_;   ///< the driver's part is fetched when somebody asks
     Bytes unsent_;                ///< what the driver did not take at once; at most one frame
     std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
     std::string last_error_;

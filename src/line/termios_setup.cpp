@@ -1,10 +1,10 @@
 #include "panelgate/line/termios_setup.hpp"
 
 // <asm/termbits.h> has termios2 and clashes with <termios.h>: this file is the only one to use it.
+#include <asm/ioctls.h>
 #include <asm/termbits.h>
-#include <sys/ioctl.h>
 
-#include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 
@@ -51,18 +51,21 @@ std::string difference(const termios2& wanted, const termios2& got, const Serial
 
 }  // namespace
 
-SetUp set_up_tty(int descriptor, const SerialFormat& format) {
-    const auto failed = [](const char* what) {
-        return SetUp{std::string(what) + ": " + std::strerror(errno), {}};
+SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops) {
+    const auto failed = [](const char* what, int error) {
+        return SetUp{std::string(what) + ": " + std::strerror(-error), {}};
     };
     termios2 before{};
-    if (ioctl(descriptor, TCGETS2, &before) != 0) return failed("not a serial device");
-    const termios2 wanted = raw(before, format);
-    if (ioctl(descriptor, TCSETS2, &wanted) != 0)
-        return failed("the driver refuses these settings");
+    if (const int result = ops.control(descriptor, TCGETS2, &before); result < 0)
+        return failed("not a serial device", result);
+    termios2 wanted = raw(before, format);
+    if (const int result = ops.control(descriptor, TCSETS2, &wanted); result < 0)
+        return failed("the driver refuses these settings", result);
     termios2 got{};
-    if (ioctl(descriptor, TCGETS2, &got) != 0) return failed("cannot read the settings back");
-    ioctl(descriptor, TCFLSH, TCIOFLUSH);  // what an earlier user left behind
+    if (const int result = ops.control(descriptor, TCGETS2, &got); result < 0)
+        return failed("cannot read the settings back", result);
+    // What an earlier user left behind goes.
+    ops.control(descriptor, TCFLSH, reinterpret_cast<void*>(std::uintptr_t{TCIOFLUSH}));
     return SetUp{{}, difference(wanted, got, format)};
 }
 

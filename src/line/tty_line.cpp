@@ -9,62 +9,143 @@
 
 #include "descriptor_line.hpp"
 #include "device_watch.hpp"
+#include "driver.hpp"
 #include "open_error.hpp"
 #include "panelgate/line/termios_setup.hpp"
 #include "panelgate/rt/log.hpp"
+#include "rs485.hpp"
+#include "rts_sender.hpp"
 
 namespace panelgate::line {
 namespace {
 
 class TtyLine final : public DescriptorLine {
   public:
-    TtyLine(const boost::asio::any_io_executor& executor, Settings settings)
+    TtyLine(const boost::asio::any_io_executor& executor, const Settings& settings, PortOps& ops)
         : DescriptorLine(executor, settings),
-          watch_(executor, settings.device, [this] { open_soon(); }) {}
+          ops_(ops),
+          watch_(executor, settings.device, [this] { open_soon(); }),
+          rts_(executor, DescriptorLine::settings(),
+               {[this](ByteView bytes) { DescriptorLine::write(bytes); },
+                [this](const std::string& why) { lost(why); }},
+               ops) {}
     ~TtyLine() override { stop(); }
 
-  private:
-    void begin_open() override {
-        const std::string error = try_open();
-        if (error.empty()) {
-            watch_.stop();
-            opened();
-        } else {
-            open_failed(error);
-        }
+    void write(ByteView bytes) override;
+    bool set_format(const SerialFormat& format) override;
+    Duration lead() const override {
+        const bool off = settings().rs485.mode == Rs485::Mode::off;
+        return off ? Duration::zero() : settings().rs485.delay_before_send;
     }
+    std::optional<Duration> unsent() override;
+
+  private:
+    void begin_open() override;
     void waiting() override { watch_.look(); }
     void cancel_open() override { watch_.stop(); }
-    void before_close() override { ::ioctl(fd(), TIOCNXCL); }
+    void before_close() override;
+    std::optional<UartErrors> uart_errors() const override {
+        return is_open() ? errors_.look(fd(), ops_) : errors_.last();
+    }
     std::string try_open();
+    std::string set_up();
+    std::string set_up_sending();
+    void warn_once(std::string& last, const std::string& what, const std::string& why);
 
+    PortOps& ops_;
     DeviceWatch watch_;
+    RtsSender rts_;
+    Driver driver_;
+    mutable UartErrorCount errors_;  ///< asked when somebody asks
     std::string last_warning_;
+    std::string last_rs485_warning_;
+    std::string last_slow_;
+    bool exclusive_ = false;  ///< by us: another program's hold is not ours to lift
 };
+
+void TtyLine::begin_open() {
+    const std::string error = try_open();
+    if (!error.empty()) return open_failed("cannot open " + settings().device + ": " + error);
+    watch_.stop();
+    opened();
+}
 
 /// Empty when the device is ready.
 std::string TtyLine::try_open() {
     const std::string& device = settings().device;
-    const std::string cannot = "cannot open " + device + ": ";
     const int opened = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-    if (opened < 0) return cannot + explain_open_error(device, errno);
-    if (const std::string error = adopt(opened); !error.empty()) return cannot + error;
-    if (flock(fd(), LOCK_EX | LOCK_NB) != 0) return cannot + holder_of_lock(fd()) + " holds it";
-    ::ioctl(fd(), TIOCEXCL);  // for programs that do not ask for the lock
-    const SetUp result = set_up_tty(fd(), settings().serial);
-    if (!result.error.empty()) return cannot + result.error;
-    if (!result.warning.empty() && result.warning != last_warning_) {
-        rt::log(rt::LogLevel::warn, "device settings differ",
-                {{"device", device}, {"why", result.warning}});
+    if (opened < 0) return explain_open_error(device, errno);
+    if (std::string error = adopt(opened); !error.empty()) return error;
+    if (flock(fd(), LOCK_EX | LOCK_NB) != 0) return holder_of_lock(fd()) + " holds it";
+    exclusive_ = ops_.control(fd(), TIOCEXCL, nullptr) >= 0;  // for those who ask for no lock
+    return set_up();
+}
+
+std::string TtyLine::set_up() {
+    const SetUp result = set_up_tty(fd(), settings().serial, ops_);
+    if (!result.error.empty()) return result.error;
+    warn_once(last_warning_, "device settings differ", result.warning);
+    driver_ = look_at_driver(fd(), ops_);
+    errors_.opened(fd(), ops_);
+    warn_once(last_slow_, "slow adapter", ask_low_latency(fd(), settings().device, ops_));
+    return set_up_sending();
+}
+
+std::string TtyLine::set_up_sending() {
+    switch (settings().rs485.mode) {
+        case Rs485::Mode::off:
+            return {};
+        case Rs485::Mode::kernel: {
+            const SetUp result = set_up_rs485(fd(), settings().rs485, ops_);
+            warn_once(last_rs485_warning_, "device settings differ", result.warning);
+            return result.error;
+        }
+        case Rs485::Mode::rts:
+            return rts_.opened(fd(), driver_);
     }
-    last_warning_ = result.warning;
-    return {};
+    std::abort();
+}
+
+/// Once a device, not at each of its openings.
+void TtyLine::warn_once(std::string& last, const std::string& what, const std::string& why) {
+    if (!why.empty() && why != last) {
+        rt::log(rt::LogLevel::warn, what, {{"device", settings().device}, {"why", why}});
+    }
+    last = why;
+}
+
+void TtyLine::before_close() {
+    rts_.closing();
+    if (std::exchange(exclusive_, false)) ops_.control(fd(), TIOCNXCL, nullptr);
+}
+
+void TtyLine::write(ByteView bytes) {
+    if (!is_open()) return;
+    if (settings().rs485.mode == Rs485::Mode::rts) return rts_.write(bytes);
+    DescriptorLine::write(bytes);
+}
+
+bool TtyLine::set_format(const SerialFormat& format) {
+    if (!is_open()) return false;
+    const SetUp result = set_up_tty(fd(), format, ops_);
+    if (!result.error.empty()) {
+        lost(result.error);
+        return false;
+    }
+    remember(format);
+    return true;
+}
+
+std::optional<Duration> TtyLine::unsent() {
+    if (!is_open() || !driver_.tells_queue) return std::nullopt;
+    return unsent_time(fd(), driver_, character_time(settings().serial), ops_);
 }
 
 }  // namespace
 
-std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings) {
-    return std::make_unique<TtyLine>(executor, std::move(settings));
+std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings,
+                                    PortOps& ops) {
+    return std::make_unique<TtyLine>(executor, settings, ops);
 }
 
 }  // namespace panelgate::line

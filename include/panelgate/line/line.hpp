@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "panelgate/base/bytes.hpp"
@@ -38,6 +39,11 @@ class Line {
         static_cast<void>(format);
         return false;
     }
+    /// Between write() and the first bit: what switching to sending takes.
+    virtual Duration lead() const { return {}; }
+    /// How long the wire still needs for what was written, as far as the driver tells. Nothing from
+    /// a line that cannot tell at all: who writes has to go by its own arithmetic.
+    virtual std::optional<Duration> unsent() { return std::nullopt; }
     /// What the way to the wire and back adds to every answer, now: nothing for a device here.
     virtual Duration latency() { return {}; }
 };

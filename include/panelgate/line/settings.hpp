@@ -9,9 +9,27 @@
 
 namespace panelgate::line {
 
+/// Who switches an RS-485 transceiver to sending, and how.
+struct Rs485 {
+    enum class Mode : std::uint8_t {
+        off,     ///< the adapter does it by itself
+        kernel,  ///< the driver does it (TIOCSRS485), to the bit
+        rts,     ///< this program does it with RTS, as well as timers allow
+    };
+    Mode mode = Mode::off;
+    bool rts_high_on_send = true;
+    /// From RTS to the first bit, and from the last bit back: 0 to 100 ms, whole ones for the
+    /// kernel.
+    Duration delay_before_send{};
+    Duration delay_after_send{};
+    bool receive_during_send = false;  ///< kernel only: the line hears itself
+    friend bool operator==(const Rs485&, const Rs485&) = default;
+};
+
 struct Settings {
     std::string device;  ///< path of a serial device, or tcp://HOST:PORT
     SerialFormat serial;
+    Rs485 rs485;                  ///< of a serial device
     Duration reopen_min = 100ms;  ///< back-off between attempts to open, doubled each time
     Duration reopen_max = 1s;
 };

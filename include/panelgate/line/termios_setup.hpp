@@ -3,6 +3,7 @@
 #include <string>
 
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/line/port_ops.hpp"
 
 namespace panelgate::line {
 
@@ -13,7 +14,8 @@ struct SetUp {
 };
 
 /// Raw mode by hand (every byte value passes, read() gives what is there), the format, any integer
-/// rate through termios2/BOTHER, then reads back what the driver took.
-SetUp set_up_tty(int descriptor, const SerialFormat& format);
+/// rate through termios2/BOTHER, then reads back what the driver took. A rate that is more than 2 %
+/// off is a warning.
+SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops = kernel_ops());
 
 }  // namespace panelgate::line

@@ -4,13 +4,15 @@
 #include <memory>
 
 #include "panelgate/line/line.hpp"
+#include "panelgate/line/port_ops.hpp"
 #include "panelgate/line/settings.hpp"
 
 namespace panelgate::line {
 
 /// A serial device (or pty) through termios on a non-blocking descriptor. Read 0, EIO, ENODEV,
 /// ENXIO and a hang-up all mean the device has gone: it is closed at once and opened again with
-/// back-off, every setting applied anew.
-std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings);
+/// back-off, every setting applied anew. `ops` outlives the line.
+std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings,
+                                    PortOps& ops = kernel_ops());
 
 }  // namespace panelgate::line

@@ -1,0 +1,79 @@
+#include "rts_sender.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/rt/asio_clock.hpp"
+#include "rs485.hpp"
+
+namespace panelgate::line {
+namespace {
+
+/// Of a driver that cannot tell when the last bit has left: an adapter on USB gets its bytes a
+/// frame (1 ms) later, and begins after the next.
+constexpr Duration kBlindMargin = 2ms;
+
+}  // namespace
+
+RtsSender::RtsSender(const boost::asio::any_io_executor& executor, const Settings& settings,
+                     Owner owner, PortOps& ops)
+    : timer_(executor), settings_(settings), owner_(std::move(owner)), ops_(ops) {}
+
+std::string RtsSender::opened(int fd, const Driver& driver) {
+    closing();
+    fd_ = fd;
+    driver_ = driver;
+    alive_ = std::make_shared<bool>(true);
+    return switch_rts(fd_, settings_.rs485, false, ops_);
+}
+
+void RtsSender::closing() {
+    if (alive_) *alive_ = false;
+    timer_.cancel();
+    held_.clear();
+    end_ = {};
+}
+
+void RtsSender::write(ByteView bytes) {
+    held_.insert(held_.end(), bytes.begin(), bytes.end());
+    if (!switch_to(true)) return;
+    if (settings_.rs485.delay_before_send > Duration::zero()) {
+        at(rt::now() + settings_.rs485.delay_before_send, &RtsSender::send_held);
+    } else {
+        send_held();
+    }
+}
+
+void RtsSender::send_held() {
+    const Bytes bytes = std::exchange(held_, {});
+    const auto alive = alive_;
+    owner_.send(bytes);
+    if (!*alive) return;  // the write failed
+    end_ = std::max(end_, rt::now()) + wire_time(settings_.serial, bytes.size());
+    const Duration margin = driver_.tells_empty ? Duration::zero() : kBlindMargin;
+    at(end_ + margin + settings_.rs485.delay_after_send, &RtsSender::release);
+}
+
+void RtsSender::release() {
+    const Duration left = unsent_time(fd_, driver_, character_time(settings_.serial), ops_);
+    if (left > Duration::zero()) {
+        at(rt::now() + left + settings_.rs485.delay_after_send, &RtsSender::release);
+    } else {
+        switch_to(false);
+    }
+}
+
+bool RtsSender::switch_to(bool sending) {
+    const std::string error = switch_rts(fd_, settings_.rs485, sending, ops_);
+    if (!error.empty()) owner_.failed(error);
+    return error.empty();
+}
+
+void RtsSender::at(TimePoint when, void (RtsSender::*next)()) {
+    timer_.expires_at(when);
+    timer_.async_wait([this, next, alive = alive_](boost::system::error_code error) {
+        if (!error && *alive) (this->*next)();
+    });
+}
+
+}  // namespace panelgate::line

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <boost/asio/steady_timer.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "driver.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/line/port_ops.hpp"
+#include "panelgate/line/settings.hpp"
+
+namespace panelgate::line {
+
+/// RS-485 mode rts: raises RTS, sends, and lowers it when the last bit should have left. Best
+/// effort: timers and USB make it late by up to some milliseconds, never early as far as the driver
+/// tells. One thread; one frame at a time (a second one during the first extends it).
+class RtsSender {
+  public:
+    struct Owner {
+        std::function<void(ByteView)> send;              ///< to the device, now
+        std::function<void(const std::string&)> failed;  ///< the device must be closed
+    };
+    /// `settings` and `ops` outlive it.
+    RtsSender(const boost::asio::any_io_executor& executor, const Settings& settings, Owner owner,
+              PortOps& ops);
+
+    /// The device is open: RTS to receiving. Empty, or why that does not work.
+    std::string opened(int fd, const Driver& driver);
+    void write(ByteView bytes);
+    /// The device is about to be closed: forgets what was to come.
+    void closing();
+
+  private:
+    void at(TimePoint when, void (RtsSender::*next)());
+    void send_held();
+    void release();
+    bool switch_to(bool sending);
+
+    boost::asio::steady_timer timer_;
+    const Settings& settings_;
+    Owner owner_;
+    PortOps& ops_;
+    int fd_ = -1;
+    Driver driver_;
+    Bytes held_;  ///< until delay_before_send is over
+    TimePoint end_{};
+    std::shared_ptr<bool> alive_;
+};
+
+}  // namespace panelgate::line

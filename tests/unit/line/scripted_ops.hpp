@@ -1,0 +1,57 @@
+#pragma once
+
+#include <asm/ioctls.h>
+#include <asm/termios.h>
+#include <linux/serial.h>
+
+#include <cerrno>
+#include <cstring>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "panelgate/line/port_ops.hpp"
+
+namespace panelgate::line {
+
+/// Answers for a driver: each request as a test says, the others as the kernel does for the pty
+/// behind it, or -ENOTTY with no descriptor.
+class ScriptedOps final : public PortOps {
+  public:
+    using Answer = std::function<int(void* argument)>;
+
+    int control(int fd, unsigned long request, void* argument) override {
+        asked.push_back(request);
+        const auto answer = answers.find(request);
+        if (answer != answers.end()) return answer->second(argument);
+        return fd >= 0 ? kernel_ops().control(fd, request, argument) : -ENOTTY;
+    }
+    void refuse(unsigned long request, int error) {
+        answers[request] = [error](void*) { return -error; };
+    }
+    /// Copies `value` to where the caller wants it.
+    template <class Value>
+    void give(unsigned long request, Value value) {
+        answers[request] = [value](void* argument) {
+            std::memcpy(argument, &value, sizeof value);
+            return 0;
+        };
+    }
+    /// A driver that keeps what it is given and tells it back.
+    template <class Value>
+    void keep(unsigned long set, unsigned long get, Value& kept) {
+        answers[set] = [&kept](void* argument) {
+            std::memcpy(&kept, argument, sizeof kept);
+            return 0;
+        };
+        answers[get] = [&kept](void* argument) {
+            std::memcpy(argument, &kept, sizeof kept);
+            return 0;
+        };
+    }
+
+    std::map<unsigned long, Answer> answers;
+    std::vector<unsigned long> asked;
+};
+
+}  // namespace panelgate::line
