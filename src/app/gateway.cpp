@@ -121,6 +121,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     if (simulates) {
         simulated_.push_back(simulate_line(executor_, line));
         device.device = simulated_.back()->device();
+        device.rs485 = {};
         settings.device = "sim";
     }
     const bool remote = line.kind == config::Line::Kind::tcp && !simulates;

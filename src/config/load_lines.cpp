@@ -61,17 +61,45 @@ void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& o
     in.finish();
 }
 
-void load_rs485(Loading& loading, MapReader& line) {
-    const Node* node = line.map("rs485");
+/// 0 to 100 ms, which is what the kernel takes.
+Duration load_rs485_delay(MapReader& in, std::string_view key, line::Rs485::Mode mode) {
+    const Duration delay = in.duration(key, 0ms, 100ms).value_or(Duration::zero());
+    if (mode == line::Rs485::Mode::kernel && delay % 1ms != Duration::zero()) {
+        in.problem(key, std::string(key) +
+                            " must be whole milliseconds in rs485 mode kernel, not " +
+                            yaml::format_duration(delay));
+    }
+    return delay;
+}
+
+void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs485& rs485) {
+    using Mode = line::Rs485::Mode;
+    const Node* node = in_line.map("rs485");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "rs485");
-    constexpr std::array<std::string_view, 3> kModes{"off", "kernel", "rts"};
-    const auto mode = in.choice_index("mode", kModes);
-    if (mode && *mode != 0) {
-        in.problem("mode",
-                   "rs485 mode '" + std::string(kModes[*mode]) +
-                       "' is not in this version; use off and an adapter that switches by itself");
-        return;  // its further keys belong to that mode
+    constexpr std::array<std::pair<std::string_view, Mode>, 3> kModes{
+        {{"off", Mode::off}, {"kernel", Mode::kernel}, {"rts", Mode::rts}}};
+    rs485.mode = in.choice<Mode>("mode", kModes).value_or(Mode::off);
+    constexpr std::array<std::string_view, 2> kLevels{"high", "low"};
+    rs485.rts_high_on_send = in.choice_index("rts_on_send", kLevels) != std::size_t{1};
+    rs485.delay_before_send = load_rs485_delay(in, "delay_before_send", rs485.mode);
+    rs485.delay_after_send = load_rs485_delay(in, "delay_after_send", rs485.mode);
+    rs485.receive_during_send = in.boolean("receive_during_send").value_or(false);
+    if (rs485.receive_during_send && rs485.mode == Mode::rts) {
+        in.problem(
+            "receive_during_send",
+            "receive_during_send belongs to rs485 mode kernel: with rts the adapter's wiring "
+            "decides it");
+    }
+    for (const std::string_view key :
+         {"rts_on_send", "delay_before_send", "delay_after_send", "receive_during_send"}) {
+        if (rs485.mode == Mode::off && in.has(key)) {
+            in.problem(key, std::string(key) + " belongs to rs485 mode kernel or rts");
+        }
+    }
+    if (rs485.mode != Mode::off && line.kind != Line::Kind::serial) {
+        in.problem("mode", "only a serial device has an rs485 mode: '" + line.device.device +
+                               "' switches by itself");
     }
     in.finish();
 }
@@ -117,7 +145,7 @@ Line load_line(Loading& loading, const Node& node) {
     load_device(loading, in, line);
     const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;
-    load_rs485(loading, in);
+    load_rs485(loading, in, line, line.device.rs485);
     line.arbiter.echo = load_echo(in);
     load_queue(loading, in, line.arbiter.queue);
     load_offline(loading, in, line.arbiter.offline);

@@ -164,6 +164,38 @@ void add_line_counters(Families& out, const Snapshot& snapshot) {
     out.push_back(busy.take());
 }
 
+struct UartCounter {
+    const char* name;
+    const char* help;
+    std::uint64_t line::UartErrors::* field;
+};
+constexpr std::array kUartCounters = {
+    UartCounter{"panelgate_framing_errors_total",
+                "Characters without a stop bit, as the driver counts them: a wrong rate, or noise.",
+                &line::UartErrors::framing},
+    UartCounter{"panelgate_parity_errors_total",
+                "Characters with a wrong parity bit, as the driver counts them.",
+                &line::UartErrors::parity},
+    UartCounter{
+        "panelgate_overruns_total",
+        "Times that characters were lost between UART and driver or in the driver's buffer.",
+        &line::UartErrors::overruns},
+    UartCounter{"panelgate_breaks_total",
+                "Times that the line was low for longer than a character.",
+                &line::UartErrors::breaks},
+};
+
+/// Only of lines whose driver counts: an unknown number is absent, not 0 (P10).
+void add_uart_counters(Families& out, const Snapshot& snapshot) {
+    for (const UartCounter& counter : kUartCounters) {
+        Family family = make_counter(counter.name, counter.help);
+        for (const LineReport& line : snapshot.lines) {
+            if (line.device.uart) family.counter(of_line(line), (*line.device.uart).*counter.field);
+        }
+        out.push_back(family.take());
+    }
+}
+
 void add_line_state(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge("panelgate_line_up", "1 while the line's device is open.");
     Family depth = make_gauge("panelgate_queue_depth", "Requests that wait for the line.");
@@ -251,6 +283,7 @@ std::string exposition(const Snapshot& snapshot) {
     add_wire_counters(families, snapshot);
     add_exceptions(families, snapshot);
     add_line_counters(families, snapshot);
+    add_uart_counters(families, snapshot);
     add_line_state(families, snapshot);
     add_station_state(families, snapshot);
     add_points(families, snapshot);

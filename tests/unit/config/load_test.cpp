@@ -63,6 +63,21 @@ TEST(ConfigLoad, FillsInTheDefaultsOfAStation) {
     EXPECT_EQ(settings.max_bits, 2000);
 }
 
+TEST(ConfigLoad, ReadsHowRs485IsSwitched) {
+    const Config config = load_valid(
+        "lines:\n  - name: a\n    device: /dev/ttyS1\n"
+        "    rs485: {mode: kernel, rts_on_send: low, delay_before_send: 1ms, delay_after_send: "
+        "2ms,\n"
+        "            receive_during_send: true}\n"
+        "  - name: b\n    device: /dev/ttyS2\n"
+        "    rs485: {mode: rts, delay_before_send: 500us}\n"
+        "modbus_tcp: [{listen: \"127.0.0.1:502\", lines: [a]}]\n");
+    EXPECT_EQ(config.lines[0].device.rs485,
+              (line::Rs485{line::Rs485::Mode::kernel, false, 1ms, 2ms, true}));
+    EXPECT_EQ(config.lines[1].device.rs485,
+              (line::Rs485{line::Rs485::Mode::rts, true, 500us, 0ms, false}));
+}
+
 TEST(ConfigLoad, ReadsEveryKeyOfALine) {
     const Config config = load_valid(
         "lines:\n  - name: hall-2\n    device: sim\n"
@@ -74,6 +89,7 @@ TEST(ConfigLoad, ReadsEveryKeyOfALine) {
         "    offline: {after: 5, probe_min: 1min, probe_max: 2min}\n" +
         kServe);
     const Line& line = config.lines[0];
+    EXPECT_EQ(line.device.rs485, line::Rs485{});
     EXPECT_EQ(line.kind, Line::Kind::simulated);
     EXPECT_EQ(to_string(line.device.serial), "250000 8O1");
     EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(1s));

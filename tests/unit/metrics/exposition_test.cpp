@@ -162,5 +162,15 @@ TEST(Process, HasNoFiguresForATextThatIsNoStat) {
     EXPECT_FALSE(parse_stat("42 (cut) S 1", {}).cpu_seconds);
 }
 
+TEST(Exposition, P10DriverErrorsAreThereForLinesWhoseDriverCounts) {
+    Snapshot snapshot = filled();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_framing_errors_total{")));
+    snapshot.lines[0].device.uart = line::UartErrors{1, 2, 3, 4};
+    expect_lines(exposition(snapshot), {R"(panelgate_framing_errors_total{line="floor1"} 1)",
+                                        R"(panelgate_parity_errors_total{line="floor1"} 2)",
+                                        R"(panelgate_overruns_total{line="floor1"} 3)",
+                                        R"(panelgate_breaks_total{line="floor1"} 4)"});
+}
+
 }  // namespace
 }  // namespace panelgate::metrics
