@@ -30,6 +30,23 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
     step(now);
 }
 
+/// Drivers and adapters begin to send later than asked, and by an unknown time: what is computed is
+/// the earliest end.
+void Arbiter::on_end(TimePoint now, Duration left) {
+    constexpr Duration kMaxShift = 1s;
+    if (!wants_end(now)) return;
+    Active& a = *active_;
+    const Duration shift = now + left - a.sent;
+    if (left <= Duration::zero() || a.heard || a.sent + shift > a.computed + kMaxShift) {
+        a.end_confirmed = true;
+        return;
+    }
+    a.sent += shift;
+    a.give_up += shift;
+    a.longest += shift;
+    quiet_since_ = std::max(quiet_since_, a.sent);
+}
+
 /// P8: our own frame is taken out of what is heard, also behind a broadcast or a timeout.
 ByteView Arbiter::without_echo(TimePoint now, ByteView bytes) {
     const bool before = echo_.complete();

@@ -229,7 +229,7 @@ void Arbiter::start(TimePoint now, Group group) {
         const auto rank = static_cast<std::size_t>(job.priority);
         if (job.attempts++ == 0) line_counters_.queue_wait[rank].observe(now - job.arrived);
     }
-    const TimePoint sent = now + wire_time(settings_.serial, adu.size());
+    const TimePoint sent = now + lead_ + wire_time(settings_.serial, adu.size());
     Duration wait{};
     std::string_view what = "broadcast";
     if (group.station == kBroadcast) {
@@ -261,6 +261,8 @@ void Arbiter::start(TimePoint now, Group group) {
                            sent,
                            sent,
                            false,
+                           sent,
+                           !confirm_ends_,
                            true,
                            {}});
 }
@@ -357,6 +359,7 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
     for (const Group& group : retries_) deadlines(group);
     if (active_) {
         earlier(active_deadline());
+        if (!active_->end_confirmed) earlier(active_->sent);
         if (active_->group.station != kBroadcast) deadlines(active_->group);
         return next;
     }

@@ -66,6 +66,9 @@ struct Bus::State final : public line::Line::Events,
     void act(arbiter::Note& note);
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
+    void confirm_end(TimePoint now) {
+        if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
+    }
     void arm();
     void on_alarm();
     void answer(Pending pending, Answer answer);
@@ -97,6 +100,8 @@ void Bus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
     observe({BusEvent::Kind::line, "up", {}, 0, 0, {}});
+    arbiter.set_lead(line->lead());
+    arbiter.confirm_ends(line->unsent().has_value());
     arbiter.on_line_up(rt::now());
     pump();
 }
@@ -111,7 +116,9 @@ void Bus::State::on_down(const std::string& why) {
 }
 
 void Bus::State::on_bytes(ByteView bytes) {
-    arbiter.on_rx(rt::now(), bytes);
+    const TimePoint now = rt::now();
+    confirm_end(now);
+    arbiter.on_rx(now, bytes);
     pump();
 }
 
@@ -236,7 +243,9 @@ void Bus::State::arm() {
 void Bus::State::on_alarm() {
     armed.reset();
     line->poll_input();  // what has arrived by now came before whatever is due now
-    arbiter.on_deadline(rt::now());
+    const TimePoint now = rt::now();
+    confirm_end(now);
+    arbiter.on_deadline(now);
     pump();
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -90,6 +91,7 @@ class BusScript {
             spins = *next > now_ ? 0 : spins + 1;
             ASSERT_LT(spins, 100) << "the arbiter asks again and again for the same instant";
             now_ = std::max(now_, *next);
+            if (arbiter_.wants_end(now_)) arbiter_.on_end(now_, unsent());
             arbiter_.on_deadline(now_);
             drain();
         }
@@ -121,6 +123,8 @@ class BusScript {
     std::vector<arbiter::Note> notes;
     std::vector<arbiter::StationEvent> events;
     std::vector<arbiter::Decision> decisions;
+    /// What a driver tells that is asked at the end of a request (Arbiter::confirm_ends).
+    std::function<Duration()> unsent = [] { return Duration::zero(); };
 
   private:
     void drain() {

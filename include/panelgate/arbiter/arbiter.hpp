@@ -96,6 +96,19 @@ class Arbiter {
     /// What the way to the wire and back adds to every answer (RTU over TCP), from the next
     /// request on.
     void set_latency(Duration latency) { latency_ = latency; }
+    /// What lies between Transmit and the first bit, from the next request on.
+    void set_lead(Duration lead) { lead_ = lead; }
+
+    /// The line can tell what has not left yet: from the next request on wants_end() comes true at
+    /// the computed end of each, and on_end() is to be told how much is left.
+    void confirm_ends(bool confirm) { confirm_ends_ = confirm; }
+    bool wants_end(TimePoint now) const {
+        return active_ && !active_->end_confirmed && now >= active_->sent;
+    }
+    /// `left`: the time that the wire still needs. More than nothing moves the end, and with it the
+    /// timeout or the turnaround; wants_end() comes again then, up to a second after the computed
+    /// end.
+    void on_end(TimePoint now, Duration left);
 
     std::optional<Action> poll_action();
     /// When to call on_deadline next; nothing when only an event can change anything.
@@ -163,12 +176,14 @@ class Arbiter {
         Group group;
         modbus::ReplyFramer framer;
         TimePoint started;     ///< first bit out
-        TimePoint sent;        ///< last bit out, computed
+        TimePoint sent;        ///< last bit out, computed, or as the line told
         TimePoint give_up;     ///< no sign of a reply until here: timeout
         TimePoint longest;     ///< a reply that has begun must have ended here
         TimePoint first_byte;  ///< heard in this attempt
         TimePoint last_byte;
         bool heard = false;
+        TimePoint computed;  ///< last bit out
+        bool end_confirmed = true;
         bool clean = true;  ///< nothing was heard before the reply could begin, but for the echo
         Bytes collided;     ///< instead of the echo
     };
@@ -261,6 +276,8 @@ class Arbiter {
     bool other_first_ = false;         ///< a retry lets one other go first
     bool up_ = false;
     Duration latency_{};
+    Duration lead_{};
+    bool confirm_ends_ = false;
     Ticket last_ticket_ = 0;
 };
 

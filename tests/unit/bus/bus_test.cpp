@@ -39,12 +39,19 @@ class MemoryLine final : public line::Line {
         });
     }
     const line::Counters& counters() const override { return counters_; }
+    std::optional<Duration> unsent() override {
+        if (!tells_unsent) return std::nullopt;
+        ++asked_for_unsent;
+        return Duration::zero();
+    }
     Events* events() { return events_; }
 
     std::vector<Bytes> written;
     Bytes reply = kReply;
     bool up_at_start = true;
     bool fail_writes = false;
+    bool tells_unsent = false;
+    int asked_for_unsent = 0;
 
   private:
     boost::asio::io_context& io_;
@@ -99,6 +106,16 @@ TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     EXPECT_TRUE(line->written.empty());
     EXPECT_EQ(bus->report().stations.front().requests.at({"6", "refused"}), 1u);
     EXPECT_TRUE(ask(18, kRead).pdu.has_value());
+}
+
+TEST_F(BusTest, AsksALineThatCanTellWhetherTheRequestHasLeft) {
+    line->tells_unsent = true;
+    bus->start();
+    const int before = line->asked_for_unsent;
+    EXPECT_TRUE(ask(17, kRead).pdu.has_value());
+    line->reply.clear();
+    EXPECT_FALSE(ask(17, kRead).pdu.has_value());
+    EXPECT_GT(line->asked_for_unsent, before);
 }
 
 TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
