@@ -39,6 +39,10 @@ void DescriptorLine::poll_input() {
     if (descriptor_.is_open()) read_all();
 }
 
+ssize_t DescriptorLine::get(std::span<std::uint8_t> room) {
+    return ::read(descriptor_.native_handle(), room.data(), room.size());
+}
+
 ssize_t DescriptorLine::put(ByteView bytes) {
     return ::write(descriptor_.native_handle(), bytes.data(), bytes.size());
 }
@@ -124,7 +128,7 @@ void DescriptorLine::read_all() {
     std::array<std::uint8_t, 1024> buffer;
     constexpr int kMaxReads = 16;  // a babbling line must not keep the loop from the others
     for (int i = 0; i < kMaxReads; ++i) {
-        const ssize_t n = ::read(descriptor_.native_handle(), buffer.data(), buffer.size());
+        const ssize_t n = get(buffer);
         if (n > 0) {
             counters_.bytes_received += static_cast<std::uint64_t>(n);
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));

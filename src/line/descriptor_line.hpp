@@ -6,6 +6,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "panelgate/line/line.hpp"
@@ -34,7 +35,8 @@ class DescriptorLine : public Line {
     virtual void begin_open() = 0;
     /// A pause before the next attempt begins.
     virtual void waiting() {}
-    /// As ::write.
+    /// As ::read and ::write.
+    virtual ssize_t get(std::span<std::uint8_t> room);
     virtual ssize_t put(ByteView bytes);
     /// stop() and a loss cancel an attempt that is under way.
     virtual void cancel_open() {}

@@ -1,0 +1,99 @@
+// P7: every way in which a device says that it has gone.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "descriptor_line.hpp"
+#include "panelgate/line/pty.hpp"
+
+namespace panelgate::line {
+namespace {
+
+struct Heard final : Line::Events {
+    void on_up() override { ++ups; }
+    void on_down(const std::string& why) override { downs.push_back(why); }
+    void on_bytes(ByteView) override { ++bytes; }
+    int ups = 0;
+    int bytes = 0;
+    std::vector<std::string> downs;
+};
+
+/// Opens at once; reading and writing end as a test says.
+class FailingLine final : public DescriptorLine {
+  public:
+    FailingLine(const boost::asio::any_io_executor& executor, const Settings& settings,
+                const Pty& pty)
+        : DescriptorLine(executor, settings), pty_(pty) {}
+    ~FailingLine() override { stop(); }
+
+    int read_error = EAGAIN;  ///< 0: end of file
+    int write_error = 0;
+
+  private:
+    void begin_open() override {
+        adopt(::dup(pty_.master()));
+        opened();
+    }
+    ssize_t get(std::span<std::uint8_t>) override {
+        errno = read_error;
+        return read_error == 0 ? 0 : -1;
+    }
+    ssize_t put(ByteView bytes) override {
+        errno = write_error;
+        return write_error == 0 ? static_cast<ssize_t>(bytes.size()) : -1;
+    }
+
+    const Pty& pty_;
+};
+
+class LostDevice : public testing::TestWithParam<int> {
+  protected:
+    boost::asio::io_context io{1};
+    Settings settings{"/dev/ttyUSB0", {}, {}, 1ms, 1ms};
+    Pty pty;
+    Heard heard;
+    FailingLine line{io.get_executor(), settings, pty};
+};
+
+std::string reason(int error) { return error == 0 ? "hang-up" : std::strerror(error); }
+
+TEST_P(LostDevice, P7IsNoticedByReadingAndOpenedAgain) {
+    line.start(heard);
+    line.poll_input();  // EAGAIN: nothing there
+    EXPECT_TRUE(heard.downs.empty());
+    line.read_error = GetParam();
+    line.poll_input();
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_EQ(heard.downs[0], "/dev/ttyUSB0 is gone: " + reason(GetParam()));
+    line.read_error = EAGAIN;
+    while (heard.ups < 2) io.run_one();
+    EXPECT_EQ(line.counters().reopens, 1u);
+    EXPECT_EQ(heard.bytes, 0);
+}
+
+TEST_P(LostDevice, P7IsNoticedByWritingAndSaidOnce) {
+    if (GetParam() == 0) GTEST_SKIP() << "write() has no end of file";
+    line.start(heard);
+    line.write_error = GetParam();
+    line.write(Bytes{1, 2, 3});
+    line.write(Bytes{4, 5, 6});
+    EXPECT_EQ(heard.downs.size(), 1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryWay, LostDevice,
+                         testing::Values(0, EIO, ENODEV, ENXIO, EBADF, EPIPE, ENOTCONN));
+
+TEST_F(LostDevice, AnInterruptedCallIsNoLoss) {
+    line.start(heard);
+    line.read_error = EINTR;
+    line.poll_input();
+    EXPECT_TRUE(heard.downs.empty());
+}
+
+}  // namespace
+}  // namespace panelgate::line
