@@ -1,5 +1,6 @@
 """A serial line in Python: a pty behind a link, panels that do what a test says, and a record of
 every frame that came along, with the time."""
+import fcntl
 import os
 import select
 import struct
@@ -68,6 +69,13 @@ class RtuBus:
         os.unlink(self._link)
         if self._error:
             raise self._error
+
+    def settings(self):
+        """What the gateway set the device to: (iflag, oflag, cflag, lflag, characters, bit/s)."""
+        tcgets2 = 0x802C542A
+        raw = fcntl.ioctl(self._slave, tcgets2, bytes(44))
+        *flags, _, characters, _, speed = struct.unpack("4IB19s2I", raw)
+        return (*flags, characters, speed)
 
     def inject(self, data):
         """Bytes on the wire that nobody asked for."""
