@@ -131,6 +131,7 @@ void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults
     share("damage", faults.damage);
     share("truncate", faults.truncate);
     share("foreign_id", faults.foreign_id);
+    share("duplicate", faults.duplicate);
     in.finish();
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/sim/collision.hpp"
 
 namespace panelgate::sim {
 
@@ -44,6 +45,7 @@ constexpr Fault kFaults[] = {
     share<&Misbehaviour::damage>("damage"),
     share<&Misbehaviour::truncate>("truncate"),
     share<&Misbehaviour::foreign_id>("foreign_id"),
+    share<&Misbehaviour::duplicate>("duplicate"),
 };
 
 std::string number(double value) {
@@ -81,12 +83,26 @@ std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviou
     return std::nullopt;
 }
 
-Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance) {
+namespace {
+
+/// The other panel of the same address says the same, up to one and a half replies later.
+void answer_twice(Spoken& spoken, std::mt19937& chance, const SerialFormat& format) {
+    const auto bits = spoken.adu.size() * static_cast<std::size_t>(format.bits_per_character());
+    std::uniform_int_distribution<std::size_t> later(0, bits * 3 / 2);
+    HeardBytes heard = collide(spoken.adu, spoken.adu, later(chance), format);
+    spoken.adu = std::move(heard.bytes);
+    spoken.ends = std::move(heard.ends);
+}
+
+}  // namespace
+
+Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
+                 const SerialFormat& format) {
     const auto happens = [&](double share) {
         return share > 0 && std::uniform_real_distribution<>(0, 1)(chance) < share;
     };
     if (adu.empty() || faults.dead || happens(faults.drop)) return {};
-    Spoken spoken{std::move(adu), faults.slow};
+    Spoken spoken{std::move(adu), faults.slow, {}};
     if (happens(faults.late)) spoken.delay += faults.late_by;
     if (happens(faults.foreign_id)) {
         const auto other = static_cast<std::uint8_t>(spoken.adu[0] == 247 ? 1 : spoken.adu[0] + 1);
@@ -98,6 +114,7 @@ Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance) {
         spoken.adu[place(chance)] ^= 0x10;
     }
     if (happens(faults.truncate)) spoken.adu.resize((spoken.adu.size() + 1) / 2);
+    if (happens(faults.duplicate)) answer_twice(spoken, chance, format);
     return spoken;
 }
 

@@ -10,8 +10,10 @@
 #include <utility>
 
 #include "panelgate/line/pty.hpp"
+#include "panelgate/line/termios_setup.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "slave_format.hpp"
 
 namespace panelgate::sim {
 
@@ -33,6 +35,8 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
           timer(executor),
           chance(settings.seed) {
         descriptor.assign(::dup(pty.master()));
+        // Who opens the device and sets nothing speaks as this line does.
+        line::set_up_tty(pty.master(), settings.serial);
     }
 
     void wait_readable();
@@ -41,6 +45,8 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     void at(TimePoint when, void (State::*next)());
     void request_ended();
     Bytes reply_to(ByteView adu);
+    void speak(Spoken spoken);
+    TimePoint end_of(std::size_t byte) const;
     void send_some();
 
     Settings settings;
@@ -49,10 +55,12 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     asio::posix::stream_descriptor descriptor;
     asio::steady_timer timer;
     Bytes request;
-    TimePoint request_end;     ///< wire time of its last bit
-    Duration longest_pause{};  ///< inside it
+    TimePoint request_end;        ///< wire time of its last bit
+    Duration longest_pause{};     ///< inside it
+    bool foreign_format = false;  ///< part of it came at another rate
     std::mt19937 chance;
     Bytes reply;
+    std::vector<std::uint32_t> ends;  ///< of its bytes, in bit times
     std::size_t sent = 0;
     TimePoint reply_start;
     bool stopped = false;
@@ -76,6 +84,7 @@ void SimulatedBus::State::read_all() {
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     if (!reply.empty()) return;  // a collision: neither side understands the other
     const bool first = request.empty();
+    foreign_format = (!first && foreign_format) || !slave_speaks(pty.master(), settings.serial);
     longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
@@ -95,17 +104,30 @@ void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
 void SimulatedBus::State::request_ended() {
     const Bytes adu = std::exchange(request, {});
     if (settings.echo && ::write(descriptor.native_handle(), adu.data(), adu.size()) < 0) return;
-    Spoken spoken{reply_to(adu), {}};
+    if (foreign_format) return;
+    Spoken spoken{reply_to(adu), {}, {}};
     if (const auto found = settings.faults.find(adu.empty() ? std::uint8_t{0} : adu[0]);
         found != settings.faults.end()) {
-        spoken = misbehave(found->second, std::move(spoken.adu), chance);
+        spoken = misbehave(found->second, std::move(spoken.adu), chance, settings.serial);
     }
+    speak(std::move(spoken));
+}
+
+void SimulatedBus::State::speak(Spoken spoken) {
     reply = std::move(spoken.adu);
     if (reply.empty()) return;
+    ends = std::move(spoken.ends);
+    const auto bits = static_cast<std::uint32_t>(settings.serial.bits_per_character());
+    for (auto i = static_cast<std::uint32_t>(ends.size()); i < reply.size(); ++i)
+        ends.push_back((i + 1) * bits);
     sent = 0;
     reply_start =
         request_end + silent_interval(settings.serial) + settings.think_time + spoken.delay;
     at(reply_start, &State::send_some);
+}
+
+TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
+    return reply_start + Duration(1s) * ends[byte] / settings.serial.baud;
 }
 
 /// Empty when nobody answers: damage, a broadcast, an address that nobody has.
@@ -129,9 +151,8 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
 
 /// Hands over the bytes whose time has come.
 void SimulatedBus::State::send_some() {
-    const Duration one = character_time(settings.serial);
-    const auto due = static_cast<std::size_t>((rt::now() - reply_start) / one);
-    const std::size_t until = std::min(reply.size(), due);
+    std::size_t until = sent;
+    while (until < reply.size() && end_of(until) <= rt::now()) ++until;
     if (until > sent) {
         const ssize_t n = ::write(descriptor.native_handle(), reply.data() + sent, until - sent);
         if (n < 0 && errno == EAGAIN) {  // nobody reads: a real line would not wait either
@@ -144,8 +165,8 @@ void SimulatedBus::State::send_some() {
         reply.clear();
         return;
     }
-    const TimePoint end = reply_start + wire_time(settings.serial, reply.size());
-    at(std::min(end, std::max(rt::now() + kTick, reply_start + one)), &State::send_some);
+    at(std::min(end_of(reply.size() - 1), std::max(rt::now() + kTick, end_of(sent))),
+       &State::send_some);
 }
 
 SimulatedBus::SimulatedBus(asio::any_io_executor executor, Settings settings,

@@ -5,8 +5,10 @@
 #include <optional>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/sim/settings.hpp"
 
@@ -22,7 +24,10 @@ std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviou
 struct Spoken {
     Bytes adu;         ///< empty: silence
     Duration delay{};  ///< more than its think time
+    /// Bit times from the first start bit to the end of each byte; empty: without pauses.
+    std::vector<std::uint32_t> ends;
 };
-Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance);
+Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
+                 const SerialFormat& format = {});
 
 }  // namespace panelgate::sim

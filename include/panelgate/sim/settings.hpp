@@ -18,6 +18,7 @@ struct Misbehaviour {
     double damage = 0;      ///< one bit of the reply is wrong
     double truncate = 0;    ///< half of the reply
     double foreign_id = 0;  ///< the reply carries another address
+    double duplicate = 0;   ///< a second panel with this address answers too, a little later
     friend bool operator==(const Misbehaviour&, const Misbehaviour&) = default;
 };
 

@@ -64,13 +64,13 @@ TEST(Misbehaviour, IsGivenAndToldInNumbers) {
     EXPECT_TRUE(faults.dead);
     EXPECT_EQ(faults.late_by, Duration(600ms));
     const FaultNumbers told = to_numbers(faults);
-    EXPECT_EQ(told.size(), 8u);
+    EXPECT_EQ(told.size(), 9u);
     for (const auto& [name, value] : numbers) EXPECT_EQ(told.at(name), value) << name;
     EXPECT_EQ(from_numbers({{"drop", 1.5}}, faults), "drop must be from 0 to 1, not 1.5");
     EXPECT_EQ(
         from_numbers({{"dread", 1}}, faults),
         "there is no fault 'dread'; faults are dead, slow_ms, late_by_ms, late, drop, damage, "
-        "truncate, foreign_id");
+        "truncate, foreign_id, duplicate");
     EXPECT_TRUE(faults.dead) << "a bad set changes nothing";
 }
 
