@@ -16,7 +16,7 @@ COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "po
 SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "points/settings.hpp", "rt/settings.hpp",
             "points/point.hpp",
             "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}
-EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim",
+EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim", "doctor",
               "metrics", "points", "web", "config", "app"}
 TABLE = {
     "base": (set(), RESULT),
@@ -26,7 +26,8 @@ TABLE = {
     "arbiter": ({"base", "modbus"}, ()),
     "rt": ({"base"}, ASIO + ("spdlog/", "fmt/")),
     "line": ({"base", "rt"}, ASIO),
-    "bus": ({"base", "rt", "modbus", "arbiter", "line"}, ASIO),
+    "doctor": ({"base"} | COUNTERS, ()),
+    "bus": ({"base", "rt", "modbus", "arbiter", "line", "doctor"}, ASIO),
     "points": ({"base", "rt", "modbus", "profile", "bus", "arbiter"}, RESULT),
     "tcp_server": ({"base", "rt", "modbus", "bus"}, ASIO),
     "sim": ({"base", "rt", "modbus", "profile", "line"}, ASIO),

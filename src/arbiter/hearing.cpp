@@ -54,6 +54,7 @@ ByteView Arbiter::without_echo(TimePoint now, ByteView bytes) {
     const ByteView rest = echo_.feed(bytes);
     if (rest.size() < bytes.size()) quiet_since_ = std::max(quiet_since_, now);
     if (active_ && echo_.pending()) active_->last_byte = now;
+    if (active_ && echo_.complete() && !before) ++symptoms_of(active_->group.station).echoes;
     if (active_ && echo_.complete() && !before && echo_memory_.on_echo(active_->group.pdu)) {
         actions_.push_back(StationEvent{StationEvent::Kind::echo, active_->group.station, {}});
     }
@@ -94,7 +95,9 @@ void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
 void Arbiter::judge_idle(TimePoint now) {
     if (idle_heard_.empty()) return;
     const Bytes heard = std::exchange(idle_heard_, {});
-    note_unused(now, modbus::classify_heard(heard, last_station_));
+    const std::vector<modbus::Unused> parts = modbus::classify_heard(heard, last_station_);
+    count_strays(parts);
+    note_unused(now, parts);
 }
 
 /// Counts and traces what was heard and is nobody's answer.
@@ -109,6 +112,7 @@ void Arbiter::note_unused(TimePoint now, const std::vector<modbus::Unused>& part
         if (what == "late") ++counters_of(part.station).late_frames;
         if (what == "foreign") ++counters_of(last_station_).foreign_frames;
         actions_.push_back(Note{now, Note::Direction::discarded, part.bytes, what, {}});
+        if (good) count_unasked(now, part);
         if (known) on_good_frame(now, part);
     }
 }

@@ -250,6 +250,7 @@ void Arbiter::start(TimePoint now, Group group) {
     actions_.push_back(Note{now, Note::Direction::sent, adu, what, why(now, group)});
     actions_.push_back(Transmit{std::move(adu)});
     modbus::ReplyFramer framer(group.station, group.pdu);
+    const Duration pause = now - quiet_since_;
     quiet_since_ = sent;
     last_station_ = group.station;
     active_.emplace(Active{std::move(group),
@@ -264,7 +265,8 @@ void Arbiter::start(TimePoint now, Group group) {
                            sent,
                            !confirm_ends_,
                            true,
-                           {}});
+                           {},
+                           pause});
 }
 
 /// How long to wait for a reply to begin. A probe waits only for what this line's panels have

@@ -116,6 +116,7 @@ void Arbiter::settle(TimePoint now, const Bytes& reply) {
     if (!echo_.complete()) {
         echo_memory_.on_reply_without_echo(active_->group.pdu, active_->clean && unused.empty());
     }
+    count_strays(unused);
     note_unused(now, unused);
     Group group = std::move(active_->group);
     const TimePoint sent = active_->sent;
@@ -143,6 +144,7 @@ void Arbiter::count_reply(TimePoint now, const Bytes& reply) {
     const Duration reply_time = wire_time(settings_.serial, reply.size() + kAduOverhead);
     const Duration think =
         std::max(now - a.sent - reply_time - silent_interval(settings_.serial), Duration::zero());
+    count_answered(reply.size() + kAduOverhead);
     counters.turnaround.observe(think);
     counters.bus_transaction.observe(now - a.started);
     station.slowest = std::max(station.slowest, think);
@@ -199,7 +201,9 @@ void Arbiter::deliver(const Group& group, const Bytes& reply) {
 }
 
 void Arbiter::fail_attempt(TimePoint now, Fault fault) {
-    note_unused(now, active_->framer.take_unused());
+    const std::vector<modbus::Unused> unused = active_->framer.take_unused();
+    count_failed(unused);
+    note_unused(now, unused);
     if (!active_->collided.empty())
         note_unused(now, modbus::classify_heard(active_->collided, kBroadcast));
     Group group = std::move(active_->group);

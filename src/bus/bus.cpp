@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "client_shares.hpp"
+#include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
@@ -47,6 +48,7 @@ struct Bus::State final : public line::Line::Events,
           counters(settings.stations),
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
+          doctor(settings),
           alarm(executor),
           refusal_alarm(executor) {}
 
@@ -83,6 +85,7 @@ struct Bus::State final : public line::Line::Events,
     RequestCounters counters;
     FlightRecorder recorder;
     DecisionRecorder decisions;
+    LineDoctor doctor;
     std::map<ClientId, std::string> client_names;
     mutable LoadMeter load;
     asio::steady_timer alarm;
@@ -103,6 +106,7 @@ void Bus::State::on_up() {
     arbiter.set_lead(line->lead());
     arbiter.confirm_ends(line->unsent().has_value());
     arbiter.on_line_up(rt::now());
+    doctor.begin(rt::now(), arbiter, *line);
     pump();
 }
 
@@ -175,6 +179,7 @@ void Bus::State::pump() {
         std::visit([this](auto& a) { act(a); }, *action);
     }
     pumping = false;
+    if (up) doctor.look(rt::now(), arbiter, *line);
     arm();
 }
 
@@ -340,6 +345,8 @@ LineStatus Bus::status() const {
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
     status.echo = label(state_->arbiter.echo());
+    if (state_->up) state_->doctor.glance(rt::now(), state_->arbiter, *state_->line);
+    status.findings = state_->doctor.findings();
     return status;
 }
 

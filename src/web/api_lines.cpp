@@ -13,8 +13,8 @@ namespace {
 constexpr unsigned kDefaultTrace = 100;  ///< frames
 constexpr unsigned kMaxTrace = 10'000;
 
-json::object describe(const LineEntry& line) {
-    const bus::LineStatus status = line.bus->status();
+/// In the list of lines a finding is only its cause.
+json::object describe(const LineEntry& line, const bus::LineStatus& status) {
     json::object object;
     object["name"] = line.name;
     object["device"] = line.device;
@@ -23,7 +23,25 @@ json::object describe(const LineEntry& line) {
     object["load_percent"] = std::round(status.load_percent * 10) / 10;
     object["queue_depth"] = status.queue_depth;
     object["echo"] = status.echo;
+    json::array causes;
+    for (const bus::LineFinding& finding : status.findings) causes.emplace_back(finding.cause);
+    object["findings"] = std::move(causes);
     return object;
+}
+
+json::array describe(const std::vector<bus::LineFinding>& findings) {
+    json::array list;
+    for (const bus::LineFinding& finding : findings) {
+        json::object object;
+        object["cause"] = finding.cause;
+        object["station"] = nullptr;
+        if (finding.station) object["station"] = *finding.station;
+        object["text"] = finding.text;
+        object["advice"] = finding.advice;
+        object["evidence"] = finding.evidence;
+        list.push_back(std::move(object));
+    }
+    return list;
 }
 
 std::string_view label(bus::TraceFrame::Direction direction) {
@@ -76,7 +94,8 @@ json::array describe(const std::vector<bus::ClientShare>& clients) {
 
 Handling get_lines(HttpRequest, const Api* api) {
     json::array lines;
-    for (const LineEntry& line : api->directory->lines) lines.push_back(describe(line));
+    for (const LineEntry& line : api->directory->lines)
+        lines.push_back(describe(line, line.bus->status()));
     json::object body;
     body["lines"] = std::move(lines);
     co_return json_response(200, body);
@@ -85,7 +104,9 @@ Handling get_lines(HttpRequest, const Api* api) {
 Handling get_line(HttpRequest request, const Api* api) {
     const auto line = find_line(*api, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    json::object body = describe(**line);
+    const bus::LineStatus status = (*line)->bus->status();
+    json::object body = describe(**line, status);
+    body["findings"] = describe(status.findings);
     body["clients"] = describe((*line)->bus->clients());
     co_return json_response(200, body);
 }

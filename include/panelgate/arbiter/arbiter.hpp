@@ -186,6 +186,7 @@ class Arbiter {
         bool end_confirmed = true;
         bool clean = true;  ///< nothing was heard before the reply could begin, but for the echo
         Bytes collided;     ///< instead of the echo
+        Duration pause{};   ///< the silence before this attempt
     };
 
     // What happens next (schedule.cpp)
@@ -234,6 +235,15 @@ class Arbiter {
     void judge_idle(TimePoint now);
     void on_good_frame(TimePoint now, const modbus::Unused& part);
     bool is_stale(TimePoint now) const;
+
+    // What the line doctor looks at (symptoms.cpp): counted, and nothing depends on it
+    void count_answered(std::size_t reply_size);
+    void count_failed(const std::vector<modbus::Unused>& parts);
+    void count_damaged(ByteView bytes);
+    void count_strays(const std::vector<modbus::Unused>& parts);
+    void count_unasked(TimePoint now, const modbus::Unused& part);
+    Symptoms& symptoms_of(std::uint8_t station) { return counters_of(station).symptoms; }
+
     TimePoint active_deadline() const;
     bool is_hearing() const;
     Duration shortest_transaction(const Job& job) const;

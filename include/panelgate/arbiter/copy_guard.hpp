@@ -27,6 +27,12 @@ class CopyGuard {
         replies_ = 0;
         hold_ = std::max(hold_, delay * 3 / 2);
     }
+    /// Looks like the second copy of the reply taken last, perhaps of another panel with the same
+    /// address and other values.
+    bool is_second(TimePoint now, ByteView reply) const {
+        return !reply_.empty() && reply.size() == reply_.size() && reply[0] == reply_[0] &&
+               now - at_ <= kLongest;
+    }
     /// How long after a reply the station is left alone.
     Duration hold() const { return hold_; }
 

@@ -28,6 +28,8 @@ class EchoFilter {
 
     /// Bytes are held back that may still turn out not to be the echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
+    /// The frame that it watches for: the one sent last.
+    ByteView frame() const { return frame_; }
     /// The whole frame came back.
     bool complete() const { return complete_; }
     /// An echo was certain and something else came.

@@ -11,6 +11,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
 
 namespace panelgate::bus {
@@ -23,7 +24,7 @@ struct BusEvent {
     enum class Kind : std::uint8_t { line, station, transaction };
     Kind kind = Kind::line;
     std::string_view what;  ///< "up", "down"; "online", "late"…; the outcome of a transaction
-    std::string why;        ///< of a line that is down
+    std::string why;        ///< of a line that is down, or that has a finding or lost one
     std::uint8_t station = 0;
     std::uint8_t function = 0;
     Duration took{};  ///< arrival to answer
@@ -38,6 +39,7 @@ struct Settings {
     std::function<void(const BusEvent&)> observe;  ///< may be empty; called from inside the bus
     std::size_t trace_frames = 2000;
     std::size_t trace_decisions = 500;
+    doctor::Settings doctor;
 };
 
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.

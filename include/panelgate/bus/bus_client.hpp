@@ -66,14 +66,24 @@ struct ClientShare {
     std::uint64_t transactions = 0;
 };
 
+/// What the line doctor takes for a cause of errors.
+struct LineFinding {
+    std::string cause;                    ///< "wrong-baud"…: stable words
+    std::optional<std::uint8_t> station;  ///< its id; nothing: the whole line
+    std::string text;
+    std::string advice;
+    std::string evidence;  ///< the numbers behind it
+};
+
 struct LineStatus {
     std::string name;
     std::string device;
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;  ///< busy share of the last seconds
-    std::string echo;         ///< "unknown", "absent", "present", "unclear"
+    double load_percent = 0;              ///< busy share of the last seconds
+    std::string echo;                     ///< "unknown", "absent", "present", "unclear"
+    std::vector<LineFinding> findings{};  ///< the likeliest first; none on a healthy line
 };
 
 struct StationStatus {

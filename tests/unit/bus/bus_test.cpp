@@ -74,6 +74,10 @@ class BusTest : public testing::Test {
         settings.guards[18] = [](ByteView pdu) {
             return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
         };
+        settings.doctor.rest = {};
+        settings.observe = [this](const BusEvent& event) {
+            if (event.kind == BusEvent::Kind::line && !event.why.empty()) seen.push_back(event.why);
+        };
         auto memory = std::make_unique<MemoryLine>(io);
         line = memory.get();
         bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
@@ -95,6 +99,7 @@ class BusTest : public testing::Test {
 
     boost::asio::io_context io{1};
     MemoryLine* line = nullptr;
+    std::vector<std::string> seen;  ///< why the line's state is not just that
     std::unique_ptr<Bus> bus;
 };
 
@@ -116,6 +121,37 @@ TEST_F(BusTest, AsksALineThatCanTellWhetherTheRequestHasLeft) {
     line->reply.clear();
     EXPECT_FALSE(ask(17, kRead).pdu.has_value());
     EXPECT_GT(line->asked_for_unsent, before);
+}
+
+TEST_F(BusTest, SaysOnceWhatIsWrongWithTheLineAndOnceThatItIsNoMore) {
+    bus->start();
+    EXPECT_TRUE(bus->status().findings.empty());
+    line->reply.clear();
+    for (int i = 0; i < 3; ++i) ask(17, kRead);  // twice each
+    ASSERT_EQ(bus->status().findings.size(), 1u);
+    const LineFinding finding = bus->status().findings[0];
+    EXPECT_EQ(finding.cause, "no-answer-at-all");
+    EXPECT_FALSE(finding.station);
+    EXPECT_FALSE(finding.text.empty());
+    EXPECT_FALSE(finding.advice.empty());
+    EXPECT_EQ(finding.evidence, "1 station(s) asked, the last 6 requests without a reply");
+    EXPECT_EQ(seen, std::vector<std::string>{"finding: no-answer-at-all, station all"});
+    line->reply = kReply;
+    EXPECT_TRUE(ask(18, kRead).pdu.has_value());
+    const auto now = bus->status().findings;
+    ASSERT_EQ(now.size(), 1u) << "one answers: it is not the line";
+    EXPECT_EQ(now[0].cause, "station-silent");
+    EXPECT_EQ(now[0].station, 17);
+    EXPECT_EQ(seen, (std::vector<std::string>{"finding: no-answer-at-all, station all",
+                                              "finding gone: no-answer-at-all, station all",
+                                              "finding: station-silent, station press"}));
+}
+
+TEST_F(BusTest, ALineThatWorksHasNoFinding) {
+    bus->start();
+    for (int i = 0; i < 50; ++i) ask(17, kRead);
+    EXPECT_TRUE(bus->status().findings.empty());
+    EXPECT_TRUE(seen.empty());
 }
 
 TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {

@@ -12,9 +12,22 @@ TEST_F(ApiLines, ListsTheLines) {
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
     EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
-        "load_percent":50.0,"queue_depth":3,"echo":"absent"})"));
+        "load_percent":50.0,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
+}
+
+TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
+    EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of("[]"));
+    bus.line.findings = {{"wrong-baud", {}, "What is wrong.", "What to do.", "9 of 9"},
+                         {"gap-too-short", 31, "Why.", "How.", "5 of 6"}};
+    EXPECT_EQ(get("/api/v1/lines").at("lines").as_array()[0].at("findings"),
+              json_of(R"(["wrong-baud","gap-too-short"])"));
+    EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of(R"([
+        {"cause":"wrong-baud","station":null,"text":"What is wrong.","advice":"What to do.",
+         "evidence":"9 of 9"},
+        {"cause":"gap-too-short","station":31,"text":"Why.","advice":"How.",
+         "evidence":"5 of 6"}])"));
 }
 
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {

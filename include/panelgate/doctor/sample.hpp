@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/line/counters.hpp"
+
+namespace panelgate::doctor {
+
+/// What the configuration says, as far as advice depends on it.
+struct LineFacts {
+    enum class Echo : std::uint8_t { automatic, on, off };
+
+    SerialFormat serial;
+    Echo echo = Echo::automatic;
+    Duration response_timeout = 500ms;  ///< of stations without an entry below
+    std::map<std::uint8_t, Duration> response_timeouts;
+};
+
+/// The counts of one line: at an instant, or (as a difference of two) of a window.
+struct Sample {
+    /// Entry 0: all stations that the configuration does not list.
+    std::map<std::uint8_t, arbiter::Symptoms> stations;
+    std::optional<line::UartErrors> uart;
+
+    /// Of all stations together; mute_in_a_row and worst_lateness are the largest of them.
+    arbiter::Symptoms total() const;
+    std::uint64_t attempts() const;
+};
+
+/// What was counted between two instants of one line. What does not only grow (mute_in_a_row,
+/// worst_lateness) is that of `later`.
+Sample difference(const Sample& later, const Sample& earlier);
+
+}  // namespace panelgate::doctor

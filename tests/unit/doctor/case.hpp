@@ -1,0 +1,78 @@
+#pragma once
+
+#include "panelgate/doctor/sample.hpp"
+
+namespace panelgate::doctor {
+
+/// Counts of one station, put together as the arbiter would count them.
+class Mix {
+  public:
+    Mix& answered(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
+        s_.answered += n;
+        s_.answered_after[pause] += n;
+        s_.mute_in_a_row = 0;
+        return *this;
+    }
+    Mix& long_answered(std::uint64_t n) {
+        s_.long_answered += n;
+        return answered(n);
+    }
+    Mix& silent(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
+        s_.silent += n;
+        s_.silent_after[pause] += n;
+        s_.mute_in_a_row += n;
+        return *this;
+    }
+    /// n silent attempts that were not the last.
+    Mix& lost(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
+        silent(n, pause);
+        s_.mute_in_a_row = 0;
+        return *this;
+    }
+    /// One wrong byte in otherwise right replies of 11 bytes.
+    Mix& damaged(std::uint64_t n) { return exact(n, 11, 3, 4, n); }
+    Mix& long_damaged(std::uint64_t n) {
+        s_.long_damaged += n;
+        return exact(n, 69, 30, 20, n);
+    }
+    /// The right length, those bytes zero that the parity check throws away.
+    Mix& zeroed(std::uint64_t n) { return exact(n, 11, 7, 4, 0); }
+    /// The right length, no byte right, none zero.
+    Mix& strange(std::uint64_t n) { return exact(n, 11, 0, 6, 0); }
+    /// Any length, any bytes.
+    Mix& garbage(std::uint64_t n) {
+        s_.damaged_short += n / 2;
+        s_.damaged_long += n - n / 2;
+        s_.damaged_bytes += 12 * n;
+        s_.damaged_zeros += 2 * n;
+        s_.damaged_odd += 5 * n;
+        s_.mute_in_a_row = 0;
+        return *this;
+    }
+    Mix& with(std::uint64_t arbiter::Symptoms::* count, std::uint64_t n) {
+        s_.*count += n;
+        return *this;
+    }
+    Mix& late(std::uint64_t n, Duration by) {
+        s_.late += n;
+        s_.worst_lateness = by;
+        return *this;
+    }
+    operator arbiter::Symptoms() const { return s_; }  // NOLINT: what it is for
+
+  private:
+    Mix& exact(std::uint64_t n, std::uint64_t bytes, std::uint64_t zeros, std::uint64_t odd,
+               std::uint64_t heads) {
+        s_.damaged_exact += n;
+        s_.damaged_bytes += bytes * n;
+        s_.damaged_zeros += zeros * n;
+        s_.damaged_odd += odd * n;
+        s_.damaged_heads += heads;
+        s_.mute_in_a_row = 0;
+        return *this;
+    }
+
+    arbiter::Symptoms s_;
+};
+
+}  // namespace panelgate::doctor
