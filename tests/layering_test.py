@@ -17,7 +17,7 @@ SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "po
             "points/point.hpp",
             "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}
 EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim", "doctor",
-              "metrics", "points", "web", "config", "app"}
+              "scan", "metrics", "points", "web", "config", "app"}
 TABLE = {
     "base": (set(), RESULT),
     "yaml": ({"base"}, RESULT),
@@ -31,6 +31,7 @@ TABLE = {
     "points": ({"base", "rt", "modbus", "profile", "bus", "arbiter"}, RESULT),
     "tcp_server": ({"base", "rt", "modbus", "bus"}, ASIO),
     "sim": ({"base", "rt", "modbus", "profile", "line"}, ASIO),
+    "scan": ({"base", "modbus", "profile"}, ()),
     "metrics": ({"base", "modbus"} | COUNTERS, ("prometheus/",)),
     "web": ({"base", "rt", "modbus", "profile", "bus", "points", "metrics"},
             ASIO + ("boost/beast/", "boost/json", "boost/optional")),

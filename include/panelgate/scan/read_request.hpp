@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/base/bytes.hpp"
+
+namespace panelgate::scan {
+
+/// A request that changes nothing. There is no other way to make one than make(), and a scan has
+/// nothing else to send: it is read-only by construction, whatever a profile asks for.
+class ReadRequest {
+  public:
+    /// Nothing unless the station is 1 to 247 and the PDU is well-formed and a pure read.
+    static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu);
+
+    std::uint8_t station() const { return adu_.front(); }
+    ByteView pdu() const { return ByteView(adu_).subspan(1, adu_.size() - 3); }
+    const Bytes& adu() const { return adu_; }
+
+  private:
+    explicit ReadRequest(Bytes adu) : adu_(std::move(adu)) {}
+    Bytes adu_;
+};
+
+}  // namespace panelgate::scan

@@ -1,0 +1,81 @@
+#include "attempt.hpp"
+
+#include <algorithm>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::scan {
+namespace {
+
+/// USB adapters hand over bytes up to 16 ms late (FTDI AN232B-04).
+constexpr Duration kAdapterPause = 25ms;
+constexpr std::size_t kPauseCharacters = 5;
+constexpr Duration kBabble = 300ms;
+/// Fewer are what a transceiver makes of switching over, not a reply.
+constexpr std::size_t kDamage = 3;
+
+}  // namespace
+
+Attempt::Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent, Patience patience)
+    : request_(std::move(request)),
+      start_by_(sent + wire_time(format, request_.adu().size()) + patience.start),
+      latest_(start_by_ + kBabble + wire_time(format, modbus::kMaxLongRtuAdu)),
+      settle_(patience.settle),
+      gap_(std::max(kAdapterPause, wire_time(format, kPauseCharacters))) {}
+
+/// A part of an echo is taken out, too: the rest is still coming.
+ByteView Attempt::without_echo() const {
+    const Bytes& sent = request_.adu();
+    const auto same = std::ranges::mismatch(heard_, sent);
+    const bool echo = same.in1 == heard_.end() || same.in2 == sent.end();
+    return echo ? ByteView(heard_).subspan(std::min(heard_.size(), sent.size())) : ByteView(heard_);
+}
+
+bool Attempt::holds_beginning(ByteView bytes) const {
+    for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
+        const int function = bytes[i + 1] & ~modbus::kExceptionBit;
+        if (bytes[i] == request_.station() && function == request_.pdu()[0]) return true;
+    }
+    return false;
+}
+
+void Attempt::on_rx(TimePoint now, ByteView bytes) {
+    last_rx_ = now;
+    const std::size_t room = kMaxHeard - std::min(kMaxHeard, heard_.size());
+    const ByteView kept = bytes.first(std::min(room, bytes.size()));
+    heard_.insert(heard_.end(), kept.begin(), kept.end());
+    replied_ = finish().kind == Outcome::Kind::replied;
+}
+
+TimePoint Attempt::ends_at() const {
+    if (without_echo().empty()) return start_by_;
+    if (replied_) return std::min(latest_, last_rx_ + settle_);
+    return std::min(latest_, std::max(start_by_, last_rx_ + gap_));
+}
+
+Outcome Attempt::finish() const {
+    Outcome outcome;
+    Heard heard = take_apart(without_echo());
+    for (Frame& frame : heard.frames) {
+        const bool ours =
+            frame.station == request_.station() && modbus::answers(request_.pdu(), frame.pdu);
+        if (!ours) {
+            outcome.strays.push_back(std::move(frame));
+        } else if (outcome.kind == Outcome::Kind::replied) {
+            ++outcome.more;
+        } else {
+            outcome.kind = Outcome::Kind::replied;
+            outcome.reply = std::move(frame.pdu);
+        }
+    }
+    const bool damaged = heard.damaged >= kDamage;
+    outcome.torn = damaged && outcome.kind == Outcome::Kind::replied;
+    if (damaged && !outcome.torn) {
+        outcome.kind = Outcome::Kind::damaged;
+        outcome.begun = holds_beginning(without_echo());
+    }
+    return outcome;
+}
+
+}  // namespace panelgate::scan

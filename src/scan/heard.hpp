@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "panelgate/base/bytes.hpp"
+
+namespace panelgate::scan {
+
+/// What is kept of one listening at most; the rest is dropped.
+inline constexpr std::size_t kMaxHeard = 4096;
+
+struct Frame {
+    std::uint8_t station = 0;
+    Bytes pdu;
+};
+
+struct Heard {
+    std::vector<Frame> frames;
+    std::size_t damaged = 0;  ///< bytes in no frame
+};
+
+/// Good frames, requests as well as replies, wherever they begin. Only functions of the standard:
+/// chance makes a frame of noise in less than one of 100 000 places.
+Heard take_apart(ByteView bytes);
+
+}  // namespace panelgate::scan

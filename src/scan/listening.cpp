@@ -1,0 +1,46 @@
+#include "state.hpp"
+
+namespace panelgate::scan {
+namespace {
+
+constexpr std::size_t kGlitches = 2;  // bytes that mean nothing
+
+void note(Talk& talk, const Heard& heard) {
+    for (const Frame& frame : heard.frames) {
+        const int function = frame.pdu[0] & ~modbus::kExceptionBit;
+        talk[frame.station].insert(static_cast<std::uint8_t>(function));
+    }
+}
+
+}  // namespace
+
+void Scanner::State::listen(TimePoint now, Duration how_long) {
+    heard.clear();
+    if (listening_at > 0) set_format(now, formats[listening_at]);
+    not_before = std::max(not_before, now) + how_long;
+}
+
+/// Good frames: another master. Bytes without sense: perhaps one in another format. Silence: it is
+/// our turn.
+void Scanner::State::end_listening(TimePoint now) {
+    const Heard parts = take_apart(heard);
+    note(result.talk, parts);
+    if (!result.talk.empty()) {
+        result.format = format;
+        if (listening_at > 0 && !std::exchange(listened_again, true)) {
+            not_before = now + settings.listen;  // who else?
+            return;
+        }
+        if (settings.speak_anyway) return settle();
+        result.ending = Result::Ending::another_master;
+        phase = Phase::done;
+        return;
+    }
+    const bool noise = parts.damaged > kGlitches;
+    if (noise) result.noise += static_cast<unsigned>(parts.damaged);
+    if ((noise || listening_at > 0) && ++listening_at < formats.size())
+        return listen(now, settings.listen_each);
+    phase = Phase::searching;
+}
+
+}  // namespace panelgate::scan

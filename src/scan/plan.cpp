@@ -1,0 +1,128 @@
+#include "plan.hpp"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <numeric>
+#include <set>
+
+namespace panelgate::scan {
+namespace {
+
+constexpr int kUsualRates[] = {9600, 19200, 38400, 115200, 57600, 4800, 2400};
+constexpr Parity kParities[] = {Parity::none, Parity::even, Parity::odd};
+constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third has the rest
+constexpr std::uint8_t kUsualLast = 31;    // of panels: their settings screens end there
+
+template <class T>
+bool allows(const std::vector<T>& list, const T& value) {
+    return list.empty() || std::ranges::find(list, value) != list.end();
+}
+
+template <class T>
+void append_new(std::vector<T>& list, const T& value) {
+    if (std::ranges::find(list, value) == list.end()) list.push_back(value);
+}
+
+/// The profiles' defaults, the most frequent first, then by the names of their profiles.
+std::vector<SerialFormat> profile_formats(const profile::Catalogue& profiles) {
+    std::vector<SerialFormat> all;
+    for (const auto& [name, profile] : profiles.all()) {
+        if (!profile.serial.source.empty()) all.push_back(profile.serial.default_format);
+    }
+    std::map<std::ptrdiff_t, std::vector<SerialFormat>, std::greater<>> by_count;
+    for (const SerialFormat& format : all)
+        append_new(by_count[std::ranges::count(all, format)], format);
+    std::vector<SerialFormat> ordered;
+    for (const auto& [count, formats] : by_count)
+        ordered.insert(ordered.end(), formats.begin(), formats.end());
+    return ordered;
+}
+
+}  // namespace
+
+std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
+                                         const Settings& settings) {
+    if (settings.remote) return {SerialFormat{}};
+    std::vector<SerialFormat> all = profile_formats(profiles);
+    append_new(all, SerialFormat{});
+    std::vector<int> rates(std::begin(kUsualRates), std::end(kUsualRates));
+    for (const int rate : settings.baud) append_new(rates, rate);
+    for (const int rate : rates) {
+        for (const Parity parity : kParities) append_new(all, SerialFormat{rate, 8, parity, 1});
+    }
+    std::erase_if(all, [&](const SerialFormat& format) {
+        return !allows(settings.baud, format.baud) || !allows(settings.parity, format.parity);
+    });
+    return all;
+}
+
+std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
+                                          const Settings& settings) {
+    std::vector<std::uint8_t> wanted = settings.stations;
+    if (wanted.empty()) {
+        wanted.resize(kUsualLast);
+        std::iota(wanted.begin(), wanted.end(), std::uint8_t{1});
+    }
+    std::set<std::uint8_t> ends;
+    for (const auto& [name, profile] : profiles.all()) {
+        ends.insert(profile.first_station);
+        ends.insert(profile.last_station);
+    }
+    std::vector<std::uint8_t> ordered;
+    for (const std::uint8_t station : ends) {
+        if (allows(wanted, station)) ordered.push_back(station);
+    }
+    for (const std::uint8_t station : wanted) append_new(ordered, station);
+    return ordered;
+}
+
+SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
+                       const std::vector<std::uint8_t>& stations) {
+    std::size_t from = 0;
+    for (std::size_t round = 0; from < stations.size(); ++round) {
+        const std::size_t left = stations.size() - from;
+        const std::size_t count =
+            round < std::size(kRounds) ? std::min(kRounds[round], left) : left;
+        for (const SerialFormat& format : formats) {
+            for (std::size_t i = from; i < from + count; ++i)
+                cells_.push_back({format, stations[i]});
+        }
+        from += count;
+    }
+}
+
+std::optional<Cell> SearchPlan::next() {
+    if (at_ == cells_.size()) return std::nullopt;
+    return cells_[at_++];
+}
+
+bool SearchPlan::is_last_of_format() const {
+    return at_ == cells_.size() || (at_ > 0 && cells_[at_].format != cells_[at_ - 1].format);
+}
+
+void SearchPlan::hint(const Cell& cell) {
+    std::array<std::vector<Cell>, 3> by_distance;
+    for (std::size_t i = at_; i < cells_.size(); ++i) {
+        const bool same_rate = cells_[i].format.baud == cell.format.baud;
+        const std::size_t distance = cells_[i].station != cell.station ? 2 : same_rate ? 0 : 1;
+        by_distance[distance].push_back(cells_[i]);
+    }
+    cells_.resize(at_);
+    for (const std::vector<Cell>& cells : by_distance)
+        cells_.insert(cells_.end(), cells.begin(), cells.end());
+}
+
+Duration SearchPlan::cost(const Settings& settings) const {
+    constexpr std::size_t kRequest = 8;
+    Duration total{};
+    for (std::size_t i = at_; i < cells_.size(); ++i) {
+        total += settings.search_timeout + wire_time(cells_[i].format, kRequest);
+        const bool changes = i + 1 == cells_.size() || cells_[i + 1].format != cells_[i].format;
+        if (changes)
+            total += settings.leave_timeout - settings.search_timeout + settings.after_format;
+    }
+    return total;
+}
+
+}  // namespace panelgate::scan

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "panelgate/scan/settings.hpp"
+
+namespace panelgate::scan {
+
+/// What is worth trying, the most likely first: what most profiles have as their default, the
+/// standard's 19200 8E1 (serial line V1.02, 2.5.1), then the usual rates with each parity. Only
+/// what the settings allow; never empty.
+std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
+                                         const Settings& settings);
+/// First and last addresses of the profiles, then the rest upwards.
+std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
+                                          const Settings& settings);
+
+/// One question while the format is unknown.
+struct Cell {
+    SerialFormat format;
+    std::uint8_t station = 0;
+    friend bool operator==(const Cell&, const Cell&) = default;
+};
+
+/// All formats with all stations, in rounds: a few stations in every format, then more of them. On
+/// a line all stations share a format: the first reply ends this.
+class SearchPlan {
+  public:
+    SearchPlan(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
+
+    std::optional<Cell> next();
+    /// The next one is in another format, or there is none.
+    bool is_last_of_format() const;
+    /// Something damaged answered here: this station in the other parities comes first, then in
+    /// the other rates.
+    void hint(const Cell& cell);
+    Duration cost(const Settings& settings) const;  ///< of what is left
+
+  private:
+    std::vector<Cell> cells_;
+    std::size_t at_ = 0;
+};
+
+}  // namespace panelgate::scan

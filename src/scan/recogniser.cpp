@@ -1,0 +1,238 @@
+#include "recogniser.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/profile/judge.hpp"
+
+namespace panelgate::scan {
+namespace {
+
+using profile::PanelProfile;
+
+constexpr const char* kGeneric = "generic";
+constexpr std::size_t kMostProbes = 256;  // to choose from
+constexpr std::size_t kMostAsked = 24;
+constexpr std::uint32_t kLastAddress = 0xFFFF;
+
+template <class T>
+bool allows(const std::vector<T>& list, const T& value) {
+    return list.empty() || std::ranges::find(list, value) != list.end();
+}
+
+bool may_be(const PanelProfile& profile, std::uint8_t station,
+            const std::optional<SerialFormat>& format) {
+    if (station < profile.first_station || station > profile.last_station) return false;
+    return !format || (allows(profile.serial.baud, format->baud) &&
+                       allows(profile.serial.parity, format->parity) &&
+                       allows(profile.serial.stop_bits, format->stop_bits));
+}
+
+void add_probe(std::vector<Bytes>& probes, Bytes pdu) {
+    if (probes.size() == kMostProbes || !modbus::is_pure_read(pdu)) return;
+    if (std::ranges::find(probes, pdu) == probes.end()) probes.push_back(std::move(pdu));
+}
+
+std::vector<Bytes> identifications(const PanelProfile& profile) {
+    std::vector<Bytes> reads;
+    for (const profile::Identification& how : profile.identification) reads.push_back(how.request);
+    return reads;
+}
+
+/// The ends of each area and what is just beyond.
+std::vector<Bytes> boundaries(const PanelProfile& profile) {
+    std::vector<Bytes> reads;
+    for (const profile::Area& area : profile.areas) {
+        std::vector<modbus::Table> tables = area.also;
+        tables.insert(tables.begin(), area.table);
+        for (const modbus::Table table : tables) {
+            for (const std::uint32_t at : {area.readable.last, area.readable.last + 1}) {
+                if (at > kLastAddress) continue;
+                reads.push_back(modbus::encode_read(table, static_cast<std::uint16_t>(at), 1));
+            }
+        }
+    }
+    return reads;
+}
+
+/// Does the reply begin as the profile says for this read? Nothing: it is not one of its own.
+std::optional<bool> identifies(const PanelProfile& profile, const Bytes& probe,
+                               const std::optional<Bytes>& reply) {
+    std::optional<bool> fits;
+    for (const profile::Identification& how : profile.identification) {
+        if (how.request != probe) continue;
+        const bool begins =
+            reply && std::ranges::mismatch(how.reply, *reply).in1 == how.reply.end();
+        fits = fits.value_or(true) && begins;
+    }
+    return fits;
+}
+
+bool is_data(const Bytes& reply) {
+    return !reply.empty() && (reply[0] & modbus::kExceptionBit) == 0;
+}
+
+}  // namespace
+
+Recogniser::Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
+                       const std::optional<SerialFormat>& format) {
+    for (const auto& [name, profile] : profiles.all()) {
+        if (name == kGeneric) {
+            generic_ = true;
+        } else if (may_be(profile, station, format)) {
+            suspects_.push_back({&profile});
+        }
+    }
+    for (const Suspect& suspect : suspects_) {
+        for (Bytes& probe : identifications(*suspect.profile)) add_probe(probes_, std::move(probe));
+    }
+    for (const Suspect& suspect : suspects_) {
+        for (Bytes& probe : boundaries(*suspect.profile)) add_probe(probes_, std::move(probe));
+    }
+}
+
+Recogniser::Answer Recogniser::expected(const PanelProfile& profile, const Bytes& probe) {
+    switch (profile::judge(profile, probe)) {
+        case profile::Judgement::fine:
+            return Answer::granted;
+        case profile::Judgement::illegal_function:
+            return Answer::no_function;
+        case profile::Judgement::illegal_value:
+        case profile::Judgement::illegal_address:
+        case profile::Judgement::write_protected:
+            return Answer::refused;
+    }
+    std::abort();
+}
+
+/// Nothing where the answer tells nothing about what the station has: silence, busy, a failure.
+std::optional<Recogniser::Answer> Recogniser::told(const std::optional<Bytes>& reply) {
+    if (!reply) return std::nullopt;
+    const auto code = modbus::exception_of(*reply);
+    if (!code) return Answer::granted;
+    switch (static_cast<modbus::ExceptionCode>(*code)) {
+        case modbus::ExceptionCode::illegal_function:
+            return Answer::no_function;
+        case modbus::ExceptionCode::illegal_data_address:
+        case modbus::ExceptionCode::illegal_data_value:
+            return Answer::refused;
+        case modbus::ExceptionCode::server_device_failure:
+        case modbus::ExceptionCode::acknowledge:
+        case modbus::ExceptionCode::server_device_busy:
+        case modbus::ExceptionCode::memory_parity_error:
+        case modbus::ExceptionCode::gateway_path_unavailable:
+        case modbus::ExceptionCode::gateway_target_failed:
+            return std::nullopt;
+    }
+    return std::nullopt;  // a vendor's own
+}
+
+/// What a panel says of itself weighs more than where its memory ends: models of one family differ
+/// there.
+bool Recogniser::is_viable(const Suspect& suspect) const {
+    if (!suspect.possible) return false;
+    return suspect.differed == 0 || (suspect.by_content && suspect.differed * 2 < suspect.agreed);
+}
+
+bool Recogniser::is_asked(const Bytes& probe) const {
+    return std::ranges::find(asked_, probe) != asked_.end();
+}
+
+std::optional<Bytes> Recogniser::next_probe() const {
+    if (asked_.size() >= kMostAsked) return std::nullopt;
+    if (auto split = best_split()) return split;
+    return confirmation();
+}
+
+/// The read that leaves the fewest possible in the worse of its two cases.
+std::optional<Bytes> Recogniser::best_split() const {
+    const Bytes* best = nullptr;
+    std::ptrdiff_t least = std::ranges::count_if(
+        suspects_, [this](const Suspect& suspect) { return is_viable(suspect); });
+    for (const Bytes& probe : probes_) {
+        if (is_asked(probe)) continue;
+        std::ptrdiff_t granted = 0;
+        std::ptrdiff_t refused = 0;
+        for (const Suspect& suspect : suspects_) {
+            if (!is_viable(suspect)) continue;
+            ++(expected(*suspect.profile, probe) == Answer::granted ? granted : refused);
+        }
+        if (std::max(granted, refused) >= least) continue;
+        least = std::max(granted, refused);
+        best = &probe;
+    }
+    return best == nullptr ? std::nullopt : std::optional(*best);
+}
+
+std::optional<Bytes> Recogniser::confirmation() const {
+    for (const Suspect& suspect : suspects_) {
+        if (!is_viable(suspect)) continue;
+        std::vector<Bytes> reads = identifications(*suspect.profile);
+        std::ranges::move(boundaries(*suspect.profile), std::back_inserter(reads));
+        for (const Bytes& read : reads) {
+            if (modbus::is_pure_read(read) && !is_asked(read)) return read;
+        }
+    }
+    return std::nullopt;
+}
+
+void Recogniser::on_reply(const Bytes& probe, const std::optional<Bytes>& reply) {
+    asked_.push_back(probe);
+    for (Suspect& suspect : suspects_) judge(suspect, probe, reply);
+}
+
+void Recogniser::skip(const Bytes& probe) { asked_.push_back(probe); }
+
+void Recogniser::judge(Suspect& suspect, const Bytes& probe,
+                       const std::optional<Bytes>& reply) const {
+    if (const auto fits = identifies(*suspect.profile, probe, reply)) {
+        suspect.possible = suspect.possible && *fits;
+        suspect.by_content = suspect.by_content || (*fits && is_data(*reply));
+    }
+    const auto answer = told(reply);
+    if (!answer) return;
+    const Answer manual = expected(*suspect.profile, probe);
+    if (*answer == manual) ++suspect.to_the_letter;
+    if ((*answer == Answer::granted) == (manual == Answer::granted)) {
+        ++suspect.agreed;
+        return;
+    }
+    ++suspect.differed;
+    const bool about_function = *answer == Answer::no_function || manual == Answer::no_function;
+    if (about_function) suspect.possible = false;
+}
+
+std::vector<Candidate> Recogniser::candidates() const {
+    std::vector<Suspect> order = suspects_;
+    std::ranges::sort(order, [](const Suspect& a, const Suspect& b) {
+        if (a.by_content != b.by_content) return a.by_content;
+        if (a.differed != b.differed) return a.differed < b.differed;
+        if (a.to_the_letter != b.to_the_letter) return a.to_the_letter > b.to_the_letter;
+        return a.profile->name < b.profile->name;
+    });
+    std::vector<Candidate> found;
+    for (const Suspect& suspect : order) {
+        if (!is_viable(suspect) || suspect.agreed == 0) continue;
+        std::string why;
+        for (const profile::Identification& how : suspect.profile->identification) {
+            if (is_asked(how.request)) why += how.means + "; ";
+        }
+        why += std::to_string(suspect.agreed) + " of " +
+               std::to_string(suspect.agreed + suspect.differed) + " reads as its manual says";
+        found.push_back({suspect.profile->name, std::move(why)});
+    }
+    if (!found.empty() || !generic_) return found;
+    std::string why = "no panel profile fits";
+    const auto nearest = std::ranges::min_element(order, std::less(), &Suspect::differed);
+    if (nearest != order.end() && nearest->agreed > nearest->differed) {
+        const Suspect& near = *nearest;
+        why += "; " + near.profile->name + " is nearest, " + std::to_string(near.agreed) + " of " +
+               std::to_string(near.agreed + near.differed) + " reads as its manual says";
+    }
+    return {{kGeneric, std::move(why)}};
+}
+
+}  // namespace panelgate::scan

@@ -1,0 +1,244 @@
+#include "panelgate/scan/scanner.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "duplicates.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "state.hpp"
+
+namespace panelgate::scan {
+namespace {
+
+constexpr unsigned kSearchRetries = 5;  // of a request with a damaged reply
+
+}  // namespace
+
+Scanner::State::State(const profile::Catalogue& catalogue, Settings s, TimePoint now)
+    : profiles(catalogue),
+      settings(std::move(s)),
+      formats(likely_formats(profiles, settings)),
+      stations(likely_stations(profiles, settings)),
+      plan(formats, stations),
+      started(now),
+      format(formats.front()),
+      not_before(now) {
+    if (!settings.remote) actions.emplace_back(SetFormat{format});
+    result.remote = settings.remote;
+    listen(now, settings.listen);
+}
+
+TimePoint Scanner::State::due() const { return attempt ? attempt->ends_at() : not_before; }
+
+void Scanner::State::step(TimePoint now) {
+    if (phase == Phase::listening) return end_listening(now);
+    if (attempt) return finish_attempt();
+    start_next(now);
+}
+
+/// The driver drops what it holds in the old format, and takes its time.
+void Scanner::State::set_format(TimePoint now, const SerialFormat& wanted) {
+    if (wanted == format) return;
+    format = wanted;
+    asked.reset();
+    actions.emplace_back(SetFormat{format});
+    not_before = now + settings.after_format;
+}
+
+void Scanner::State::start_next(TimePoint now) {
+    if (phase == Phase::searching) {
+        start_search(now);
+    } else {
+        start_asking(now);
+    }
+}
+
+void Scanner::State::start_search(TimePoint now) {
+    if (!again.empty()) {
+        retry = again.front();
+        again.pop_front();
+        return ask(now, retry->station, settings.leave_timeout, Purpose::again);
+    }
+    if (!cell) cell = plan.next();
+    if (!cell) {
+        result.ending = Result::Ending::finished;
+        phase = Phase::done;
+        return;
+    }
+    if (cell->format != format) return set_format(now, cell->format);  // asked when that is done
+    const Duration patience =
+        plan.is_last_of_format() ? settings.leave_timeout : settings.search_timeout;
+    ask(now, cell->station, patience, Purpose::search);
+    cell.reset();
+}
+
+void Scanner::State::start_asking(TimePoint now) {
+    const auto take = [](std::deque<std::uint8_t>& queue) {
+        const std::uint8_t station = queue.front();
+        queue.pop_front();
+        return station;
+    };
+    if (examination) {
+        if (const auto next = examination->next()) return transmit(now, *next, Purpose::examine);
+        result.stations.push_back(examination->finding());
+        examination.reset();
+    }
+    if (!again.empty()) {
+        retry = again.front();
+        again.pop_front();
+        return ask(now, retry->station, settings.second_timeout, Purpose::again);
+    }
+    if (!first_pass.empty())
+        return ask(now, take(first_pass), settings.first_timeout, Purpose::first_pass);
+    if (!to_examine.empty()) {
+        examination.emplace(profiles, settings, take(to_examine), known_format());
+        return;
+    }
+    if (!second_pass.empty())
+        return ask(now, take(second_pass), settings.second_timeout, Purpose::second_pass);
+    result.ending = Result::Ending::finished;
+    phase = Phase::done;
+}
+
+void Scanner::State::ask(TimePoint now, std::uint8_t station, Duration timeout, Purpose why) {
+    const auto request = ReadRequest::make(station, first_question());
+    transmit(now, {*request, {timeout, settings.quiet}}, why);
+}
+
+void Scanner::State::transmit(TimePoint now, const Ask& wanted, Purpose why) {
+    Patience patience = wanted.patience;
+    patience.start += latency;
+    purpose = why;
+    asked.set(wanted.request.station());
+    attempt.emplace(wanted.request, format, now, patience);
+    actions.emplace_back(Transmit{wanted.request});
+}
+
+void Scanner::State::finish_attempt() {
+    const Outcome outcome = attempt->finish();
+    const std::uint8_t station = attempt->request().station();
+    attempt.reset();
+    if (purpose == Purpose::examine) {
+        examination->on_outcome(outcome);
+    } else {
+        on_outcome(station, outcome);
+    }
+    for (const Frame& frame : outcome.strays) on_stray(frame);
+}
+
+void Scanner::State::on_outcome(std::uint8_t station, const Outcome& outcome) {
+    switch (outcome.kind) {
+        case Outcome::Kind::replied:
+            beforehand[station].twice += outcome.more;
+            found(station);
+            break;
+        case Outcome::Kind::damaged:
+            on_damaged(station, outcome.begun);
+            break;
+        case Outcome::Kind::silent:
+            if (retry && retry->late) found(station);  // it was heard
+            ask_again_later(station);
+            break;
+    }
+    retry.reset();
+}
+
+/// Once more with patience, when everybody else was asked.
+void Scanner::State::ask_again_later(std::uint8_t station) {
+    if (phase != Phase::asking || answered.contains(station) || waited_for[station]) return;
+    waited_for.set(station);
+    second_pass.push_back(station);
+}
+
+/// Something answers. Two at one address are understood now and then; a wrong parity never.
+void Scanner::State::on_damaged(std::uint8_t station, bool begun) {
+    Again next = retry.value_or(Again{station, 0, false, false});
+    next.begun = next.begun || begun;
+    if (++next.tries <= kSearchRetries) {
+        again.push_back(next);
+    } else if (phase == Phase::asking) {
+        if (next.begun || next.late) found(station);
+        ask_again_later(station);
+    } else {
+        plan.hint({format, station});
+        if (std::ranges::find(result.damaged_formats, format) == result.damaged_formats.end())
+            result.damaged_formats.push_back(format);
+    }
+}
+
+/// A good frame that does not answer what was asked last: a late reply, a second one, or somebody
+/// else's.
+void Scanner::State::on_stray(const Frame& frame) {
+    if (examination && frame.station == examination->station() && examination->on_stray(frame))
+        return;
+    const bool ours = asked[frame.station] && modbus::answers(first_question(), frame.pdu);
+    if (!ours) {
+        const int function = frame.pdu[0] & ~modbus::kExceptionBit;
+        result.talk[frame.station].insert(static_cast<std::uint8_t>(function));
+        return;
+    }
+    Evidence& seen = beforehand[frame.station];
+    if (answered.contains(frame.station)) {
+        ++(seen.late > 0 ? seen.late : seen.twice);
+        return;
+    }
+    ++seen.late;
+    const auto waits = [&](const Again& other) { return other.station == frame.station; };
+    if (std::ranges::none_of(again, waits)) again.push_front({frame.station, 0, true, false});
+    if (phase == Phase::searching) settle();
+}
+
+/// This is the line's format: every station is asked in it.
+void Scanner::State::settle() {
+    phase = Phase::asking;
+    for (const std::uint8_t station : stations) {
+        const auto waits = [&](const Again& other) { return other.station == station; };
+        if (!answered.contains(station) && std::ranges::none_of(again, waits))
+            first_pass.push_back(station);
+    }
+}
+
+void Scanner::State::found(std::uint8_t station) {
+    if (!answered.insert(station).second) return;
+    to_examine.push_back(station);
+    std::erase(second_pass, station);
+    if (phase == Phase::searching) settle();
+}
+
+std::optional<SerialFormat> Scanner::State::known_format() const {
+    return settings.remote ? std::nullopt : std::optional(format);
+}
+
+Scanner::Scanner(const profile::Catalogue& profiles, Settings settings, TimePoint now)
+    : state_(std::make_unique<State>(profiles, std::move(settings), now)) {}
+Scanner::~Scanner() = default;
+
+void Scanner::on_rx(TimePoint now, ByteView bytes) {
+    if (state_->attempt) return state_->attempt->on_rx(now, bytes);
+    if (state_->phase != State::Phase::listening) return;  // of the format before
+    Bytes& heard = state_->heard;
+    const std::size_t room = kMaxHeard - std::min(kMaxHeard, heard.size());
+    const ByteView kept = bytes.first(std::min(room, bytes.size()));
+    heard.insert(heard.end(), kept.begin(), kept.end());
+}
+
+void Scanner::on_deadline(TimePoint now) {
+    while (!done() && state_->due() <= now) state_->step(now);
+}
+
+void Scanner::set_latency(Duration latency) { state_->latency = latency; }
+
+std::optional<Action> Scanner::poll_action() {
+    if (state_->actions.empty()) return std::nullopt;
+    Action action = std::move(state_->actions.front());
+    state_->actions.pop_front();
+    return action;
+}
+
+std::optional<TimePoint> Scanner::next_deadline() const {
+    return done() ? std::nullopt : std::optional(state_->due());
+}
+
+bool Scanner::done() const { return state_->phase == State::Phase::done; }
+
+}  // namespace panelgate::scan

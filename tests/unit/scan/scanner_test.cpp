@@ -1,0 +1,274 @@
+#include "panelgate/scan/scanner.hpp"
+
+#include <gmock/gmock.h>
+
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/scan/report.hpp"
+#include "support/hex.hpp"
+#include "virtual_line.hpp"
+
+namespace panelgate::scan {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// "31 autonics-gplp-s"; several candidates are joined by '|', a doubled address ends in '!'.
+std::vector<std::string> texts(const Result& result) {
+    std::vector<std::string> all;
+    for (const StationFinding& finding : result.stations) {
+        std::string text = std::to_string(finding.station);
+        for (std::size_t i = 0; i < finding.candidates.size(); ++i)
+            text += (i == 0 ? " " : "|") + finding.candidates[i].profile;
+        all.push_back(text + (finding.duplicate ? "!" : ""));
+    }
+    return all;
+}
+
+void add_demo(VirtualLine& line) {
+    line.add("autonics-gplp-s", 31);
+    line.add("autonics-gp-2005", 5);
+    line.add("autonics-arm", 17);
+    line.add("panasonic-gt", 20);
+    line.add("omron-cp2e", 1);
+}
+
+const std::vector<std::string> kDemo{"1 omron-cp2e", "5 autonics-gp-2005", "17 autonics-arm",
+                                     "20 panasonic-gt", "31 autonics-gplp-s"};
+
+TEST(Scanner, FindsTheFivePanelsOfTheDemo) {
+    VirtualLine line;
+    add_demo(line);
+    const Result result = line.scan({});
+    EXPECT_EQ(result.ending, Result::Ending::finished);
+    EXPECT_EQ(result.format, (SerialFormat{38400, 8, Parity::none, 1}));
+    EXPECT_EQ(texts(result), kDemo);
+    EXPECT_TRUE(result.talk.empty());
+    EXPECT_FALSE(result.noisy);
+    EXPECT_LT(line.now - line.start, 30s);
+}
+
+TEST(Scanner, ReportsAnAddressThatTwoPanelsShareAndStillTellsThePanel) {
+    for (const char* profile : {"autonics-gplp-s", "panasonic-gt", "autonics-arm"}) {
+        VirtualLine line;
+        add_demo(line);
+        line.add(profile, 7).duplicate = 1;
+        const Result result = line.scan({});
+        EXPECT_THAT(texts(result), Contains(std::string("7 ") + profile + "!"));
+        EXPECT_EQ(result.stations.size(), 6u);
+        EXPECT_LT(line.now - line.start, 60s);
+        EXPECT_FALSE(result.noisy);
+        EXPECT_TRUE(result.talk.empty());
+    }
+}
+
+TEST(Scanner, FindsAnAddressThatTwoPanelsShareAlsoWhenItIsTheOnlyOne) {
+    VirtualLine line;
+    line.add("autonics-gplp-s", 1).duplicate = 1;
+    EXPECT_THAT(texts(line.scan({})), ElementsAre("1 autonics-gplp-s!"));
+}
+
+TEST(Scanner, TakesDamageAllOverTheLineForNoise) {
+    VirtualLine line;
+    for (const std::uint8_t station : Bytes{2, 3, 4, 9})
+        line.add("autonics-gplp-s", station).damage = 0.4;
+    const Result result = line.scan({});
+    EXPECT_TRUE(result.noisy);
+    EXPECT_EQ(texts(result).size(), 4u);
+    for (const StationFinding& finding : result.stations) EXPECT_FALSE(finding.duplicate);
+}
+
+TEST(Scanner, FindsTheFormatWhateverItIs) {
+    for (const SerialFormat& format :
+         {SerialFormat{9600, 8, Parity::even, 1}, SerialFormat{9600, 8, Parity::odd, 1},
+          SerialFormat{115200, 8, Parity::even, 1}, SerialFormat{2400, 8, Parity::odd, 1}}) {
+        VirtualLine line(format);
+        line.add("panasonic-gt", 20);
+        line.add("omron-cp2e", 3);
+        const Result result = line.scan({});
+        EXPECT_EQ(result.format, format);
+        EXPECT_EQ(result.stations.size(), 2u);
+        EXPECT_LT(line.now - line.start, 90s) << to_string(format);
+    }
+}
+
+TEST(Scanner, TriesTheOtherParitiesWhenRepliesAreDamaged) {
+    VirtualLine line({57600, 8, Parity::even, 1});
+    line.add("panasonic-gt", 1);
+    line.garble_other_parities();
+    const Result result = line.scan({});
+    EXPECT_EQ(result.format, (SerialFormat{57600, 8, Parity::even, 1}));
+    EXPECT_THAT(texts(result), ElementsAre("1 panasonic-gt"));
+}
+
+TEST(Scanner, KeepsToTheStationsAndFormatsItWasGiven) {
+    VirtualLine line;
+    add_demo(line);
+    Settings settings;
+    settings.baud = {38400};
+    settings.parity = {Parity::none};
+    settings.stations = {5, 17, 40};
+    EXPECT_THAT(texts(line.scan(settings)), ElementsAre("5 autonics-gp-2005", "17 autonics-arm"));
+    for (const Bytes& adu : line.sent) EXPECT_TRUE(adu[0] == 5 || adu[0] == 17 || adu[0] == 40);
+    EXPECT_THAT(line.formats, ElementsAre(SerialFormat{38400, 8, Parity::none, 1}));
+}
+
+TEST(Scanner, SaysNothingWhileAnotherMasterTalks) {
+    VirtualLine line;
+    add_demo(line);
+    line.say(300ms, modbus::encode_adu(17, "03 00 00 00 05"_hex));
+    line.say(310ms, modbus::encode_adu(17, "03 0A 00 01 00 02 00 03 00 04 00 05"_hex));
+    const Result result = line.scan({});
+    EXPECT_EQ(result.ending, Result::Ending::another_master);
+    EXPECT_TRUE(line.sent.empty());
+    EXPECT_EQ(result.talk, (Talk{{17, {3}}}));
+    EXPECT_EQ(result.format, (SerialFormat{38400, 8, Parity::none, 1}));
+    EXPECT_THAT(advice("/dev/x", result).at(0), HasSubstr("(station 17 function 3): stop it"));
+}
+
+TEST(Scanner, FindsTheFormatInWhichAnotherMasterTalks) {
+    VirtualLine line({19200, 8, Parity::even, 1});
+    for (int i = 0; i < 300; ++i) line.say(i * 100ms, modbus::encode_adu(2, "03 00 00 00 05"_hex));
+    const Result result = line.scan({});
+    EXPECT_EQ(result.ending, Result::Ending::another_master);
+    EXPECT_EQ(result.format, (SerialFormat{19200, 8, Parity::even, 1}));
+    EXPECT_TRUE(line.sent.empty());
+}
+
+TEST(Scanner, ScansAllTheSameWhenTold) {
+    VirtualLine line;
+    add_demo(line);
+    line.say(300ms, modbus::encode_adu(9, "03 00 00 00 05"_hex));
+    Settings settings;
+    settings.speak_anyway = true;
+    const Result result = line.scan(settings);
+    EXPECT_EQ(texts(result), kDemo);
+    EXPECT_EQ(result.talk, (Talk{{9, {3}}}));
+}
+
+TEST(Scanner, ReportsFramesThatAnswerNothingItHasAsked) {
+    VirtualLine line;
+    add_demo(line);
+    for (int i = 0; i < 5; ++i)
+        line.say(1500ms + i * 3s, modbus::encode_adu(200, "06 00 01 00 02"_hex));
+    const Result result = line.scan({});
+    EXPECT_EQ(texts(result), kDemo);
+    EXPECT_EQ(result.talk, (Talk{{200, {6}}}));
+}
+
+TEST(Scanner, IsNotStoppedByNoise) {
+    VirtualLine line;
+    add_demo(line);
+    std::mt19937 chance(5);
+    for (int i = 0; i < 400; ++i) line.say(i * 37ms, Bytes{static_cast<std::uint8_t>(chance())});
+    const Result result = line.scan({});
+    EXPECT_EQ(texts(result), kDemo);
+    EXPECT_GT(result.noise, 10u);
+}
+
+TEST(Scanner, FindsSlowPanelsByTheirLateReplies) {
+    VirtualLine line;
+    line.add("autonics-gplp-s", 1).slow = 150ms;
+    line.add("autonics-gplp-a", 3).slow = 400ms;
+    const Result result = line.scan({});
+    EXPECT_THAT(texts(result), ElementsAre("1 autonics-gplp-s", "3 autonics-gplp-a"));
+    EXPECT_TRUE(result.talk.empty());
+}
+
+TEST(Scanner, DoesNotTakeLateRepliesForASecondPanel) {
+    VirtualLine line;
+    sim::Misbehaviour& faults = line.add("autonics-gplp-s", 4);
+    faults.late = 0.4;
+    faults.late_by = 505ms;
+    const Result result = line.scan({});
+    EXPECT_THAT(texts(result), ElementsAre("4 autonics-gplp-s"));
+    EXPECT_GT(result.stations[0].evidence.late, 0u);
+}
+
+TEST(Scanner, TakesTheEchoOfAnAdapterForWhatItIs) {
+    VirtualLine line;
+    add_demo(line);
+    line.echo();
+    EXPECT_EQ(texts(line.scan({})), kDemo);
+}
+
+TEST(Scanner, LeavesTheFormatOfARemoteDeviceToIt) {
+    VirtualLine line({19200, 8, Parity::even, 1});
+    add_demo(line);
+    Settings settings;
+    settings.remote = true;
+    const Result result = line.scan(settings);
+    EXPECT_EQ(texts(result), kDemo);
+    EXPECT_TRUE(line.formats.empty());
+}
+
+TEST(Scanner, EndsWhenNothingAnswers) {
+    VirtualLine line;
+    const Result result = line.scan({});
+    EXPECT_EQ(result.ending, Result::Ending::finished);
+    EXPECT_TRUE(result.stations.empty());
+    EXPECT_EQ(line.sent.size(), 21u * 31u);
+    EXPECT_LT(line.now - line.start, 80s);
+}
+
+TEST(Scanner, SendsOnlyReadsWhateverAProfileAsksFor) {
+    profile::Catalogue profiles = shipped();
+    profile::PanelProfile hostile = *shipped().find("omron-cp2e");
+    hostile.name = "hostile";
+    for (const auto& request :
+         {"06 00 01 00 02"_hex, "10 00 01 00 01 02 00 05"_hex, "08 00 04 00 00"_hex,
+          "16 00 01 00 00 00 05"_hex, "03 00"_hex, "2B 0D 01 00"_hex, ""_hex})
+        hostile.identification.push_back({request, "06"_hex, "it can be written to", "nowhere"});
+    profiles.add(hostile);
+    VirtualLine line;
+    add_demo(line);
+    line.scan({}, profiles);
+    EXPECT_GT(line.sent.size(), 100u);
+    for (const Bytes& adu : line.sent) {
+        const ByteView pdu = ByteView(adu).subspan(1, adu.size() - 3);
+        EXPECT_TRUE(modbus::is_pure_read(pdu) &&
+                    modbus::check_request(pdu, modbus::QuantityCheck::wide))
+            << to_hex(adu);
+        EXPECT_GE(adu[0], 1);
+    }
+}
+
+TEST(ReadRequest, CanBeMadeOfReadsOnly) {
+    for (int function = 0; function < 256; ++function) {
+        const Bytes pdu{static_cast<std::uint8_t>(function), 0, 0, 0, 1};
+        const bool read = function >= 1 && function <= 4;
+        EXPECT_EQ(ReadRequest::make(7, pdu).has_value(), read) << function;
+    }
+    EXPECT_FALSE(ReadRequest::make(0, "03 00 00 00 01"_hex)) << "a broadcast";
+    EXPECT_FALSE(ReadRequest::make(248, "03 00 00 00 01"_hex));
+    EXPECT_EQ(ReadRequest::make(7, "03 00 00 00 01"_hex)->pdu().size(), 5u);
+}
+
+TEST(Scanner, MayBePokedAtAnyTime) {
+    VirtualLine line;
+    add_demo(line);
+    Scanner scanner(shipped(), {}, line.start);
+    for (int i = 0; i < 20'000 && !scanner.done(); ++i) {
+        line.run(scanner, line.start + i * 3ms);
+        scanner.on_deadline(line.start + i * 3ms - 1ms);
+        const Progress progress = scanner.progress(line.start + i * 3ms);
+        EXPECT_GE(progress.share, 0);
+        EXPECT_LE(progress.share, 1);
+    }
+    EXPECT_TRUE(scanner.done());
+    EXPECT_EQ(texts(scanner.result()), kDemo);
+}
+
+TEST(Scanner, TellsWhatItKnowsBeforeItIsDone) {
+    VirtualLine line;
+    add_demo(line);
+    Scanner scanner(shipped(), {}, line.start);
+    line.run(scanner, line.start + 1500ms);
+    EXPECT_EQ(scanner.result().ending, Result::Ending::running);
+    EXPECT_FALSE(scanner.result().stations.empty());
+    EXPECT_GT(scanner.progress(line.now).remaining, Duration::zero());
+}
+
+}  // namespace
+}  // namespace panelgate::scan
