@@ -58,6 +58,8 @@ void find_no_answer(Case& c) {
     for (const auto& [id, symptoms] : c.window.stations) {
         if (symptoms.attempts() == 0) continue;
         if (symptoms.mute_in_a_row < bar.enough(3)) return;
+        // Who asks for addresses that nobody has, finds nobody: a scan.
+        if (id == 0 && c.window.stations.size() > 1) continue;
         mute += symptoms.mute_in_a_row;
         ++stations;
     }
@@ -138,6 +140,18 @@ Symptoms unexplained(const Case& c) {
     return rest.total();
 }
 
+/// All of few damaged replies came from one of several stations: it may be that one, or chance.
+bool may_be_one_station(const Case& c, const Symptoms& s) {
+    constexpr std::uint64_t kFew = 8;
+    if (s.damaged() >= kFew) return false;
+    bool one = false, others = false;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        one = one || symptoms.damaged() == s.damaged();
+        others = others || (symptoms.answered > 0 && symptoms.damaged() == 0);
+    }
+    return one && others;
+}
+
 double share(std::uint64_t part, std::uint64_t whole) {
     return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
@@ -162,11 +176,12 @@ void find_noise(Case& c) {
     const Bar bar{c, Cause::noise};
     const Symptoms s = unexplained(c);
     const bool all_wrong = is_all_damaged(c, c.all) && c.has(Cause::wrong_parity);
-    const bool overrun = c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
+    const bool overrun =
+        c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
     // One damaged frame in a thousand is life; one in a hundred is a fault.
     const double limit = bar.low ? 0.003 : 0.01;
-    const bool damage =
-        s.damaged() >= bar.enough(3) && share(s.damaged(), s.damaged() + s.answered) >= limit;
+    const bool damage = s.damaged() >= bar.enough(3) && (bar.low || !may_be_one_station(c, s)) &&
+                        share(s.damaged(), s.damaged() + s.answered) >= limit;
     const bool strays = s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
     if (all_wrong || overrun || (!damage && !strays)) return;
     std::string advice =

@@ -15,14 +15,17 @@ std::optional<std::uint8_t> named(std::uint8_t station) {
     return station;
 }
 
-/// Others are heard well, so it is not the line. When only long replies are hit and nobody else has
-/// any, the line may be it nevertheless.
+/// The others would have had five damaged replies if the line damaged theirs as often (none by
+/// chance: 0.7 %), and have had a fifth of that at most. When only long replies are hit and nobody
+/// else has any, the line may be it nevertheless.
 bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     const std::uint64_t others_answered = c.all.answered - s.answered;
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
+    const std::uint64_t own = s.answered + s.damaged();
+    const std::uint64_t expected = others_answered * s.damaged();  // in parts of `own`
     const bool hit = s.damaged() >= bar.enough(3) && s.damaged() * 20 >= s.answered;
-    const bool others_fine = others_answered >= 10 && others_damaged * 50 <= others_answered &&
-                             others_damaged * 5 <= s.damaged();
+    const bool others_fine =
+        expected >= bar.enough(5) * own && others_damaged * 5 * own <= expected;
     const bool unfair = s.long_damaged == s.damaged() && c.all.long_answered < s.long_answered + 5;
     return hit && others_fine && !unfair;
 }

@@ -61,6 +61,9 @@ TEST_F(Diagnose, NobodyAndNothingIsHeard) {
     EXPECT_THAT(causes({{1, Mix().silent(6)}, {2, Mix().silent(9)}, {3, {}}}),
                 ElementsAre("no-answer-at-all"));
     EXPECT_THAT(causes({{0, Mix().silent(10)}}), ElementsAre("no-answer-at-all"));
+    EXPECT_THAT(causes({{0, Mix().silent(99)}, {1, {}}}), IsEmpty()) << "a scan";
+    EXPECT_THAT(causes({{0, Mix().answered(1)}, {1, Mix().silent(9)}}),
+                ElementsAre("station-silent 1"));
     EXPECT_THAT(causes({{1, Mix().silent(5)}}), IsEmpty()) << "too early to tell";
     // The cable was cut just now: it has worked within the window.
     EXPECT_THAT(causes({{1, Mix().answered(80).silent(6)}, {2, Mix().answered(80).silent(4)}}),
@@ -97,7 +100,8 @@ TEST_F(Diagnose, OnlyDamageOfEverybodyIsBaudOrParity) {
     EXPECT_THAT(causes({{1, Mix().garbage(4)}}), ElementsAre("noise")) << "too few to tell";
     EXPECT_THAT(causes({{1, Mix().damaged(9)}, {2, Mix().damaged(9)}}), ElementsAre("noise"))
         << "right beginnings: neither";
-    EXPECT_THAT(causes({{1, Mix().garbage(9)}, {2, Mix().answered(9)}}), ElementsAre("noise"));
+    EXPECT_THAT(causes({{1, Mix().garbage(9)}, {2, Mix().answered(9)}}),
+                ElementsAre("duplicate-address 1"));
 }
 
 TEST_F(Diagnose, WithoutAParityCheckZerosAreNothingSpecial) {
@@ -134,6 +138,17 @@ TEST_F(Diagnose, SporadicDamageOfEverybodyIsNoise) {
                 ElementsAre("noise"));
     EXPECT_THAT(causes({{1, Mix().answered(500).damaged(1)}}, {{Cause::noise, {}, {}, {}, {}}}),
                 IsEmpty());
+}
+
+TEST_F(Diagnose, AFewDamagedRepliesOfOneOfTwoStationsDoNotTellYet) {
+    EXPECT_THAT(causes({{1, Mix().answered(20)}, {2, Mix().answered(20).damaged(3)}}), IsEmpty());
+    EXPECT_THAT(causes({{1, Mix().answered(20).damaged(1)}, {2, Mix().answered(20).damaged(3)}}),
+                ElementsAre("noise"));
+    EXPECT_THAT(causes({{1, Mix().answered(60)}, {2, Mix().answered(20).damaged(3)}}),
+                ElementsAre("duplicate-address 2"));
+    EXPECT_THAT(causes({{1, Mix().answered(2)}, {2, Mix().answered(20).damaged(9)}}),
+                ElementsAre("noise"))
+        << "the other one was hardly asked";
 }
 
 TEST_F(Diagnose, DamageOfLongRepliesPointsToTheTermination) {
