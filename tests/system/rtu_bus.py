@@ -14,6 +14,11 @@ import harness
 
 Frame = namedtuple("Frame", "at bytes")  # at: time.monotonic() when its last byte had been read
 
+# Of requests: where the byte count is and how many bytes there are besides; 65, user-defined, has
+# one here as well.
+COUNTED = {20: (2, 5), 23: (10, 13), 65: (2, 5)}
+FIXED = {8: 8, 22: 10, 24: 6, 43: 7}
+
 
 def request_length(data):
     """Bytes of the request ADU that starts here, None while nothing can be said."""
@@ -25,6 +30,11 @@ def request_length(data):
         return None if len(data) < 7 else 9 + data[6]
     if data[1] in (7, 11, 12, 17):
         return 4
+    if data[1] in COUNTED:
+        at, rest = COUNTED[data[1]]
+        return None if len(data) <= at else rest + data[at]
+    if data[1] in FIXED:
+        return FIXED[data[1]]
     raise AssertionError(f"no rule for function {data[1]}")
 
 
@@ -38,7 +48,7 @@ def echo_address(frame):
 
 
 class RtuBus:
-    """panels: {station: function(frame) -> reply PDU | Raw(bytes) | None for silence}
+    """panels: {station: function(frame) -> reply PDU | Raw(bytes) | Pieces | None for silence}
     echo: function(frame) -> what the adapter hears of the frame that it sends; glued: in one piece
     with the reply"""
 
@@ -64,9 +74,10 @@ class RtuBus:
     def __exit__(self, *_):
         os.close(self._end)
         self._thread.join(harness.PATIENCE)
+        if os.readlink(self._link) == os.ttyname(self._slave):  # not another bus' by now
+            os.unlink(self._link)
         for descriptor in (self._wake, self._master, self._slave):
             os.close(descriptor)
-        os.unlink(self._link)
         if self._error:
             raise self._error
 
@@ -121,6 +132,9 @@ class RtuBus:
             self._changed.notify_all()
         panel = self._panels.get(frame[0])
         reply = panel(frame) if panel else None
+        if isinstance(reply, Pieces):
+            reply.send(self._master)
+            return
         if reply is not None and not isinstance(reply, Raw):
             reply = harness.rtu(frame[0], reply)
         pieces = [self._echo(frame), reply or b""]
@@ -131,6 +145,23 @@ class RtuBus:
 
 class Raw(bytes):
     """A reply that goes out as it is, address and CRC included."""
+
+
+class Pieces:
+    """A reply with holes: [(seconds of silence, the bytes behind it)]. Without an echo."""
+
+    def __init__(self, pieces):
+        self._pieces = pieces
+        self.longest = 0.0  # seconds, of the holes as they came out
+
+    def send(self, descriptor):
+        before = None
+        for pause, data in self._pieces:
+            time.sleep(pause)
+            os.write(descriptor, data)
+            now = time.monotonic()
+            self.longest = max(self.longest, now - (before or now))
+            before = now
 
 
 def scripted(*replies):

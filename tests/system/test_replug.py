@@ -1,6 +1,9 @@
-"""P7: an adapter that is unplugged and plugged in again a hundred times, under load."""
+"""P7: an adapter that is unplugged and plugged in again a hundred times, under load, or
+moved to another socket."""
+import contextlib
 import os
 import pathlib
+import struct
 import tempfile
 import time
 import unittest
@@ -66,6 +69,33 @@ class Replug(unittest.TestCase):
                 self.assertLessEqual(max(counts) - min(counts), 1)
                 self.assertRegex(program.get("/metrics")[1],
                                  rf'line_reopens_total\{{line="shaky"\}} {ROUNDS - 1}')
+
+    def test_P7_a_link_that_names_another_device_by_now_is_followed(self):
+        # As when an adapter is moved to another socket: udev points its link to the new node, and
+        # the old one hangs up afterwards.
+        def panel(value):
+            return lambda frame: struct.pack(">BBH", 3, 2, value)
+
+        with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as bus:
+            link = pathlib.Path(folder) / "tty"
+            bus.enter_context(RtuBus(link, {1: panel(0)}))
+            with harness.configured(CONFIG % link) as program, program.client() as client:
+                program.log.wait_for("line up.*line=shaky")
+                returns = []
+                for value in range(ROUNDS // 4):
+                    other = contextlib.ExitStack()
+                    other.enter_context(RtuBus(link, {1: panel(value + 1)}))
+                    old = struct.pack(">BBH", 3, 2, value)
+                    self.assertEqual(client.ask(1, read_registers(5)), old)  # open, and works
+                    bus.close()
+                    bus.enter_context(other)
+                    start = time.monotonic()
+                    while (reply := client.ask(1, read_registers(5)))[0] != 3:
+                        pass
+                    returns.append(time.monotonic() - start)
+                    self.assertEqual(reply, struct.pack(">BBH", 3, 2, value + 1))
+                print(f"\n  on the new device after {max(returns) * 1000:.0f} ms at most")
+                self.assertLess(max(returns), 1)
 
     def test_P7_a_missing_device_costs_next_to_nothing(self):
         with tempfile.TemporaryDirectory() as folder:
