@@ -12,92 +12,21 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 
+#include "conversation.hpp"
 #include "driver.hpp"
 #include "open_error.hpp"
-#include "panelgate/line/termios_setup.hpp"
-#include "port.hpp"
 #include "record.hpp"
 #include "rs485.hpp"
 
 namespace panelgate::line {
 namespace {
 
-constexpr SerialFormat kPlain{19'200, 8, Parity::none, 1};
-
-/// Returns when the host says, on the console, that it has done so. "mute": no byte goes back any
-/// more; "answer": again; "send HEX"; "break".
-void tell_host(const std::string& what) {
-    std::printf("host: %s\n", what.c_str());
-    std::fflush(stdout);
-    std::string done;
-    std::getline(std::cin, done);
-}
-
-/// Until `wanted` holds, for 3 s at most.
-template <class Condition>
-bool wait_until(Condition wanted) {
-    for (int i = 0; i < 300 && !wanted(); ++i) ::poll(nullptr, 0, 10);
-    return wanted();
-}
-
-int ask(int fd, unsigned long request, void* argument) {
-    return kernel_ops().control(fd, request, argument);
-}
-
 int order(int fd, unsigned long request, std::uintptr_t argument) {
     return ask(fd, request, reinterpret_cast<void*>(argument));
 }
 
-termios2 settings_of(int fd) {
-    termios2 t{};
-    ask(fd, TCGETS2, &t);
-    return t;
-}
-
-std::string set_up(Port& port, const SerialFormat& format) {
-    if (!port.is_open()) return std::strerror(port.error());
-    const SetUp result = set_up_tty(port.fd(), format);
-    return result.error + result.warning;
-}
-
-Bytes all_values() {
-    Bytes bytes;
-    for (int value = 0; value < 256; ++value) bytes.push_back(static_cast<std::uint8_t>(value));
-    return bytes;
-}
-
-/// Empty when every byte value came through both ways: the host inverts, so that two faults cannot
-/// make up for each other.
-std::string exchange(Port& port, const Bytes& bytes) {
-    if (!port.write(bytes)) return "cannot be written";
-    const Bytes got = port.read(bytes.size());
-    for (std::size_t i = 0; i < got.size(); ++i) {
-        if (got[i] == static_cast<std::uint8_t>(~bytes[i])) continue;
-        return "byte " + std::to_string(i) + " was " + std::to_string(got[i]) + " for " +
-               std::to_string(bytes[i]) + " inverted";
-    }
-    if (got.size() < bytes.size()) return "only " + std::to_string(got.size()) + " came back";
-    return port.read(1, 50).empty() ? "" : "more came back than was sent";
-}
-
-/// As terminal programs leave a port: cooked, echo, both kinds of flow control, 7 bits.
-void use_as_terminal(int fd) {
-    termios2 t = settings_of(fd);
-    t.c_iflag = ICRNL | IXON | IXOFF | ISTRIP | PARMRK | INPCK | IUCLC;
-    t.c_oflag = OPOST | ONLCR | OLCUC;
-    t.c_lflag = ICANON | ECHO | ISIG | IEXTEN;
-    t.c_cflag = CS7 | PARENB | PARODD | CSTOPB | CREAD | B300 | CRTSCTS;
-    t.c_cc[VSTART] = 0x11;
-    t.c_cc[VSTOP] = 0x13;
-    t.c_cc[VMIN] = 0;
-    t.c_cc[VTIME] = 7;
-    ask(fd, TCSETS2, &t);
-}
-
-/// Folder and name of the device that the port belongs to, in its driver's folder: what
-/// "unbind" wants to know.
+/// The name of the device that the port belongs to, in its driver's folder: what "unbind" wants.
 std::string device_of(const std::string& driver, const std::string& tty) {
     namespace fs = std::filesystem;
     for (const auto& entry : fs::directory_iterator(driver)) {
@@ -119,11 +48,13 @@ void Checks::check(const std::string& name, bool good, const std::string& detail
     std::fflush(stdout);
 }
 
-int Checks::run() {
+void Checks::run_uart() {
     formats();
-    rates();
+    odd_rate();
+    rate_above_base();
     bytes();
     earlier_users();
+    stopped_output();
     breaks();
     exclusive();
     sending();
@@ -131,8 +62,20 @@ int Checks::run() {
     low_latency();
     not_serial();
     absent();
+    unbind();
+}
+
+void Checks::run_adapter() {
+    formats();
+    odd_rate();
+    rate_of_adapter();
+    bytes();
+    earlier_users();
+    exclusive();
+    sending();
+    low_latency();
+    adapter_timer();
     unplug();
-    return failed_;
 }
 
 void Checks::formats() {
@@ -165,14 +108,25 @@ void Checks::formats() {
     }
 }
 
-void Checks::rates() {
+void Checks::odd_rate() {
     Port port(port_);
     set_up(port, kPlain);
     const std::string odd = set_up(port, {12'345, 8, Parity::none, 1});
     check("rate.12345", odd.empty(),
           odd + "made " + std::to_string(settings_of(port.fd()).c_ospeed));
+}
+
+void Checks::rate_above_base() {
+    Port port(port_);
+    set_up(port, kPlain);
     const std::string above = set_up(port, {250'000, 8, Parity::none, 1});
     check("rate.above_baud_base", above.find(" bit/s of 250000") != above.npos, above);
+}
+
+void Checks::rate_of_adapter() {
+    Port port(port_);
+    const std::string said = set_up(port, {250'000, 8, Parity::none, 1});
+    check("rate.250000", said.empty(), said);
 }
 
 void Checks::bytes() {
@@ -188,18 +142,27 @@ void Checks::bytes() {
 void Checks::earlier_users() {
     Port theirs(port_);
     Port port(port_);
-    const Driver driver = look_at_driver(port.fd(), kernel_ops());
-    const auto take_over = [&] {
-        std::string wrong = set_up(port, kPlain);
-        wait_until([&] { return unsent_time(port.fd(), driver, 1ms, kernel_ops()) == 0ms; });
-        tell_host("answer");
-        return wrong.empty() ? exchange(port, all_values()) : wrong;
-    };
     tell_host("mute");  // with the echo of a terminal on this end, answers would never end
     use_as_terminal(theirs.fd());
-    std::string wrong = take_over();
+    std::string wrong = take_over(port);
     check("earlier_user.cooked", wrong.empty(), wrong);
+    const termios2 left = settings_of(port.fd());
+    constexpr tcflag_t kWanted = CS8 | CREAD | CLOCAL;
+    check("earlier_user.nothing_left",
+          left.c_iflag == IGNBRK && left.c_oflag == 0 && left.c_lflag == 0 &&
+              (left.c_cflag & ~static_cast<tcflag_t>(CBAUD | HUPCL)) == kWanted);
 
+    tell_host("send 6f6c64");
+    int waiting = 0;
+    wait_until([&] { return ask(port.fd(), TIOCINQ, &waiting) == 0 && waiting == 3; });
+    wrong = take_over(port);
+    check("earlier_user.unread_input", waiting == 3 && wrong.empty(),
+          std::to_string(waiting) + " bytes were waiting " + wrong);
+}
+
+void Checks::stopped_output() {
+    Port theirs(port_);
+    Port port(port_);
     tell_host("mute");
     use_as_terminal(theirs.fd());
     tell_host("send 13");  // XOFF, which stops the output of a port with IXON
@@ -209,15 +172,8 @@ void Checks::earlier_users() {
         ask(port.fd(), TIOCOUTQ, &held);
         return held > 0;
     });
-    wrong = take_over();
+    const std::string wrong = take_over(port);
     check("earlier_user.stopped_by_xoff", stopped && wrong.empty(), wrong);
-
-    tell_host("send 6f6c64");
-    int waiting = 0;
-    wait_until([&] { return ask(port.fd(), TIOCINQ, &waiting) == 0 && waiting == 3; });
-    wrong = take_over();
-    check("earlier_user.unread_input", waiting == 3 && wrong.empty(),
-          std::to_string(waiting) + " bytes were waiting " + wrong);
 }
 
 void Checks::breaks() {
@@ -329,13 +285,40 @@ void Checks::absent() {
     report("absent", port.fd());
 }
 
-void Checks::unplug() {
+void Checks::adapter_timer() {
+    const std::string file = "/sys/class/tty/" + std::filesystem::path(port_).filename().string() +
+                             "/device/latency_timer";
+    write_file(file, "16");
+    Port port(port_);
+    const Driver driver = look_at_driver(port.fd(), kernel_ops());
+    check("queue.is_told", driver.tells_queue);
+    check("queue.last_bit_is_not_asked_for", !driver.tells_empty);
+    const std::string said = ask_low_latency(port.fd(), port_, kernel_ops());
+    int now = 0;
+    std::ifstream(file) >> now;
+    check("low_latency.timer", said.empty() && now == 1, std::to_string(now) + " ms " + said);
+}
+
+void Checks::unbind() {
     const std::string folder = "/sys/bus/pnp/drivers/serial/";
     const std::string device = device_of(folder, std::filesystem::path(port_).filename());
     check("unplug.device", !device.empty(), device);
+    take_away([&] { write_file(folder + "unbind", device); },
+              [&] { write_file(folder + "bind", device); });
+}
+
+void Checks::unplug() {
+    take_away([] { tell_host("unplug"); },
+              [this] {
+                  tell_host("plug");
+                  wait_until([this] { return Port(port_).is_open(); });
+              });
+}
+
+void Checks::take_away(const std::function<void()>& take, const std::function<void()>& give) {
     Port port(port_);
     set_up(port, kPlain);
-    write_file(folder + "unbind", device);
+    take();
     pollfd p{port.fd(), POLLIN, 0};
     const int polled = ::poll(&p, 1, 3000);
     std::uint8_t byte = 0;
@@ -354,7 +337,7 @@ void Checks::unplug() {
     check("unplug.open_again_fails", !why.empty(), why);
     gone.close();
     port.close();
-    write_file(folder + "bind", device);
+    give();
     Port back(port_);
     std::string wrong = set_up(back, kPlain);
     if (wrong.empty()) wrong = exchange(back, all_values());

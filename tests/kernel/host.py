@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""host.py KERNEL INITRAMFS OUTPUT: the machine around guest.cpp.
+"""host.py KERNEL INITRAMFS OUTPUT [usb]: the machine around guest.cpp.
 
-Boots it in qemu and plays the other end of its second serial port: every byte goes back inverted,
-and the guest's lines "host: ..." on the console are obeyed, each answered with "done". What drivers answered there goes to
+Boots it in qemu and plays the other end of its second serial port, or with "usb" of an FTDI adapter
+on USB: every byte goes back inverted, and the guest's lines "host: ..." on the console are obeyed, each answered with "done". What drivers answered there goes to
 files TABLE.txt in the folder OUTPUT. Exit code 0 only when the guest said that it is done and that nothing failed.
 """
 import json
@@ -19,6 +19,9 @@ import tempfile
 import time
 
 DEADLINE = 90.0  # seconds; a boot and all checks take 5 with software emulation on a busy machine
+
+
+ADAPTER = "usb-serial,id=adapter,chardev=port"
 
 
 class Connection:
@@ -40,7 +43,7 @@ class Connection:
 class Machine:
     """The emulated machine; ends with the `with` block, whatever happened."""
 
-    def __init__(self, kernel, initramfs):
+    def __init__(self, kernel, initramfs, usb):
         self.folder = tempfile.TemporaryDirectory(prefix="panelgate-kernel-")
         folder = pathlib.Path(self.folder.name)
         port, monitor = Connection(folder, "port"), Connection(folder, "monitor")
@@ -49,7 +52,8 @@ class Machine:
              "-nodefaults", "-display", "none", "-kernel", kernel, "-initrd", initramfs,
              "-append", "console=ttyS0 quiet loglevel=1 panic=-1 random.trust_cpu=on",
              "-chardev", "stdio,id=console,signal=off", "-serial", "chardev:console",
-             "-chardev", f"socket,id=port,path={port.path}", "-serial", "chardev:port",
+             "-chardev", f"socket,id=port,path={port.path}",
+             *(["-device", "qemu-xhci", "-device", ADAPTER] if usb else ["-serial", "chardev:port"]),
              "-qmp", f"unix:{monitor.path}"],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True)
         try:
@@ -57,6 +61,7 @@ class Machine:
             self.replies = self.monitor.makefile("r")
             self.replies.readline()  # the greeting
             self.muted = False
+            self.events = []
             self.order("qmp_capabilities")
         except BaseException:
             self.end()
@@ -83,6 +88,13 @@ class Machine:
                 raise RuntimeError(f"qemu refuses {command}: {reply['error']['desc']}")
             if "return" in reply:
                 return
+            self.events.append(reply.get("event"))
+
+
+    def wait_event(self, event):
+        while event not in self.events:
+            self.events.append(json.loads(self.replies.readline()).get("event"))
+        self.events.remove(event)
 
 
 def obey(machine, wish):
@@ -93,6 +105,11 @@ def obey(machine, wish):
         while select.select([machine.port], [], [], 0)[0] and machine.port.recv(4096):
             pass  # from before: not to be answered
         machine.muted = word == "mute"
+    elif word == "unplug":
+        machine.order("device_del", id="adapter")
+        machine.wait_event("DEVICE_DELETED")
+    elif word == "plug":
+        machine.order("device_add", driver="usb-serial", id="adapter", chardev="port")
     elif word == "send":
         machine.port.sendall(bytes.fromhex(argument))
     else:
@@ -131,6 +148,7 @@ def console_lines(machine, start):
 TABLES = {
     "8250": "the 8250 driver, a 16550A of qemu-system-x86",
     "absent": "the 8250 driver, a ttyS without a UART",
+    "ftdi": "ftdi_sio, the FT232BM of qemu-system-x86",
     "gone": "a descriptor of a 16550A whose driver was unbound meanwhile",
 }
 
@@ -153,6 +171,8 @@ def run(machine, output, start):
         if found := re.match(r"guest: done, (\d+) checks, (\d+) failed", line):
             verdict = int(found[1]) > 0 and int(found[2]) == 0
     for name, lines in tables.items():
+        if not lines:
+            continue
         head = f"# {release}, {TABLES[name]}"
         (output / f"{name}.txt").write_text("\n".join([head, *lines, ""]))
     if verdict is None:
@@ -161,11 +181,11 @@ def run(machine, output, start):
 
 
 def main():
-    if len(sys.argv) != 4:
+    if len(sys.argv) not in (4, 5) or sys.argv[4:] not in ([], ["usb"]):
         sys.exit(__doc__)
-    kernel, initramfs, output = sys.argv[1:]
+    kernel, initramfs, output, *usb = sys.argv[1:]
     start = time.monotonic()
-    with Machine(kernel, initramfs) as machine:
+    with Machine(kernel, initramfs, bool(usb)) as machine:
         try:
             good = run(machine, pathlib.Path(output), start)
         except (RuntimeError, OSError) as error:
