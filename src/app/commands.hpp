@@ -17,6 +17,16 @@ ExitCode check(const std::string& file, bool json);
 /// `links`: "NAME=PTY-LINK" a line; no entry = only the pty's own path is printed.
 ExitCode simulate(const std::string& file, const std::vector<std::string>& links);
 ExitCode address(const std::string& profile, const std::string& what);
+/// The command line of `scan` as typed; lists are empty when not given.
+struct ScanOptions {
+    std::string device;
+    std::string baud;
+    std::string parity;
+    std::string stations;
+    bool yaml = false;
+    bool speak = false;  ///< although another master is talking
+};
+ExitCode scan(const ScanOptions& options);
 /// Lists all, or describes one.
 ExitCode profiles(const std::string& name);
 

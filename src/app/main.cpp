@@ -12,6 +12,24 @@ using namespace panelgate::app;
 constexpr const char* kAbout =
     "panelgate: a Modbus RTU-to-TCP gateway for operator panels on RS-485 lines";
 
+void add_scan(CLI::App& cli, ScanOptions& options, ExitCode& code) {
+    CLI::App* scan_cli = cli.add_subcommand(
+        "scan", "find stations, serial settings and panel profiles on a line; only ever reads");
+    scan_cli->add_option("DEVICE", options.device, "a serial device, or tcp://HOST:PORT")
+        ->required();
+    scan_cli->add_option("--baud", options.baud, "rates to try, such as 9600,38400");
+    scan_cli->add_option("--parity", options.parity, "none, even, odd or a list of them");
+    scan_cli->add_option("--stations", options.stations,
+                         "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
+    scan_cli->add_flag("--yaml", options.yaml, "print a configuration of the line instead");
+    scan_cli->add_flag("--speak", options.speak, "scan although another master is talking");
+    scan_cli->footer(
+        "Exit codes: 0 something was found; 64 usage; 69 the device cannot be used, another "
+        "master\n"
+        "is talking, nothing was found, or the scan was interrupted (what was found is printed).");
+    scan_cli->callback([&options, &code] { code = scan(options); });
+}
+
 int run_command(int argc, char** argv) {
     CLI::App cli{kAbout, "panelgate"};
     cli.set_version_flag("--version", std::string("panelgate ") + PANELGATE_VERSION);
@@ -49,6 +67,9 @@ int run_command(int argc, char** argv) {
         "--line", links,
         "NAME=PTY-LINK, a link to the line's pty, or NAME=tcp://ADDR:PORT, RTU over TCP");
     simulate_cli->callback([&] { code = simulate(file, links); });
+
+    ScanOptions scan_options;
+    add_scan(cli, scan_options, code);
 
     std::string profile;
     std::string what;

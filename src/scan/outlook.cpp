@@ -11,6 +11,18 @@ constexpr std::size_t kRequest = 8;
 constexpr int kProbes = 12;        // of a usual recognition
 constexpr Duration kProbe = 20ms;  // request, think time and reply
 
+/// What a remote line is set to cannot be asked; what the panels found can be set to is known.
+std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
+                                            const Result& result) {
+    std::vector<const profile::PanelProfile*> panels;
+    for (const StationFinding& finding : result.stations) {
+        if (finding.candidates.empty()) continue;
+        const auto* panel = profiles.find(finding.candidates.front().profile);
+        if (panel != nullptr) panels.push_back(panel);
+    }
+    return common_format(profiles, panels);
+}
+
 }  // namespace
 
 /// First pass, second pass of who will be silent, examination of who has answered.
@@ -69,7 +81,10 @@ Result Scanner::result() const {
         finding.evidence.twice += seen->second.twice;
         finding.evidence.late += seen->second.late;
     }
-    if (!result.stations.empty() || !result.talk.empty()) result.format = state.known_format();
+    if (!result.stations.empty() || !result.talk.empty()) {
+        result.format =
+            result.remote ? supposed_format(state.profiles, result) : state.known_format();
+    }
     std::ranges::sort(result.stations, std::less(), &StationFinding::station);
     tell_duplicates(result);
     return result;

@@ -77,6 +77,20 @@ std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
     return ordered;
 }
 
+bool offers(const profile::PanelProfile& panel, const SerialFormat& format) {
+    return allows(panel.serial.baud, format.baud) && allows(panel.serial.parity, format.parity) &&
+           allows(panel.serial.stop_bits, format.stop_bits);
+}
+
+std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
+                                          const std::vector<const profile::PanelProfile*>& panels) {
+    for (const SerialFormat& format : likely_formats(profiles, {})) {
+        const auto fits = [&](const auto* panel) { return offers(*panel, format); };
+        if (std::ranges::all_of(panels, fits)) return format;
+    }
+    return std::nullopt;
+}
+
 SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
                        const std::vector<std::uint8_t>& stations) {
     std::size_t from = 0;

@@ -19,6 +19,12 @@ std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
 std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
                                           const Settings& settings);
 
+/// The panel's manual offers this format.
+bool offers(const profile::PanelProfile& panel, const SerialFormat& format);
+/// The likeliest format that all of these offer: what a remote line is probably set to.
+std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
+                                          const std::vector<const profile::PanelProfile*>& panels);
+
 /// One question while the format is unknown.
 struct Cell {
     SerialFormat format;

@@ -7,6 +7,7 @@
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/judge.hpp"
+#include "plan.hpp"
 
 namespace panelgate::scan {
 namespace {
@@ -18,17 +19,10 @@ constexpr std::size_t kMostProbes = 256;  // to choose from
 constexpr std::size_t kMostAsked = 24;
 constexpr std::uint32_t kLastAddress = 0xFFFF;
 
-template <class T>
-bool allows(const std::vector<T>& list, const T& value) {
-    return list.empty() || std::ranges::find(list, value) != list.end();
-}
-
 bool may_be(const PanelProfile& profile, std::uint8_t station,
             const std::optional<SerialFormat>& format) {
     if (station < profile.first_station || station > profile.last_station) return false;
-    return !format || (allows(profile.serial.baud, format->baud) &&
-                       allows(profile.serial.parity, format->parity) &&
-                       allows(profile.serial.stop_bits, format->stop_bits));
+    return !format || offers(profile, *format);
 }
 
 void add_probe(std::vector<Bytes>& probes, Bytes pdu) {

@@ -117,9 +117,11 @@ std::string yaml_text(const std::string& text) {
 }
 
 std::string yaml_serial(const Result& result) {
-    if (result.remote || !result.format) return {};
+    if (!result.format) return {};
     const SerialFormat& format = *result.format;
-    return "    serial: {baud: " + std::to_string(format.baud) +
+    const std::string supposed =
+        result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
+    return supposed + "    serial: {baud: " + std::to_string(format.baud) +
            ", data_bits: " + std::to_string(format.data_bits) +
            ", parity: " + std::string(parity_name(format.parity)) +
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
@@ -186,11 +188,13 @@ std::string report_text(const std::string& device, const Result& result,
 
 std::string report_yaml(const std::string& device, const Result& result) {
     if (!found_any(result)) return "# " + heading(device, result) + "\nlines: []\n";
-    std::string text =
-        "# found by panelgate scan\nlines:\n  - name: line1\n    device: " + yaml_text(device) +
-        '\n' + yaml_serial(result) + "    stations:\n";
+    std::string text = "# found by panelgate scan\n";
+    if (result.ending == Result::Ending::running)
+        text += "# incomplete: the scan was interrupted\n";
+    text += "lines:\n  - name: line1\n    device: " + yaml_text(device) + '\n' +
+            yaml_serial(result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);
-    return text;
+    return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // nothing runs without a server
 }
 
 std::vector<std::string> advice(const std::string& device, const Result& result) {
@@ -213,10 +217,6 @@ std::vector<std::string> advice(const std::string& device, const Result& result)
         sentences.push_back(
             "replies of several stations are damaged: look at wiring, termination "
             "and shield before trusting the rest");
-    }
-    for (const StationFinding& finding : result.stations) {
-        if (finding.duplicate)
-            sentences.push_back(oddities(finding) + "; give one another address");
     }
     if (!found_any(result) && result.ending == Result::Ending::finished)
         sentences.push_back(nothing_answered(result));

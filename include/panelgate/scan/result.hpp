@@ -44,7 +44,8 @@ struct Result {
         another_master,  ///< heard before the first word, and nothing was said
     };
     Ending ending = Ending::running;
-    /// Where stations answered, or where another master was understood. Of a remote device nothing.
+    /// Where stations answered, or where another master was understood. Of a remote device what its
+    /// panels can be set to.
     std::optional<SerialFormat> format;
     bool remote = false;
     std::vector<StationFinding> stations;  ///< by address

@@ -201,6 +201,7 @@ TEST(Scanner, LeavesTheFormatOfARemoteDeviceToIt) {
     const Result result = line.scan(settings);
     EXPECT_EQ(texts(result), kDemo);
     EXPECT_TRUE(line.formats.empty());
+    EXPECT_EQ(result.format, (SerialFormat{38400, 8, Parity::none, 1})) << "all of them allow it";
 }
 
 TEST(Scanner, EndsWhenNothingAnswers) {
