@@ -4,6 +4,7 @@
 #include <asm/ioctls.h>
 #include <asm/termbits.h>
 
+#include <cerrno>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -56,8 +57,10 @@ SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops) {
         return SetUp{std::string(what) + ": " + std::strerror(-error), {}};
     };
     termios2 before{};
-    if (const int result = ops.control(descriptor, TCGETS2, &before); result < 0)
-        return failed("not a serial device", result);
+    const int asked = ops.control(descriptor, TCGETS2, &before);
+    // As a ttyS without hardware answers, and an adapter that was unplugged a moment ago.
+    if (asked == -EIO) return failed("there is no UART behind it", asked);
+    if (asked < 0) return failed("not a serial device", asked);
     termios2 wanted = raw(before, format);
     if (const int result = ops.control(descriptor, TCSETS2, &wanted); result < 0)
         return failed("the driver refuses these settings", result);

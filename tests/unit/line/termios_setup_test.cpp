@@ -73,7 +73,7 @@ TEST_F(TermiosSetup, ARateThatIsNearlyMetIsFine) {
 }
 
 TEST_F(TermiosSetup, ARateThatIsMoreThanTwoPercentOffIsAWarning) {
-    make_rate(115'200);  // a 16550 of 1.8432 MHz, asked for what it cannot do
+    make_rate(115'200);  // a 16550 of 1.8432 MHz, asked for what it cannot do, keeps what it had
     const auto result = set_up({250'000, 8, Parity::none, 1});
     EXPECT_EQ(result.error, "");
     EXPECT_EQ(result.warning, "the driver made 115200 bit/s of 250000");
@@ -95,8 +95,8 @@ TEST_F(TermiosSetup, WhatADriverDropsIsAWarning) {
 TEST_F(TermiosSetup, ARefusalIsAnErrorWithItsReason) {
     ops.refuse(TCSETS2, EINVAL);
     EXPECT_EQ(set_up({}).error, "the driver refuses these settings: Invalid argument");
-    ops.refuse(TCSETS2, EIO);  // ttyS3 without a UART
-    EXPECT_EQ(set_up({}).error, "the driver refuses these settings: Input/output error");
+    ops.refuse(TCGETS2, EIO);  // ttyS3 without a UART
+    EXPECT_EQ(set_up({}).error, "there is no UART behind it: Input/output error");
     ops.refuse(TCGETS2, ENOTTY);
     EXPECT_EQ(set_up({}).error, "not a serial device: Inappropriate ioctl for device");
 }
