@@ -24,6 +24,7 @@ ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
     boost::asio::io_context io(1);
+    SignalLoop loop(io);
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
         gateway.start();
@@ -32,8 +33,8 @@ ExitCode serve(config::Config config, bool simulate,
         return kUnavailable;
     }
     started(gateway);
-    run_until_signal(io, {[&] { gateway.stop_accepting(); }, [&] { return gateway.drained(); },
-                          [&] { gateway.stop(); }});
+    loop.run({[&] { gateway.stop_accepting(); }, [&] { return gateway.drained(); },
+              [&] { gateway.stop(); }});
     return kFine;
 }
 

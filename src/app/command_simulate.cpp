@@ -56,6 +56,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
 
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
+    SignalLoop loop(io);
     std::vector<std::unique_ptr<sim::SimulatedBus>> buses;
     std::vector<std::unique_ptr<PtyLink>> made;
     std::vector<std::unique_ptr<TcpBridge>> bridges;
@@ -81,11 +82,11 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
         std::cerr << "panelgate: " << error.what() << '\n';
         return kUnavailable;
     }
-    run_until_signal(io, {[] {}, [] { return true; },
-                          [&] {
-                              bridges.clear();
-                              for (const auto& bus : buses) bus->stop();
-                          }});
+    loop.run({[] {}, [] { return true; },
+              [&] {
+                  bridges.clear();
+                  for (const auto& bus : buses) bus->stop();
+              }});
     return kFine;
 }
 

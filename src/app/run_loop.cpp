@@ -1,6 +1,5 @@
 #include "run_loop.hpp"
 
-#include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
 
@@ -16,16 +15,12 @@ using boost::system::error_code;
 constexpr auto kLongestEnd = 10s;
 constexpr auto kLook = 5ms;
 
-/// Lives on run_until_signal's stack for as long as the loop runs.
+/// Lives on run()'s stack for as long as the loop runs.
 class Loop {
   public:
-    Loop(asio::io_context& io, const Ending& ending)
-        : io_(io),
-          ending_(ending),
-          ends_(io, SIGTERM, SIGINT),
-          reloads_(io, SIGHUP),
-          look_(io),
-          limit_(io) {}
+    Loop(asio::io_context& io, const Ending& ending, asio::signal_set& ends,
+         asio::signal_set& reloads)
+        : io_(io), ending_(ending), ends_(ends), reloads_(reloads), look_(io), limit_(io) {}
 
     void start() {
         wait_for_end();
@@ -81,8 +76,8 @@ class Loop {
 
     asio::io_context& io_;
     const Ending& ending_;
-    asio::signal_set ends_;
-    asio::signal_set reloads_;
+    asio::signal_set& ends_;
+    asio::signal_set& reloads_;
     asio::steady_timer look_;
     asio::steady_timer limit_;
     bool ending_now_ = false;
@@ -91,11 +86,15 @@ class Loop {
 
 }  // namespace
 
-void run_until_signal(asio::io_context& io, const Ending& ending) {
+SignalLoop::SignalLoop(asio::io_context& io)
+    : io_(io), ends_(io, SIGTERM, SIGINT), reloads_(io, SIGHUP) {
     std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
-    Loop loop(io, ending);
+}
+
+void SignalLoop::run(const Ending& ending) {
+    Loop loop(io_, ending, ends_, reloads_);
     loop.start();
-    io.run();
+    io_.run();
 }
 
 }  // namespace panelgate::app

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
 #include <functional>
 
 namespace panelgate::app {
@@ -12,7 +13,18 @@ struct Ending {
     std::function<void()> finish;  ///< then, or after 10 s, or at the second signal
 };
 
-/// Runs the loop until a signal has ended it. SIGHUP is told to be no reload in this version.
-void run_until_signal(boost::asio::io_context& io, const Ending& ending);
+/// Keeps signals from its construction on, so that none ends the program while it starts.
+class SignalLoop {
+  public:
+    explicit SignalLoop(boost::asio::io_context& io);
+    /// Runs the loop until a signal, also an earlier one, has ended it. SIGHUP is told to be no
+    /// reload in this version.
+    void run(const Ending& ending);
+
+  private:
+    boost::asio::io_context& io_;
+    boost::asio::signal_set ends_;
+    boost::asio::signal_set reloads_;
+};
 
 }  // namespace panelgate::app

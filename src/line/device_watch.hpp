@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace panelgate::line {
 
@@ -15,20 +16,28 @@ class DeviceWatch {
     /// `changed` may be called at any time between look() and stop().
     DeviceWatch(const boost::asio::any_io_executor& executor, std::string device,
                 std::function<void()> changed);
+    ~DeviceWatch();
+    DeviceWatch(const DeviceWatch&) = delete;
+    DeviceWatch& operator=(const DeviceWatch&) = delete;
 
     /// Watches the directory of the device, or the nearest one above that exists: by-id folders go
     /// with their last device. Again after each failed attempt; harmless when nothing is new.
     void look();
+    /// Nothing more is told until look(). Cheap: closing an inotify descriptor, which the kernel
+    /// makes wait for tens of milliseconds at times, is left to the end.
     void stop();
 
   private:
+    bool prepare();
+    void remember(int watch);
     void wait();
     void take_all();
 
     boost::asio::posix::stream_descriptor inotify_;
     std::string device_;
     std::function<void()> changed_;
-    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+    std::vector<int> watched_;  ///< one folder after another, the device's own at last
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(false);  ///< between look() and stop()
 };
 
 }  // namespace panelgate::line
