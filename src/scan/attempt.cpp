@@ -45,12 +45,15 @@ void Attempt::on_rx(TimePoint now, ByteView bytes) {
     const std::size_t room = kMaxHeard - std::min(kMaxHeard, heard_.size());
     const ByteView kept = bytes.first(std::min(room, bytes.size()));
     heard_.insert(heard_.end(), kept.begin(), kept.end());
-    replied_ = finish().kind == Outcome::Kind::replied;
+    const Outcome so_far = finish();
+    replied_ = so_far.kind == Outcome::Kind::replied;
+    begun_ = so_far.begun;
 }
 
 TimePoint Attempt::ends_at() const {
     if (without_echo().empty()) return start_by_;
     if (replied_) return std::min(latest_, last_rx_ + settle_);
+    if (begun_) return std::min(latest_, last_rx_ + std::max(gap_, settle_));
     return std::min(latest_, std::max(start_by_, last_rx_ + gap_));
 }
 

@@ -50,6 +50,7 @@ class Attempt {
     TimePoint last_rx_{};
     Bytes heard_;
     bool replied_ = false;
+    bool begun_ = false;  ///< a damaged reply: no other is to be expected
 };
 
 }  // namespace panelgate::scan

@@ -55,7 +55,7 @@ Progress Scanner::progress(TimePoint now) const {
             progress.remaining = state.plan.cost(state.settings) + std::max(state.due(), now) - now;
             break;
         case State::Phase::asking:
-            progress.remaining = state.asking_cost();
+            progress.remaining = state.asking_cost() + std::max(state.due(), now) - now;
             break;
         case State::Phase::done:
             break;

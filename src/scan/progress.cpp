@@ -19,10 +19,10 @@ std::string format_progress(const Progress& progress, std::size_t width) {
     std::string line = (percent < 10    ? "  "
                         : percent < 100 ? " "
                                         : "") +
-                       std::to_string(percent) + " %  " + progress.what;
-    if (progress.found > 0) line += ", " + std::to_string(progress.found) + " found";
-    line += progress.found > 0 ? ", about " : ", at most ";
-    line += time_text(progress.remaining) + " left";
+                       std::to_string(percent) + " %, " +
+                       (progress.found > 0 ? "about " : "at most ") +
+                       time_text(progress.remaining) + " left, " + std::to_string(progress.found) +
+                       " found: " + progress.what;
     line.resize(std::min(line.size(), width));
     return line;
 }

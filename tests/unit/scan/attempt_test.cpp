@@ -43,7 +43,7 @@ TEST(Attempt, EndsWhenNothingFollowsTheReply) {
 TEST(Attempt, WaitsForTheRestOfWhatHasBegunButNotForBabble) {
     Attempt attempt = make();
     attempt.on_rx(kSent + 107ms, Bytes(kReply.begin(), kReply.begin() + 3));
-    EXPECT_EQ(attempt.ends_at(), kSent + 132ms);
+    EXPECT_EQ(attempt.ends_at(), kSent + 167ms);
     for (int i = 0; i < 10'000; ++i) attempt.on_rx(kSent + 107ms + i * 1ms, "55 AA 55 AA"_hex);
     EXPECT_LT(attempt.ends_at(), kSent + 1s);
     EXPECT_EQ(attempt.finish().kind, Outcome::Kind::damaged);

@@ -133,11 +133,11 @@ TEST(ScanReport, AdvisesInWholeSentences) {
 TEST(ScanProgress, FitsItsWidth) {
     const Progress progress{0.424, 11200ms, "38400 8N1, station 17", 3};
     EXPECT_EQ(format_progress(progress, 80),
-              " 42 %  38400 8N1, station 17, 3 found, about 12 s left");
-    EXPECT_EQ(format_progress(progress, 20), " 42 %  38400 8N1, st");
+              " 42 %, about 12 s left, 3 found: 38400 8N1, station 17");
+    EXPECT_EQ(format_progress(progress, 20), " 42 %, about 12 s le");
     EXPECT_EQ(format_progress({0, 130s, "38400 8N1, listening", 0}, 80),
-              "  0 %  38400 8N1, listening, at most 3 min left");
-    EXPECT_EQ(format_progress({1, {}, "x", 1}, 80), "100 %  x, 1 found, about 0 s left");
+              "  0 %, at most 3 min left, 0 found: 38400 8N1, listening");
+    EXPECT_EQ(format_progress({1, {}, "x", 1}, 80), "100 %, about 0 s left, 1 found: x");
 }
 
 }  // namespace

@@ -63,6 +63,23 @@ TEST(Scanner, ReportsAnAddressThatTwoPanelsShareAndStillTellsThePanel) {
     }
 }
 
+TEST(Scanner, ReportsItWheneverTheTwoHappenToSpeak) {
+    int recognised = 0;
+    constexpr int kRuns = 200;
+    for (int run = 0; run < kRuns; ++run) {
+        VirtualLine line;
+        line.seed(static_cast<unsigned>(run));
+        line.add("omron-cp2e", 1);
+        line.add("autonics-gplp-s", 7).duplicate = 1;
+        const auto found = texts(line.scan({}));
+        ASSERT_EQ(found.size(), 2u) << run;
+        EXPECT_EQ(found[0], "1 omron-cp2e") << run;
+        EXPECT_EQ(found[1].back(), '!') << run << ": " << found[1];
+        recognised += found[1] == "7 autonics-gplp-s!" ? 1 : 0;
+    }
+    EXPECT_GE(recognised, kRuns * 95 / 100);
+}
+
 TEST(Scanner, FindsAnAddressThatTwoPanelsShareAlsoWhenItIsTheOnlyOne) {
     VirtualLine line;
     line.add("autonics-gplp-s", 1).duplicate = 1;

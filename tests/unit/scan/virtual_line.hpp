@@ -40,6 +40,7 @@ class VirtualLine {
             others_.emplace(start + at + wire_time(format_, i + 1), bytes[i]);
     }
     void garble_other_parities() { garbles_ = true; }
+    void seed(unsigned value) { chance_.seed(value); }
     void echo() { echo_ = true; }
     /// Nobody answers: a function of the request's ADU instead of the stations.
     void answer_by(std::function<Bytes(const Bytes&)> answer) { answer_ = std::move(answer); }
