@@ -73,11 +73,11 @@ class ScanRun final : public line::Line::Events {
     /// Why it ended early; empty when it did not.
     const std::string& cut_short() const { return cut_short_; }
     /// The line never came up.
-    bool has_begun() const { return scanner_.has_value(); }
+    bool has_begun() const { return scanner_ != nullptr; }
     scan::Result result() const { return scanner_->result(); }
 
     void on_up() override {
-        scanner_.emplace(profiles_, settings_, rt::now());
+        scanner_ = std::make_unique<scan::Scanner>(profiles_, settings_, rt::now());
         if (progress_.is_shown()) redraw();
         pump();
     }
@@ -105,7 +105,9 @@ class ScanRun final : public line::Line::Events {
         arm();
     }
     void arm() {
-        alarm_.expires_at(*scanner_->next_deadline());
+        const auto next = scanner_->next_deadline();
+        if (!next) return;
+        alarm_.expires_at(*next);
         alarm_.async_wait([this](error_code error) {
             if (error) return;
             line_->poll_input();  // what has arrived by now came before whatever is due now
@@ -127,7 +129,7 @@ class ScanRun final : public line::Line::Events {
     const scan::Settings& settings_;
     const profile::Catalogue profiles_ = profile::Catalogue::shipped();
     std::unique_ptr<line::Line> line_;
-    std::optional<scan::Scanner> scanner_;
+    std::unique_ptr<scan::Scanner> scanner_;  ///< since the line is up
     ProgressLine progress_;
     asio::steady_timer alarm_;
     asio::steady_timer redraw_;

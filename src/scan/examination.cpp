@@ -29,28 +29,30 @@ bool Examination::repeats() const {
     return seen.damaged > 0 && seen.twice == 0 && checks_ < settings_.most_repeats;
 }
 
-bool Examination::fetch_probe() {
-    if (finding_.evidence.good == 0) return false;
-    if (!probe_) {
-        probe_ = recogniser_.next_probe();
-        tries_ = 0;
-    }
-    return probe_.has_value();
-}
-
 std::optional<Ask> Examination::next() {
     if (!probe_ && repeats()) {
         ++checks_;
-        const auto check = ReadRequest::make(station(), first_question());
-        return Ask{*check, {settings_.second_timeout, settings_.settle}};
+        return make_ask(first_question(), settings_.settle);
     }
-    while (fetch_probe()) {
+    if (finding_.evidence.good == 0) return std::nullopt;
+    while (true) {
+        if (!probe_) {
+            probe_ = recogniser_.next_probe();
+            tries_ = 0;
+        }
+        if (!probe_) return std::nullopt;
         ++tries_;
-        if (const auto request = ReadRequest::make(station(), *probe_))
-            return Ask{*request, {settings_.second_timeout, settings_.quiet}};
-        recogniser_.skip(*std::exchange(probe_, std::nullopt));
+        if (auto wanted = make_ask(*probe_, settings_.quiet)) return wanted;
+        recogniser_.skip(*probe_);
+        probe_.reset();
     }
-    return std::nullopt;
+}
+
+/// Nothing when it is no read.
+std::optional<Ask> Examination::make_ask(const Bytes& pdu, Duration settle) const {
+    const auto request = ReadRequest::make(station(), pdu);
+    if (!request) return std::nullopt;
+    return Ask{*request, {settings_.second_timeout, settle}};
 }
 
 void Examination::count(const Outcome& outcome) {
@@ -96,7 +98,8 @@ void Examination::on_outcome(const Outcome& outcome) {
     }
     const bool damaged = outcome.kind == Outcome::Kind::damaged;
     if (!replied && tries_ < (damaged ? settings_.damaged_tries : kSilentProbes)) return;
-    const Bytes probe = *std::exchange(probe_, std::nullopt);
+    const Bytes probe = std::move(*probe_);
+    probe_.reset();
     if (damaged) {
         recogniser_.skip(probe);
     } else {

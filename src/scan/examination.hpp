@@ -40,7 +40,7 @@ class Examination {
 
   private:
     bool repeats() const;
-    bool fetch_probe();
+    std::optional<Ask> make_ask(const Bytes& pdu, Duration settle) const;
     void count(const Outcome& outcome);
     void compare(const Bytes& reply);
 

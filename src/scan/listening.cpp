@@ -38,8 +38,11 @@ void Scanner::State::end_listening(TimePoint now) {
     }
     const bool noise = parts.damaged > kGlitches;
     if (noise) result.noise += static_cast<unsigned>(parts.damaged);
-    if ((noise || listening_at > 0) && ++listening_at < formats.size())
+    const bool look_on = noise || listening_at > 0;
+    if (look_on && listening_at + 1 < formats.size()) {
+        ++listening_at;
         return listen(now, settings.listen_each);
+    }
     phase = Phase::searching;
 }
 

@@ -32,6 +32,7 @@ void add_probe(std::vector<Bytes>& probes, Bytes pdu) {
 
 std::vector<Bytes> identifications(const PanelProfile& profile) {
     std::vector<Bytes> reads;
+    reads.reserve(profile.identification.size());
     for (const profile::Identification& how : profile.identification) reads.push_back(how.request);
     return reads;
 }
@@ -184,7 +185,7 @@ void Recogniser::judge(Suspect& suspect, const Bytes& probe,
                        const std::optional<Bytes>& reply) const {
     if (const auto fits = identifies(*suspect.profile, probe, reply)) {
         suspect.possible = suspect.possible && *fits;
-        suspect.by_content = suspect.by_content || (*fits && is_data(*reply));
+        suspect.by_content = suspect.by_content || (*fits && reply && is_data(*reply));
     }
     const auto answer = told(reply);
     if (!answer) return;

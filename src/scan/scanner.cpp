@@ -91,7 +91,8 @@ void Scanner::State::start_asking(TimePoint now) {
     if (!first_pass.empty())
         return ask(now, take(first_pass), settings.first_timeout, Purpose::first_pass);
     if (!to_examine.empty()) {
-        examination.emplace(profiles, settings, take(to_examine), known_format());
+        examination =
+            std::make_unique<Examination>(profiles, settings, take(to_examine), known_format());
         return;
     }
     if (!second_pass.empty())
@@ -102,7 +103,7 @@ void Scanner::State::start_asking(TimePoint now) {
 
 void Scanner::State::ask(TimePoint now, std::uint8_t station, Duration timeout, Purpose why) {
     const auto request = ReadRequest::make(station, first_question());
-    transmit(now, {*request, {timeout, settings.quiet}}, why);
+    if (request) transmit(now, {*request, {timeout, settings.quiet}}, why);
 }
 
 void Scanner::State::transmit(TimePoint now, const Ask& wanted, Purpose why) {
@@ -110,7 +111,7 @@ void Scanner::State::transmit(TimePoint now, const Ask& wanted, Purpose why) {
     patience.start += latency;
     purpose = why;
     asked.set(wanted.request.station());
-    attempt.emplace(wanted.request, format, now, patience);
+    attempt = std::make_unique<Attempt>(wanted.request, format, now, patience);
     actions.emplace_back(Transmit{wanted.request});
 }
 

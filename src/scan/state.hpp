@@ -3,6 +3,7 @@
 #include <bitset>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <vector>
@@ -70,7 +71,7 @@ struct Scanner::State {
     Bytes heard;
 
     std::optional<Cell> cell;  ///< to be asked when its format is set
-    std::optional<Attempt> attempt;
+    std::unique_ptr<Attempt> attempt;
     Purpose purpose = Purpose::search;
     std::optional<Again> retry;  ///< what `attempt` is, when its purpose is `again`
 
@@ -82,7 +83,7 @@ struct Scanner::State {
     std::deque<std::uint8_t> first_pass;
     std::deque<std::uint8_t> second_pass;
     std::deque<std::uint8_t> to_examine;
-    std::optional<Examination> examination;
+    std::unique_ptr<Examination> examination;
     Result result;
 };
 
