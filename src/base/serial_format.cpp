@@ -1,6 +1,14 @@
 #include "panelgate/base/serial_format.hpp"
 
+#include <algorithm>
+
 namespace panelgate {
+
+std::string to_string(Parity parity) {
+    const auto* word =
+        std::ranges::find(kParityWords, parity, [](const auto& w) { return w.second; });
+    return std::string(word->first);
+}
 
 std::string to_string(const SerialFormat& format) {
     const char parity = format.parity == Parity::none   ? 'N'

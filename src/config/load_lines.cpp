@@ -13,9 +13,6 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-constexpr std::array<std::pair<std::string_view, Parity>, 3> kParities{
-    {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
-
 /// False when there was a fault: then nothing may be concluded from the format.
 bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
     const std::size_t before = loading.problems.list().size();
@@ -29,7 +26,7 @@ bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
     } else if (data_bits != 8) {
         in.problem("data_bits", "data_bits must be 8, not '" + std::to_string(data_bits) + '\'');
     }
-    format.parity = in.choice<Parity>("parity", kParities).value_or(format.parity);
+    format.parity = in.choice<Parity>("parity", kParityWords).value_or(format.parity);
     format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
     in.finish();
     return loading.problems.list().size() == before;

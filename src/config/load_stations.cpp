@@ -28,18 +28,6 @@ std::string join(const std::vector<T>& values, const Format& format) {
     return list;
 }
 
-std::string word(Parity parity) {
-    switch (parity) {
-        case Parity::none:
-            return "none";
-        case Parity::even:
-            return "even";
-        case Parity::odd:
-            return "odd";
-    }
-    std::abort();
-}
-
 /// The line's serial format against what the panel can be set to.
 void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& profile) {
     if (!work.serial_known) return;
@@ -47,6 +35,7 @@ void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& pro
     const SerialFormat& format = work.line.device.serial;
     const std::string source = " (" + profile.manual + ", " + serial.source + ')';
     const auto number = [](int value) { return std::to_string(value); };
+    const auto word = [](Parity parity) { return to_string(parity); };
     const auto refuse = [&](std::string_view key, const std::string& allowed,
                             const std::string& value) {
         in.problem("profile", profile.name + " allows " + std::string(key) + ' ' + allowed +
@@ -55,7 +44,7 @@ void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& pro
     if (!allows(serial.baud, format.baud))
         refuse("baud", join(serial.baud, number), number(format.baud));
     if (!allows(serial.parity, format.parity))
-        refuse("parity", join(serial.parity, word), word(format.parity));
+        refuse("parity", join(serial.parity, word), to_string(format.parity));
     if (!allows(serial.stop_bits, format.stop_bits))
         refuse("stop_bits", join(serial.stop_bits, number), number(format.stop_bits));
 }

@@ -155,9 +155,7 @@ std::string describe_area(const Area& area) {
 
 std::string describe(const PanelProfile& profile) {
     const auto count = [](int value) { return std::to_string(value); };
-    const auto parity = [](Parity p) {
-        return std::string(p == Parity::none ? "none" : p == Parity::even ? "even" : "odd");
-    };
+    const auto parity = [](Parity p) { return to_string(p); };
     std::string text =
         profile.name + ": " + profile.description + "\nmanual: " + profile.manual + '\n';
     text +=

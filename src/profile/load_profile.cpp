@@ -30,8 +30,6 @@ constexpr Tables kTables{{{"coils", modbus::Table::coils},
                           {"discrete-inputs", modbus::Table::discrete_inputs},
                           {"input-registers", modbus::Table::input_registers},
                           {"holding-registers", modbus::Table::holding_registers}}};
-constexpr std::array<std::pair<std::string_view, Parity>, 3> kParities{
-    {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
 constexpr std::array<std::pair<std::string_view, BitDigits>, 3> kBits{
     {{"none", BitDigits::none}, {"hex", BitDigits::hex}, {"decimal", BitDigits::decimal}}};
 
@@ -120,7 +118,7 @@ void load_default(const Node* node, Serial& serial, Problems& problems) {
     if (node == nullptr) return;
     MapReader in(*node, problems, "default");
     f.baud = static_cast<int>(in.integer("baud", 50, kMaxBaud).value_or(f.baud));
-    f.parity = in.choice<Parity>("parity", kParities).value_or(f.parity);
+    f.parity = in.choice<Parity>("parity", kParityWords).value_or(f.parity);
     f.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(f.stop_bits));
     in.finish();
 }
@@ -129,7 +127,7 @@ void load_serial(const Node& node, Serial& serial, Problems& problems) {
     const std::size_t before = problems.list().size();
     MapReader in(node, problems, "serial");
     serial.baud = integers(in, "baud", 50, kMaxBaud);
-    serial.parity = choices(in, "parity", kParities);
+    serial.parity = choices(in, "parity", kParityWords);
     serial.stop_bits = integers(in, "stop_bits", 1, 2);
     serial.source = in.text("source").value_or("");
     load_default(in.map("default"), serial, problems);

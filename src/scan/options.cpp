@@ -61,13 +61,11 @@ std::optional<std::string> parse_baud(std::string_view text, Settings& settings)
 }
 
 std::optional<std::string> parse_parity(std::string_view text, Settings& settings) {
-    static constexpr std::array<std::pair<std::string_view, Parity>, 3> kNames{
-        {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
     std::vector<Parity> parities;
     for (const std::string_view part : split(text)) {
-        const auto known =
-            std::ranges::find(kNames, part, &std::pair<std::string_view, Parity>::first);
-        if (known == kNames.end())
+        const auto* known =
+            std::ranges::find(kParityWords, part, &std::pair<std::string_view, Parity>::first);
+        if (known == kParityWords.end())
             return "--parity " + quoted(text) + " is not a list of none, even and odd";
         if (std::ranges::find(parities, known->second) == parities.end())
             parities.push_back(known->second);

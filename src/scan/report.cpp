@@ -89,18 +89,6 @@ std::string heading(const std::string& device, const Result& result) {
     return text;
 }
 
-std::string_view parity_name(Parity parity) {
-    switch (parity) {
-        case Parity::none:
-            return "none";
-        case Parity::even:
-            return "even";
-        case Parity::odd:
-            return "odd";
-    }
-    std::abort();
-}
-
 /// Plain where YAML surely reads it as text, else in double quotes.
 std::string yaml_text(const std::string& text) {
     static constexpr std::string_view kPlain = "/._-+@=";
@@ -123,7 +111,7 @@ std::string yaml_serial(const Result& result) {
         result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
     return supposed + "    serial: {baud: " + std::to_string(format.baud) +
            ", data_bits: " + std::to_string(format.data_bits) +
-           ", parity: " + std::string(parity_name(format.parity)) +
+           ", parity: " + to_string(format.parity) +
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
 }
 

@@ -1,13 +1,20 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "panelgate/base/time.hpp"
 
 namespace panelgate {
 
 enum class Parity : std::uint8_t { none, even, odd };
+/// As configuration, profiles and command line write it.
+inline constexpr std::array<std::pair<std::string_view, Parity>, 3> kParityWords{
+    {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}}};
+std::string to_string(Parity parity);
 
 /// How characters look on a line. The default is the standard's: 19200 8E1 (serial line
 /// V1.02, 2.5.1).
