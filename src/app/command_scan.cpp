@@ -13,6 +13,8 @@
 #include <utility>
 
 #include "commands.hpp"
+#include "panelgate/config/profiles_dir.hpp"
+#include "panelgate/config/real_files.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/rt/asio_clock.hpp"
@@ -52,9 +54,12 @@ class ProgressLine {
 /// Drives a Scanner over a line until it is done, the line fails or a signal comes.
 class ScanRun final : public line::Line::Events {
   public:
-    ScanRun(asio::io_context& io, const scan::Settings& settings, const line::Settings& device)
+    /// `settings` and `profiles` outlive it.
+    ScanRun(asio::io_context& io, const scan::Settings& settings,
+            const profile::Catalogue& profiles, const line::Settings& device)
         : io_(io),
           settings_(settings),
+          profiles_(profiles),
           line_(settings.remote ? line::make_tcp_line(io.get_executor(), device)
                                 : line::make_tty_line(io.get_executor(), device)),
           alarm_(io),
@@ -127,7 +132,7 @@ class ScanRun final : public line::Line::Events {
 
     asio::io_context& io_;
     const scan::Settings& settings_;
-    const profile::Catalogue profiles_ = profile::Catalogue::shipped();
+    const profile::Catalogue& profiles_;
     std::unique_ptr<line::Line> line_;
     std::unique_ptr<scan::Scanner> scanner_;  ///< since the line is up
     ProgressLine progress_;
@@ -161,12 +166,25 @@ std::optional<scan::Settings> parse_options(const ScanOptions& options) {
     return std::nullopt;
 }
 
+/// The shipped profiles and those of --profiles; false (and told) when something is wrong there.
+bool load_profiles(const std::string& dir, profile::Catalogue& catalogue) {
+    if (dir.empty()) return true;
+    yaml::Problems problems(dir);
+    const auto faults = config::add_profiles(dir, config::RealFiles(), catalogue, problems);
+    for (const std::string& fault : faults) std::cerr << "panelgate: --profiles: " << fault << '\n';
+    std::cerr << problems.text();
+    return faults.empty() && problems.empty();
+}
+
 void print(const ScanOptions& options, const ScanRun& run) {
     const scan::Result result = run.result();
     if (options.yaml) {
         const bool remote = result.remote;
-        std::cout << scan::report_yaml(
-            remote ? options.device : std::filesystem::absolute(options.device).string(), result);
+        const auto absolute = [](const std::string& path) {
+            return path.empty() ? path : std::filesystem::absolute(path).string();
+        };
+        std::cout << scan::report_yaml(remote ? options.device : absolute(options.device), result,
+                                       absolute(options.profiles));
     } else {
         std::cout << scan::report_text(options.device, result, run.cut_short());
     }
@@ -180,13 +198,15 @@ void print(const ScanOptions& options, const ScanRun& run) {
 ExitCode scan(const ScanOptions& options) {
     const auto settings = parse_options(options);
     if (!settings) return kUsage;
+    profile::Catalogue profiles = profile::Catalogue::shipped();
+    if (!load_profiles(options.profiles, profiles)) return kBadConfig;
     rt::LogSettings quiet;
     quiet.level = rt::LogLevel::error;  // the result is what there is to say
     rt::set_up_log(quiet);
     line::Settings device;
     device.device = options.device;
     asio::io_context io(1);
-    ScanRun run(io, *settings, device);
+    ScanRun run(io, *settings, profiles, device);
     run.run();
     if (!run.has_begun()) {
         std::cerr << "panelgate: " << run.cut_short() << '\n';

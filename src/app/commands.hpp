@@ -23,6 +23,7 @@ struct ScanOptions {
     std::string baud;
     std::string parity;
     std::string stations;
+    std::string profiles;  ///< a directory of further ones
     bool yaml = false;
     bool speak = false;  ///< although another master is talking
 };

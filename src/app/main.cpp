@@ -21,6 +21,8 @@ void add_scan(CLI::App& cli, ScanOptions& options, ExitCode& code) {
     scan_cli->add_option("--parity", options.parity, "none, even, odd or a list of them");
     scan_cli->add_option("--stations", options.stations,
                          "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
+    scan_cli->add_option("--profiles", options.profiles,
+                         "directory of further panel profiles, as profiles_dir of a configuration");
     scan_cli->add_flag("--yaml", options.yaml, "print a configuration of the line instead");
     scan_cli->add_flag("--speak", options.speak, "scan although another master is talking");
     scan_cli->footer(

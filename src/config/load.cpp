@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -8,6 +7,7 @@
 #include "loader.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/config/profiles_dir.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -38,22 +38,9 @@ std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapRea
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
     const auto dir = root.text("profiles_dir");
     if (!dir) return catalogue;
-    const auto paths = loading.files.list_yaml(*dir);
-    if (!paths) {
-        root.problem("profiles_dir", "profiles_dir: cannot list the directory " + *dir);
-        return catalogue;
-    }
-    for (const std::string& path : *paths) {
-        const auto text = loading.files.read(path);
-        if (!text) {
-            root.problem("profiles_dir", "profiles_dir: cannot read " + path);
-            continue;
-        }
-        yaml::Problems own(path);
-        auto profile =
-            profile::load_profile(*text, std::filesystem::path(path).stem().string(), own);
-        loading.problems.take(own);
-        if (profile) catalogue->add(std::move(*profile));
+    for (const std::string& fault :
+         add_profiles(*dir, loading.files, *catalogue, loading.problems)) {
+        root.problem("profiles_dir", "profiles_dir: " + fault);
     }
     return catalogue;
 }

@@ -174,11 +174,13 @@ std::string report_text(const std::string& device, const Result& result,
     return text;
 }
 
-std::string report_yaml(const std::string& device, const Result& result) {
+std::string report_yaml(const std::string& device, const Result& result,
+                        const std::string& profiles_dir) {
     if (!found_any(result)) return "# " + heading(device, result) + "\nlines: []\n";
     std::string text = "# found by panelgate scan\n";
     if (result.ending == Result::Ending::running)
         text += "# incomplete: the scan was interrupted\n";
+    if (!profiles_dir.empty()) text += "profiles_dir: " + yaml_text(profiles_dir) + '\n';
     text += "lines:\n  - name: line1\n    device: " + yaml_text(device) + '\n' +
             yaml_serial(result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);

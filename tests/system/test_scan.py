@@ -16,6 +16,7 @@ import unittest
 
 import harness
 from harness import PATIENCE, read_registers, rtu
+from test_sixth_panel import PANEL
 
 SIX = """
   - name: %s
@@ -34,6 +35,15 @@ ODD = """
     device: sim
     serial: {baud: 9600, data_bits: 8, parity: odd, stop_bits: 1}
     stations: [{id: 20, profile: panasonic-gt}]
+"""
+ACME = """
+profiles_dir: %s
+lines:
+  - name: hall
+    device: sim
+    serial: {baud: 19200, parity: even}
+    stations: [{id: 9, profile: acme-ax-7}]
+modbus_tcp: [{listen: "127.0.0.1:0"}]
 """
 FOUND = {1: "omron-cp2e", 5: "autonics-gp-2005", 7: "autonics-gplp-s", 17: "autonics-arm",
          20: "panasonic-gt", 31: "autonics-gplp-s"}
@@ -163,6 +173,28 @@ class Scan(unittest.TestCase):
                                   "--parity", "none,even")
             self.assertEqual((code, out), (69, f"{links['odd']}: no station answered\n"))
             self.assertIn("nothing answered: ", err)
+
+    def test_a_panel_that_only_a_file_describes_is_recognised(self):
+        with tempfile.TemporaryDirectory() as folder:
+            panels, link = pathlib.Path(folder) / "panels", pathlib.Path(folder) / "tty"
+            panels.mkdir()
+            (panels / "acme-ax-7.yaml").write_text(PANEL)
+            file = pathlib.Path(folder) / "hall.yaml"
+            file.write_text(ACME % panels)
+            with harness.Program("simulate", "-c", str(file), "--line", f"hall={link}"):
+                wait_until(link.exists)
+                limits = ("--stations", "9", "--baud", "19200")
+                self.assertNotIn("acme", scan(str(link), *limits)[1])
+                code, out, err = scan(str(link), *limits, "--profiles", str(panels), "--yaml")
+            self.assertEqual((code, err), (0, ""))
+            self.assertIn("{id: 9, name: station-9, profile: acme-ax-7}", out)
+            (pathlib.Path(folder) / "found.yaml").write_text(out)
+            checked = harness.run("check", "-c", "found.yaml", cwd=folder)
+            self.assertEqual(checked.returncode, 0, checked.stderr)
+            (panels / "broken.yaml").write_text("description: nothing else\n")
+            code, out, err = scan(str(link), "--profiles", str(panels))
+            self.assertEqual((code, out), (78, ""))
+            self.assertRegex(err, r"broken\.yaml:1:1: ")
 
     def test_a_device_server_needs_no_format(self):
         with tempfile.TemporaryDirectory() as folder:

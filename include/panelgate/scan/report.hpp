@@ -13,8 +13,9 @@ std::string report_text(const std::string& device, const Result& result,
                         const std::string& ending = {});
 
 /// The same as a configuration of one line, complete and valid when a station was found. `device`
-/// is an absolute path or tcp://HOST:PORT.
-std::string report_yaml(const std::string& device, const Result& result);
+/// is an absolute path or tcp://HOST:PORT; `profiles_dir`, when not empty, an absolute path.
+std::string report_yaml(const std::string& device, const Result& result,
+                        const std::string& profiles_dir = {});
 
 /// What a person should know or do besides: one sentence each.
 std::vector<std::string> advice(const std::string& device, const Result& result);
