@@ -72,9 +72,7 @@ void Arbiter::collide(TimePoint now, ByteView bytes) {
     a.last_byte = now;
     a.heard = true;
     quiet_since_ = std::max(a.sent, now);
-    const std::size_t room = modbus::ReplyFramer::kMaxHeard - a.collided.size();
-    const ByteView kept = bytes.first(std::min(room, bytes.size()));
-    a.collided.insert(a.collided.end(), kept.begin(), kept.end());
+    append_up_to(modbus::ReplyFramer::kMaxHeard, a.collided, bytes);
 }
 
 /// No reply can begin before the request has left and the silence after it told the station so. On

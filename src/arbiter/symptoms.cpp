@@ -21,21 +21,11 @@ std::size_t pause_class(Duration pause) {
     return i;
 }
 
-/// Bytes of the request ADU at the front, by its function; 0 when nothing tells. What is heard is
-/// cut into replies elsewhere, and a request glued to its reply would pass for damage.
-std::size_t request_size(ByteView heard) {
-    constexpr std::size_t kFixed = 8;  // address, function, two words, CRC
-    if (heard.size() < kFixed) return 0;
-    const std::uint8_t function = heard[1];
-    if (function >= modbus::kReadCoils && function <= modbus::kWriteSingleRegister) return kFixed;
-    const bool many =
-        function == modbus::kWriteMultipleCoils || function == modbus::kWriteMultipleRegisters;
-    return many ? kFixed + 1 + heard[6] : 0;
-}
-
 /// Of another master: not our own frame, which an adapter that is said to have no echo may give.
+/// What is heard is cut into replies elsewhere, and a request glued to its reply would pass for
+/// damage.
 bool begins_with_request(ByteView heard, ByteView own) {
-    const std::size_t size = request_size(heard);
+    const std::size_t size = modbus::request_adu_length(heard);
     return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size)) &&
            !std::ranges::equal(heard.first(size), own);
 }

@@ -1,5 +1,7 @@
 #include "panelgate/base/bytes.hpp"
 
+#include <algorithm>
+
 namespace panelgate {
 
 std::uint8_t Reader::u8() {
@@ -36,6 +38,12 @@ Writer& Writer::u16(unsigned value) {
 Writer& Writer::raw(ByteView bytes) {
     bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
     return *this;
+}
+
+void append_up_to(std::size_t limit, Bytes& bytes, ByteView more) {
+    const std::size_t room = limit - std::min(limit, bytes.size());
+    more = more.first(std::min(room, more.size()));
+    bytes.insert(bytes.end(), more.begin(), more.end());
 }
 
 std::string to_hex(ByteView bytes, std::string_view separator) {

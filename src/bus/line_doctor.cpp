@@ -31,7 +31,7 @@ doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     return facts;
 }
 
-doctor::Sample sample_of(const arbiter::Arbiter& arbiter, const line::Line& line) {
+doctor::Sample sample_of(const arbiter::Arbiter& arbiter, line::Line& line) {
     doctor::Sample sample;
     for (const auto& [id, counters] : arbiter.station_counters()) {
         sample.stations.emplace_hint(sample.stations.end(), id, counters.symptoms);
@@ -45,19 +45,19 @@ doctor::Sample sample_of(const arbiter::Arbiter& arbiter, const line::Line& line
 LineDoctor::LineDoctor(const Settings& settings)
     : settings_(settings), doctor_(settings.doctor, facts_of(settings.arbiter)) {}
 
-void LineDoctor::begin(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line) {
+void LineDoctor::begin(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
     doctor_.begin(now, sample_of(arbiter, line));
 }
 
-void LineDoctor::look(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line) {
+void LineDoctor::look(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
     if (doctor_.due(now)) judge(now, arbiter, line);
 }
 
-void LineDoctor::glance(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line) {
+void LineDoctor::glance(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
     if (doctor_.rested(now)) judge(now, arbiter, line);
 }
 
-void LineDoctor::judge(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line) {
+void LineDoctor::judge(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
     const doctor::Doctor::Change change = doctor_.look(now, sample_of(arbiter, line));
     for (const doctor::Finding& finding : change.gone) say(finding, false);
     for (const doctor::Finding& finding : change.appeared) say(finding, true);

@@ -15,16 +15,16 @@ class LineDoctor {
     /// The settings outlive it.
     explicit LineDoctor(const Settings& settings);
 
-    void begin(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line);
+    void begin(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line);
     /// Something happened: looks once a step.
-    void look(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line);
+    void look(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line);
     /// Somebody wants to know: looks unless it has just done so.
-    void glance(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line);
+    void glance(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line);
 
     std::vector<LineFinding> findings() const;
 
   private:
-    void judge(TimePoint now, const arbiter::Arbiter& arbiter, const line::Line& line);
+    void judge(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line);
     void say(const doctor::Finding& finding, bool is_new) const;
 
     const Settings& settings_;

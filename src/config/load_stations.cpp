@@ -12,14 +12,10 @@ namespace panelgate::config {
 namespace {
 
 using arbiter::StationSettings;
+using profile::allows;
 using profile::PanelProfile;
 using yaml::MapReader;
 using yaml::Node;
-
-template <class T>
-bool allows(const std::vector<T>& allowed, const T& value) {
-    return allowed.empty() || std::ranges::find(allowed, value) != allowed.end();
-}
 
 template <class T, class Format>
 std::string join(const std::vector<T>& values, const Format& format) {

@@ -50,7 +50,6 @@ ssize_t DescriptorLine::put(ByteView bytes) {
 std::string DescriptorLine::adopt(int fd) {
     error_code error;
     descriptor_.assign(fd, error);
-    fd_ = fd;
     if (!error) return {};
     ::close(fd);
     return error.message();

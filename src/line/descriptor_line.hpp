@@ -26,7 +26,7 @@ class DescriptorLine : public Line {
     void stop() final;
     void poll_input() final;
     void write(ByteView bytes) override;
-    const Counters& counters() const final {
+    const Counters& counters() final {
         counters_.uart = uart_errors();
         return counters_;
     }
@@ -44,7 +44,7 @@ class DescriptorLine : public Line {
     /// The device is open and about to be closed.
     virtual void before_close() {}
     /// What the driver has counted, also while the device is closed.
-    virtual std::optional<UartErrors> uart_errors() const { return {}; }
+    virtual std::optional<UartErrors> uart_errors() { return {}; }
     /// Something may be there now: tries, unless it is open or was tried a moment ago.
     void open_soon();
 
@@ -58,7 +58,7 @@ class DescriptorLine : public Line {
     void remember(const SerialFormat& format) { settings_.serial = format; }
 
     const Settings& settings() const { return settings_; }
-    int fd() const { return fd_; }
+    int fd() { return descriptor_.native_handle(); }
     bool is_open() const { return descriptor_.is_open(); }
     /// Completions outlive the line: they ask here first.
     std::shared_ptr<bool> alive() const { return alive_; }
@@ -74,12 +74,11 @@ class DescriptorLine : public Line {
 
     Settings settings_;
     boost::asio::posix::stream_descriptor descriptor_;
-    int fd_ = -1;  ///< of descriptor_
     boost::asio::steady_timer timer_;
     Reopen reopen_;
     Events* events_ = nullptr;
     std::shared_ptr<bool> alive_;
-    mutable Counters counters_;   ///< the driver's part is fetched when somebody asks
+    Counters counters_;           ///< the driver's part is fetched when somebody asks
     Bytes unsent_;                ///< what the driver did not take at once; at most one frame
     std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
     std::string last_error_;

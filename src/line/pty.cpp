@@ -19,7 +19,7 @@ namespace {
 
 }  // namespace
 
-Pty::Pty() {
+Pty::Pty(const SerialFormat& format) {
     master_ = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (master_ < 0) fail("posix_openpt");
     std::array<char, 64> name{};
@@ -38,7 +38,7 @@ Pty::Pty() {
         errno = error;
         fail(path_.c_str());
     }
-    set_up_tty(slave_, SerialFormat{});  // raw: a pty starts with echo and line editing
+    set_up_tty(slave_, format);  // raw: a pty starts with echo and line editing
 }
 
 Pty::~Pty() {

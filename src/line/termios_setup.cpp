@@ -33,6 +33,12 @@ termios2 raw(const termios2& before, const SerialFormat& format) {
     return t;
 }
 
+/// What a receiver tolerates (serial line V1.02, 3.2).
+bool is_near(speed_t rate, int baud) {
+    constexpr long long kTolerance = 50;  // a fiftieth: 2 %
+    return std::llabs(static_cast<long long>(rate) - baud) * kTolerance <= baud;
+}
+
 std::string difference(const termios2& wanted, const termios2& got, const SerialFormat& format) {
     std::string text;
     const auto differs = [&](tcflag_t mask) {
@@ -41,8 +47,7 @@ std::string difference(const termios2& wanted, const termios2& got, const Serial
     if (differs(CSIZE)) text += "data bits were not taken; ";
     if (differs(PARENB | PARODD)) text += "parity was not taken; ";
     if (differs(CSTOPB)) text += "stop bits were not taken; ";
-    const double off = std::abs(static_cast<double>(got.c_ospeed) - format.baud) / format.baud;
-    if (off > 0.02) {  // what a receiver tolerates (serial line V1.02, 3.2)
+    if (!is_near(got.c_ospeed, format.baud)) {
         text += "the driver made " + std::to_string(got.c_ospeed) + " bit/s of " +
                 std::to_string(format.baud) + "; ";
     }
@@ -70,6 +75,13 @@ SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops) {
     // What an earlier user left behind goes.
     ops.control(descriptor, TCFLSH, reinterpret_cast<void*>(std::uintptr_t{TCIOFLUSH}));
     return SetUp{{}, difference(wanted, got, format)};
+}
+
+bool tty_speaks(int descriptor, const SerialFormat& format, PortOps& ops) {
+    termios2 set{};
+    if (ops.control(descriptor, TCGETS2, &set) < 0) return true;
+    const bool odd = (set.c_cflag & PARODD) != 0;
+    return is_near(set.c_ospeed, format.baud) && odd == (format.parity == Parity::odd);
 }
 
 }  // namespace panelgate::line

@@ -44,7 +44,7 @@ class TtyLine final : public DescriptorLine {
     void waiting() override { watch_.look(); }
     void cancel_open() override { watch_.stop(); }
     void before_close() override;
-    std::optional<UartErrors> uart_errors() const override {
+    std::optional<UartErrors> uart_errors() override {
         return is_open() ? errors_.look(fd(), ops_) : errors_.last();
     }
     std::string try_open();
@@ -56,7 +56,7 @@ class TtyLine final : public DescriptorLine {
     DeviceWatch watch_;
     RtsSender rts_;
     Driver driver_;
-    mutable UartErrorCount errors_;  ///< asked when somebody asks
+    UartErrorCount errors_;  ///< asked when somebody asks
     std::string last_warning_;
     std::string last_rs485_warning_;
     std::string last_slow_;

@@ -179,6 +179,16 @@ bool is_never_answered(ByteView pdu) {
     return pdu.size() >= 3 && pdu[0] == kDiagnostics && field(pdu, 1) == kListenOnly;
 }
 
+std::size_t request_adu_length(ByteView heard) {
+    constexpr std::size_t kFixed = 8;  // address, function, two words, CRC
+    constexpr std::size_t kByteCount = 6;
+    if (heard.size() <= kByteCount) return 0;
+    const std::uint8_t function = heard[1];
+    if (function >= kReadCoils && function <= kWriteSingleRegister) return kFixed;
+    const bool many = function == kWriteMultipleCoils || function == kWriteMultipleRegisters;
+    return many ? kFixed + 1 + heard[kByteCount] : 0;
+}
+
 std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
     if (pdu.empty()) return std::nullopt;
     switch (pdu[0]) {

@@ -42,9 +42,7 @@ bool Attempt::holds_beginning(ByteView bytes) const {
 
 void Attempt::on_rx(TimePoint now, ByteView bytes) {
     last_rx_ = now;
-    const std::size_t room = kMaxHeard - std::min(kMaxHeard, heard_.size());
-    const ByteView kept = bytes.first(std::min(room, bytes.size()));
-    heard_.insert(heard_.end(), kept.begin(), kept.end());
+    append_up_to(kMaxHeard, heard_, bytes);
     const Outcome so_far = finish();
     replied_ = so_far.kind == Outcome::Kind::replied;
     begun_ = so_far.begun;

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
@@ -11,14 +12,6 @@ namespace {
 
 constexpr std::size_t kFixedRequest = 8;  // AP 6.1 to 6.6: address, function, two words, CRC
 constexpr std::size_t kAroundPdu = 3;
-
-/// A request of 0F or 10: header, byte count, data, CRC.
-std::size_t multiple_write_length(ByteView bytes) {
-    constexpr std::size_t kByteCount = 6;
-    const bool multiple =
-        bytes[1] == modbus::kWriteMultipleCoils || bytes[1] == modbus::kWriteMultipleRegisters;
-    return multiple && bytes.size() > kByteCount ? kByteCount + 1 + bytes[kByteCount] + 2 : 0;
-}
 
 bool is_plausible(ByteView bytes) {
     const auto function = static_cast<std::uint8_t>(bytes[1] & ~modbus::kExceptionBit);
@@ -33,7 +26,7 @@ std::size_t frame_length(ByteView bytes) {
     const modbus::ReplyLength reply = modbus::reply_length(bytes);
     const bool known = reply.kind == modbus::ReplyLength::Kind::known;
     for (const std::size_t length : std::array<std::size_t, 3>{
-             known ? reply.length : 0, kFixedRequest, multiple_write_length(bytes)}) {
+             known ? reply.length : 0, kFixedRequest, modbus::request_adu_length(bytes)}) {
         if (length >= kMinAdu && length <= bytes.size() && modbus::crc_ok(bytes.first(length)))
             return length;
     }

@@ -5,14 +5,12 @@ namespace {
 
 constexpr std::size_t kGlitches = 2;  // bytes that mean nothing
 
-void note(Talk& talk, const Heard& heard) {
-    for (const Frame& frame : heard.frames) {
-        const int function = frame.pdu[0] & ~modbus::kExceptionBit;
-        talk[frame.station].insert(static_cast<std::uint8_t>(function));
-    }
-}
-
 }  // namespace
+
+void note(Talk& talk, const Frame& frame) {
+    const int function = frame.pdu[0] & ~modbus::kExceptionBit;
+    talk[frame.station].insert(static_cast<std::uint8_t>(function));
+}
 
 void Scanner::State::listen(TimePoint now, Duration how_long) {
     heard.clear();
@@ -24,7 +22,7 @@ void Scanner::State::listen(TimePoint now, Duration how_long) {
 /// our turn.
 void Scanner::State::end_listening(TimePoint now) {
     const Heard parts = take_apart(heard);
-    note(result.talk, parts);
+    for (const Frame& frame : parts.frames) note(result.talk, frame);
     if (!result.talk.empty()) {
         result.format = format;
         if (listening_at > 0 && !std::exchange(listened_again, true)) {

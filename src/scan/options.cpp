@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "lists.hpp"
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::scan {
@@ -54,7 +55,7 @@ std::optional<std::string> parse_baud(std::string_view text, Settings& settings)
             return "--baud " + quoted(text) +
                    " is not a list of rates from 50 to 4000000 such as 9600,38400";
         }
-        if (std::ranges::find(rates, *rate) == rates.end()) rates.push_back(*rate);
+        append_new(rates, *rate);
     }
     settings.baud = std::move(rates);
     return std::nullopt;
@@ -67,8 +68,7 @@ std::optional<std::string> parse_parity(std::string_view text, Settings& setting
             std::ranges::find(kParityWords, part, &std::pair<std::string_view, Parity>::first);
         if (known == kParityWords.end())
             return "--parity " + quoted(text) + " is not a list of none, even and odd";
-        if (std::ranges::find(parities, known->second) == parities.end())
-            parities.push_back(known->second);
+        append_new(parities, known->second);
     }
     settings.parity = std::move(parities);
     return std::nullopt;

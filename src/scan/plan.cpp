@@ -6,23 +6,18 @@
 #include <numeric>
 #include <set>
 
+#include "lists.hpp"
+
 namespace panelgate::scan {
+
+using profile::allows;
+
 namespace {
 
 constexpr int kUsualRates[] = {9600, 19200, 38400, 115200, 57600, 4800, 2400};
 constexpr Parity kParities[] = {Parity::none, Parity::even, Parity::odd};
 constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third has the rest
 constexpr std::uint8_t kUsualLast = 31;    // of panels: their settings screens end there
-
-template <class T>
-bool allows(const std::vector<T>& list, const T& value) {
-    return list.empty() || std::ranges::find(list, value) != list.end();
-}
-
-template <class T>
-void append_new(std::vector<T>& list, const T& value) {
-    if (std::ranges::find(list, value) == list.end()) list.push_back(value);
-}
 
 /// The profiles' defaults, the most frequent first, then by the names of their profiles.
 std::vector<SerialFormat> profile_formats(const profile::Catalogue& profiles) {

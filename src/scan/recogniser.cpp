@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "lists.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/judge.hpp"
@@ -25,9 +26,9 @@ bool may_be(const PanelProfile& profile, std::uint8_t station,
     return !format || offers(profile, *format);
 }
 
-void add_probe(std::vector<Bytes>& probes, Bytes pdu) {
+void add_probe(std::vector<Bytes>& probes, const Bytes& pdu) {
     if (probes.size() == kMostProbes || !modbus::is_pure_read(pdu)) return;
-    if (std::ranges::find(probes, pdu) == probes.end()) probes.push_back(std::move(pdu));
+    append_new(probes, pdu);
 }
 
 std::vector<Bytes> identifications(const PanelProfile& profile) {
@@ -82,10 +83,10 @@ Recogniser::Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
         }
     }
     for (const Suspect& suspect : suspects_) {
-        for (Bytes& probe : identifications(*suspect.profile)) add_probe(probes_, std::move(probe));
+        for (const Bytes& probe : identifications(*suspect.profile)) add_probe(probes_, probe);
     }
     for (const Suspect& suspect : suspects_) {
-        for (Bytes& probe : boundaries(*suspect.profile)) add_probe(probes_, std::move(probe));
+        for (const Bytes& probe : boundaries(*suspect.profile)) add_probe(probes_, probe);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "duplicates.hpp"
+#include "lists.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "state.hpp"
 
@@ -162,8 +163,7 @@ void Scanner::State::on_damaged(std::uint8_t station, bool begun) {
         ask_again_later(station);
     } else {
         plan.hint({format, station});
-        if (std::ranges::find(result.damaged_formats, format) == result.damaged_formats.end())
-            result.damaged_formats.push_back(format);
+        append_new(result.damaged_formats, format);
     }
 }
 
@@ -174,8 +174,7 @@ void Scanner::State::on_stray(const Frame& frame) {
         return;
     const bool ours = asked[frame.station] && modbus::answers(first_question(), frame.pdu);
     if (!ours) {
-        const int function = frame.pdu[0] & ~modbus::kExceptionBit;
-        result.talk[frame.station].insert(static_cast<std::uint8_t>(function));
+        note(result.talk, frame);
         return;
     }
     Evidence& seen = beforehand[frame.station];
@@ -217,10 +216,7 @@ Scanner::~Scanner() = default;
 void Scanner::on_rx(TimePoint now, ByteView bytes) {
     if (state_->attempt) return state_->attempt->on_rx(now, bytes);
     if (state_->phase != State::Phase::listening) return;  // of the format before
-    Bytes& heard = state_->heard;
-    const std::size_t room = kMaxHeard - std::min(kMaxHeard, heard.size());
-    const ByteView kept = bytes.first(std::min(room, bytes.size()));
-    heard.insert(heard.end(), kept.begin(), kept.end());
+    append_up_to(kMaxHeard, state_->heard, bytes);
 }
 
 void Scanner::on_deadline(TimePoint now) {

@@ -15,6 +15,9 @@
 
 namespace panelgate::scan {
 
+/// A frame of somebody else's conversation.
+void note(Talk& talk, const Frame& frame);
+
 struct Scanner::State {
     enum class Phase : std::uint8_t { listening, searching, asking, done };
     /// Why the request on the wire was sent.

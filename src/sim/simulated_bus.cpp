@@ -13,7 +13,6 @@
 #include "panelgate/line/termios_setup.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/rt/asio_clock.hpp"
-#include "slave_format.hpp"
 
 namespace panelgate::sim {
 
@@ -31,12 +30,11 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     State(const asio::any_io_executor& executor, Settings s, std::vector<Station> all)
         : settings(std::move(s)),
           stations(std::move(all)),
+          pty(settings.serial),
           descriptor(executor),
           timer(executor),
           chance(settings.seed) {
         descriptor.assign(::dup(pty.master()));
-        // Who opens the device and sets nothing speaks as this line does.
-        line::set_up_tty(pty.master(), settings.serial);
     }
 
     void wait_readable();
@@ -51,7 +49,7 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
 
     Settings settings;
     std::vector<Station> stations;
-    line::Pty pty;
+    line::Pty pty;  ///< who opens it and sets nothing speaks as this line does
     asio::posix::stream_descriptor descriptor;
     asio::steady_timer timer;
     Bytes request;
@@ -84,13 +82,11 @@ void SimulatedBus::State::read_all() {
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     if (!reply.empty()) return;  // a collision: neither side understands the other
     const bool first = request.empty();
-    foreign_format = (!first && foreign_format) || !slave_speaks(pty.master(), settings.serial);
+    foreign_format = (!first && foreign_format) || !line::tty_speaks(pty.master(), settings.serial);
     longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
-    const std::size_t room = kMaxRequest - std::min(kMaxRequest, request.size());
-    request.insert(request.end(), bytes.begin(),
-                   bytes.begin() + static_cast<std::ptrdiff_t>(std::min(room, bytes.size())));
+    append_up_to(kMaxRequest, request, bytes);
     at(request_end + silent_interval(settings.serial), &State::request_ended);
 }
 

@@ -20,13 +20,7 @@ lines:
     serial: {baud: 115200, data_bits: 8, parity: none, stop_bits: 1}
     timing: {response_timeout: 200ms}
     stations: [{id: 1, name: one}]
-  - name: steady
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations: [{id: 31, name: press, profile: autonics-gplp-s}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
+""" + harness.STEADY_LINE
 DOWN = b"\x83\x0a"
 
 

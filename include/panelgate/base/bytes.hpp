@@ -47,6 +47,9 @@ class Writer {
     Bytes bytes_;
 };
 
+/// Appends as much of `more` as fits into `limit` bytes in all; the rest is dropped.
+void append_up_to(std::size_t limit, Bytes& bytes, ByteView more);
+
 /// "1f 03 00"; an empty separator gives "1f0300".
 std::string to_hex(ByteView bytes, std::string_view separator = " ");
 /// Pairs of hex digits, blanks between pairs allowed; nothing on anything else.

@@ -32,7 +32,7 @@ class Line {
     virtual void poll_input() = 0;
     /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
-    virtual const Counters& counters() const = 0;
+    virtual const Counters& counters() = 0;
     /// Other characters from now on, while it is up and nothing is being sent. False when this end
     /// does not decide that (RTU over TCP), or the device refuses (then it is down).
     virtual bool set_format(const SerialFormat& format) {

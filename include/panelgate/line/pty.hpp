@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "panelgate/base/serial_format.hpp"
+
 namespace panelgate::line {
 
 /// A pseudo-terminal pair: programs open path() as if it were a serial device, the simulated bus
@@ -9,8 +11,9 @@ namespace panelgate::line {
 /// it.
 class Pty {
   public:
-    /// Throws std::system_error when the system has none left.
-    Pty();
+    /// Its users speak this format until they set another. Throws std::system_error when the system
+    /// has none left.
+    explicit Pty(const SerialFormat& format = {});
     ~Pty();
     Pty(const Pty&) = delete;
     Pty& operator=(const Pty&) = delete;

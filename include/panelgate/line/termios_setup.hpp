@@ -18,4 +18,9 @@ struct SetUp {
 /// off is a warning.
 SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops = kernel_ops());
 
+/// Is a device set to this rate, within the 2 % that a receiver tolerates, and to odd parity only
+/// if the format has it? Asked at the master of a pseudo-terminal: what its users speak (a pty
+/// forgets whether there is any parity). True when it cannot be told.
+bool tty_speaks(int descriptor, const SerialFormat& format, PortOps& ops = kernel_ops());
+
 }  // namespace panelgate::line

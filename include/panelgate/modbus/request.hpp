@@ -43,6 +43,10 @@ bool is_pure_read(ByteView pdu);
 /// 08/0004 Force Listen Only Mode: a unicast request that is never answered (DIA-01).
 bool is_never_answered(ByteView pdu);
 
+/// Length of the request ADU (address to CRC) that begins here, where its function and byte count
+/// tell it: 01 to 06, 0F and 10. 0: nothing tells, or too little is there to tell.
+std::size_t request_adu_length(ByteView heard);
+
 /// Lq of Table B: length of the normal RTU reply (address to CRC) when the request tells it;
 /// 0 for 08/0004; nothing when only the reply tells.
 std::optional<std::size_t> reply_length_from_request(ByteView pdu);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -62,6 +63,12 @@ struct FunctionRule {
     bool broadcast = false;
     std::string source;
 };
+
+/// A list of what is allowed; an empty one allows everything.
+template <class T>
+bool allows(const std::vector<T>& list, const T& value) {
+    return list.empty() || std::ranges::find(list, value) != list.end();
+}
 
 struct Serial {
     std::vector<int> baud;  ///< allowed

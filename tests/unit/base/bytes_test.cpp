@@ -77,5 +77,17 @@ TEST(Hex, ComesBackAsItWent) {
     EXPECT_EQ(from_hex(to_hex(bytes, "")), bytes);
 }
 
+TEST(Bytes, AreAppendedUpToALimit) {
+    Bytes bytes{1, 2};
+    const Bytes more{3, 4, 5};
+    append_up_to(4, bytes, more);
+    EXPECT_EQ(bytes, (Bytes{1, 2, 3, 4}));
+    append_up_to(4, bytes, more);
+    append_up_to(3, bytes, more);  // beyond it already
+    EXPECT_EQ(bytes, (Bytes{1, 2, 3, 4}));
+    append_up_to(9, bytes, more);
+    EXPECT_EQ(bytes, (Bytes{1, 2, 3, 4, 3, 4, 5}));
+}
+
 }  // namespace
 }  // namespace panelgate

@@ -38,7 +38,7 @@ class MemoryLine final : public line::Line {
             if (events_ != nullptr) events_->on_bytes(adu);
         });
     }
-    const line::Counters& counters() const override { return counters_; }
+    const line::Counters& counters() override { return counters_; }
     std::optional<Duration> unsent() override {
         if (!tells_unsent) return std::nullopt;
         ++asked_for_unsent;

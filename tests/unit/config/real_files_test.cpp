@@ -8,28 +8,24 @@
 #include <fstream>
 #include <string>
 
+#include "support/temp_dir.hpp"
+
 namespace panelgate::config {
 namespace {
 
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 
-/// An empty directory of the running test's own.
 class RealFilesTest : public ::testing::Test {
   protected:
-    RealFilesTest() {
-        std::string name = (fs::temp_directory_path() / "panelgate-files-XXXXXX").string();
-        dir_ = mkdtemp(name.data());
-    }
-    ~RealFilesTest() override { fs::remove_all(dir_); }
-
     std::string put(const std::string& name, const std::string& text) const {
         const std::string path = (dir_ / name).string();
         std::ofstream(path, std::ios::binary) << text;
         return path;
     }
 
-    fs::path dir_;
+    const test::TempDir folder_;
+    const fs::path& dir_ = folder_.path();
 };
 
 TEST_F(RealFilesTest, ReadsAFileByteForByte) {

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "scripted_ops.hpp"
+#include "support/temp_dir.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -64,14 +65,11 @@ TEST(Driver, ADeviceThatGoesMeanwhileHasNothingLeftToSend) {
 class LowLatency : public testing::Test {
   protected:
     LowLatency() {
-        std::string name = (std::filesystem::temp_directory_path() / "panelgate-XXXXXX").string();
-        sysfs = mkdtemp(name.data());
         device = sysfs / "ttyUSB7";
         std::ofstream(device) << "";
         std::filesystem::create_symlink(device, sysfs / "by-id");
         timer = sysfs / "class/tty/ttyUSB7/device/latency_timer";
     }
-    ~LowLatency() override { std::filesystem::remove_all(sysfs); }
     void has_timer(int ms) {
         std::filesystem::create_directories(timer.parent_path());
         std::ofstream(timer) << ms << '\n';
@@ -84,7 +82,8 @@ class LowLatency : public testing::Test {
     std::string ask() { return ask_low_latency(kNoDevice, sysfs / "by-id", ops, sysfs); }
 
     ScriptedOps ops;
-    std::filesystem::path sysfs;
+    const test::TempDir folder;
+    const std::filesystem::path& sysfs = folder.path();
     std::filesystem::path device;
     std::filesystem::path timer;
 };

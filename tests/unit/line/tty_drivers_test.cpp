@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/rt/asio_clock.hpp"
@@ -15,14 +16,6 @@
 
 namespace panelgate::line {
 namespace {
-
-struct Heard final : Line::Events {
-    void on_up() override { ++ups; }
-    void on_down(const std::string& why) override { downs.push_back(why); }
-    void on_bytes(ByteView) override {}
-    int ups = 0;
-    std::vector<std::string> downs;
-};
 
 class TtyDrivers : public testing::Test {
   protected:

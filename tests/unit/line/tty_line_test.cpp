@@ -12,33 +12,22 @@
 #include <optional>
 #include <vector>
 
+#include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/reopen.hpp"
+#include "support/temp_dir.hpp"
 
 namespace panelgate::line {
 namespace {
 
-struct Heard final : Line::Events {
-    void on_up() override { ++ups; }
-    void on_down(const std::string& why) override { downs.push_back(why); }
-    void on_bytes(ByteView more) override { bytes.insert(bytes.end(), more.begin(), more.end()); }
-
-    int ups = 0;
-    std::vector<std::string> downs;
-    Bytes bytes;
-};
-
 class TtyLineTest : public testing::Test {
   protected:
     TtyLineTest() {
-        std::string name = (std::filesystem::temp_directory_path() / "panelgate-XXXXXX").string();
-        dir = mkdtemp(name.data());
         settings.device = dir / "tty";
         settings.serial = {38400, 8, Parity::none, 1};
         settings.reopen_min = 1ms;
         settings.reopen_max = 4ms;
     }
-    ~TtyLineTest() override { std::filesystem::remove_all(dir); }
 
     void plug(const Pty& pty) { std::filesystem::create_symlink(pty.path(), settings.device); }
     void unplug() { std::filesystem::remove(settings.device); }
@@ -59,7 +48,8 @@ class TtyLineTest : public testing::Test {
     }
 
     boost::asio::io_context io{1};
-    std::filesystem::path dir;
+    const test::TempDir folder;
+    const std::filesystem::path& dir = folder.path();
     Settings settings;
     Heard heard;
 };
