@@ -30,7 +30,8 @@ void JobQueue::put_back(Job job) {
 
 bool JobQueue::is_aged(TimePoint now, const Job& job, PriorityClass over) const {
     const int steps = static_cast<int>(job.priority) - static_cast<int>(over);
-    return steps > 0 && now - job.arrived >= steps * settings_.ageing;
+    return steps > 0 &&
+           now - job.arrived >= steps * std::min<Duration>(500ms, settings_.deadline / 8);
 }
 
 JobQueue::Choice JobQueue::choose(TimePoint now, const Test& may_run) const {

@@ -99,7 +99,7 @@ void Arbiter::step(TimePoint now) {
 /// Starts what is next when the line may be used. False when nothing can be done now.
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_until_ || now < quiet_since_ + gap_of(last_station_)) return false;
-    const bool alone = settings_.quarantine == Quarantine::line && !retries_.empty();
+    const bool alone = settings_.quarantine != Quarantine::station && !retries_.empty();
     if (alone) return start_retry(now);
     if (!other_first_ && start_retry(now)) return true;
     const auto due = next_probe();

@@ -12,20 +12,8 @@
 
 namespace panelgate::arbiter {
 
-namespace {
-
-/// Ageing has to work before the deadline does, or the lowest class could starve (P9).
-QueueSettings with_ageing(QueueSettings settings) {
-    settings.ageing = std::min(settings.ageing, settings.deadline / 8);
-    return settings;
-}
-
-}  // namespace
-
 Arbiter::Arbiter(Settings settings)
-    : settings_(std::move(settings)),
-      queue_(with_ageing(settings_.queue)),
-      echo_memory_(settings_.echo) {
+    : settings_(std::move(settings)), queue_(settings_.queue), echo_memory_(settings_.echo) {
     for (const StationSettings& station : settings_.stations) {
         configured_[station.id] = station;
         counters_[station.id];
@@ -254,7 +242,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
 /// still answer within the whole one.
 void Arbiter::quarantine(TimePoint now, const Group& group, Station& station, TimePoint sent) {
     expect_late(now, station, sent);
-    if (settings_.quarantine == Quarantine::line && !group.probe) {
+    if (settings_.quarantine != Quarantine::station && !group.probe) {
         const bool early = station.settings.adaptive_timeout;
         const TimePoint others = early ? now + station.timeout() : station.not_before;
         quarantined_until_ = std::max(quarantined_until_, std::min(others, station.not_before));

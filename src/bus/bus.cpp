@@ -31,6 +31,11 @@ ClientId next_client_id() {
     return ++last;
 }
 
+arbiter::Host host_of(std::string_view address) {
+    const auto hash = static_cast<arbiter::Host>(std::hash<std::string_view>{}(address));
+    return hash == 0 ? 1 : hash;
+}
+
 /// Outlives the Bus for as long as a posted completion needs it.
 struct Bus::State final : public line::Line::Events,
                           public std::enable_shared_from_this<Bus::State> {
@@ -68,6 +73,7 @@ struct Bus::State final : public line::Line::Events,
     void act(arbiter::Note& note);
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
+    void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {
         if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
     }
@@ -145,6 +151,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     job.station = request.station;
     job.pdu = std::move(request.pdu);
     job.client = request.client;
+    job.host = request.host;
     job.priority = request.priority;
     const bool read = modbus::is_pure_read(job.pdu);
     if (job.priority == arbiter::PriorityClass::read && !read)

@@ -15,6 +15,8 @@ constexpr std::array kCounts = {
     &Symptoms::damaged_zeros, &Symptoms::damaged_odd,   &Symptoms::long_answered,
     &Symptoms::long_damaged,  &Symptoms::strays,        &Symptoms::doubled,
     &Symptoms::late,          &Symptoms::unasked,       &Symptoms::echoes,
+    &Symptoms::wrong,         &Symptoms::requests,      &Symptoms::crc_swapped,
+    &Symptoms::trailed,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness
 static_assert(sizeof(Symptoms) ==

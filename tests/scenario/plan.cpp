@@ -39,7 +39,6 @@ void draw_line(Random& random, Plan& plan) {
     s.queue.limit = random.between(8, 64);
     s.queue.per_client = random.between(2, 32);
     s.queue.deadline = random.between(500ms, 4s);
-    s.queue.ageing = random.between(50ms, 1s);
     s.offline.after = static_cast<int>(random.between(2, 5));
     s.offline.probe_min = random.between(100ms, 1s);
     s.offline.probe_max = random.between(2s, 10s);

@@ -178,6 +178,12 @@ void World::make_noise() {
 
 void World::lose_line() {
     if (is_over()) return;
+    if (up_) reset_line();
+    at(now_ + random_.between(5s, 60s), [this] { lose_line(); });
+}
+
+/// Down now, and up again some time later.
+void World::reset_line() {
     up_ = false;
     ++life_;
     air_.clear();
@@ -187,7 +193,6 @@ void World::lose_line() {
         checker_.on_line(now_);
         subject_.on_line_up(now_);
     });
-    at(now_ + random_.between(5s, 60s), [this] { lose_line(); });
 }
 
 void World::become(Customer& customer) {

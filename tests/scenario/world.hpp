@@ -60,6 +60,7 @@ class World {
     void act(const arbiter::Finish& finish);
     void act(const arbiter::Note& note);
     void act(const arbiter::Decision&) {}
+    void act(const arbiter::Reset&) { reset_line(); }
     void act(const arbiter::StationEvent&) {}
 
     FramePtr put_on_wire(Bytes bytes, bool ours, bool answer);
@@ -69,6 +70,7 @@ class World {
     void tell(const std::string& what, ByteView bytes = {});
     void make_noise();
     void lose_line();
+    void reset_line();
 
     void become(Customer& customer);
     void ask(std::size_t index);

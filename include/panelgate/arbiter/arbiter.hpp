@@ -67,7 +67,12 @@ struct StationEvent {
     std::uint8_t station = 0;
     Duration by{};
 };
-using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent>;
+/// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
+/// more: then on_line_down and on_line_up.
+struct Reset {
+    std::string_view why;  ///< a literal, for people
+};
+using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Reset>;
 
 /// Decides what one line does. Pure: time is an argument, actions come out of poll_action();
 /// calling on_deadline early or twice is harmless.

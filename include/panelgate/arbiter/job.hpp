@@ -12,6 +12,8 @@ namespace panelgate::arbiter {
 /// Names one accepted job; never reused.
 using Ticket = std::uint64_t;
 using Client = std::uint64_t;
+/// Where a client comes from: all connections from one address have the same.
+using Host = std::uint64_t;
 
 /// One request on its way. The PDU has passed modbus::check_request.
 struct Job {
@@ -19,6 +21,7 @@ struct Job {
     std::uint8_t station = 0;  ///< 0: broadcast
     Bytes pdu;
     Client client = 0;
+    Host host = 0;  ///< 0: the client is its own
     PriorityClass priority = PriorityClass::read;
     TimePoint arrived;
     TimePoint deadline;

@@ -28,23 +28,25 @@ struct StationSettings {
     std::optional<Duration> late_window;
     /// How old a value that was read before may be when it answers a client; 0 = ask the panel.
     Duration max_age{};
-    /// Items of one read, for merging: the profile's or the standard's limit.
+    /// Items of one read, for joining: the profile's or the standard's limit.
     std::uint16_t max_registers = 125;
     std::uint16_t max_bits = 2000;
+    /// The profile vouches for these two. Else reads are joined only up to what the station has
+    /// answered before (P6).
+    bool vouched = false;
 };
 
 struct QueueSettings {
     std::size_t limit = 256;      ///< requests that wait on this line
     std::size_t per_client = 32;  ///< of one client
     Duration deadline = 2s;       ///< of a request, from its arrival to its answer
-    /// A request that has waited this long is treated as one class higher; twice, as two (P9).
-    Duration ageing = 500ms;
 };
 
 /// Who has to be quiet after a timeout until a late reply can no longer come (P1).
 enum class Quarantine : std::uint8_t {
-    line,     ///< everybody
-    station,  ///< the silent station; others may be asked, at the risk of a collision
+    automatic,  ///< the silent station; everybody where its replies have been late before
+    line,       ///< everybody
+    station,    ///< the silent station; others may be asked, at the risk of a collision
 };
 
 /// Whether the adapter hears what it sends (P8).
@@ -62,11 +64,17 @@ struct Settings {
     Duration broadcast_turnaround = 100ms;  ///< serial line V1.02, 2.4.1: 100..200 ms
     /// Silence that ends a reply whose length nothing tells (FRM-11); counted from its last byte.
     Duration end_of_frame = 20ms;
+    /// The longest silence inside a reply of known length; counted from its last byte. The default
+    /// is for a tty: a USB latency timer (16 ms) and a busy machine.
+    Duration reply_hole = 60ms;
     QueueSettings queue;
     OfflineSettings offline;
-    Quarantine quarantine = Quarantine::line;
+    Quarantine quarantine = Quarantine::automatic;
     /// The line is a real UART: bytes cannot come before the request has left. Not so on a pty.
     bool paced = false;
+    /// The way to the wire may hold frames back and deliver all of them later (RTU over TCP): what
+    /// is owed does not lapse by time alone.
+    bool may_stall = false;
     /// Identical, contained and adjacent reads share one transaction (P6).
     bool share_reads = true;
     /// Without a word about it, a line is taken to have none.

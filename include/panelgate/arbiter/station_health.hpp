@@ -12,7 +12,7 @@ namespace panelgate::arbiter {
 struct OfflineSettings {
     int after = 3;               ///< silent transactions in a row; 1..1000
     Duration probe_min = 500ms;  ///< first pause between two probes
-    Duration probe_max = 30s;    ///< the pause doubles up to here
+    Duration probe_max = 5s;     ///< the pause doubles up to here
 };
 
 /// What is known of one station's life. Pure. A transaction that hears anything of the station,

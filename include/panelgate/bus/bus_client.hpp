@@ -4,9 +4,11 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/time.hpp"
@@ -17,12 +19,15 @@ namespace panelgate::bus {
 /// Who asks: one number a TCP connection, HTTP session or internal task. 0 is nobody's.
 using ClientId = std::uint64_t;
 ClientId next_client_id();
+/// The same for all clients of one address ("10.0.0.7", without the port); never 0.
+arbiter::Host host_of(std::string_view address);
 
 /// One request to one station; station 0 is a broadcast.
 struct Request {
     std::uint8_t station = 0;  ///< 0..247
     Bytes pdu;
     ClientId client = 0;
+    arbiter::Host host = 0;  ///< the client's address (host_of()); 0: it is its own
     arbiter::PriorityClass priority = arbiter::PriorityClass::read;
     modbus::QuantityCheck quantity = modbus::QuantityCheck::fit;
 };

@@ -44,6 +44,12 @@ class Line {
     /// How long the wire still needs for what was written, as far as the driver tells. Nothing from
     /// a line that cannot tell at all: who writes has to go by its own arithmetic.
     virtual std::optional<Duration> unsent() { return std::nullopt; }
+    /// The far end has not taken what was written, although its time is over: it is not to be left
+    /// there, to be executed whenever the way is free again.
+    virtual bool undelivered() { return false; }
+    /// Throws away what has not left yet, closes, and opens again with back-off. The line goes down
+    /// (on_down, from inside). `why` is for people.
+    virtual void reset(const std::string& why) { static_cast<void>(why); }
     /// What the way to the wire and back adds to every answer, now: nothing for a device here.
     virtual Duration latency() { return {}; }
 };
