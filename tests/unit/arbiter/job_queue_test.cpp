@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <string>
+#include <vector>
 
-#include "support/hex.hpp"
+#include "support/queue_fixture.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -14,71 +14,8 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-bool any(const Job& /*job*/) { return true; }
-
-/// Every job reads or writes another address, unless it says otherwise.
-class JobQueueTest : public testing::Test {
-  protected:
-    Job job(Host host, Client client, std::uint8_t station, PriorityClass priority) {
-        Job made;
-        made.ticket = ++ticket_;
-        made.host = host;
-        made.client = client;
-        made.station = station;
-        made.priority = priority;
-        const unsigned address = 2 * static_cast<unsigned>(ticket_ % 30000);
-        made.pdu = priority == PriorityClass::write ? Writer().u8(6).u16(address).u16(1).take()
-                                                    : Writer().u8(3).u16(address).u16(1).take();
-        return made;
-    }
-    Job read(Client client, std::uint8_t station, Host host = 0) {
-        return job(host, client, station, PriorityClass::read);
-    }
-    Job write(Client client, std::uint8_t station, Host host = 0) {
-        return job(host, client, station, PriorityClass::write);
-    }
-    Job poll(Client client, std::uint8_t station, Host host = 0) {
-        return job(host, client, station, PriorityClass::poll);
-    }
-    Job read_of(Client client, const Bytes& pdu) {
-        Job made = read(client, 1);
-        made.pdu = pdu;
-        return made;
-    }
-    Ticket add(Job job) {
-        const Ticket ticket = job.ticket;
-        const auto admission = queue_.push(std::move(job));
-        EXPECT_TRUE(admission.taken);
-        EXPECT_FALSE(admission.shed);
-        EXPECT_TRUE(queue_.consistent());
-        return ticket;
-    }
-    /// Of the next one, 0 when none may run. What peek() shows is what comes.
-    Ticket next(const JobQueue::Test& may_run = any) {
-        const Job* shown = queue_.peek(may_run);
-        const Ticket ticket = shown == nullptr ? 0 : shown->ticket;
-        const auto popped = queue_.pop(may_run);
-        EXPECT_EQ(popped ? popped->ticket : 0, ticket);
-        EXPECT_TRUE(queue_.consistent());
-        return ticket;
-    }
-    std::vector<Ticket> drain() {
-        std::vector<Ticket> tickets;
-        while (const Ticket ticket = next()) tickets.push_back(ticket);
-        return tickets;
-    }
-    static std::vector<Ticket> tickets(const std::vector<Job>& jobs) {
-        std::vector<Ticket> all;
-        for (const Job& job : jobs) all.push_back(job.ticket);
-        return all;
-    }
-    void limits(std::size_t limit, std::size_t per_client) {
-        queue_ = JobQueue(QueueSettings{.limit = limit, .per_client = per_client, .deadline = 2s});
-    }
-
-    JobQueue queue_{QueueSettings{}};
-    Ticket ticket_ = 0;
-};
+using test::any;
+using JobQueueTest = test::QueueFixture;
 
 TEST_F(JobQueueTest, WritesGoBeforeReadsAndReadsBeforePolls) {
     const Ticket poll_ = add(poll(1, 1));

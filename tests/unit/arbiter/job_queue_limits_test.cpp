@@ -1,0 +1,233 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "panelgate/arbiter/job_queue.hpp"
+#include "support/hex.hpp"
+#include "support/queue_fixture.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::any;
+
+class JobQueueLimits : public test::QueueFixture {
+  protected:
+    /// Of the one that had to go, 0 when it was none; the newcomer was taken.
+    Ticket shed_for(Job job) {
+        const auto admission = queue_.push(std::move(job));
+        EXPECT_TRUE(admission.taken);
+        EXPECT_TRUE(queue_.consistent());
+        return admission.shed ? admission.shed->ticket : 0;
+    }
+    bool refuses(Job job) {
+        const auto admission = queue_.push(std::move(job));
+        EXPECT_FALSE(!admission.taken && admission.shed);
+        EXPECT_TRUE(queue_.consistent());
+        return !admission.taken;
+    }
+};
+
+TEST_F(JobQueueLimits, P9RefusesMoreThanOneClientMayHave) {
+    limits(10, 2);
+    add(read(1, 1));
+    add(read(1, 2));
+    EXPECT_TRUE(refuses(read(1, 3)));
+    EXPECT_TRUE(refuses(write(1, 3)));
+    add(read(2, 3));
+}
+
+TEST_F(JobQueueLimits, P9RefusesMoreThanTheLimitWhenAllHaveTheSame) {
+    limits(4, 4);
+    for (Client client = 1; client <= 4; ++client) add(read(client, 1));
+    EXPECT_TRUE(refuses(read(5, 1)));
+    EXPECT_TRUE(refuses(read(1, 1)));
+}
+
+TEST_F(JobQueueLimits, P6EqualReadsCountOnce) {
+    for (Client client = 1; client <= 1024; ++client)
+        ASSERT_TRUE(queue_.push(read_of(client, "03 00 10 00 08"_hex)).taken);
+    EXPECT_TRUE(queue_.consistent());
+    EXPECT_EQ(queue_.size(), 1u);
+    EXPECT_EQ(queue_.waiting(), 1024u);
+    EXPECT_TRUE(queue_.pop(any));
+    EXPECT_EQ(queue_.size(), 1u);
+    EXPECT_EQ(queue_.take_all(1, any).size(), 1023u);
+    EXPECT_EQ(queue_.size(), 0u);
+}
+
+TEST_F(JobQueueLimits, P6ContainedReadsCountOnceWhicheverCameFirst) {
+    add(read_of(1, "03 00 12 00 02"_hex));
+    add(read_of(2, "03 00 14 00 02"_hex));
+    EXPECT_EQ(queue_.size(), 2u);
+    const Ticket wide = add(read_of(3, "03 00 10 00 08"_hex));
+    add(read_of(4, "03 00 17 00 01"_hex));
+    EXPECT_EQ(queue_.size(), 1u);
+    add(read_of(5, "03 00 17 00 02"_hex));
+    add(read_of(5, "04 00 12 00 02"_hex));
+    Job alone = read_of(6, "03 00 12 00 02"_hex);
+    alone.alone = true;
+    add(std::move(alone));
+    EXPECT_EQ(queue_.size(), 4u);
+    queue_.remove_if([&](const Job& job) { return job.ticket == wide; });
+    EXPECT_TRUE(queue_.consistent());
+    EXPECT_EQ(queue_.size(), 5u);  // the first two count again; 17 rides on 17 and 18
+}
+
+TEST_F(JobQueueLimits, P6AReadThatRidesIsTakenWhenTheQueueIsFull) {
+    limits(2, 1);
+    add(read_of(1, "03 00 10 00 08"_hex));
+    add(read_of(2, "03 00 20 00 08"_hex));
+    add(read_of(1, "03 00 20 00 08"_hex));
+    add(read_of(3, "03 00 11 00 02"_hex));
+    EXPECT_TRUE(refuses(read_of(3, "03 00 17 00 02"_hex)));
+}
+
+TEST_F(JobQueueLimits, NeverHoldsMoreThanItsMost) {
+    const Bytes pdu = "03 00 10 00 08"_hex;
+    for (std::size_t i = 0; i < JobQueue::kMost; ++i)
+        ASSERT_TRUE(queue_.push(read_of(i % 640 + 1, pdu)).taken);
+    EXPECT_TRUE(refuses(read_of(1, pdu)));
+    EXPECT_TRUE(refuses(write(1, 1)));
+    queue_.put_back(read_of(1, pdu));
+    EXPECT_EQ(queue_.waiting(), JobQueue::kMost + 1);
+}
+
+TEST_F(JobQueueLimits, P9ANewcomerTakesTheNewestPlaceOfTheGreediestHost) {
+    limits(6, 6);
+    add(read(1, 1, 100));
+    add(read(2, 1, 100));
+    add(read(2, 1, 100));
+    const Ticket newest_of_greediest = add(read(2, 2, 100));
+    add(read(1, 1, 100));
+    add(read(3, 1, 200));
+    EXPECT_EQ(shed_for(read(4, 1, 300)), newest_of_greediest);
+    EXPECT_EQ(queue_.size(), 6u);
+}
+
+TEST_F(JobQueueLimits, P9PollsGoBeforeReadsAndReadsBeforeWrites) {
+    limits(4, 4);
+    const Ticket write_ = add(write(1, 1));
+    const Ticket poll_ = add(poll(1, 2));
+    const Ticket read_ = add(read(1, 3));
+    add(write(1, 4));
+    EXPECT_EQ(shed_for(read(2, 1)), poll_);
+    EXPECT_EQ(shed_for(write(3, 1)), read_);
+    EXPECT_TRUE(refuses(read(4, 1)));  // half of the queue is not more than half
+    EXPECT_TRUE(refuses(read(2, 2)));
+    EXPECT_TRUE(queue_.has(1, 1) && write_ != 0);
+}
+
+TEST_F(JobQueueLimits, P9AWriteGoesForAReadOnlyWhereOneHostHoldsMoreThanHalf) {
+    limits(4, 4);
+    for (std::uint8_t station = 1; station <= 3; ++station) add(write(1, station));
+    add(read(2, 1));
+    const Ticket newest = ticket_ - 1;
+    EXPECT_EQ(shed_for(read(3, 1)), newest);
+    EXPECT_TRUE(refuses(read(4, 1)));
+}
+
+TEST_F(JobQueueLimits, P9AWriteTakesThePlaceOfAReadEvenOfItsOwn) {
+    limits(3, 4);
+    add(read(1, 1));
+    add(write(1, 2));
+    const Ticket own = add(read(1, 3));
+    EXPECT_TRUE(refuses(read(1, 4)));
+    EXPECT_EQ(shed_for(write(1, 4)), own);
+}
+
+TEST_F(JobQueueLimits, P9AFloodOfWritesDoesNotTakeTheReadsOfThoseWhoHaveLess) {
+    limits(6, 6);
+    for (std::uint8_t station = 1; station <= 4; ++station) add(write(1, station));
+    add(read(2, 1));
+    add(read(3, 1));
+    EXPECT_TRUE(refuses(write(1, 5)));
+}
+
+TEST_F(JobQueueLimits, WhatGoesIsTheNewestOfItsLane) {
+    limits(4, 4);
+    const Ticket first = add(poll(1, 1));
+    const Ticket second = add(write(1, 1));
+    const Ticket third = add(read(1, 1));
+    const Ticket fourth = add(write(1, 1));
+    EXPECT_EQ(shed_for(write(2, 1)), fourth);
+    EXPECT_EQ(shed_for(write(3, 1)), third);
+    EXPECT_EQ(shed_for(write(4, 1)), second);
+    EXPECT_EQ(shed_for(write(5, 1)), first);
+    EXPECT_TRUE(refuses(write(6, 1)));
+}
+
+TEST_F(JobQueueLimits, NothingGoesFromBeforeABroadcast) {
+    limits(3, 3);
+    add(read(1, 1));
+    add(read(1, 2));
+    const Ticket broadcast = add(write(1, 0));
+    EXPECT_EQ(shed_for(write(2, 1)), broadcast);
+}
+
+TEST_F(JobQueueLimits, P9AHostWhoseReadsAreAllDoubledStillMakesRoom) {
+    limits(8, 8);
+    for (unsigned i = 0; i < 8; ++i) {
+        const Bytes pdu = Writer().u8(3).u16(10 * i).u16(1).take();
+        for (Client client = 1; client <= 2; ++client) {
+            Job job = read_of(client, pdu);
+            job.host = 100;
+            add(std::move(job));
+        }
+    }
+    EXPECT_NE(shed_for(read(3, 1, 200)), 0u);
+    EXPECT_EQ(queue_.waiting(), 16u);
+}
+
+/// 40 connections of one host, 16 requests each at once and again with every answer; a polite
+/// client asks for one thing after the other.
+void plays_beside_a_flood(Host flood, Host polite, PriorityClass priority) {
+    JobQueue queue{QueueSettings{}};
+    Ticket ticket = 0;
+    std::map<Client, int> open;
+    const auto ask = [&](Host host, Client client, PriorityClass as) {
+        Job job;
+        job.ticket = ++ticket;
+        job.host = host;
+        job.client = client;
+        job.station = static_cast<std::uint8_t>(1 + ticket % 5);
+        job.priority = as;
+        job.pdu = Writer().u8(3).u16(static_cast<unsigned>(ticket * 7 % 60000)).u16(1).take();
+        auto admission = queue.push(std::move(job));
+        EXPECT_FALSE(admission.shed && admission.shed->client == 1000);
+        if (admission.shed) --open[admission.shed->client];
+        if (admission.taken) ++open[client];
+        return admission.taken;
+    };
+    constexpr Client kPolite = 1000;
+    int longest = 0;
+    for (int turn = 0, since = 0; turn < 500; ++turn) {
+        for (Client client = 1; client <= 40; ++client) {
+            while (open[client] < 16 && ask(flood, client, priority)) continue;
+        }
+        if (open[kPolite] == 0) {
+            EXPECT_TRUE(ask(polite, kPolite, PriorityClass::read));
+            since = 0;
+        }
+        longest = std::max(longest, ++since);
+        --open[queue.pop(any)->client];
+    }
+    EXPECT_TRUE(queue.consistent());
+    EXPECT_LE(longest, flood == polite ? 42 : priority == PriorityClass::write ? 5 : 3);
+}
+
+TEST(JobQueueFlood, P9APoliteClientBesideAFloodingHostIsNeverRefused) {
+    plays_beside_a_flood(100, 200, PriorityClass::read);
+    plays_beside_a_flood(100, 200, PriorityClass::write);
+}
+
+TEST(JobQueueFlood, P9APoliteClientOfTheFloodingHostIsNotRefusedEither) {
+    plays_beside_a_flood(100, 100, PriorityClass::read);
+    plays_beside_a_flood(100, 100, PriorityClass::write);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

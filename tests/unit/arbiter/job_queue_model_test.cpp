@@ -1,0 +1,283 @@
+// The queue beside a model that is too simple to be wrong: a list, looked through from the start
+// each time.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <random>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+class Model {
+  public:
+    explicit Model(QueueSettings settings) : settings_(settings) {}
+
+    std::vector<Job> jobs;  ///< by ticket
+
+    void add(const Job& job) {
+        enter({own(job), 0, 0});
+        enter({own(job), job.client, 0});
+        enter({own(job), job.client, 1 + job.station});
+        jobs.push_back(job);
+        std::ranges::sort(jobs, {}, &Job::ticket);
+    }
+    void remove(Ticket ticket) {
+        std::erase_if(jobs, [&](const Job& job) { return job.ticket == ticket; });
+        std::erase_if(turns_, [&](const auto& entry) {
+            const auto& [host, client, lane] = entry.first;
+            return std::ranges::none_of(jobs, [&, h = host, c = client, l = lane](const Job& job) {
+                return own(job) == h && (c == 0 || c == job.client) &&
+                       (l == 0 || l == 1 + job.station);
+            });
+        });
+    }
+    /// First of its lane, and no broadcast is in between.
+    bool is_first(const Job& job) const {
+        return std::ranges::none_of(jobs, [&](const Job& other) {
+            const bool related =
+                other.station == job.station || other.station == 0 || job.station == 0;
+            return other.client == job.client && other.ticket < job.ticket && related;
+        });
+    }
+    std::vector<const Job*> firsts(const JobQueue::Test& may_run) const {
+        std::vector<const Job*> found;
+        for (const Job& job : jobs) {
+            if (is_first(job) && may_run(job)) found.push_back(&job);
+        }
+        return found;
+    }
+    /// The next one of a class.
+    const Job* next(PriorityClass priority, const JobQueue::Test& may_run) const {
+        const Job* best = nullptr;
+        for (const Job* job : firsts(may_run)) {
+            if (job->priority != priority) continue;
+            if (best == nullptr || turn_of(*job) < turn_of(*best)) best = job;
+        }
+        return best;
+    }
+    void popped(const Job& job) {
+        ++now_;
+        for (const Key& key : {Key{own(job), 0, 0}, Key{own(job), job.client, 0},
+                               Key{own(job), job.client, 1 + job.station}})
+            turns_[key][static_cast<std::size_t>(job.priority)] = now_;
+        remove(job.ticket);
+    }
+    bool counts(const Job& job) const {
+        const auto span = span_of(job);
+        return !span || std::ranges::none_of(jobs, [&](const Job& other) {
+            const auto wider = span_of(other);
+            if (!wider || other.ticket == job.ticket || !wider->contains(*span)) return false;
+            return !(*wider == *span) || other.ticket < job.ticket;
+        });
+    }
+    std::size_t counting(const JobQueue::Test& of) const {
+        return static_cast<std::size_t>(
+            std::ranges::count_if(jobs, [&](const Job& job) { return of(job) && counts(job); }));
+    }
+    std::size_t of_host(const Job& like) const {
+        return counting([&](const Job& job) { return own(job) == own(like); });
+    }
+    std::size_t of_client(const Job& like) const {
+        return counting([&](const Job& job) { return job.client == like.client; });
+    }
+    bool rides(const Job& job) const {
+        const auto span = span_of(job);
+        return span && std::ranges::any_of(jobs, [&](const Job& other) {
+                   const auto wider = span_of(other);
+                   return wider && wider->contains(*span);
+               });
+    }
+    static std::optional<ReadSpan> span_of(const Job& job) {
+        if (job.alone || job.station == 0) return std::nullopt;
+        return read_span(job.station, job.pdu);
+    }
+    static Host own(const Job& job) { return job.host == 0 ? 1000 + job.client : job.host; }
+
+    void check_admission(const Job& job, const JobQueue::Admission& admission) const {
+        const std::size_t size = counting([](const Job&) { return true; });
+        if (rides(job) || (size < settings_.limit && of_client(job) < settings_.per_client)) {
+            EXPECT_TRUE(admission.taken && !admission.shed);
+        } else if (of_client(job) >= settings_.per_client) {
+            EXPECT_FALSE(admission.taken);
+        } else {
+            EXPECT_EQ(admission.taken, admission.shed.has_value());
+            if (admission.shed) check_shed(job, *admission.shed, size);
+        }
+    }
+
+  private:
+    using Key = std::tuple<Host, Client, int>;
+
+    void check_shed(const Job& job, const Job& shed, std::size_t size) const {
+        const bool write = job.priority == PriorityClass::write;
+        const bool shed_write = shed.priority == PriorityClass::write;
+        const bool other_host = of_host(shed) > of_host(job) + 1;
+        const bool other_client = own(shed) == own(job) && of_client(shed) > of_client(job) + 1;
+        EXPECT_TRUE(other_host || other_client || (write && !shed_write));
+        if (shed_write && !write) EXPECT_GT(2 * of_host(shed), size);
+        EXPECT_TRUE(counts(shed));
+        for (const Job& behind : jobs) {
+            const bool related = behind.client == shed.client && behind.ticket > shed.ticket;
+            if (related && behind.station == shed.station) EXPECT_TRUE(span_of(behind));
+            if (related) EXPECT_TRUE(behind.station != 0 && shed.station != 0);
+        }
+    }
+    void enter(const Key& key) {
+        const auto [it, added] = turns_.try_emplace(key);
+        if (added) it->second.fill(++now_);
+    }
+    std::array<std::uint64_t, 3> turn_of(const Job& job) const {
+        const auto rank = static_cast<std::size_t>(job.priority);
+        return {turns_.at({own(job), 0, 0})[rank], turns_.at({own(job), job.client, 0})[rank],
+                turns_.at({own(job), job.client, 1 + job.station})[rank]};
+    }
+
+    QueueSettings settings_;
+    std::map<Key, std::array<std::uint64_t, 3>> turns_;  ///< of hosts, clients and lanes
+    std::uint64_t now_ = 0;
+};
+
+class JobQueueModel : public testing::Test {
+  protected:
+    unsigned below(unsigned limit) { return static_cast<unsigned>(random_() % limit); }
+
+    Job any_job(unsigned clients, unsigned stations, unsigned spans) {
+        Job job;
+        job.ticket = ++ticket_;
+        job.client = 1 + below(clients);
+        job.host = job.client % 4;  // 0: its own
+        job.station = static_cast<std::uint8_t>(below(12) == 0 ? 0 : 1 + below(stations));
+        job.priority = static_cast<PriorityClass>(below(3));
+        if (job.station == 0) job.priority = PriorityClass::write;
+        const bool write = job.priority == PriorityClass::write;
+        const unsigned function = write ? 6 : 3 + below(2);
+        job.pdu = Writer().u8(function).u16(below(spans)).u16(1 + below(1 + spans / 2)).take();
+        job.alone = below(10) == 0;
+        job.start_by = TimePoint{Duration(below(1000))};
+        return job;
+    }
+    JobQueue::Test any_test() {
+        const std::uint64_t mask = random_() | (below(2) == 0 ? ~std::uint64_t{0} : 0);
+        return [mask](const Job& job) { return (mask >> (job.ticket % 64) & 1u) != 0; };
+    }
+
+    std::mt19937 random_{20260101};
+    Ticket ticket_ = 0;
+};
+
+TEST_F(JobQueueModel, PopsAndCountsLikeASimpleList) {
+    const QueueSettings settings{.limit = 24, .per_client = 6, .deadline = 2s};
+    JobQueue queue(settings);
+    Model model(settings);
+    std::vector<Job> taken;
+    int overtaken = 0;
+    int shed = 0;
+    for (int i = 0; i < 20'000 && !HasFailure(); ++i) {
+        const unsigned what = below(20);
+        if (what < 11) {
+            const Job job = any_job(9, 4, 12);
+            const auto admission = queue.push(job);
+            model.check_admission(job, admission);
+            if (admission.shed) model.remove(admission.shed->ticket);
+            if (admission.taken) model.add(job);
+            shed += admission.shed ? 1 : 0;
+        } else if (what < 17) {
+            const auto test = any_test();
+            const Job* shown = queue.peek(test);
+            const Ticket ticket = shown == nullptr ? 0 : shown->ticket;
+            const auto popped = queue.pop(test);
+            ASSERT_EQ(popped ? popped->ticket : 0, ticket);
+            ASSERT_EQ(popped.has_value(), !model.firsts(test).empty());
+            if (!popped) continue;
+            const Job* expected = model.next(popped->priority, test);
+            ASSERT_TRUE(expected != nullptr && expected->ticket == ticket);
+            bool higher = false;
+            for (const auto c : {PriorityClass::write, PriorityClass::read})
+                higher = higher || (c < popped->priority && model.next(c, test) != nullptr);
+            ASSERT_EQ(queue.last_was_passed_over(), higher);
+            overtaken += higher ? 1 : 0;
+            model.popped(*popped);
+            if (below(4) == 0) taken.push_back(*popped);
+        } else if (what == 17) {
+            const auto test = any_test();
+            const auto station = static_cast<std::uint8_t>(1 + below(4));
+            std::vector<Ticket> expected;
+            for (bool again = true; again;) {
+                again = false;
+                for (const Job* job : model.firsts(test)) {
+                    if (job->station != station) continue;
+                    expected.push_back(job->ticket);
+                    model.remove(job->ticket);
+                    again = true;
+                    break;
+                }
+            }
+            std::ranges::sort(expected);
+            std::vector<Ticket> got;
+            for (const Job& job : queue.take_all(station, test)) got.push_back(job.ticket);
+            ASSERT_EQ(got, expected);
+        } else if (what == 18) {
+            const auto keep = any_test();
+            const auto match = [&](const Job& job) { return !keep(job) && job.ticket % 3 == 0; };
+            for (const Job& job : queue.remove_if(match)) {
+                ASSERT_TRUE(match(job));
+                model.remove(job.ticket);
+            }
+            ASSERT_TRUE(std::ranges::none_of(model.jobs, match));
+        } else if (!taken.empty()) {
+            queue.put_back(taken.back());
+            model.add(taken.back());
+            taken.pop_back();
+        }
+        ASSERT_EQ(queue.waiting(), model.jobs.size());
+        ASSERT_EQ(queue.size(), model.counting([](const Job&) { return true; }));
+        std::optional<TimePoint> first;
+        for (const Job& job : model.jobs)
+            first = std::min(first.value_or(job.start_by), job.start_by);
+        ASSERT_EQ(queue.first_expiry(), first);
+        ASSERT_TRUE(queue.consistent());
+    }
+    EXPECT_GT(overtaken, 50);
+    EXPECT_GT(shed, 500);
+}
+
+TEST_F(JobQueueModel, HoldsThousandsOfHundredsOfClients) {
+    JobQueue queue(QueueSettings{.limit = 3000, .per_client = 32, .deadline = 2s});
+    std::size_t most = 0;
+    for (int i = 0; i < 100'000; ++i) {
+        const unsigned what = below(100);
+        if (what < 60) {
+            queue.push(any_job(640, 30, 400));
+        } else if (what < 95) {
+            const auto test = any_test();
+            const Job* shown = queue.peek(test);
+            const Ticket ticket = shown == nullptr ? 0 : shown->ticket;
+            const auto popped = queue.pop(test);
+            ASSERT_EQ(popped ? popped->ticket : 0, ticket);
+        } else if (what < 99) {
+            const auto rest = any_test();
+            queue.take_all(static_cast<std::uint8_t>(1 + below(30)),
+                           [&](const Job& job) { return job.ticket % 2 == 0 && rest(job); });
+        } else if (below(100) == 0) {
+            queue.remove_if([](const Job& job) { return job.ticket % 5 == 0; });
+        }
+        most = std::max(most, queue.waiting());
+        if (i % 5000 == 0) ASSERT_TRUE(queue.consistent());
+    }
+    EXPECT_TRUE(queue.consistent());
+    EXPECT_GT(most, 3000u);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
