@@ -24,16 +24,14 @@ const JobQueue::Lane& JobQueue::lane_at(const Place& place) const {
     return hosts_.at(place.host).sources.at(place.client).lanes.at(place.station);
 }
 
-/// Lanes are in order of tickets, so the first ones tell.
+/// Lanes are in order of tickets, so the first ones tell; broadcasts are the first lane.
 bool JobQueue::in_order(const Source& source, std::uint8_t station) {
-    const Ticket ticket = source.lanes.at(station).jobs.front().job.ticket;
-    if (station != kBroadcast) {
-        const auto broadcasts = source.lanes.find(kBroadcast);
-        return broadcasts == source.lanes.end() ||
-               ticket < broadcasts->second.jobs.front().job.ticket;
-    }
+    const auto& [first_station, first_lane] = *source.lanes.begin();
+    if (first_station != kBroadcast) return true;
+    const Ticket broadcast = first_lane.jobs.front().job.ticket;
+    if (station != kBroadcast) return source.lanes.at(station).jobs.front().job.ticket < broadcast;
     return std::ranges::all_of(source.lanes, [&](const auto& other) {
-        return ticket <= other.second.jobs.front().job.ticket;
+        return broadcast <= other.second.jobs.front().job.ticket;
     });
 }
 
