@@ -89,8 +89,10 @@ bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
 bool WaitingReads::consistent() const {
     std::size_t widest = 0;
     for (const auto& [span, equals] : spans_) {
-        const bool contained = std::ranges::any_of(spans_, [&](const auto& other) {
-            return !(other.first == span) && other.first.contains(span);
+        constexpr std::uint32_t kAll = 65536;
+        const auto table = spans_.lower_bound({span.station, span.function, 0, kAll});
+        const bool contained = std::any_of(table, spans_.find(span), [&inner = span](auto& wider) {
+            return wider.first.contains(inner);
         });
         if (equals.empty() || contained == is_widest(span)) return false;
         if (!contained) ++widest;
