@@ -87,10 +87,11 @@ bus::Guard guard_of(const profile::PanelProfile& profile) {
 }
 
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
+    std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
     for (const arbiter::StationSettings& settings : line.arbiter.stations) {
-        if (settings.id == station) return settings.frame_gap;
+        if (settings.id == station) gap = settings.frame_gap;
     }
-    return line.arbiter.unlisted.frame_gap;
+    return gap.value_or(silent_interval(line.device.serial));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "panelgate/arbiter/echo.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <utility>
 
@@ -12,6 +13,13 @@ bool teaches_echo(ByteView request) {
     if (!modbus::is_pure_read(request)) return false;
     const auto reply = modbus::reply_length_from_request(request);
     return reply && *reply != request.size() + kAduOverhead;
+}
+
+bool holds_fragment(ByteView heard, ByteView frame) {
+    for (std::size_t i = 0; i + 1 < heard.size(); ++i) {
+        if (!std::ranges::search(frame, heard.subspan(i, 2)).empty()) return true;
+    }
+    return false;
 }
 
 ByteView EchoFilter::feed(ByteView bytes) {
@@ -68,8 +76,9 @@ EchoFilter::Expect EchoMemory::expect(ByteView request) const {
     return EchoFilter::Expect::perhaps;
 }
 
-bool EchoMemory::must_be_learned_before(ByteView request) const {
-    return state_ == State::unknown && !modbus::is_pure_read(request);
+bool EchoMemory::must_be_learned_before(ByteView request, bool tried) const {
+    const bool open = state_ == State::unknown || (state_ == State::unclear && !tried);
+    return open && !modbus::is_pure_read(request);
 }
 
 bool EchoMemory::on_echo(ByteView request) {
@@ -78,9 +87,9 @@ bool EchoMemory::on_echo(ByteView request) {
     return true;
 }
 
-void EchoMemory::on_reply_without_echo(ByteView request, bool clean) {
+void EchoMemory::on_reply_without_echo(ByteView request, bool fragment) {
     if (state_ == State::present || state_ == State::absent || !teaches_echo(request)) return;
-    state_ = clean ? State::absent : State::unclear;
+    state_ = fragment ? State::unclear : State::absent;
 }
 
 void EchoMemory::on_unclear() {

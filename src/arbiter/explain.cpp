@@ -1,12 +1,9 @@
-// Why the schedule decides as it does, in one line a decision.
+#include "explain.hpp"
 
-#include <string>
-#include <utility>
+#include <algorithm>
+#include <cstdlib>
 
-#include "panelgate/arbiter/arbiter.hpp"
-#include "rules.hpp"
-
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::explain {
 namespace {
 
 std::string ms(Duration duration) {
@@ -35,8 +32,7 @@ std::string who(const Job& job) {
 
 }  // namespace
 
-std::string Arbiter::why(TimePoint now, const Group& group) const {
-    if (!settings_.explain) return {};
+std::string start(TimePoint now, const Group& group, const JobQueue& queue) {
     if (group.learns_for != 0)
         return "a write is next and nobody knows whether this line has an echo";
     if (group.probe) return "the station is offline and its probe is due";
@@ -44,43 +40,39 @@ std::string Arbiter::why(TimePoint now, const Group& group) const {
     std::string text = who(leader) + ": ";
     if (group.attempts > 1) return text + "attempt " + std::to_string(group.attempts);
     text += "next in turn after " + ms(now - leader.arrived) + ", " +
-            std::to_string(queue_.size()) + " wait";
-    if (queue_.last_was_aged()) text += ", ahead of a higher class because of its age";
+            std::to_string(queue.waiting()) + " wait";
+    if (queue.last_was_passed_over()) text += ", ahead of a higher class that has had its turns";
     if (group.jobs.size() > 1) {
         text += ", answers " + std::to_string(group.jobs.size()) + " requests in one";
     }
     return text;
 }
 
-void Arbiter::explain_refusal(TimePoint now, const Job& job, Fault fault) {
-    if (!settings_.explain) return;
-    std::string text = who(job) + " refused: ";
-    if (fault == Fault::offline) {
-        const StationHealth& health = station_of(job.station).health;
-        text += "offline after " + std::to_string(health.silent_in_a_row()) +
-                " silent transactions, next probe in " +
-                ms(std::max(health.next_probe() - now, Duration::zero()));
-    } else {
-        text += std::to_string(queue_.size()) + " of " + std::to_string(settings_.queue.limit) +
-                " wait on this line, at most " + std::to_string(settings_.queue.per_client) +
-                " of one client";
-    }
-    actions_.push_back(Decision{now, std::move(text)});
+std::string offline(TimePoint now, const Job& job, const StationHealth& health) {
+    return who(job) + " refused: offline after " + std::to_string(health.silent_in_a_row()) +
+           " silent transactions, next probe in " +
+           ms(std::max(health.next_probe() - now, Duration::zero()));
 }
 
-void Arbiter::explain_quarantine(TimePoint now, const Group& group) {
-    if (!settings_.explain) return;
-    actions_.push_back(Decision{now, "nobody but this request for " + ms(quarantined_until_ - now) +
-                                         ": station " + std::to_string(group.station) +
-                                         " did not answer and may do so late"});
+std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting) {
+    return who(job) + " refused: " + std::to_string(waiting) + " of " +
+           std::to_string(settings.limit) + " wait on this line, at most " +
+           std::to_string(settings.per_client) + " of one client";
 }
 
-void Arbiter::explain_end(TimePoint now, const Job& job, Fault fault) {
-    if (!settings_.explain) return;
-    const bool sent = fault == Fault::timeout;
-    actions_.push_back(Decision{now, who(job) + " given up after " + ms(now - job.arrived) +
-                                         (sent ? ": no answer before its deadline"
-                                               : ": it could not end before its deadline")});
+std::string shed(const Job& job) {
+    return who(job) + " given up: the queue is full, and its host has the most waiting";
 }
 
-}  // namespace panelgate::arbiter
+std::string line_rests(Duration rest, const Group& group) {
+    return "nobody but this request for " + ms(rest) + ": station " +
+           std::to_string(group.station) + " did not answer and may do so late";
+}
+
+std::string expired(TimePoint now, const Job& job, bool transmitted) {
+    return who(job) + " given up after " + ms(now - job.arrived) +
+           (transmitted ? ": no answer before its deadline"
+                        : ": it could not end before its deadline");
+}
+
+}  // namespace panelgate::arbiter::explain

@@ -25,6 +25,10 @@ bool may_change(const std::optional<modbus::Range>& range, const ReadSpan& span)
 }  // namespace
 
 void ReadCache::store(const ReadSpan& span, Bytes reply, TimePoint sampled) {
+    for (const std::uint8_t station : {span.station, kBroadcast}) {
+        const auto written = written_.find(station);
+        if (written != written_.end() && written->second >= sampled) return;
+    }
     entries_.remove_if([&](const Entry& entry) { return span.contains(entry.span); });
     entries_.push_front({span, std::move(reply), sampled});
     if (entries_.size() > kEntries) entries_.pop_back();
@@ -43,7 +47,8 @@ std::optional<ReadCache::Hit> ReadCache::find(const ReadSpan& span, TimePoint no
     return std::nullopt;
 }
 
-void ReadCache::on_write(std::uint8_t station, ByteView request) {
+void ReadCache::on_write(TimePoint now, std::uint8_t station, ByteView request) {
+    written_[station] = now;
     const std::optional<modbus::Range> range = modbus::access_of(request).write;
     entries_.remove_if([&](const Entry& entry) {
         return (station == kBroadcast || entry.span.station == station) &&

@@ -18,14 +18,14 @@ void StationHealth::on_damaged() {
     state_ = State::suspect;
 }
 
-bool StationHealth::on_silence(TimePoint now) {
+bool StationHealth::on_silence(TimePoint now, bool at_once) {
     ++silent_;
     if (offline()) {
         pause_ = std::min(pause_ * 2, settings_.probe_max);
         next_probe_ = now + pause_;
         return false;
     }
-    if (silent_ < settings_.after) {
+    if (silent_ < settings_.after && !at_once) {
         state_ = State::suspect;
         return false;
     }

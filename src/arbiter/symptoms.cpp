@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
-#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/ledger.hpp"
+#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
-#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
@@ -21,55 +22,57 @@ std::size_t pause_class(Duration pause) {
     return i;
 }
 
-/// Of another master: not our own frame, which an adapter that is said to have no echo may give.
-/// What is heard is cut into replies elsewhere, and a request glued to its reply would pass for
-/// damage.
-bool begins_with_request(ByteView heard, ByteView own) {
-    const std::size_t size = modbus::request_adu_length(heard);
-    return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size)) &&
-           !std::ranges::equal(heard.first(size), own);
+/// A good frame, but for the order of the CRC's bytes.
+bool has_swapped_crc(ByteView heard) {
+    if (heard.size() < 4) return false;
+    Bytes swapped(heard.begin(), heard.end());
+    std::swap(swapped[swapped.size() - 1], swapped[swapped.size() - 2]);
+    return modbus::crc_ok(swapped);
 }
 
 }  // namespace
 
-void Arbiter::count_answered(std::size_t reply_size) {
-    Symptoms& symptoms = symptoms_of(active_->group.station);
+void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
+                         const Station::Replied& replied) {
+    StationCounters& counters = of(attempt.group().station);
+    Symptoms& symptoms = counters.symptoms;
+    counters.turnaround.observe(think);
+    counters.bus_transaction.observe(now - attempt.timing().started);
+    if (const auto code = modbus::exception_of(attempt.reply())) ++counters.exceptions[*code];
     ++symptoms.answered;
-    ++symptoms.answered_after[pause_class(active_->pause)];
-    if (reply_size >= Symptoms::kLongReply) ++symptoms.long_answered;
+    ++symptoms.answered_after[pause_class(attempt.timing().pause)];
+    if (attempt.reply().size() + kAduOverhead >= Symptoms::kLongReply) ++symptoms.long_answered;
+    if (attempt.echoed()) ++symptoms.echoes;
+    if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
+    if (replied.trailed) ++symptoms.trailed;
     symptoms.mute_in_a_row = 0;
 }
 
-/// An attempt without a reply; `parts` is all that was heard in it.
-void Arbiter::count_failed(const std::vector<modbus::Unused>& parts) {
-    const Active& a = *active_;
-    Symptoms& symptoms = symptoms_of(a.group.station);
-    Bytes damaged;
-    for (const modbus::Unused& part : parts) {
-        if (part.kind != modbus::Unused::Kind::damaged) continue;
-        if (begins_with_request(part.bytes, echo_.frame())) {
-            ++symptoms.unasked;
-        } else {
-            damaged.insert(damaged.end(), part.bytes.begin(), part.bytes.end());
-        }
-    }
-    if (!a.collided.empty()) {
+void Ledger::on_failed(const Attempt& attempt, Verdict verdict) {
+    Symptoms& symptoms = symptoms_of(attempt.group().station);
+    if (attempt.echoed()) ++symptoms.echoes;
+    if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
+    if (verdict != Verdict::silent) symptoms.mute_in_a_row = 0;
+    if (attempt.echo().mismatch()) {
         ++symptoms.collided;
         symptoms.mute_in_a_row = 0;
-    } else if (!damaged.empty()) {
-        count_damaged(damaged);
+    } else if (verdict == Verdict::wrong) {
+        ++symptoms.wrong;
+    } else if (!attempt.damaged_bytes().empty()) {
+        count_damaged(attempt);
         symptoms.mute_in_a_row = 0;
     } else {
-        const bool silent = !a.heard && a.clean;
+        const bool silent = !attempt.heard() && !attempt.disturbed();
         ++(silent ? symptoms.silent : symptoms.disturbed);
-        if (silent) ++symptoms.silent_after[pause_class(a.pause)];
+        if (silent) ++symptoms.silent_after[pause_class(attempt.timing().pause)];
         ++symptoms.mute_in_a_row;
     }
 }
 
 /// Its own line in the account of an attempt: what came instead of the reply.
-void Arbiter::count_damaged(ByteView bytes) {
-    const Group& group = active_->group;
+void Ledger::count_damaged(const Attempt& attempt) {
+    const Group& group = attempt.group();
+    const ByteView bytes = attempt.damaged_bytes();
     Symptoms& symptoms = symptoms_of(group.station);
     const auto expected = modbus::reply_length_from_request(group.pdu);
     const bool head = bytes.size() >= 2 && bytes[0] == group.station &&
@@ -81,6 +84,7 @@ void Arbiter::count_damaged(ByteView bytes) {
     } else {
         ++symptoms.damaged_long;
     }
+    if (has_swapped_crc(bytes)) ++symptoms.crc_swapped;
     if (head) ++symptoms.damaged_heads;
     if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;
     symptoms.damaged_bytes += bytes.size();
@@ -89,44 +93,33 @@ void Arbiter::count_damaged(ByteView bytes) {
     symptoms.damaged_zeros += static_cast<std::uint64_t>(std::ranges::count(bytes, 0));
 }
 
-/// Damaged bytes that no attempt has failed by: before a good reply, behind it, or between.
-void Arbiter::count_strays(const std::vector<modbus::Unused>& parts) {
-    for (const modbus::Unused& part : parts) {
-        if (part.kind != modbus::Unused::Kind::damaged) continue;
-        Symptoms& symptoms = symptoms_of(last_station_);
-        const bool request = begins_with_request(part.bytes, echo_.frame());
-        ++(request ? symptoms.unasked : symptoms.strays);
-    }
-}
-
-/// A good frame that no request was open for. Call before the reply that is owed is settled by it.
-void Arbiter::count_unasked(TimePoint now, const modbus::Unused& part) {
-    const auto found = stations_.find(part.station);
-    if (found == stations_.end()) {
-        ++symptoms_of(last_station_).unasked;
-        return;
-    }
-    const Station& station = found->second;
-    Symptoms& symptoms = symptoms_of(part.station);
-    const ByteView pdu = ByteView(part.bytes).subspan(1, part.bytes.size() - kAduOverhead);
-    constexpr Duration kLatest = 10s;
-    const Duration lateness =
-        now - station.due + station.timeout() - station.settings.response_timeout;
-    const bool may_be_late = station.owed > 0 || lateness < kLatest;
-    const bool is_open = active_ && active_->group.station == part.station;
-    if (std::ranges::equal(part.bytes, echo_.frame())) {
-        ++symptoms.echoes;  // or the reply to 05 or 06 twice, which looks the same
-    } else if (station.owed == 0 && ((is_open && modbus::answers(active_->group.pdu, pdu)) ||
-                                     station.copies.is_second(now, pdu))) {
-        ++symptoms.doubled;
-    } else if (may_be_late && !station.unanswered.empty() &&
-               modbus::answers(station.unanswered, pdu)) {
-        symptoms.mute_in_a_row = 0;
-        if (lateness <= Duration::zero()) return;  // behind a wait that was cut short
-        ++symptoms.late;
-        symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
-    } else {
-        ++symptoms.unasked;
+void Ledger::count_stray(const modbus::Unused& part, Part what, std::uint8_t asked,
+                         Duration lateness) {
+    const bool known = what != Part::damaged && what != Part::unknown && what != Part::request;
+    Symptoms& symptoms = symptoms_of(known ? part.station : asked);
+    switch (what) {
+        case Part::damaged:
+            if (!inside_attempt_) ++symptoms.strays;
+            return;
+        case Part::echo:
+            ++symptoms.echoes;
+            return;
+        case Part::request:
+            ++symptoms.requests;
+            return;
+        case Part::late:
+            symptoms.mute_in_a_row = 0;
+            if (lateness <= Duration::zero()) return;  // behind a wait that was cut short
+            ++symptoms.late;
+            symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
+            return;
+        case Part::copy:
+            ++symptoms.doubled;
+            return;
+        case Part::unasked:
+        case Part::unknown:
+            ++symptoms.unasked;
+            return;
     }
 }
 

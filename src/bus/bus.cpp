@@ -77,6 +77,7 @@ struct Bus::State final : public line::Line::Events,
     void confirm_end(TimePoint now) {
         if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
     }
+    void check_delivery(TimePoint now);
     void arm();
     void on_alarm();
     void answer(Pending pending, Answer answer);
@@ -257,8 +258,16 @@ void Bus::State::on_alarm() {
     line->poll_input();  // what has arrived by now came before whatever is due now
     const TimePoint now = rt::now();
     confirm_end(now);
+    check_delivery(now);
     arbiter.on_deadline(now);
     pump();
+}
+
+/// A request that the far end has not even taken when its time is over must not be executed
+/// whenever the way is free again (P2), and its late reply must not answer another one (P1).
+void Bus::State::check_delivery(TimePoint now) {
+    if (up && arbiter.is_unheard(now) && line->undelivered())
+        line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.

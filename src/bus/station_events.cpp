@@ -22,6 +22,8 @@ std::string_view label(arbiter::StationEvent::Kind kind) {
             return "collision";
         case arbiter::StationEvent::Kind::echo:
             return "echo";
+        case arbiter::StationEvent::Kind::trail:
+            return "trail";
     }
     std::abort();
 }
@@ -55,6 +57,10 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
             return say(settings.arbiter.echo == arbiter::EchoMode::off ? rt::LogLevel::warn
                                                                        : rt::LogLevel::info,
                        "line hears itself", "its echo is checked and taken out");
+        case arbiter::StationEvent::Kind::trail:
+            return say(rt::LogLevel::warn, "bytes behind its replies",
+                       "the line now waits up to " + ms +
+                           "ms for them; look at how its transceiver lets go of the line");
     }
 }
 

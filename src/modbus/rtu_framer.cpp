@@ -93,22 +93,34 @@ std::optional<Bytes> ReplyFramer::on_silence() {
 }
 
 std::vector<Unused> ReplyFramer::take_unused() {
-    std::vector<Unused> unused = std::exchange(unused_, {});
-    return unused;
+    behind_ = 0;
+    return std::exchange(unused_, {});
 }
 
 /// Judges the possible starts from the first on. One that still waits for bytes holds up the later
 /// ones: bytes inside a reply must not pass for a reply.
 std::optional<Bytes> ReplyFramer::scan(bool silence) {
     collect_starts();
+    open_length_ = false;
     while (!starts_.empty()) {
         bool open = false;
         const std::size_t start = starts_.front();
         if (auto pdu = judge(start, silence, open)) return accept(start, std::move(*pdu));
-        if (open) return std::nullopt;
+        if (open) {
+            const ReplyLength length = reply_length(ByteView(heard_).subspan(start));
+            open_length_ = expected_ || length.kind != ReplyLength::Kind::by_silence;
+            return std::nullopt;
+        }
         starts_.pop_front();
     }
     return std::nullopt;
+}
+
+bool ReplyFramer::ends_with_other_frame() const {
+    if (!starts_.empty() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
+    const ReplyLength length = reply_length(heard_);
+    return length.kind == ReplyLength::Kind::known && length.length == heard_.size() &&
+           crc_ok(heard_);
 }
 
 bool ReplyFramer::is_start(std::uint8_t address, std::uint8_t function) const {
@@ -155,8 +167,18 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
         open = !silence;
         return std::nullopt;
     }
-    const ByteView frame = rest.first(size);
-    if (!crc_ok(frame)) return std::nullopt;
+    if (!crc_ok(rest.first(size)) && rest[1] == kEncapsulatedInterface) {
+        // An object count that is too low: only silence tells the end (FRM-10).
+        open = !silence;
+        if (!silence || !crc_ok(rest)) return std::nullopt;
+        return answering(rest);
+    }
+    return answering(rest.first(size));
+}
+
+/// The PDU of this frame, when it is good and answers.
+std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
+    if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame)) return std::nullopt;
     const ByteView pdu = frame.subspan(1, frame.size() - 1 - kCrc);
     if (!answers(request_, pdu)) return std::nullopt;
     return Bytes(pdu.begin(), pdu.end());
@@ -164,7 +186,10 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
 
 std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     classify(ByteView(heard_).first(start));
+    const std::size_t before = unused_.size();
     classify(ByteView(heard_).subspan(start + pdu.size() + 1 + kCrc));
+    behind_ = unused_.size() - before;
+    open_length_ = false;
     heard_.clear();
     starts_.clear();
     looked_ = 0;
@@ -177,12 +202,16 @@ void ReplyFramer::discard(std::size_t count) {
     heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(count));
     starts_.clear();
     looked_ = 0;
+    open_length_ = false;
     collect_starts();
 }
 
 void ReplyFramer::classify(ByteView bytes) {
     for (Unused& part : classify_heard(bytes, station_)) {
-        damaged_ = damaged_ || (part.kind == Unused::Kind::damaged && holds_start(part.bytes));
+        if (part.kind == Unused::Kind::damaged && holds_start(part.bytes)) {
+            damaged_ = true;
+            damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
+        }
         constexpr std::size_t kKept = 64;  // parts; beyond, only their bytes matter
         if (unused_.size() < kKept) {
             unused_.push_back(std::move(part));

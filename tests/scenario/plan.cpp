@@ -59,7 +59,7 @@ void draw_panels(Random& random, Plan& plan, double much) {
         panel = draw_faults(random, panel, much);
         arbiter::StationSettings station = plan.settings.unlisted;
         station.id = panel.id;
-        if (random.chance(0.3)) station.frame_gap += random.between(0us, 4ms);
+        if (random.chance(0.3)) station.frame_gap = *station.frame_gap + random.between(0us, 4ms);
         plan.settings.stations.push_back(station);
         plan.panels.push_back(panel);
     }

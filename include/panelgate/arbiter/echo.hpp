@@ -47,6 +47,9 @@ class EchoFilter {
 /// The reply to this request can never be the request itself: it shows whether there is an echo.
 bool teaches_echo(ByteView request);
 
+/// Two bytes or more of `heard` stand like this in our own frame: a part of its echo.
+bool holds_fragment(ByteView heard, ByteView frame);
+
 /// What is known of a line's echo (P8): told by the configuration, or learned from reads, whose
 /// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
 class EchoMemory {
@@ -55,7 +58,7 @@ class EchoMemory {
         unknown,
         absent,
         present,
-        unclear,  ///< a read was answered, but with something in front of the answer
+        unclear,  ///< a part of a read came back in front of its answer: whole echoes may come
     };
 
     explicit EchoMemory(EchoMode mode);
@@ -65,12 +68,14 @@ class EchoMemory {
     void forget();
     EchoFilter::Expect expect(ByteView request) const;
     /// This request could be confirmed by its own echo, and nobody knows whether there is one.
-    bool must_be_learned_before(ByteView request) const;
+    /// `tried`: a read was sent for it already; where that did not tell, it goes all the same.
+    bool must_be_learned_before(ByteView request, bool tried) const;
 
     /// The whole echo of this request came back. True when that is news.
     bool on_echo(ByteView request);
-    /// A good reply to this request came with nothing in front, or with other bytes.
-    void on_reply_without_echo(ByteView request, bool clean);
+    /// A good reply to this request came; `fragment`: with a part of the request in front of it.
+    /// Other bytes in front, and whatever stands behind, tell nothing about an echo (FRM-07).
+    void on_reply_without_echo(ByteView request, bool fragment);
     /// The read that was to tell did not.
     void on_unclear();
     /// The echo differed: learn again, unless the configuration knows.

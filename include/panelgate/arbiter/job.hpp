@@ -28,6 +28,7 @@ struct Job {
     TimePoint start_by;  ///< the last moment at which starting it makes sense
     int attempts = 0;    ///< transmissions so far
     bool alone = false;  ///< a shared transaction for it was refused: ask for just this
+    bool gone = false;   ///< its client has left while it was on the wire: no further attempt
 };
 
 }  // namespace panelgate::arbiter

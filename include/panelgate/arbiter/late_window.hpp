@@ -8,9 +8,12 @@
 namespace panelgate::arbiter {
 
 /// How long after a timeout a reply of one station may still come. Auto starts at the response
-/// timeout and grows to one and a half times the lateness seen, at most to eight timeouts. Pure.
+/// timeout, grows to one and a half times the lateness seen, at most to eight timeouts, and shrinks
+/// again while replies come in time: one that was late once is no reason to wait for ever. Pure.
 class LateWindow {
   public:
+    static constexpr int kForget = 512;  ///< replies in time, after which it shrinks by a third
+
     LateWindow(std::optional<Duration> fixed, Duration response_timeout)
         : fixed_(fixed), timeout_(response_timeout), window_(response_timeout) {}
 
@@ -18,16 +21,26 @@ class LateWindow {
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {
         worst_ = std::max(worst_, lateness);
-        window_ = std::clamp(lateness * 3 / 2, window_, 8 * timeout_);
+        window_ = std::clamp(lateness * 3 / 2, window_, std::max(window_, 8 * timeout_));
+        timely_ = 0;
     }
-    /// The longest lateness seen; the timeout to raise to is this and the old timeout.
+    void on_timely() {
+        if (++timely_ < kForget) return;
+        timely_ = 0;
+        window_ = std::max(timeout_, window_ * 2 / 3);
+        worst_ = worst_ * 2 / 3 < kNegligible ? Duration::zero() : worst_ * 2 / 3;
+    }
+    /// The longest lateness seen lately; 0: it keeps its timeout.
     Duration worst() const { return worst_; }
 
   private:
+    static constexpr Duration kNegligible = 1ms;
+
     std::optional<Duration> fixed_;
     Duration timeout_;
     Duration window_;
     Duration worst_{};
+    int timely_ = 0;
 };
 
 }  // namespace panelgate::arbiter

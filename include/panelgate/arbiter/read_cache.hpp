@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <list>
+#include <map>
 #include <optional>
 
 #include "panelgate/arbiter/shared_read.hpp"
@@ -21,13 +23,14 @@ class ReadCache {
         Duration age{};
     };
 
-    /// The normal reply to `span`, read by a request that left at `sampled` or later.
+    /// The normal reply to `span`, read by a request that left at `sampled` or later. Not kept when
+    /// something was written since: nobody knows which came first.
     void store(const ReadSpan& span, Bytes reply, TimePoint sampled);
     /// The youngest value of all these items that is not older than max_age.
     std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
     /// This request may change what the station holds (0: all stations), answered or not. Other
     /// tables may show the same memory (Autonics UB and UW), so of these nothing is kept.
-    void on_write(std::uint8_t station, ByteView request);
+    void on_write(TimePoint now, std::uint8_t station, ByteView request);
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }
 
@@ -37,7 +40,8 @@ class ReadCache {
         Bytes reply;
         TimePoint sampled;
     };
-    std::list<Entry> entries_;  ///< the youngest first
+    std::list<Entry> entries_;                   ///< the youngest first
+    std::map<std::uint8_t, TimePoint> written_;  ///< when each station was last written to; 0: all
 };
 
 }  // namespace panelgate::arbiter

@@ -19,8 +19,9 @@ struct StationSettings {
     /// Follow the turnaround that was seen, from timeout_floor up to response_timeout.
     bool adaptive_timeout = false;
     Duration timeout_floor = 20ms;
-    /// Silence before a request to this station and after its reply; never less than t3.5.
-    Duration frame_gap = 1750us;
+    /// Silence before a request to this station and after its reply; nothing: the standard's
+    /// (silent_interval()).
+    std::optional<Duration> frame_gap;
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
     /// How long after a timeout a reply may still come; nothing = auto: the response timeout at

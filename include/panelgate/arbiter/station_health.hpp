@@ -32,8 +32,9 @@ class StationHealth {
     bool on_reply(TimePoint now);
     /// Only damaged bytes came: alive, though not well.
     void on_damaged();
-    /// A whole transaction (all its attempts) passed in silence. True when that took it offline.
-    bool on_silence(TimePoint now);
+    /// A whole transaction (all its attempts) passed in silence. True when that took it offline:
+    /// `at_once`, or after as many in a row as the settings say.
+    bool on_silence(TimePoint now, bool at_once = false);
 
     /// When an offline station may be asked again; the budget of the line may postpone it.
     TimePoint next_probe() const { return next_probe_; }
@@ -51,23 +52,5 @@ class StationHealth {
 };
 
 std::string_view label(StationHealth::State state);
-
-/// Keeps all probes of a line's offline stations together below a share of its time (P4: at most
-/// 5 %, aiming at 3 %): after one that cost d nothing is probed for d * (1 / share - 1). Pure.
-class ProbeBudget {
-  public:
-    static constexpr double kShare = 0.03;
-
-    bool allows(TimePoint now) const { return now >= next_; }
-    TimePoint next() const { return next_; }
-    /// A probe without reply ended at `now` after having kept the line for `cost`.
-    void spend(TimePoint now, Duration cost) {
-        const double rest = to_seconds(cost) * (1.0 / kShare - 1.0);
-        next_ = now + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(rest));
-    }
-
-  private:
-    TimePoint next_{};
-};
 
 }  // namespace panelgate::arbiter

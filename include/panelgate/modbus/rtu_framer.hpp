@@ -57,16 +57,29 @@ class ReplyFramer {
 
     /// Bytes wait for more, or for the silence that judges them.
     bool has_pending() const { return !heard_.empty(); }
-    /// Bytes were given up that held the address and function of the reply but no good frame: the
-    /// reply came damaged, which is not silence.
+    /// Some of them may be the beginning of the reply.
+    bool has_candidate() const { return !starts_.empty(); }
+    /// ... and its own first bytes tell how long it is: a silence inside is only a hole.
+    bool knows_length() const { return open_length_; }
+    /// Bytes were given up that held the address and function of the reply but no good frame.
     bool was_damaged() const { return damaged_; }
-    /// What was stepped over so far. Call after a reply was found, or at the end.
+    /// ... and as many of them as the reply has, or nothing tells how many that are: the reply
+    /// itself came damaged.
+    bool was_damaged_whole() const { return damaged_whole_; }
+    /// All that is pending is one good frame of the station, and it does not answer.
+    bool ends_with_other_frame() const;
+    /// What was stepped over so far, in the order in which it was heard.
     std::vector<Unused> take_unused();
+    /// How many of the parts that take_unused() gives next stand behind the reply.
+    std::size_t parts_behind() const { return behind_; }
+    /// Gives up what is pending: it has been judged by somebody else.
+    void drop_pending() { discard(heard_.size()); }
 
   private:
     std::optional<Bytes> scan(bool silence);
     std::size_t frame_size(ByteView rest, bool silence) const;
     std::optional<Bytes> judge(std::size_t start, bool silence, bool& open) const;
+    std::optional<Bytes> answering(ByteView frame) const;
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
     void collect_starts();
@@ -80,7 +93,10 @@ class ReplyFramer {
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
     std::deque<std::size_t> starts_;  ///< offsets with the right address and function, unjudged
+    bool open_length_ = false;
     bool damaged_ = false;
+    bool damaged_whole_ = false;
+    std::size_t behind_ = 0;
     std::vector<Unused> unused_;
 };
 

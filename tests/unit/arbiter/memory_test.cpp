@@ -43,7 +43,7 @@ TEST(ReadCache, P6AWriteForgetsWhatItMayChange) {
           Case{17, "05 04 00 FF 00"_hex, false}, Case{17, "41 01"_hex, false}}) {
         ReadCache cache;
         cache.store(*read_span(17, kRead), kReply, TimePoint{});
-        cache.on_write(c.station, c.request);
+        cache.on_write(TimePoint{1h}, c.station, c.request);
         EXPECT_EQ(cache.size(), c.kept ? 1u : 0u) << to_hex(c.request);
     }
 }
@@ -105,7 +105,7 @@ TEST(Memory, P6AClientNeverReadsOlderThanItsOwnWriteAlsoOneThatTimedOut) {
     EXPECT_FALSE(bus.answered(read)) << "its own write is still open";
     bus.run_for(490ms);  // silence; the timeout is 500 ms
     EXPECT_FALSE(bus.answered(write));
-    bus.run_for(600ms);
+    ASSERT_TRUE(bus.next_sent(1s));
     ASSERT_TRUE(bus.answered(write));
     EXPECT_FALSE(bus.answered(read)) << "and what was known is forgotten";
     ASSERT_EQ(bus.sent.size(), 3u);
@@ -194,12 +194,13 @@ TEST(AdaptiveTimeout, OfALineAnswersTheClientEarlyAndStillWaitsForALateReply) {
 TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
     Settings settings = settings_with(0s);
     settings.explain = true;
+    settings.quarantine = Quarantine::line;
     settings.queue.per_client = 1;
     settings.unlisted.retries = 0;
     BusScript bus(settings);
     bus.submit(17, kRead, 1);
     bus.submit(18, kRead, 2);
-    EXPECT_FALSE(bus.try_submit(18, kRead, 2));
+    EXPECT_FALSE(bus.try_submit(18, "03 00 00 00 03"_hex, 2));
     EXPECT_EQ(bus.notes[0].why,
               "read of client 1 to station 17: next in turn after 0.0 ms, 0 wait");
     ASSERT_EQ(bus.decisions.size(), 1u);

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "panelgate/arbiter/job.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+/// Write these bytes in one piece, now.
+struct Transmit {
+    Bytes adu;
+};
+/// A job is done: its one and only answer.
+struct Finish {
+    Ticket ticket = 0;
+    Result<Bytes> pdu = Fault::cancelled;
+    bool transmitted = false;  ///< at least once, at least partly
+    bool shared = false;       ///< another job's transaction answered it too
+    /// Of a value that was read before and answers from memory (max_age).
+    std::optional<Duration> age;
+};
+/// Something was seen on the wire, for the trace.
+struct Note {
+    enum class Direction : std::uint8_t { sent, received, discarded };
+    TimePoint at;  ///< first bit out, or last byte in
+    Direction direction = Direction::sent;
+    Bytes bytes;
+    std::string_view what;  ///< a literal: "request", "reply", "foreign"…
+    std::string why;        ///< of a sent frame, with Settings::explain: why this one now
+};
+/// With Settings::explain: why something is not done now, or not at all. One line.
+struct Decision {
+    TimePoint at;
+    std::string text;
+};
+/// A station changed its health, or showed something that its owner should know.
+struct StationEvent {
+    enum class Kind : std::uint8_t {
+        offline,
+        online,
+        late,       ///< it answered `by` after the response timeout
+        drift,      ///< 95 of 100 replies take up to `by`: near the response timeout
+        collision,  ///< the echo of a request to it differed from what was sent
+        echo,       ///< a request to it came back: the line hears itself
+        trail,      ///< something stands behind its replies, up to `by`: the line waits for that
+    };
+    Kind kind = Kind::online;
+    std::uint8_t station = 0;
+    Duration by{};
+};
+/// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
+/// more: then on_line_down and on_line_up.
+struct Reset {
+    std::string_view why;  ///< a literal, for people
+};
+using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Reset>;
+
+}  // namespace panelgate::arbiter

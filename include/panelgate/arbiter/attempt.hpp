@@ -1,0 +1,133 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/group.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
+
+namespace panelgate::arbiter {
+
+/// What an attempt came to.
+enum class Verdict : std::uint8_t {
+    open,     ///< not yet
+    replied,  ///< reply() is the answer
+    silent,   ///< nothing of the station until its time was over
+    damaged,  ///< something that began like the reply, or like our own frame, and was neither
+    wrong,    ///< a good frame of the station that does not answer the request
+};
+
+/// One request on the wire: what is heard meanwhile, its instants, and in the end one verdict.
+/// Damage does not end it while the reply may still come (FRM-04); a silence inside a reply of
+/// known length is a hole. Pure.
+class Attempt {
+  public:
+    struct Timing {
+        TimePoint started;        ///< first bit out
+        TimePoint sent;           ///< last bit out, computed
+        Duration patience{};      ///< from `sent` on: no sign of a reply until then is a timeout
+        Duration usual{};         ///< what the station has ever needed, at most `patience`
+        Duration end_of_frame{};  ///< silence that ends what has no known length
+        Duration hole{};          ///< the longest silence inside a reply of known length
+        Duration longest_reply{};
+        Duration pause{};  ///< the silence before this attempt
+        /// A reply cannot begin more than this before `sent`; nothing: the line is no real UART.
+        std::optional<Duration> tolerance;
+        Duration character{};
+        bool confirm_end = false;  ///< somebody will tell when the last bit has really left
+    };
+    /// Is this good frame of the station, which does not answer, what it said instead of the reply?
+    /// Not when it is the echo, a copy, or the late reply to an earlier request.
+    using Ends = std::function<bool(ByteView adu)>;
+
+    Attempt(Group group, const Timing& timing, EchoFilter echo);
+
+    Verdict on_rx(TimePoint now, ByteView bytes, const Ends& ends);
+    /// Harmless when nothing is due.
+    Verdict on_deadline(TimePoint now, const Ends& ends);
+    TimePoint deadline() const;
+    /// A broadcast is over when its last bit has left.
+    bool is_broadcast() const { return group_.station == 0; }
+
+    bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
+    TimePoint end_wanted_at() const { return end_confirmed_ ? TimePoint::max() : timing_.sent; }
+    /// `left`: the time that the wire still needs for the request. Drivers and adapters begin to
+    /// send later than asked: what is computed is the earliest end. Moves everything by a second at
+    /// most.
+    void on_end(TimePoint now, Duration left);
+
+    Group& group() { return group_; }
+    const Group& group() const { return group_; }
+    const Timing& timing() const { return timing_; }
+    TimePoint give_up() const { return timing_.sent + timing_.patience; }
+    /// The whole answer PDU; its first byte came before the request had left by our arithmetic.
+    const Bytes& reply() const { return *reply_; }
+    bool replied_early() const { return first_byte_ < timing_.sent; }
+    /// The reply is not to be believed: it counts as heard, and the attempt goes on.
+    void reject_reply();
+
+    const EchoFilter& echo() const { return echo_; }
+    /// The whole echo came back, and nothing of it was needed to make the reply whole.
+    bool echoed() const { return echo_.complete() && !borrowed_; }
+    /// A part of our own frame came back in front of the reply.
+    bool fragment_in_front() const { return fragment_; }
+    /// What stands in front of the reply is too little for an echo that was damaged.
+    bool clean_in_front() const {
+        return !echo_.mismatch() && noise_in_front_ * 2 < echo_.frame().size();
+    }
+    /// Something of the station was heard, good or not.
+    bool heard() const { return heard_; }
+    /// Bytes were heard that came before a reply could.
+    bool disturbed() const { return disturbed_; }
+    TimePoint last_byte() const { return last_byte_; }
+    /// Bytes that came before the request had left: on a real UART they are old. Since the last
+    /// call.
+    Bytes take_stale() { return std::exchange(stale_, {}); }
+
+    /// What was heard and belongs to no reply, since the last call.
+    std::vector<modbus::Unused> take_strays();
+    /// All of it that was damaged, since the beginning (bounded).
+    const Bytes& damaged_bytes() const { return damaged_bytes_; }
+    /// What the echo filter still holds back.
+    Bytes release_echo() { return echo_.release(); }
+
+  private:
+    Verdict feed(ByteView bytes, const Ends& ends);
+    Verdict accept(std::optional<Bytes> reply);
+    Verdict judge_pending(const Ends& ends);
+    void judge_strays(std::size_t from, const Ends& ends);
+    void collect();
+    bool is_stale(TimePoint now, std::size_t size) const;
+    /// Bytes of somebody were heard: the reply may be lost, and the usual time tells.
+    bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
+    bool is_hearing() const { return framer_.has_pending() || echo_.pending(); }
+
+    Group group_;
+    Timing timing_;
+    EchoFilter echo_;
+    modbus::ReplyFramer framer_;
+    /// As framer_, for the case that the echo's last byte was lost and the reply's first was taken
+    /// for it.
+    std::optional<modbus::ReplyFramer> lender_;
+    std::optional<Bytes> reply_;
+    std::vector<modbus::Unused> strays_;
+    Bytes damaged_bytes_;
+    Bytes stale_;
+    TimePoint computed_end_;
+    TimePoint first_byte_;
+    TimePoint last_byte_;
+    bool heard_ = false;
+    bool disturbed_ = false;
+    bool fragment_ = false;
+    std::size_t noise_in_front_ = 0;  ///< bytes
+    bool borrowed_ = false;
+    bool wrong_ = false;
+    bool end_confirmed_ = true;
+};
+
+}  // namespace panelgate::arbiter

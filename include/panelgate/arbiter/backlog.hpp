@@ -1,0 +1,48 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/job_queue.hpp"
+
+namespace panelgate::arbiter {
+
+/// All that has been accepted and is not on the wire: requests that wait for their turn, and those
+/// whose attempt failed and goes again. Pure.
+class Backlog {
+  public:
+    explicit Backlog(const QueueSettings& settings) : queue_(settings) {}
+
+    JobQueue& queue() { return queue_; }
+    const JobQueue& queue() const { return queue_; }
+    bool empty() const { return queue_.empty() && retries_.empty(); }
+    /// Something of this client waits for this station.
+    bool has(Client client, std::uint8_t station) const;
+
+    /// The same request goes again. At most one a station.
+    void retry(Group group) { retries_.push_back(std::move(group)); }
+    bool has_retries() const { return !retries_.empty(); }
+    std::optional<Group> take_retry(const std::function<bool(const Group&)>& may_go);
+    void each_retry(const std::function<void(const Group&)>& show) const;
+
+    /// What this client has waiting; it is gone then.
+    std::vector<Job> cancel(Client client);
+    /// Those that can no longer be started, or, transmitted before, answered in time.
+    std::vector<Job> expire(TimePoint now);
+    std::optional<TimePoint> first_expiry() const;
+    /// Those that match, waiting for their first turn.
+    std::vector<Job> remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
+    /// Everything.
+    std::vector<Job> clear();
+
+  private:
+    std::vector<Job> remove_retries(const JobQueue::Test& match);
+
+    JobQueue queue_;
+    std::deque<Group> retries_;
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/base/bytes.hpp"
+
+namespace panelgate::arbiter {
+
+/// Jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
+struct Group {
+    std::vector<Job> jobs;
+    std::uint8_t station = 0;
+    Bytes pdu;
+    std::optional<ReadSpan> span;
+    int attempts = 0;
+    TimePoint started{};      ///< the first attempt: what answers was not read before
+    Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
+    bool probe = false;
+    bool first_silence = false;  ///< its station was well when it was first sent
+    /// It only finds out about the echo, for this job, which waits in the queue.
+    Ticket learns_for = 0;
+
+    /// It asks for more than any of its jobs.
+    bool joined() const {
+        return !jobs.empty() &&
+               std::ranges::none_of(jobs, [&](const Job& job) { return job.pdu == pdu; });
+    }
+    bool has(Client client, std::uint8_t to) const {
+        return (station == to || station == 0) &&
+               std::ranges::any_of(jobs, [&](const Job& job) { return job.client == client; });
+    }
+    void on_gone(Client client) {
+        for (Job& job : jobs) job.gone = job.gone || job.client == client;
+    }
+    /// Nobody waits for it any more.
+    bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/arbiter/actions.hpp"
+#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/bus_shares.hpp"
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/station.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
+
+namespace panelgate::arbiter {
+
+/// What the arbiter says: actions in their order, and counts. It listens to what the parts return;
+/// nothing depends on it. Symptoms are what the line doctor looks at.
+class Ledger {
+  public:
+    explicit Ledger(const Settings& settings);
+
+    std::optional<Action> poll();
+    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, std::string why);
+    void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
+    void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
+    void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
+    void reset(std::string_view why) { actions_.push_back(Reset{why}); }
+    /// One line, when Settings::explain wants it.
+    void decide(TimePoint now, std::string text);
+    bool explains() const { return explain_; }
+
+    // What happened on the wire
+    void on_started(TimePoint now, const Job& job);
+    /// An attempt is over; `gap`: the silence behind it, which nobody else can use.
+    void on_ended(TimePoint now, const Attempt& attempt, Duration gap);
+    void on_client_gone(Client client) { shares_.forget(client); }
+    void on_answered(TimePoint now, const Attempt& attempt, Duration think,
+                     const Station::Replied& replied);
+    void on_failed(const Attempt& attempt, Verdict verdict);
+    void on_echo_mismatch(std::uint8_t station);
+
+    /// What a good frame is that nobody waits for, or that some bytes are damaged.
+    enum class Part : std::uint8_t { damaged, echo, request, late, copy, unasked, unknown };
+    /// Traces and counts it; `asked` is who was asked last. Damage inside an attempt is its own.
+    void on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
+                  Duration lateness = {});
+    void inside_attempt(bool inside) { inside_attempt_ = inside; }
+
+    const LineCounters& line() const { return line_; }
+    const std::map<std::uint8_t, StationCounters>& stations() const { return stations_; }
+    const BusShares& shares() const { return shares_; }
+
+  private:
+    StationCounters& of(std::uint8_t station);
+    Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
+    void count_damaged(const Attempt& attempt);
+    void count_stray(const modbus::Unused& part, Part what, std::uint8_t asked, Duration lateness);
+
+    bool explain_;
+    bool inside_attempt_ = false;
+    std::deque<Action> actions_;
+    LineCounters line_;
+    BusShares shares_;
+    std::map<std::uint8_t, StationCounters> stations_;
+};
+
+}  // namespace panelgate::arbiter

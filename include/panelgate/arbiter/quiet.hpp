@@ -1,0 +1,79 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::arbiter {
+
+/// When the line may be used: the last bit seen on it, the gap behind that, and whatever else it
+/// has to rest for. Pure.
+class Quiet {
+  public:
+    /// `longest`: of a frame. Bytes without a pause for longer than that are no frame but a line
+    /// that floats, and nobody has to wait for their end (LAT-02).
+    explicit Quiet(Duration longest) : longest_(longest) {}
+
+    /// The line was opened: one silent interval before the first frame (MST-01).
+    void on_open(TimePoint now) {
+        *this = Quiet(longest_);
+        since_ = now;
+        until_ = now;
+    }
+    /// Our frame leaves, its last bit at `end`; the gap of `station` follows it.
+    void on_sent(TimePoint end, std::uint8_t station) {
+        since_ = end;
+        station_ = station;
+        until_ = {};
+        noise_ = {};
+    }
+    /// Something is heard that belongs to a transaction.
+    void on_heard(TimePoint now) {
+        since_ = std::max(since_, now);
+        noise_ = {};
+    }
+    /// Something is heard that nobody asked for.
+    void on_noise(TimePoint now) {
+        if (now > since_ + kPause || noise_ == TimePoint{}) noise_ = now;
+        since_ = std::max(since_, now);
+    }
+    void rest_until(TimePoint until) { until_ = std::max(until_, until); }
+    /// What the line rested for has come.
+    void rest_is_over() { until_ = {}; }
+
+    /// When a frame may follow that wants `gap` of silence in front.
+    TimePoint free_at(Duration gap) const {
+        const TimePoint silent = since_ + gap;
+        const bool floats = noise_ != TimePoint{} && since_ - noise_ >= longest_;
+        return std::max(floats ? noise_ + longest_ : silent, until_);
+    }
+    TimePoint since() const { return since_; }
+    /// Whose gap follows the last bit: who was asked last.
+    std::uint8_t station() const { return station_; }
+
+    /// Nobody but `station` may be asked until then, and only for the same again (P1).
+    void quarantine(std::uint8_t station, TimePoint until) {
+        if (until <= quarantined_until_) return;
+        quarantined_ = station;
+        quarantined_until_ = until;
+    }
+    /// What the station owed has come.
+    void lift(std::uint8_t station) {
+        if (quarantined_ == station) quarantined_until_ = {};
+    }
+    TimePoint quarantined_until() const { return quarantined_until_; }
+
+  private:
+    static constexpr Duration kPause = 20ms;  ///< what an adapter holds back is no pause
+
+    Duration longest_;
+    TimePoint since_{};
+    TimePoint until_{};
+    TimePoint noise_{};  ///< the first of the bytes that came without a pause
+    TimePoint quarantined_until_{};
+    std::uint8_t station_ = 0;
+    std::uint8_t quarantined_ = 0;
+};
+
+}  // namespace panelgate::arbiter

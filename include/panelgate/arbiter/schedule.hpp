@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "panelgate/arbiter/backlog.hpp"
+#include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/quiet.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/sharing.hpp"
+#include "panelgate/arbiter/stations.hpp"
+
+namespace panelgate::arbiter {
+
+/// What goes next on a line that is free: a retry, a probe, or a request in turn, together with
+/// what else it answers. Decides; changes only what waits. Pure.
+class Schedule {
+  public:
+    explicit Schedule(const Settings& settings);
+
+    struct Next {
+        std::optional<Group> group;  ///< nothing: not now
+        bool new_way = false;        ///< the line is to be opened anew first
+    };
+    /// `proved`: what was sent before has passed the way to the wire.
+    Next next(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
+              TimePoint proved);
+    /// When that may say something else; nothing: when something happens.
+    std::optional<TimePoint> next_start(const Stations& stations, const Quiet& quiet) const;
+
+    Backlog& backlog() { return backlog_; }
+    const Backlog& backlog() const { return backlog_; }
+    /// The same request goes again; others may go in between where only its station rests.
+    void retry(Group group);
+    /// What was asked for together goes again, each for itself.
+    void give_back(Group& group);
+
+  private:
+    std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
+    std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
+    Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
+                  TimePoint proved);
+    JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;
+
+    Quarantine quarantine_;
+    bool may_stall_;
+    Backlog backlog_;
+    Sharing sharing_;
+    Ticket learned_for_ = 0;    ///< a read was sent for it, to find out about the echo (P8)
+    bool other_first_ = false;  ///< a retry lets one other go first
+};
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,156 @@
+#pragma once
+
+#include <array>
+#include <deque>
+#include <optional>
+
+#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/copy_guard.hpp"
+#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/late_window.hpp"
+#include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/arbiter/trail.hpp"
+#include "panelgate/arbiter/turnaround.hpp"
+
+namespace panelgate::arbiter {
+
+/// What a good frame of a station is that nobody waits for.
+enum class Stray : std::uint8_t {
+    late,     ///< a reply that was owed
+    copy,     ///< the reply taken last, once more
+    second,   ///< another one of its shape behind it: two panels with one address
+    unasked,  ///< anything else
+};
+
+/// What one panel owes, when it may be asked, how long it is waited for, and what a stray frame of
+/// it is. It owns these states: each changes in its verbs only. Pure.
+class Station {
+  public:
+    /// `slack`: what a receiver may hold back of a reply that has begun (its FIFO).
+    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
+            Duration slack);
+
+    // What it owes (P1)
+
+    /// An attempt that left at `sent` ended without its own reply: one more is owed, until it has
+    /// come or cannot come any more.
+    void owe(TimePoint now, const Bytes& pdu, TimePoint sent);
+    bool owes() const { return !owed_.empty(); }
+    /// From then on another request may go there; until then only the very same.
+    TimePoint rested() const { return not_before_; }
+    bool may_ask(TimePoint now, const Bytes& pdu) const {
+        return now >= not_before_ || (owes() && pdu == owed_pdu_);
+    }
+    /// A request goes there, and what was owed before has lapsed if it could not come any more.
+    void on_asked(TimePoint now, const Group& group);
+    /// It owes a reply to a request that nothing proves to have passed: none that was sent later
+    /// than `proved` has been answered since.
+    bool doubtful(TimePoint proved) const { return owes() && owed_.back() >= proved; }
+
+    // What comes of it
+
+    struct Heard {
+        Stray stray = Stray::unasked;
+        Duration lateness{};   ///< of a late one, behind its response timeout
+        bool back = false;     ///< it was offline
+        bool settled = false;  ///< it owes nothing any more
+    };
+    /// The one judge of stray frames. `pdu`: without address and CRC.
+    Heard on_stray_frame(TimePoint now, ByteView pdu);
+    /// What on_stray_frame() would say; changes nothing.
+    Stray judge(TimePoint now, ByteView pdu) const;
+    /// Bytes of nobody behind its reply.
+    void on_stray_bytes(TimePoint now) { trail_.on_stray(now); }
+
+    struct Replied {
+        bool back = false;     ///< it was offline
+        bool drift = false;    ///< it has come near its response timeout
+        bool trail = false;    ///< something always stands behind its replies: that is new
+        bool trailed = false;  ///< something stood behind the reply before
+    };
+    /// Its answer to an attempt. `waited`: from the end of the request to the start of the reply;
+    /// `think`: without the silence that tells the panel that the request is over.
+    Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
+    /// An attempt failed that kept the line for `cost`.
+    void on_failed(TimePoint now, Verdict verdict, Duration cost);
+    /// The whole transaction failed. True when that took it offline.
+    bool on_given_up(TimePoint now, Fault fault);
+    /// This early frame repeats the reply before: perhaps the request never got through.
+    bool is_early_copy(TimePoint now, const Attempt& attempt) const {
+        return attempt.group().attempts == 1 && copies_.is_copy(now, attempt.reply());
+    }
+
+    // How it is to be asked
+
+    const StationSettings& settings() const { return settings_; }
+    const StationHealth& health() const { return health_; }
+    bool take_half_open(TimePoint now) { return health_.take_half_open(now); }
+    /// Nobody listed it, and nobody has ever heard it.
+    bool stranger() const { return !listed_ && !health_.last_success(); }
+    bool forgettable(TimePoint now) const {
+        return stranger() && !owes() && now >= asked_ + kForgetStranger;
+    }
+    /// It has just fallen silent, and is not offline yet.
+    bool suspect() const { return health_.silent_in_a_row() > 0 && !health_.offline(); }
+    /// It fails again and again, and is not silent.
+    bool failing() const { return failed_in_a_row_ >= kFailing && !health_.offline(); }
+    /// As far as its own share of the bus goes.
+    bool may_spend(TimePoint now) const { return !failing() || budget_.allows(now); }
+    bool may_retry(const Group& group) const;
+    /// How long the next attempt waits for its reply to begin. `line`: the longest think time of
+    /// all stations of the line so far; `hurry`: others have just fallen silent, and waited for.
+    Duration patience(const Group& group, std::optional<Duration> line, bool hurry) const;
+    /// What it has ever needed, and some more; at most its response timeout.
+    Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
+    Duration response_timeout() const { return timeout(); }
+    /// What 95 of 100 of its replies need, lately.
+    Duration slow_by() const { return turnaround_.quantile(0.95); }
+    Bytes probe_pdu() const;
+    /// The longest read of this function that it has answered; items.
+    std::uint32_t longest_read(std::uint8_t function) const;
+    Duration worst_lateness() const { return late_.worst(); }
+    /// Until when nobody should send, because of what follows its replies.
+    TimePoint trail_until() const { return trail_.until(); }
+    Duration trail() const { return trail_.hold(); }
+    std::optional<Duration> slowest() const {
+        return health_.last_success() ? std::optional(slowest_) : std::nullopt;
+    }
+
+    static constexpr int kFailing = 2;  ///< transactions in a row
+    static constexpr Duration kForgetStranger = 60s;
+
+  private:
+    Duration timeout() const {
+        return settings_.adaptive_timeout ? adaptive_.value(turnaround_)
+                                          : settings_.response_timeout;
+    }
+    void rest_for_owed(TimePoint now);
+    Duration short_wait(std::optional<Duration> line) const;
+
+    StationSettings settings_;
+    bool listed_;
+    Duration slack_;
+    StationHealth health_;
+    LateWindow late_;
+    Turnaround turnaround_;
+    AdaptiveTimeout adaptive_;
+    DriftAlarm drift_;
+    CopyGuard copies_;
+    Trail trail_;
+    ProbeBudget budget_{ProbeBudget::kFailing};
+    std::deque<TimePoint> owed_;  ///< when the requests left whose replies may still come
+    Bytes owed_pdu_;              ///< they are one and the same
+    TimePoint not_before_{};
+    TimePoint asked_{};
+    Bytes cheapest_read_;  ///< that it has answered
+    Bytes last_read_;      ///< what to probe with before it has answered any
+    std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
+    Duration slowest_{};                           ///< from request to reply
+    int failed_in_a_row_ = 0;
+    bool trail_told_ = false;
+    int probes_ = 0;  ///< in vain, since it was heard last
+};
+
+}  // namespace panelgate::arbiter

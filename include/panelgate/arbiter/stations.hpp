@@ -1,0 +1,64 @@
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/station.hpp"
+
+namespace panelgate::arbiter {
+
+/// All stations of a line: made when they are first asked, strangers forgotten again. Knows what
+/// those that do not answer may cost together, and whose probe is due. Pure.
+class Stations {
+  public:
+    explicit Stations(const Settings& settings);
+
+    Station& of(std::uint8_t id);
+    const Station* find(std::uint8_t id) const;
+    /// The configured ones, or those for unlisted stations.
+    const StationSettings& settings(std::uint8_t id) const;
+    /// The silence that this station wants in front of a request and behind its reply.
+    Duration gap(std::uint8_t id) const;
+    /// The longest that any station of the line has needed.
+    std::optional<Duration> slowest() const { return slowest_; }
+    /// Bytes of nobody behind this station's reply.
+    void on_trail(TimePoint now, std::uint8_t id) {
+        const auto found = stations_.find(id);
+        if (found != stations_.end()) found->second.on_stray_bytes(now);
+    }
+    void on_reply(Duration waited) { slowest_ = std::max(slowest_.value_or(waited), waited); }
+
+    /// How long the next attempt waits for its reply to begin.
+    Duration patience(TimePoint now, const Group& group);
+    /// The budgets of those that do not answer let this one be asked. A station that has only just
+    /// fallen silent, or that keeps failing, is to wait for them only while others want the line.
+    bool may_spend(TimePoint now, std::uint8_t id) const;
+    /// A request to a station that is offline may be its probe: once an interval, in the budget.
+    bool take_half_open(TimePoint now, std::uint8_t id);
+    /// An attempt failed that kept the line for `cost`.
+    void on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost);
+
+    /// The listed offline station whose probe is due longest, nothing when none is.
+    std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
+    /// When the next probe is due.
+    std::optional<TimePoint> next_probe() const;
+    /// Drops the strangers that nobody has asked for lately.
+    void forget_strangers(TimePoint now);
+    std::size_t size() const { return stations_.size(); }
+
+  private:
+    OfflineSettings offline_;
+    StationSettings unlisted_;
+    Duration standard_gap_;
+    Duration slack_;
+    std::map<std::uint8_t, StationSettings> configured_;
+    std::map<std::uint8_t, Station> stations_;
+    ProbeBudget probes_{ProbeBudget::kOffline};
+    ProbeBudget suspects_{ProbeBudget::kFailing};
+    std::optional<Duration> slowest_;
+    TimePoint hurry_until_{};  ///< one has just been waited for in vain: the next ones are not
+};
+
+}  // namespace panelgate::arbiter

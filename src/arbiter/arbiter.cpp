@@ -1,0 +1,424 @@
+#include "panelgate/arbiter/arbiter.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "explain.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+using Kind = StationEvent::Kind;
+
+Arbiter::Arbiter(Settings settings)
+    : settings_(std::move(settings)),
+      stations_(settings_),
+      schedule_(settings_),
+      quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu)),
+      strays_(settings_.serial),
+      echo_memory_(settings_.echo),
+      ledger_(settings_) {
+    settings_.end_of_frame = std::max(settings_.end_of_frame, silent_interval(settings_.serial));
+    settings_.reply_hole = std::max(settings_.reply_hole, settings_.end_of_frame);
+}
+
+Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
+    if (!up_ || resetting_) return Fault::line_down;
+    if (const auto ticket = answer_from_memory(now, job)) return *ticket;
+    if (refuses(now, job)) return Fault::offline;
+    job.ticket = ++last_ticket_;
+    job.arrived = now;
+    job.deadline = now + settings_.queue.deadline;
+    job.start_by = job.deadline - shortest_transaction(job);
+    const Ticket ticket = job.ticket;
+    if (joins_active(now, job)) {
+        job.attempts = 1;
+        ledger_.on_started(now, job);
+        active_->group().jobs.push_back(std::move(job));
+        return ticket;
+    }
+    const JobQueue::Admission admission = schedule_.backlog().queue().push(job);
+    if (admission.shed) {
+        if (ledger_.explains()) ledger_.decide(now, explain::shed(*admission.shed));
+        const bool sent = admission.shed->attempts > 0;  // in a joined read that did not come about
+        ledger_.finish(*admission.shed, sent ? Fault::timeout : Fault::busy);
+    }
+    if (!admission.taken) {
+        if (ledger_.explains())
+            ledger_.decide(now, explain::full(job, settings_.queue, queue_depth()));
+        return Fault::busy;
+    }
+    step(now);
+    return ticket;
+}
+
+/// The station is offline, and this is not to be its probe.
+bool Arbiter::refuses(TimePoint now, const Job& job) {
+    if (job.station == kBroadcast) return false;
+    stations_.forget_strangers(now);
+    const Station& station = stations_.of(job.station);
+    if (!station.health().offline()) return false;
+    const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
+    if (may_wake && stations_.take_half_open(now, job.station)) return false;
+    if (ledger_.explains()) ledger_.decide(now, explain::offline(now, job, station.health()));
+    return true;
+}
+
+/// A value that was read lately, where the station's max_age allows it. Not for polls, which are to
+/// bring new ones, and not while the client has something open there: it must not read older than
+/// its own write.
+std::optional<Ticket> Arbiter::answer_from_memory(TimePoint now, const Job& job) {
+    const Duration max_age = stations_.settings(job.station).max_age;
+    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
+    const auto span = read_span(job.station, job.pdu);
+    const bool on_wire = active_ && active_->group().has(job.client, job.station);
+    if (!span || on_wire || schedule_.backlog().has(job.client, job.station)) return std::nullopt;
+    auto hit = cache_.find(*span, now, max_age);
+    if (!hit) return std::nullopt;
+    ledger_.finish_from_memory(++last_ticket_, std::move(hit->pdu), hit->age);
+    return last_ticket_;
+}
+
+/// Not a repeated one: an answer to the first attempt may still come, and would be too old.
+bool Arbiter::joins_active(TimePoint now, const Job& job) const {
+    if (!active_ || now >= active_->timing().sent || active_->group().attempts != 1) return false;
+    return contained_in(active_->group().span, job) &&
+           !schedule_.backlog().has(job.client, job.station) &&
+           active_->group().jobs.size() < JobQueue::kMost;
+}
+
+void Arbiter::cancel(TimePoint now, Client client) {
+    ledger_.on_client_gone(client);
+    for (const Job& job : schedule_.backlog().cancel(client)) ledger_.finish(job, Fault::cancelled);
+    if (active_) active_->group().on_gone(client);
+    step(now);
+}
+
+void Arbiter::on_line_up(TimePoint now) {
+    up_ = true;
+    resetting_ = false;
+    proved_ = now;
+    quiet_.on_open(now);
+    pace_ = {};
+    echo_memory_.forget();
+    step(now);
+}
+
+/// What was sent is owed all the same: a device server may hand it to the next connection.
+void Arbiter::on_line_down(TimePoint now) {
+    up_ = false;
+    resetting_ = false;
+    strays_.forget();
+    cache_.clear();
+    if (active_) {
+        note(now, active_->take_strays());
+        const Attempt attempt = take_active(now);
+        const Group& group = attempt.group();
+        if (!attempt.is_broadcast())
+            stations_.of(group.station).owe(now, group.pdu, attempt.timing().sent);
+        for (const Job& job : group.jobs) ledger_.finish(job, Fault::line_lost);
+    }
+    for (const Job& job : schedule_.backlog().clear())
+        ledger_.finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
+}
+
+void Arbiter::on_rx(TimePoint now, ByteView bytes) {
+    if (bytes.empty() || !up_) return;
+    expire_active(now);
+    if (!active_ || active_->is_broadcast()) {
+        hear_idle(now, bytes);
+    } else {
+        const bool was_wrong = active_->echo().mismatch();
+        const Verdict verdict = active_->on_rx(now, bytes, ends_attempt(now));
+        quiet_.on_heard(std::max(active_->timing().sent, now));
+        if (active_->echo().mismatch() && !was_wrong) {
+            ledger_.on_echo_mismatch(active_->group().station);
+            echo_memory_.on_mismatch();
+        }
+        if (const Bytes stale = active_->take_stale(); !stale.empty()) hear_idle(now, stale);
+        conclude(now, verdict);
+    }
+    step(now);
+}
+
+void Arbiter::on_end(TimePoint now, Duration left) {
+    if (!wants_end(now)) return;
+    active_->on_end(now, left);
+    quiet_.on_heard(active_->timing().sent);
+}
+
+void Arbiter::step(TimePoint now) {
+    check_active(now);
+    expire(now);
+    if (!active_ && strays_.pending() && now >= quiet_.since() + settings_.end_of_frame)
+        judge_idle(now);
+    while (up_ && !resetting_ && !active_ && start_next(now)) check_active(now);
+}
+
+void Arbiter::check_active(TimePoint now) {
+    if (!active_ || now < active_->deadline()) return;
+    if (active_->is_broadcast()) return end_broadcast(now);
+    conclude(now, active_->on_deadline(now, ends_attempt(now)));
+}
+
+void Arbiter::conclude(TimePoint now, Verdict verdict) {
+    const std::vector<modbus::Unused> strays = active_->take_strays();
+    ledger_.inside_attempt(true);
+    switch (verdict) {
+        case Verdict::open:
+            note(now, strays);
+            break;
+        case Verdict::replied:
+            settle(now);
+            note(now, strays);
+            break;
+        case Verdict::silent:
+        case Verdict::damaged:
+        case Verdict::wrong:
+            note(now, strays);
+            fail(now, verdict);
+            break;
+    }
+    ledger_.inside_attempt(false);
+}
+
+/// The last bit of a broadcast has left: nobody answers, the line rests for the turnaround.
+void Arbiter::end_broadcast(TimePoint now) {
+    const Attempt attempt = take_active(now);
+    quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
+    for (const Job& job : attempt.group().jobs)
+        ledger_.finish(job, modbus::normal_write_reply(job.pdu));
+}
+
+/// The reply is there.
+void Arbiter::settle(TimePoint now) {
+    Station& station = stations_.of(active_->group().station);
+    const bool early = active_->replied_early();
+    if (early && !settings_.paced && pace_.believed() && station.is_early_copy(now, *active_)) {
+        active_->reject_reply();
+        return;
+    }
+    pace_.on_reply(early);
+    Attempt attempt = take_active(now);
+    Group& group = attempt.group();
+    const Bytes& reply = attempt.reply();
+    const Duration reply_time = wire_time(settings_.serial, reply.size() + kAduOverhead);
+    const Duration waited = std::max(now - attempt.timing().sent - reply_time, Duration::zero());
+    const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
+    const Station::Replied replied = station.on_reply(now, attempt, waited, think);
+    stations_.on_reply(waited);
+    proved_ = std::max(proved_, attempt.timing().started);
+    strays_.on_replied(group.station);
+    quiet_.rest_until(station.trail_until());
+    ledger_.on_answered(now, attempt, think, replied);
+    if (replied.back) ledger_.event(Kind::online, group.station);
+    if (replied.drift) ledger_.event(Kind::drift, group.station, station.slow_by());
+    if (replied.trail) ledger_.event(Kind::trail, group.station, station.trail());
+    if (!attempt.echoed() && (attempt.fragment_in_front() || attempt.clean_in_front()))
+        echo_memory_.on_reply_without_echo(group.pdu, attempt.fragment_in_front());
+    const bool exception = modbus::exception_of(reply).has_value();
+    if (group.span && !exception && station.settings().max_age > Duration::zero())
+        cache_.store(*group.span, reply, group.started);
+    if (exception) schedule_.give_back(group);
+    for (const Job& job : group.jobs)
+        ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
+}
+
+void Arbiter::fail(TimePoint now, Verdict verdict) {
+    Attempt attempt = take_active(now);
+    ledger_.on_failed(attempt, verdict);
+    Group& group = attempt.group();
+    Station& station = stations_.of(group.station);
+    const TimePoint sent = attempt.timing().sent;
+    const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
+    station.owe(now, group.pdu, sent);
+    stations_.on_failed(now, group.station, verdict, cost);
+    rest_others(now, group, sent);
+    group.silent_after = verdict == Verdict::silent
+                             ? std::min(now - sent, attempt.timing().patience) - latency_
+                             : Duration::zero();
+    const bool in_time =
+        std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
+    if (in_time && station.may_retry(group)) {
+        schedule_.retry(std::move(group));
+    } else if (group.joined()) {
+        schedule_.give_back(group);  // nobody's health: the panel may only not take the length
+    } else {
+        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+    }
+}
+
+/// No further attempt: everybody is answered, and the station judged.
+void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
+    for (const Job& job : group.jobs) ledger_.finish(job, fault);
+    if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
+    const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
+    if (group.learns_for != 0 && fault != Fault::damaged) {
+        // P8: the write never left, and its station is silent.
+        for (const Job& job : schedule_.backlog().remove_if(asked)) ledger_.finish(job, fault);
+    }
+    Station& station = stations_.of(group.station);
+    const auto theirs = [&](const Job& job) { return job.station == group.station; };
+    if (!station.on_given_up(now, fault)) return;
+    if (!station.stranger()) ledger_.event(Kind::offline, group.station);
+    for (const Job& job : schedule_.backlog().remove_if(theirs))
+        ledger_.finish(job, Fault::offline);
+}
+
+/// P1: a late reply would collide with what others are told meanwhile, where such have come before,
+/// or where the configuration says so. A probe lets the others go on in any case. A timeout that
+/// was chosen short (adaptive) frees the others early, but not the station itself.
+void Arbiter::rest_others(TimePoint now, const Group& group, TimePoint sent) {
+    const Station& station = stations_.of(group.station);
+    const StationSettings& own = station.settings();
+    TimePoint until = station.rested();
+    if (settings_.quarantine == Quarantine::line && !group.probe) {
+        if (own.adaptive_timeout) until = std::min(until, now + station.response_timeout());
+    } else if (settings_.quarantine == Quarantine::automatic && group.first_silence &&
+               station.worst_lateness() > Duration::zero()) {
+        until = std::min(until, sent + own.response_timeout + station.worst_lateness() * 5 / 4);
+    } else {
+        return;
+    }
+    quiet_.quarantine(group.station, until);
+    if (ledger_.explains()) ledger_.decide(now, explain::line_rests(until - now, group));
+}
+
+/// The attempt is over: its time is accounted for, and what the echo filter held back is heard.
+Attempt Arbiter::take_active(TimePoint now) {
+    Attempt attempt = std::move(*active_);
+    active_.reset();
+    ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
+    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
+        ledger_.event(Kind::echo, attempt.group().station);
+    strays_.hear(attempt.release_echo());
+    return attempt;
+}
+
+void Arbiter::expire(TimePoint now) {
+    expire_active(now);
+    for (const Job& job : schedule_.backlog().expire(now)) {
+        const bool sent = job.attempts > 0;
+        if (ledger_.explains()) ledger_.decide(now, explain::expired(now, job, sent));
+        ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
+    }
+}
+
+/// Those of the transaction whose own deadline has come; the others go on waiting for its reply. A
+/// broadcast that is leaving is answered when it has left.
+void Arbiter::expire_active(TimePoint now) {
+    if (!active_ || active_->is_broadcast()) return;
+    std::vector<Job>& jobs = active_->group().jobs;
+    for (const Job& job : jobs) {
+        if (job.deadline <= now) ledger_.finish(job, Fault::timeout);
+    }
+    std::erase_if(jobs, [&](const Job& job) { return job.deadline <= now; });
+}
+
+Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
+    return [this, now](ByteView adu) { return strays_.is_wrong_reply(now, adu, stations_); };
+}
+
+void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
+    quiet_.on_noise(now);
+    strays_.hear(bytes);
+    if (strays_.full()) judge_idle(now);
+}
+
+void Arbiter::judge_idle(TimePoint now) { note(now, strays_.take(quiet_.station())); }
+
+void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
+    const bool idle = !active_ || now < active_->timing().sent;
+    strays_.note(now, parts, idle, stations_, quiet_, ledger_);
+}
+
+bool Arbiter::start_next(TimePoint now) {
+    if (now < quiet_.free_at(stations_.gap(quiet_.station()))) return false;
+    if (strays_.pending()) judge_idle(now);  // it may tell that the line is not free
+    Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_, proved_);
+    if (next.new_way) {
+        resetting_ = true;
+        ledger_.reset(
+            "a request was not answered, and nothing since then: what was sent may "
+            "still be on its way");
+    }
+    if (!next.group) return false;
+    start(now, std::move(*next.group));
+    return true;
+}
+
+void Arbiter::start(TimePoint now, Group group) {
+    Bytes adu = modbus::encode_adu(group.station, group.pdu);
+    if (++group.attempts == 1) group.started = now;
+    for (Job& job : group.jobs) {
+        if (job.attempts++ == 0) ledger_.on_started(now, job);
+    }
+    Attempt::Timing timing;
+    timing.started = now;
+    timing.sent = now + lead_ + wire_time(settings_.serial, adu.size());
+    timing.end_of_frame = settings_.end_of_frame;
+    timing.hole = settings_.reply_hole;
+    timing.longest_reply =
+        2 * wire_time(settings_.serial, modbus::kMaxLongRtuAdu) + settings_.reply_hole;
+    timing.pause = now - quiet_.since();
+    timing.character = character_time(settings_.serial);
+    timing.confirm_end = confirm_ends_;
+    // Rates may differ by 2 % (and both ends in the same direction), and what has left is computed.
+    if (settings_.paced) timing.tolerance = (timing.sent - now) * 3 / 100 + timing.character;
+    if (group.station != kBroadcast) {
+        Station& station = stations_.of(group.station);
+        station.on_asked(now, group);
+        if (group.attempts == 1)
+            group.first_silence = !station.suspect() && !station.health().offline();
+        timing.patience = stations_.patience(now, group) + latency_;
+        timing.usual = std::min(station.usual() + latency_, timing.patience);
+    }
+    if (!modbus::is_pure_read(group.pdu)) cache_.on_write(now, group.station, group.pdu);
+    const std::string why =
+        ledger_.explains() ? explain::start(now, group, schedule_.backlog().queue()) : "";
+    quiet_.on_sent(timing.sent, group.station);
+    strays_.on_sent(adu);
+    const EchoFilter echo(adu, echo_memory_.expect(group.pdu));
+    active_.emplace(std::move(group), timing, echo);
+    ledger_.transmit(now, *active_, std::move(adu), why);
+}
+
+std::optional<TimePoint> Arbiter::next_deadline() const {
+    std::optional<TimePoint> next = schedule_.backlog().first_expiry();
+    const auto earlier = [&next](TimePoint t) { next = next ? std::min(*next, t) : t; };
+    if (active_) {
+        earlier(std::min(active_->deadline(), active_->end_wanted_at()));
+        for (const Job& job : active_->group().jobs) {
+            if (!active_->is_broadcast()) earlier(job.deadline);
+        }
+        return next;
+    }
+    if (strays_.pending()) earlier(quiet_.since() + settings_.end_of_frame);
+    if (!up_ || resetting_) return next;
+    if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
+    return next;
+}
+
+/// Request, gap, and the shortest thing a station can say.
+Duration Arbiter::shortest_transaction(const Job& job) const {
+    const std::size_t request = job.pdu.size() + kAduOverhead;
+    if (job.station == kBroadcast) return wire_time(settings_.serial, request);
+    return wire_time(settings_.serial, request + kShortestReplyAdu) +
+           silent_interval(settings_.serial);
+}
+
+StationHealth Arbiter::health(std::uint8_t id) const {
+    const Station* found = stations_.find(id);
+    return found == nullptr ? StationHealth(settings_.offline) : found->health();
+}
+
+Duration Arbiter::response_timeout(std::uint8_t id) const {
+    const Station* found = stations_.find(id);
+    return found == nullptr ? stations_.settings(id).response_timeout : found->response_timeout();
+}
+
+}  // namespace panelgate::arbiter

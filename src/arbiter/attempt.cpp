@@ -1,0 +1,154 @@
+#include "panelgate/arbiter/attempt.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+using modbus::Unused;
+
+Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
+    : group_(std::move(group)),
+      timing_(timing),
+      echo_(std::move(echo)),
+      framer_(group_.station, group_.pdu),
+      computed_end_(timing.sent),
+      first_byte_(timing.sent),
+      last_byte_(timing.sent),
+      end_confirmed_(!timing.confirm_end) {}
+
+Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
+    const bool was_complete = echo_.complete();
+    const ByteView rest = echo_.feed(bytes);
+    if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
+    if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
+        lender_.emplace(group_.station, group_.pdu);
+        const std::uint8_t lent = group_.station;
+        lender_->feed(ByteView(&lent, 1));
+    }
+    if (rest.empty()) return Verdict::open;
+    if (is_stale(now, rest.size())) {
+        disturbed_ = true;
+        stale_.insert(stale_.end(), rest.begin(), rest.end());
+        return Verdict::open;
+    }
+    if (!heard_) first_byte_ = now;
+    heard_ = true;
+    last_byte_ = now;
+    return feed(rest, ends);
+}
+
+Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
+    if (accept(framer_.feed(bytes)) == Verdict::replied) return Verdict::replied;
+    if (lender_) {
+        if (auto reply = lender_->feed(bytes)) {
+            borrowed_ = true;
+            return accept(std::move(reply));
+        }
+    }
+    return framer_.ends_with_other_frame() ? judge_pending(ends) : Verdict::open;
+}
+
+Verdict Attempt::accept(std::optional<Bytes> reply) {
+    collect();
+    if (!reply) return Verdict::open;
+    reply_ = std::move(reply);
+    return Verdict::replied;
+}
+
+/// What is pending becomes strays. Was it what the station said instead of the reply?
+Verdict Attempt::judge_pending(const Ends& ends) {
+    const std::size_t before = strays_.size();
+    framer_.drop_pending();
+    collect();
+    judge_strays(before, ends);
+    return wrong_ ? Verdict::wrong : Verdict::open;
+}
+
+void Attempt::judge_strays(std::size_t from, const Ends& ends) {
+    for (; from < strays_.size(); ++from) {
+        const Unused& part = strays_[from];
+        wrong_ = wrong_ || (part.kind == Unused::Kind::own && ends(part.bytes));
+    }
+}
+
+void Attempt::collect() {
+    const std::size_t behind = framer_.parts_behind();
+    std::vector<Unused> parts = framer_.take_unused();
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const bool foreign = begins_with_request(parts[i].bytes, echo_.frame());
+        if (parts[i].kind == Unused::Kind::damaged && !foreign) {
+            const bool in_front = i + behind < parts.size();
+            if (in_front) noise_in_front_ += parts[i].bytes.size();
+            fragment_ = fragment_ || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
+            append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);
+            disturbed_ = true;
+        }
+        strays_.push_back(std::move(parts[i]));
+    }
+}
+
+std::vector<Unused> Attempt::take_strays() { return std::exchange(strays_, {}); }
+
+TimePoint Attempt::deadline() const {
+    if (is_broadcast()) return timing_.sent;
+    const TimePoint over = give_up();
+    if (!is_hearing()) return in_doubt() ? std::min(over, timing_.sent + timing_.usual) : over;
+    const bool hole = framer_.has_candidate() && framer_.knows_length();
+    const TimePoint silent =
+        std::max(timing_.sent, last_byte_) + (hole ? timing_.hole : timing_.end_of_frame);
+    // What may be the reply is heard to its end, also after its time, but not for ever.
+    const bool may_be_reply = framer_.has_candidate() || echo_.pending();
+    return std::min(silent, may_be_reply ? over + timing_.longest_reply : over);
+}
+
+Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
+    if (now < deadline()) return Verdict::open;
+    if (is_hearing()) {
+        if (const Bytes held = echo_.release(); !held.empty()) {
+            heard_ = true;
+            if (feed(held, ends) == Verdict::replied) return Verdict::replied;
+        }
+        const std::size_t before = strays_.size();
+        if (accept(framer_.on_silence()) == Verdict::replied) return Verdict::replied;
+        judge_strays(before, ends);
+    }
+    if (wrong_) return Verdict::wrong;
+    const bool damaged = framer_.was_damaged() || echo_.mismatch();
+    if (framer_.was_damaged_whole()) return Verdict::damaged;
+    const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
+    if (now < timing_.sent + wait) return Verdict::open;
+    return damaged ? Verdict::damaged : Verdict::silent;
+}
+
+void Attempt::on_end(TimePoint now, Duration left) {
+    constexpr Duration kMaxShift = 1s;
+    if (!wants_end(now)) return;
+    const TimePoint end = now + left;
+    if (left <= Duration::zero() || heard_ || end > computed_end_ + kMaxShift) {
+        end_confirmed_ = true;
+        return;
+    }
+    timing_.sent = end;
+}
+
+void Attempt::reject_reply() {
+    Unused part;
+    part.kind = Unused::Kind::own;
+    part.station = group_.station;
+    part.bytes = modbus::encode_adu(group_.station, *reply_);
+    strays_.push_back(std::move(part));
+    reply_.reset();
+    heard_ = false;
+}
+
+bool Attempt::is_stale(TimePoint now, std::size_t size) const {
+    if (!timing_.tolerance || heard_) return false;
+    const Duration before = timing_.character * static_cast<int>(size - 1);
+    return now - before < timing_.sent - *timing_.tolerance;
+}
+
+}  // namespace panelgate::arbiter

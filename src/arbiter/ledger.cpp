@@ -1,0 +1,120 @@
+#include "panelgate/arbiter/ledger.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+
+std::string_view word(Ledger::Part what) {
+    switch (what) {
+        case Ledger::Part::damaged:
+            return "damaged";
+        case Ledger::Part::echo:
+            return "echo";
+        case Ledger::Part::request:
+            return "foreign request";
+        case Ledger::Part::late:
+            return "late";
+        case Ledger::Part::copy:
+            return "copy";
+        case Ledger::Part::unasked:
+        case Ledger::Part::unknown:
+            return "foreign";
+    }
+    std::abort();
+}
+
+std::string_view word(const Group& group) {
+    if (group.learns_for != 0) return "learn echo";
+    if (group.station == kBroadcast) return "broadcast";
+    if (group.probe) return "probe";
+    return group.attempts > 1 ? "retry" : "request";
+}
+
+}  // namespace
+
+Ledger::Ledger(const Settings& settings) : explain_(settings.explain) {
+    for (const StationSettings& station : settings.stations) stations_[station.id];
+    stations_[kUnlisted];
+}
+
+std::optional<Action> Ledger::poll() {
+    if (actions_.empty()) return std::nullopt;
+    Action action = std::move(actions_.front());
+    actions_.pop_front();
+    return action;
+}
+
+StationCounters& Ledger::of(std::uint8_t station) {
+    const auto found = stations_.find(station);
+    return found == stations_.end() ? stations_[kUnlisted] : found->second;
+}
+
+void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, std::string why) {
+    const Group& group = attempt.group();
+    if (group.attempts > 1) ++of(group.station).retries;
+    if (group.station == kBroadcast) ++line_.broadcasts;
+    actions_.push_back(Note{now, Note::Direction::sent, adu, word(group), std::move(why)});
+    actions_.push_back(Transmit{std::move(adu)});
+}
+
+void Ledger::finish(const Job& job, Result<Bytes> pdu, bool shared) {
+    actions_.push_back(Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}});
+}
+
+void Ledger::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
+    Finish answer;
+    answer.ticket = ticket;
+    answer.pdu = std::move(pdu);
+    answer.age = age;
+    actions_.push_back(std::move(answer));
+}
+
+void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
+    actions_.push_back(StationEvent{kind, station, by});
+}
+
+void Ledger::decide(TimePoint now, std::string text) {
+    if (explain_) actions_.push_back(Decision{now, std::move(text)});
+}
+
+void Ledger::on_started(TimePoint now, const Job& job) {
+    line_.queue_wait[static_cast<std::size_t>(job.priority)].observe(now - job.arrived);
+}
+
+void Ledger::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
+    const Attempt::Timing& timing = attempt.timing();
+    const TimePoint longest = attempt.give_up() + timing.longest_reply;
+    const TimePoint end = std::max({timing.sent, attempt.last_byte(), std::min(now, longest)});
+    const Duration busy = end - timing.started + gap;
+    line_.busy += busy;
+    const std::vector<Job>& jobs = attempt.group().jobs;
+    for (const Job& job : jobs) {
+        if (!job.gone) shares_.add(job.client, busy / static_cast<int>(jobs.size()));
+    }
+}
+
+void Ledger::on_echo_mismatch(std::uint8_t station) {
+    ++of(station).echo_mismatches;
+    event(StationEvent::Kind::collision, station);
+}
+
+void Ledger::on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
+                      Duration lateness) {
+    const bool known = what == Part::late || what == Part::copy || what == Part::unasked;
+    of(known ? part.station : asked).discarded_bytes += part.bytes.size();
+    if (what == Part::late) ++of(part.station).late_frames;
+    if (what == Part::unasked || what == Part::unknown || what == Part::request)
+        ++of(asked).foreign_frames;
+    count_stray(part, what, asked, lateness);
+    actions_.push_back(Note{now, Note::Direction::discarded, part.bytes, word(what), {}});
+}
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,75 @@
+#include "panelgate/arbiter/sharing.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+
+/// Items of one read that this station is known to answer.
+std::uint32_t known_length(const Station& station, const ReadSpan& span) {
+    const StationSettings& settings = station.settings();
+    const std::uint32_t limit = span.reads_bits() ? settings.max_bits : settings.max_registers;
+    return settings.vouched ? limit : std::min(limit, station.longest_read(span.function));
+}
+
+}  // namespace
+
+Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const {
+    Group group;
+    group.station = leader.station;
+    group.pdu = leader.pdu;
+    if (share_ && !leader.alone) group.span = read_span(leader.station, leader.pdu);
+    group.jobs.push_back(std::move(leader));
+    while (group.span) {
+        const std::uint32_t before = group.span->count;
+        for (Job& job : queue.take_all(group.station, [&](const Job& other) {
+                 if (!joins(group, other, station)) return false;
+                 group.span = join(*group.span, *read_span(other.station, other.pdu));
+                 return true;
+             })) {
+            group.jobs.push_back(std::move(job));
+        }
+        if (group.span->count == before) break;
+    }
+    if (group.span) group.pdu = encode_span(*group.span);
+    return group;
+}
+
+bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
+    if (job.alone || job.station != group.station) return false;
+    const auto span = read_span(job.station, job.pdu);
+    if (!span || !group.span->touches(*span)) return false;
+    if (group.span->contains(*span)) return true;
+    const ReadSpan both = join(*group.span, *span);
+    // The whole of one that contains all the others has been asked for by a client.
+    if (both != *span && both.count > known_length(station, both)) return false;
+    return std::none_of(refused_.begin(), refused_.end(),
+                        [&](const ReadSpan& refused) { return both.contains(refused); });
+}
+
+std::vector<Job> Sharing::split(Group& group) {
+    const auto asked_all = [&](const Job& job) { return job.pdu == group.pdu; };
+    if (group.joined()) {
+        if (refused_.size() >= kRemembered) refused_.pop_front();
+        refused_.push_back(*group.span);
+    }
+    std::vector<Job> parts;
+    for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
+        if (asked_all(*job)) continue;
+        job->alone = true;
+        parts.push_back(*job);
+    }
+    std::erase_if(group.jobs, [&](const Job& job) { return !asked_all(job); });
+    return parts;
+}
+
+Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) {
+    if (job.pdu == group.pdu || modbus::exception_of(reply)) return reply;
+    return slice_reply(*group.span, reply, *read_span(job.station, job.pdu));
+}
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,161 @@
+#include "panelgate/arbiter/station.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::arbiter {
+
+Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
+                 Duration slack)
+    : settings_(settings),
+      listed_(listed),
+      slack_(slack),
+      health_(offline),
+      late_(settings.late_window, settings.response_timeout),
+      adaptive_(settings.timeout_floor, settings.response_timeout) {}
+
+void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
+    constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
+    owed_pdu_ = pdu;
+    owed_.push_back(sent);
+    if (owed_.size() > kMost) owed_.pop_front();
+    rest_for_owed(now);
+}
+
+/// Until what left last can no longer be answered: within its timeout, and so much later as its
+/// replies may be late.
+void Station::rest_for_owed(TimePoint now) {
+    not_before_ = std::max(now, owed_.back() + settings_.response_timeout) + late_.value();
+}
+
+void Station::on_asked(TimePoint now, const Group& group) {
+    if (now >= not_before_) owed_.clear();
+    asked_ = now;
+    if (group.span) last_read_ = group.pdu;
+}
+
+Stray Station::judge(TimePoint now, ByteView pdu) const {
+    if (owes() && modbus::answers(owed_pdu_, pdu)) return Stray::late;
+    if (copies_.is_copy(now, pdu)) return Stray::copy;
+    return copies_.is_second(now, pdu) ? Stray::second : Stray::unasked;
+}
+
+Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
+    Heard heard;
+    heard.stray = judge(now, pdu);
+    if (heard.stray != Stray::late) {
+        if (copies_.on_unasked(now, pdu)) heard.stray = Stray::copy;
+        if (heard.stray == Stray::copy) trail_.on_stray(now);
+        return heard;
+    }
+    // Panels serve in turn: it is the oldest one that is owed.
+    const TimePoint due = owed_.front() + settings_.response_timeout;
+    slowest_ = std::max(slowest_, now - owed_.front());
+    owed_.pop_front();
+    heard.lateness = std::max(now - due, Duration::zero());
+    if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
+    heard.settled = owed_.empty();
+    if (heard.settled) not_before_ = now;
+    heard.back = health_.on_reply(now);
+    probes_ = 0;
+    return heard;
+}
+
+Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Duration waited,
+                                   Duration think) {
+    const Group& group = attempt.group();
+    Replied result;
+    result.back = health_.on_reply(now);
+    probes_ = 0;
+    failed_in_a_row_ = 0;
+    budget_.clear();
+    slowest_ = std::max(slowest_, waited);
+    turnaround_.add(think);
+    adaptive_.on_reply();
+    late_.on_timely();
+    result.drift = drift_.check(turnaround_, settings_.response_timeout);
+    result.trailed = trail_.seen();
+    const bool had_trail = trail_.hold() > Duration::zero();
+    trail_.on_reply(now);
+    copies_.on_reply(now, attempt.reply());
+    const bool has_trail = trail_.hold() > Duration::zero();
+    result.trail = has_trail && !had_trail && !std::exchange(trail_told_, true);
+    if (owes()) {
+        // Each attempt may be answered, and nobody knows which one this reply was for.
+        owed_.pop_front();
+        owed_.push_back(attempt.timing().sent);
+        rest_for_owed(now);
+    } else {
+        not_before_ = std::max(not_before_, now + copies_.hold());
+    }
+    if (!group.span || modbus::exception_of(attempt.reply())) return result;
+    std::uint32_t& longest = longest_read_.at(group.span->function);
+    longest = std::max(longest, group.span->count);
+    const auto known = read_span(0, cheapest_read_);
+    if (!known || group.span->count < known->count) cheapest_read_ = group.pdu;
+    return result;
+}
+
+void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
+    if (verdict == Verdict::silent) adaptive_.on_timeout();
+    if (health_.offline()) ++probes_;
+    if (failing()) budget_.spend(now, cost);
+}
+
+bool Station::on_given_up(TimePoint now, Fault fault) {
+    ++failed_in_a_row_;
+    if (fault == Fault::damaged && !health_.offline()) {
+        health_.on_damaged();
+        return false;
+    }
+    return health_.on_silence(now, stranger());
+}
+
+bool Station::may_retry(const Group& group) const {
+    if (group.abandoned() || health_.offline() || failing() || stranger()) return false;
+    if (suspect() && !group.first_silence) return false;
+    const bool harmless = modbus::is_pure_read(group.pdu) || settings_.retry_writes;
+    return harmless && group.attempts <= settings_.retries;
+}
+
+Duration Station::short_wait(std::optional<Duration> line) const {
+    const std::optional<Duration> own = slowest();
+    const Duration whole = settings_.response_timeout;
+    if (!own && !line) return whole;
+    return std::min(whole, std::max<Duration>(20ms, 3 * own.value_or(*line) + 10ms) + slack_);
+}
+
+Duration Station::patience(const Group& group, std::optional<Duration> line, bool hurry) const {
+    const Duration whole = settings_.response_timeout;
+    if (group.silent_after > Duration::zero()) {
+        // A retry behind a whole timeout waits as long as the panel has ever needed; one behind a
+        // shorter wait longer than that was.
+        if (group.silent_after >= whole) return short_wait(line);
+        return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
+    }
+    if (health_.offline() && !slowest()) {
+        // Nobody knows how long it needs: one probe after the other waits twice as long.
+        constexpr int kDoublings = 6;
+        return std::min(whole, short_wait(line) * (1 << (probes_ % kDoublings)));
+    }
+    if (health_.offline() || suspect() || stranger()) return short_wait(line);
+    if (hurry && slowest()) return std::min(timeout(), short_wait(line));
+    return timeout();
+}
+
+Bytes Station::probe_pdu() const {
+    if (!cheapest_read_.empty()) return cheapest_read_;
+    if (!last_read_.empty()) return last_read_;
+    return modbus::encode_read(modbus::Table::holding_registers, 0, 1);
+}
+
+std::uint32_t Station::longest_read(std::uint8_t function) const {
+    return function < longest_read_.size() ? longest_read_[function] : 0;
+}
+
+}  // namespace panelgate::arbiter

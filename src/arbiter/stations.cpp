@@ -1,0 +1,100 @@
+#include "panelgate/arbiter/stations.hpp"
+
+#include <algorithm>
+
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+/// A receiver hands bytes over when so many are there, or after a pause: 16550 and its kin.
+constexpr std::size_t kFifo = 16;
+}  // namespace
+
+Stations::Stations(const Settings& settings)
+    : offline_(settings.offline),
+      unlisted_(settings.unlisted),
+      standard_gap_(silent_interval(settings.serial)),
+      slack_(wire_time(settings.serial, kFifo)) {
+    for (const StationSettings& station : settings.stations) configured_[station.id] = station;
+}
+
+const StationSettings& Stations::settings(std::uint8_t id) const {
+    const auto found = configured_.find(id);
+    return found == configured_.end() ? unlisted_ : found->second;
+}
+
+Station& Stations::of(std::uint8_t id) {
+    const auto found = stations_.find(id);
+    if (found != stations_.end()) return found->second;
+    const bool listed = configured_.contains(id);
+    return stations_.try_emplace(id, settings(id), offline_, listed, slack_).first->second;
+}
+
+const Station* Stations::find(std::uint8_t id) const {
+    const auto found = stations_.find(id);
+    return found == stations_.end() ? nullptr : &found->second;
+}
+
+Duration Stations::gap(std::uint8_t id) const {
+    return settings(id).frame_gap.value_or(standard_gap_);
+}
+
+Duration Stations::patience(TimePoint now, const Group& group) {
+    return of(group.station).patience(group, slowest_, now < hurry_until_);
+}
+
+bool Stations::may_spend(TimePoint now, std::uint8_t id) const {
+    const Station* station = find(id);
+    if (station == nullptr) return true;
+    if (station->suspect() && !suspects_.allows(now)) return false;
+    return station->may_spend(now);
+}
+
+bool Stations::take_half_open(TimePoint now, std::uint8_t id) {
+    return probes_.allows(now) && of(id).take_half_open(now);
+}
+
+void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost) {
+    Station& station = of(id);
+    station.on_failed(now, verdict, cost);
+    if (station.health().offline()) {
+        probes_.spend(now, cost);
+    } else if (station.suspect()) {
+        suspects_.spend(now, cost);
+    } else if (verdict == Verdict::silent) {
+        // It may be one of several that have died together: the others are not waited for longer
+        // than they have ever needed, for as long as this one has taken a fifth of.
+        hurry_until_ = now + static_cast<int>(1 / ProbeBudget::kFailing) * cost;
+    }
+}
+
+std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
+    std::optional<std::uint8_t> best;
+    TimePoint earliest = TimePoint::max();
+    for (const auto& [id, station] : stations_) {
+        if (!station.health().offline() || station.stranger()) continue;
+        const TimePoint due = std::max(station.health().next_probe(), station.rested());
+        if (due > now || due >= earliest) continue;
+        earliest = due;
+        best = id;
+    }
+    return best;
+}
+
+std::optional<TimePoint> Stations::next_probe() const {
+    std::optional<TimePoint> next;
+    for (const auto& [id, station] : stations_) {
+        if (!station.health().offline() || station.stranger()) continue;
+        const TimePoint due =
+            std::max({station.health().next_probe(), station.rested(), probes_.next()});
+        if (!next || due < *next) next = due;
+    }
+    return next;
+}
+
+void Stations::forget_strangers(TimePoint now) {
+    std::erase_if(stations_, [&](const auto& entry) { return entry.second.forgettable(now); });
+}
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,97 @@
+#include "panelgate/arbiter/strays.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/request.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+using modbus::Unused;
+using Kind = StationEvent::Kind;
+using Part = Ledger::Part;
+
+namespace {
+
+ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - kAduOverhead); }
+
+/// A good frame that can only be a request, another master's.
+bool is_request(ByteView adu) {
+    const modbus::ReplyLength as_reply = modbus::reply_length(adu);
+    const bool fits_reply =
+        as_reply.kind == modbus::ReplyLength::Kind::known && as_reply.length == adu.size();
+    return !fits_reply && modbus::request_adu_length(adu) == adu.size();
+}
+
+Part part_of(Stray stray) {
+    switch (stray) {
+        case Stray::late:
+            return Part::late;
+        case Stray::copy:
+        case Stray::second:
+            return Part::copy;
+        case Stray::unasked:
+            return Part::unasked;
+    }
+    std::abort();
+}
+
+}  // namespace
+
+void Strays::hear(ByteView bytes) { idle_.insert(idle_.end(), bytes.begin(), bytes.end()); }
+
+std::vector<Unused> Strays::take(std::uint8_t asked) {
+    return modbus::classify_heard(std::exchange(idle_, {}), asked);
+}
+
+Part Strays::judge(const Unused& part, const Stations& stations) const {
+    if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
+    if (begins_with_request(part.bytes, last_frame_) &&
+        (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
+        return Part::request;
+    if (part.kind == Unused::Kind::damaged) return Part::damaged;
+    return stations.find(part.station) == nullptr ? Part::unknown : Part::unasked;
+}
+
+void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, Stations& stations,
+                  Quiet& quiet, Ledger& ledger) const {
+    for (const Unused& part : parts) {
+        const Part what = judge(part, stations);
+        if (what != Part::unasked) {
+            ledger.on_stray(now, part, what, quiet.station());
+            if (what == Part::damaged && idle) stations.on_trail(now, replied_);
+            if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
+            continue;
+        }
+        const Station::Heard heard =
+            stations.of(part.station).on_stray_frame(now, pdu_of(part.bytes));
+        ledger.on_stray(now, part, part_of(heard.stray), quiet.station(), heard.lateness);
+        if (heard.stray == Stray::late) ledger.event(Kind::late, part.station, heard.lateness);
+        if (heard.back) ledger.event(Kind::online, part.station);
+        if (heard.settled) quiet.lift(part.station);
+    }
+}
+
+/// Another master asks: whoever speaks now damages the reply to it. Its panel has as long as ours
+/// need at the most, or as many are used to.
+void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
+                            Quiet& quiet) const {
+    const std::size_t size = modbus::request_adu_length(request);
+    const ByteView pdu = pdu_of(request.first(size));
+    if (request.size() > size || request[0] == kBroadcast) return;  // its reply is heard as well
+    constexpr std::size_t kShort = 8;
+    const Duration reply =
+        wire_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
+    const Duration think = std::clamp<Duration>(3 * stations.slowest().value_or(10ms), 20ms, 100ms);
+    quiet.rest_until(now + silent_interval(serial_) + think + reply);
+}
+
+bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const {
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu)) return false;
+    const Station* station = stations.find(adu[0]);
+    return station != nullptr && station->judge(now, pdu_of(adu)) == Stray::unasked;
+}
+
+}  // namespace panelgate::arbiter
