@@ -7,7 +7,9 @@
 #include <sys/socket.h>
 
 #include <boost/asio/connect.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <charconv>
 #include <optional>
 #include <utility>
 
@@ -52,6 +54,17 @@ void set_options(int fd) {
     set(IPPROTO_TCP, TCP_KEEPCNT, kProbes);
 }
 
+/// Nothing on a name. A number needs no resolver, which answers one line after the other: a name
+/// server that is silent must not keep this line waiting.
+std::optional<tcp::endpoint> numeric(const TcpEndpoint& endpoint) {
+    error_code is_name;
+    const asio::ip::address address = asio::ip::make_address(endpoint.host, is_name);
+    if (is_name) return std::nullopt;
+    std::uint16_t port = 0;
+    std::from_chars(endpoint.port.data(), endpoint.port.data() + endpoint.port.size(), port);
+    return tcp::endpoint(address, port);
+}
+
 class TcpLine final : public DescriptorLine {
   public:
     TcpLine(const asio::any_io_executor& executor, Settings settings, TcpEndpoint endpoint)
@@ -71,6 +84,7 @@ class TcpLine final : public DescriptorLine {
     void close_device(bool discard) override;
     std::string takes_nothing() const override { return "the connection takes nothing"; }
     std::optional<TimePoint> unacknowledged_since();
+    void resolve();
     ssize_t put(ByteView bytes) override {
         return ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     }
@@ -103,6 +117,12 @@ void TcpLine::begin_open() {
     patience_.async_wait([this, current = current()](const error_code& error) {
         if (!error && current()) failed("no answer within 5 s");
     });
+    const auto address = numeric(endpoint_);
+    if (!address) return resolve();
+    connect(tcp::resolver::results_type::create(*address, endpoint_.host, endpoint_.port));
+}
+
+void TcpLine::resolve() {
     resolver_.async_resolve(
         endpoint_.host, endpoint_.port, tcp::resolver::numeric_service,
         [this, current = current()](const error_code& error,
