@@ -72,18 +72,29 @@ void DescriptorLine::open_failed(const std::string& why) {
 void DescriptorLine::opened() {
     if (openings_++ > 0) ++counters_.reopens;
     last_error_.clear();
-    reopen_.succeeded();
+    has_brought_ = false;
     wait_readable();
     events_->on_up();
 }
 
 void DescriptorLine::lost(const std::string& why) {
     close();
-    last_error_ = settings_.device + " is gone: " + why;
-    if (events_ != nullptr) events_->on_down(last_error_);
+    go_down(settings_.device + " is gone: " + why, has_brought_ || may_be_back());
+}
+
+void DescriptorLine::reset(const std::string& why) {
+    if (!descriptor_.is_open()) return;
+    close(true);
+    go_down(settings_.device + " is opened anew: " + why, has_brought_);
+}
+
+/// An opening that has brought nothing waits as one that failed: the next may be as useless.
+void DescriptorLine::go_down(const std::string& why, bool look_at_once) {
+    last_error_ = why;
+    if (events_ != nullptr) events_->on_down(why);
     if (events_ == nullptr) return;
     retry_later();
-    open_soon();  // it may be there again already
+    if (look_at_once) open_soon();
 }
 
 void DescriptorLine::retry_later() {
@@ -104,9 +115,13 @@ void DescriptorLine::open_soon() {
     wait_to_open();
 }
 
-void DescriptorLine::close() {
+/// What should have left long ago is not to be sent when nobody waits for it any more.
+void DescriptorLine::close(bool discard) {
+    if (descriptor_.is_open()) close_device(discard || undelivered());
     unsent_.clear();
-    if (descriptor_.is_open()) before_close();
+}
+
+void DescriptorLine::close_device(bool) {
     error_code ignored;  // close() itself may fail on an unplugged device
     descriptor_.close(ignored);
 }
@@ -130,6 +145,7 @@ void DescriptorLine::read_all() {
         const ssize_t n = get(buffer);
         if (n > 0) {
             counters_.bytes_received += static_cast<std::uint64_t>(n);
+            if (!std::exchange(has_brought_, true)) reopen_.succeeded();
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
             if (events_ == nullptr || !descriptor_.is_open()) return;
             if (static_cast<std::size_t>(n) < buffer.size()) return;
@@ -143,8 +159,9 @@ void DescriptorLine::read_all() {
 
 void DescriptorLine::write(ByteView bytes) {
     if (!descriptor_.is_open()) return;
+    if (undelivered()) return reset(takes_nothing());
     counters_.bytes_sent += bytes.size();
-    unsent_.insert(unsent_.end(), bytes.begin(), bytes.end());
+    unsent_.assign(bytes.begin(), bytes.end());
     flush();
 }
 

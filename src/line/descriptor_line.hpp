@@ -16,8 +16,9 @@
 namespace panelgate::line {
 
 /// What lines on a non-blocking descriptor have in common: one read loop, writes in one piece,
-/// closing at the first sign of loss and opening again with back-off. How to open is the derived
-/// class's: begin_open() ends, at once or later, in opened() or open_failed().
+/// never more than one frame that has not left, closing at the first sign of loss and opening again
+/// with back-off. An opening counts as a success when it has brought a byte. How to open is the
+/// derived class's: begin_open() ends, at once or later, in opened() or open_failed().
 class DescriptorLine : public Line {
   public:
     DescriptorLine(const boost::asio::any_io_executor& executor, Settings settings);
@@ -25,7 +26,10 @@ class DescriptorLine : public Line {
     void start(Events& events) final;
     void stop() final;
     void poll_input() final;
+    /// Resets the line when what was written before has not left (undelivered()).
     void write(ByteView bytes) override;
+    bool undelivered() override { return !unsent_.empty(); }
+    void reset(const std::string& why) final;
     const Counters& counters() final {
         counters_.uart = uart_errors();
         return counters_;
@@ -41,8 +45,13 @@ class DescriptorLine : public Line {
     /// stop() and a loss cancel an attempt that is under way.
     virtual void cancel_open() {}
 
-    /// The device is open and about to be closed.
-    virtual void before_close() {}
+    /// Closes the open device. `discard`: what has not left is never to leave.
+    virtual void close_device(bool discard);
+    /// Why write() resets the line.
+    virtual std::string takes_nothing() const { return "the device takes nothing"; }
+    /// A loss may go unseen until the device is there again: one look at once, whatever the opening
+    /// has brought.
+    virtual bool may_be_back() const { return false; }
     /// What the driver has counted, also while the device is closed.
     virtual std::optional<UartErrors> uart_errors() { return {}; }
     /// Something may be there now: tries, unless it is open or was tried a moment ago.
@@ -65,9 +74,10 @@ class DescriptorLine : public Line {
     boost::asio::any_io_executor executor() { return timer_.get_executor(); }
 
   private:
+    void go_down(const std::string& why, bool look_at_once);
     void retry_later();
     void wait_to_open();
-    void close();
+    void close(bool discard = false);
     void wait_readable();
     void read_all();
     void flush();
@@ -81,6 +91,7 @@ class DescriptorLine : public Line {
     Counters counters_;           ///< the driver's part is fetched when somebody asks
     Bytes unsent_;                ///< what the driver did not take at once; at most one frame
     std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
+    bool has_brought_ = false;    ///< this opening, a byte
     std::string last_error_;
     TimePoint next_try_{};  ///< open_soon() before this has to wait
 };

@@ -2,9 +2,11 @@
 
 #include <asm/ioctls.h>
 #include <linux/serial.h>
+#include <termios.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 
@@ -30,6 +32,10 @@ Duration unsent_time(int fd, const Driver& driver, Duration character, PortOps& 
     if (driver.tells_empty && ops.control(fd, TIOCSERGETLSR, &status) < 0) status = TIOCSER_TEMT;
     const int shifting = (status & TIOCSER_TEMT) == 0 ? 1 : 0;
     return (std::max(queued, 0) + shifting) * character;
+}
+
+void drop_unsent(int fd, PortOps& ops) {
+    ops.control(fd, TCFLSH, reinterpret_cast<void*>(std::uintptr_t{TCOFLUSH}));
 }
 
 namespace {

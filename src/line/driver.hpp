@@ -19,6 +19,9 @@ Driver look_at_driver(int fd, PortOps& ops);
 /// How long the wire still needs for what was written, as far as the driver tells: never blocks.
 Duration unsent_time(int fd, const Driver& driver, Duration character, PortOps& ops);
 
+/// Throws away what was written and has not left. usbserial cannot, and goes on holding it.
+void drop_unsent(int fd, PortOps& ops);
+
 /// Received bytes are to be handed over at once and not when a timer of the adapter says so (FTDI:
 /// 16 ms): ASYNC_LOW_LATENCY, else the adapter's `latency_timer` under `sysfs`. Empty when that is
 /// done or there is nothing to do; else what slows the line down, and what helps.

@@ -1,14 +1,20 @@
 #include "panelgate/line/tcp_line.hpp"
 
+#include <linux/sockios.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include <boost/asio/connect.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <charconv>
+#include <optional>
 #include <utility>
 
 #include "descriptor_line.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -19,17 +25,44 @@ using boost::system::error_code;
 
 constexpr Duration kConnectTimeout = 5s;
 
-/// A server that has gone is noticed within half a minute also while nobody asks.
+/// How long the kernel goes on with bytes that the server does not acknowledge, or has no room for
+/// (TCP_USER_TIMEOUT). Its own patience, 15 minutes, would keep the line up without a server. Five
+/// retransmissions fit in (after 0.2, 0.6, 1.4, 3 and 6.2 s, the last one at the limit).
+constexpr int kPatience = 6;  // s
+
+/// Probes of an idle connection. The patience above ends them too, in place of their number: so the
+/// first has to be early enough for three of them. A server that has gone is noticed within it also
+/// while nobody asks.
+constexpr int kIdle = 3;        // s before the first probe
+constexpr int kProbePause = 1;  // s
+constexpr int kProbes = 3;
+static_assert(kIdle + kProbes * kProbePause <= kPatience);
+
+/// A server may keep an acknowledgement back until there is something to send with it: Linux and
+/// Windows up to 200 ms. What it has had for a shorter time says nothing.
+constexpr Duration kDelayedAck = 200ms;
+
 void set_options(int fd) {
-    const int on = 1;
-    const int idle = 10;  // s before the first probe
-    const int pause = 5;  // s between probes
-    const int probes = 3;
-    ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    ::setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
-    ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
-    ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &pause, sizeof pause);
-    ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
+    const auto set = [fd](int level, int name, int value) {
+        ::setsockopt(fd, level, name, &value, sizeof value);
+    };
+    set(IPPROTO_TCP, TCP_NODELAY, 1);
+    set(IPPROTO_TCP, TCP_USER_TIMEOUT, kPatience * 1000);
+    set(SOL_SOCKET, SO_KEEPALIVE, 1);
+    set(IPPROTO_TCP, TCP_KEEPIDLE, kIdle);
+    set(IPPROTO_TCP, TCP_KEEPINTVL, kProbePause);
+    set(IPPROTO_TCP, TCP_KEEPCNT, kProbes);
+}
+
+/// Nothing on a name. A number needs no resolver, which answers one line after the other: a name
+/// server that is silent must not keep this line waiting.
+std::optional<tcp::endpoint> numeric(const TcpEndpoint& endpoint) {
+    error_code is_name;
+    const asio::ip::address address = asio::ip::make_address(endpoint.host, is_name);
+    if (is_name) return std::nullopt;
+    std::uint16_t port = 0;
+    std::from_chars(endpoint.port.data(), endpoint.port.data() + endpoint.port.size(), port);
+    return tcp::endpoint(address, port);
 }
 
 class TcpLine final : public DescriptorLine {
@@ -43,9 +76,15 @@ class TcpLine final : public DescriptorLine {
     ~TcpLine() override { stop(); }
 
     Duration latency() override;
+    void write(ByteView bytes) override;
+    bool undelivered() override;
 
   private:
     void begin_open() override;
+    void close_device(bool discard) override;
+    std::string takes_nothing() const override { return "the connection takes nothing"; }
+    std::optional<TimePoint> unacknowledged_since();
+    void resolve();
     ssize_t put(ByteView bytes) override {
         return ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     }
@@ -67,6 +106,9 @@ class TcpLine final : public DescriptorLine {
     tcp::socket socket_;  ///< while it connects
     asio::steady_timer patience_;
     std::uint64_t attempt_ = 0;
+    TimePoint last_write_{};
+    std::size_t last_size_ = 0;
+    TimePoint older_{};  ///< of what had not been acknowledged when the last frame was written
 };
 
 void TcpLine::begin_open() {
@@ -75,6 +117,12 @@ void TcpLine::begin_open() {
     patience_.async_wait([this, current = current()](const error_code& error) {
         if (!error && current()) failed("no answer within 5 s");
     });
+    const auto address = numeric(endpoint_);
+    if (!address) return resolve();
+    connect(tcp::resolver::results_type::create(*address, endpoint_.host, endpoint_.port));
+}
+
+void TcpLine::resolve() {
     resolver_.async_resolve(
         endpoint_.host, endpoint_.port, tcp::resolver::numeric_service,
         [this, current = current()](const error_code& error,
@@ -123,6 +171,37 @@ Duration TcpLine::latency() {
     socklen_t size = sizeof info;
     if (!is_open() || ::getsockopt(fd(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return {};
     return std::chrono::microseconds(info.tcpi_rtt + 4 * info.tcpi_rttvar);
+}
+
+void TcpLine::write(ByteView bytes) {
+    if (!is_open()) return;
+    if (undelivered()) return reset(takes_nothing());  // what follows makes this frame the last one
+    const TimePoint now = rt::now();
+    older_ = unacknowledged_since().value_or(now);
+    last_write_ = now;
+    last_size_ = bytes.size();
+    DescriptorLine::write(bytes);
+}
+
+/// When the oldest byte was written that the server's system has not acknowledged.
+std::optional<TimePoint> TcpLine::unacknowledged_since() {
+    int waiting = 0;
+    if (::ioctl(fd(), SIOCOUTQ, &waiting) != 0 || waiting <= 0) return std::nullopt;
+    return static_cast<std::size_t>(waiting) <= last_size_ ? last_write_ : older_;
+}
+
+bool TcpLine::undelivered() {
+    if (!is_open()) return false;
+    if (DescriptorLine::undelivered()) return true;
+    const auto since = unacknowledged_since();
+    return since && rt::now() - *since >= latency() + kDelayedAck;
+}
+
+/// Discarding needs a reset (RST): after a usual end the kernel goes on sending what it holds.
+void TcpLine::close_device(bool discard) {
+    const linger at_once{1, 0};
+    if (discard) ::setsockopt(fd(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    DescriptorLine::close_device(discard);
 }
 
 }  // namespace

@@ -10,14 +10,22 @@
 #include "descriptor_line.hpp"
 #include "device_watch.hpp"
 #include "driver.hpp"
+#include "impatience.hpp"
 #include "open_error.hpp"
 #include "panelgate/line/termios_setup.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "rs485.hpp"
 #include "rts_sender.hpp"
 
 namespace panelgate::line {
 namespace {
+
+/// What a driver may take longer than the wire: an adapter on a busy USB or one that wakes up.
+constexpr Duration kTransferTime = 50ms;
+
+/// For the closing of a device that keeps what it was given although it was told to drop it.
+constexpr Duration kCloseWait = 10ms;
 
 class TtyLine final : public DescriptorLine {
   public:
@@ -38,12 +46,15 @@ class TtyLine final : public DescriptorLine {
         return off ? Duration::zero() : settings().rs485.delay_before_send;
     }
     std::optional<Duration> unsent() override;
+    bool undelivered() override;
 
   private:
     void begin_open() override;
     void waiting() override { watch_.look(); }
     void cancel_open() override { watch_.stop(); }
-    void before_close() override;
+    void close_device(bool discard) override;
+    bool may_be_back() const override { return true; }
+    bool holds_nothing() { return unsent().value_or(Duration::zero()) == Duration::zero(); }
     std::optional<UartErrors> uart_errors() override {
         return is_open() ? errors_.look(fd(), ops_) : errors_.last();
     }
@@ -60,6 +71,7 @@ class TtyLine final : public DescriptorLine {
     std::string last_warning_;
     std::string last_rs485_warning_;
     std::string last_slow_;
+    TimePoint gone_by_{};     ///< a driver that still holds something then is stuck
     bool exclusive_ = false;  ///< by us: another program's hold is not ours to lift
 };
 
@@ -86,6 +98,7 @@ std::string TtyLine::set_up() {
     if (!result.error.empty()) return result.error;
     warn_once(last_warning_, "device settings differ", result.warning);
     driver_ = look_at_driver(fd(), ops_);
+    gone_by_ = rt::now() + kTransferTime;
     errors_.opened(fd(), ops_);
     warn_once(last_slow_, "slow adapter", ask_low_latency(fd(), settings().device, ops_));
     return set_up_sending();
@@ -114,15 +127,33 @@ void TtyLine::warn_once(std::string& last, const std::string& what, const std::s
     last = why;
 }
 
-void TtyLine::before_close() {
+void TtyLine::close_device(bool discard) {
     rts_.closing();
     if (std::exchange(exclusive_, false)) ops_.control(fd(), TIOCNXCL, nullptr);
+    std::optional<Impatience> impatience;
+    if (discard) {
+        drop_unsent(fd(), ops_);
+        if (!holds_nothing()) impatience.emplace(kCloseWait);
+        // Nothing follows: whoever else is on the line must not find it held.
+        if (settings().rs485.mode == Rs485::Mode::rts)
+            switch_rts(fd(), settings().rs485, false, ops_);
+    }
+    DescriptorLine::close_device(discard);
 }
 
 void TtyLine::write(ByteView bytes) {
     if (!is_open()) return;
+    if (holds_nothing()) {
+        gone_by_ = rt::now() + lead() + wire_time(settings().serial, bytes.size()) + kTransferTime;
+    }
     if (settings().rs485.mode == Rs485::Mode::rts) return rts_.write(bytes);
     DescriptorLine::write(bytes);
+}
+
+bool TtyLine::undelivered() {
+    if (!is_open()) return false;
+    if (DescriptorLine::undelivered()) return true;
+    return rt::now() >= gone_by_ && !holds_nothing();
 }
 
 bool TtyLine::set_format(const SerialFormat& format) {

@@ -11,7 +11,9 @@ namespace panelgate::line {
 
 /// A serial device (or pty) through termios on a non-blocking descriptor. Read 0, EIO, ENODEV,
 /// ENXIO and a hang-up all mean the device has gone: it is closed at once and opened again with
-/// back-off, every setting applied anew. `ops` outlives the line.
+/// back-off, every setting applied anew. undelivered(): it did not take what was written, or its
+/// driver still holds it long after its time; bytes that an adapter has taken and keeps to itself
+/// are not seen. `ops` outlives the line.
 std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings,
                                     PortOps& ops = kernel_ops());
 

@@ -1,6 +1,5 @@
 // P7: every way in which a device says that it has gone.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
 #include <cerrno>
@@ -8,40 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "descriptor_line.hpp"
+#include "failing_line.hpp"
 #include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
 
 namespace panelgate::line {
 namespace {
-
-/// Opens at once; reading and writing end as a test says.
-class FailingLine final : public DescriptorLine {
-  public:
-    FailingLine(const boost::asio::any_io_executor& executor, const Settings& settings,
-                const Pty& pty)
-        : DescriptorLine(executor, settings), pty_(pty) {}
-    ~FailingLine() override { stop(); }
-
-    int read_error = EAGAIN;  ///< 0: end of file
-    int write_error = 0;
-
-  private:
-    void begin_open() override {
-        adopt(::dup(pty_.master()));
-        opened();
-    }
-    ssize_t get(std::span<std::uint8_t>) override {
-        errno = read_error;
-        return read_error == 0 ? 0 : -1;
-    }
-    ssize_t put(ByteView bytes) override {
-        errno = write_error;
-        return write_error == 0 ? static_cast<ssize_t>(bytes.size()) : -1;
-    }
-
-    const Pty& pty_;
-};
 
 class LostDevice : public testing::TestWithParam<int> {
   protected:

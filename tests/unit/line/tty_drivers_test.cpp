@@ -118,7 +118,7 @@ TEST_F(TtyDrivers, RtsStaysForWhatTheDriverStillHolds) {
     uart.type = PORT_16550A;
     ops.give(TIOCGSERIAL, uart);
     ops.give(TIOCSERGETLSR, unsigned{TIOCSER_TEMT});
-    std::deque<int> queue{0, 7, 2};  // at opening, then at each look
+    std::deque<int> queue{0, 0, 7, 2};  // at opening, before the frame, then at each look
     ops.answers[TIOCOUTQ] = [&](void* argument) {
         *static_cast<int*>(argument) = queue.empty() ? 0 : queue.front();
         if (!queue.empty()) queue.pop_front();

@@ -1,0 +1,107 @@
+// When a line that was opened and was of no use is opened again.
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cerrno>
+#include <string>
+
+#include "failing_line.hpp"
+#include "line_events.hpp"
+#include "panelgate/line/pty.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+
+namespace panelgate::line {
+namespace {
+
+class Reopening : public testing::Test {
+  protected:
+    Reopening() { line.start(heard); }
+    /// From the line's going down to its being up again.
+    Duration pause() {
+        const int ups = heard.ups;
+        const TimePoint begin = rt::now();
+        while (heard.ups == ups) io.run_one();
+        return rt::now() - begin;
+    }
+    Duration pause_after_reset() {
+        line.reset("not taken");
+        return pause();
+    }
+
+    boost::asio::io_context io{1};
+    Settings settings{"/dev/ttyUSB0", {}, {}, 10ms, 80ms};
+    Pty pty;
+    Heard heard;
+    FailingLine line{io.get_executor(), settings, pty};
+};
+
+TEST_F(Reopening, P7WaitsLongerAfterEachResetThatFollowsAnOpeningWithoutAByte) {
+    EXPECT_GE(pause_after_reset(), settings.reopen_min);
+    EXPECT_GE(pause_after_reset(), 2 * settings.reopen_min);
+    EXPECT_GE(pause_after_reset(), 4 * settings.reopen_min);
+    EXPECT_GE(pause_after_reset(), settings.reopen_max);
+    EXPECT_GE(pause_after_reset(), settings.reopen_max);
+}
+
+TEST_F(Reopening, StartsAnewWhenAByteHasCome) {
+    settings.reopen_max = 10s;
+    FailingLine patient{io.get_executor(), settings, pty};
+    patient.start(heard);
+    Duration grown{};
+    for (int i = 0; i < 5; ++i) {
+        patient.reset("not taken");
+        grown = pause();
+    }
+    patient.bring();
+    patient.reset("not taken");
+    const Duration useful = pause();
+    EXPECT_LT(useful, grown / 2);  // at once
+    patient.reset("not taken");
+    EXPECT_LT(pause(), grown / 2);  // the shortest pause again
+}
+
+TEST_F(Reopening, P7AServerThatAcceptsAndHangsUpIsNotAskedInATightLoop) {
+    Duration all{};
+    for (int i = 0; i < 3; ++i) {
+        line.lose();
+        all += pause();
+    }
+    EXPECT_GE(all, 7 * settings.reopen_min);
+}
+
+TEST_F(Reopening, AResetSaysWhatAndWhyAndDiscards) {
+    line.reset("the request was not taken");
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_EQ(heard.downs[0], "/dev/ttyUSB0 is opened anew: the request was not taken");
+    EXPECT_TRUE(line.closed_for_good);
+    line.reset("again");  // down already
+    EXPECT_EQ(heard.downs.size(), 1u);
+}
+
+TEST_F(Reopening, ALossDiscardsOnlyWhatShouldHaveLeft) {
+    line.write(Bytes{1, 2, 3});
+    line.lose();
+    EXPECT_FALSE(line.closed_for_good);
+    pause();
+    line.write_error = EAGAIN;
+    line.write(Bytes{1, 2, 3});
+    line.lose();
+    EXPECT_TRUE(line.closed_for_good);
+}
+
+TEST_F(Reopening, P1AtMostOneFrameIsEverUnsent) {
+    line.write_error = EAGAIN;
+    EXPECT_FALSE(line.undelivered());
+    line.write(Bytes{1, 2, 3});
+    EXPECT_TRUE(heard.downs.empty());
+    EXPECT_TRUE(line.undelivered());
+    line.write(Bytes{4, 5, 6});
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_EQ(heard.downs[0], "/dev/ttyUSB0 is opened anew: the device takes nothing");
+    EXPECT_TRUE(line.closed_for_good);
+    EXPECT_FALSE(line.undelivered());
+    EXPECT_EQ(line.counters().bytes_sent, 3u);
+}
+
+}  // namespace
+}  // namespace panelgate::line
