@@ -46,13 +46,15 @@ inline Bytes reply_to_read(std::uint16_t value) { return Writer().u8(3).u8(2).u1
 /// A client whose socket lives in the same thread: it runs the loop while it waits.
 class Client {
   public:
-    Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0)
+    Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0,
+           const char* own_address = "127.0.0.1")
         : context_(context), socket_(context) {
         const tcp::endpoint server(asio::ip::address_v4::loopback(), port);
         socket_.open(tcp::v4());
         if (receive_buffer != 0) {
             socket_.set_option(tcp::socket::receive_buffer_size(receive_buffer));
         }
+        socket_.bind({asio::ip::make_address(own_address), 0});
         socket_.connect(server);
         socket_.set_option(tcp::no_delay(true));
         socket_.non_blocking(true);
