@@ -106,6 +106,8 @@ class Client {
             return closed_;
         });
     }
+    /// It was cut off: what was under way to it may be lost.
+    bool was_reset() const { return reset_; }
     /// Whether something has come that was not received yet.
     bool has_input() {
         pull();
@@ -120,6 +122,7 @@ class Client {
         error_code error;
         const std::size_t n = socket_.read_some(asio::buffer(chunk), error);
         if (error && error != asio::error::would_block) closed_ = true;
+        if (error == asio::error::connection_reset) reset_ = true;
         received_ += n;
         framer_.feed(ByteView(chunk.data(), n));
     }
@@ -130,6 +133,7 @@ class Client {
     std::uint16_t last_transaction_ = 100;
     std::size_t received_ = 0;
     bool closed_ = false;
+    bool reset_ = false;
 };
 
 /// A listener on a free loopback port with two lines: floor1 (stations 1 and 2, the second read

@@ -64,6 +64,21 @@ TEST_F(SessionPipeline, P9TakesEightyRequestsAndThenNoMore) {
     EXPECT_EQ(bus1.seen.size(), 16U);
 }
 
+TEST_F(SessionPipeline, ReadsWhatNobodyWillAnswerSoThatTheLastRepliesArrive) {
+    settings.in_flight = 1;
+    settings.waiting = 1;
+    start();
+    Client client = connect();
+    client.send(reads(1000));  // more than one read, so some of it is left in the kernel
+    ASSERT_TRUE(run_until_held(1));
+    listener->stop([] {});
+    do_all_that_is_due();
+    expect_values(client, 0, 1);
+    expect_refusals(client, 1, 2);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_FALSE(client.was_reset());
+}
+
 TEST_F(SessionPipeline, P9LetsTheKernelHoldUpAClientThatAsksTooMuch) {
     start();
     Client client = connect();
