@@ -13,8 +13,11 @@
 #include <utility>
 
 #include "access_list.hpp"
+#include "caller.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "session.hpp"
+#include "shared.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -72,7 +75,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
   private:
     void accept();
     void on_accept(const error_code& error, tcp::socket socket);
-    void admit(tcp::socket socket, std::string client);
+    void admit(tcp::socket socket, const tcp::endpoint& peer);
     bool has_room();
     void on_closed(const std::shared_ptr<Session>& session);
     void close_acceptor();
@@ -144,7 +147,7 @@ void Listener::Core::on_accept(const error_code& error, tcp::socket socket) {
         if (!gone && !allowed_.allows(peer.address())) {
             shared_->log("connection refused", text(peer), "reason=\"not in the allow list\"");
         } else if (!gone && has_room()) {
-            admit(std::move(socket), text(peer));
+            admit(std::move(socket), peer);
         }
     }
     accept();
@@ -159,15 +162,15 @@ bool Listener::Core::has_room() {
     return !full;
 }
 
-void Listener::Core::admit(tcp::socket socket, std::string client) {
+void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
     set_up(socket, shared_->settings.output_limit);
     const auto session = std::make_shared<Session>(
-        std::move(socket), std::move(client), shared_,
+        std::move(socket), shared_,
         [weak = weak_from_this()](const std::shared_ptr<Session>& closed) {
             if (const auto self = weak.lock()) self->on_closed(closed);
         });
     sessions_.insert(session);
-    session->start();
+    session->start(Caller(text(peer), bus::host_of(peer.address().to_string())));
 }
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {

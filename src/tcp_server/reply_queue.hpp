@@ -9,8 +9,8 @@
 
 namespace panelgate::tcp_server {
 
-/// The requests of one connection that are not answered yet, in the order of their arrival
-/// (PIP-02): a reply leaves only when all before it have left. Pure.
+/// The replies of one connection, in the order of the requests' arrival (PIP-02): one leaves only
+/// when all before it have left. Pure.
 class ReplyQueue {
   public:
     /// Names one request for as long as the connection lives.
@@ -29,26 +29,28 @@ class ReplyQueue {
     std::optional<Bytes> pop();
 
     bool empty() const { return slots_.empty(); }
-    /// Requests that were opened and have not been popped: what the client sees as outstanding.
-    std::size_t in_flight() const { return in_flight_; }
-    /// Bytes of replies that wait for their turn.
+    /// Requests that are neither settled nor dropped.
+    std::size_t unanswered() const { return unanswered_; }
+    /// Requests whose replies may not leave yet: the first unanswered one and all behind it.
+    std::size_t held() const { return slots_.size() - ready_; }
+    /// Bytes of the replies that may leave: these wait for nobody but the client.
     std::size_t ready_bytes() const { return ready_bytes_; }
 
   private:
     struct Slot {
         std::uint16_t transaction = 0;
         std::uint8_t unit = 0;
-        bool opened = false;
         bool settled = false;
         Bytes adu;  ///< empty when nothing is to be sent
     };
     Slot& at(Ticket ticket) { return slots_[static_cast<std::size_t>(ticket - first_)]; }
-    void fill(Slot& slot, ByteView pdu);
+    void close(Slot& slot);
 
     std::deque<Slot> slots_;
-    Ticket first_ = 0;  ///< of slots_.front()
-    std::size_t in_flight_ = 0;
+    Ticket first_ = 0;       ///< of slots_.front()
+    std::size_t ready_ = 0;  ///< slots at the front that are settled
     std::size_t ready_bytes_ = 0;
+    std::size_t unanswered_ = 0;
 };
 
 }  // namespace panelgate::tcp_server

@@ -45,6 +45,7 @@ asio::awaitable<bus::Answer> transact(std::shared_ptr<BusCaller> caller, bus::Bu
     if (!caller->abandoned) {
         if (caller->used.insert(bus).second) bus->name_client(caller->client, caller->name);
         request.client = caller->client;
+        request.host = caller->host;
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);
         if (!caller->abandoned) co_return answer;

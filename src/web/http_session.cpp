@@ -84,6 +84,9 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<const Api
       buffer_(kHeaderLimit + kReadSize + api_->settings.max_body) {
     boost::system::error_code ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+    boost::system::error_code gone;
+    const auto peer = stream_.socket().remote_endpoint(gone);
+    if (!gone) caller_->host = bus::host_of(peer.address().to_string());
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {

@@ -36,7 +36,8 @@ struct Settings {
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
-    std::size_t in_flight = 16;            ///< per connection; one more is answered 06
+    std::size_t in_flight = 16;            ///< requests of one connection on the buses
+    std::size_t waiting = 64;              ///< requests that wait behind them; then nobody reads
     Duration partial_adu_timeout = 5s;     ///< a half-sent ADU closes its connection
     int bad_protocol_ids = 3;              ///< in a row close the connection
     std::size_t output_limit = 64 * 1024;  ///< bytes that a client has not read; above it is closed

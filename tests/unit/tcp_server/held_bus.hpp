@@ -3,6 +3,9 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <deque>
+#include <map>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -39,6 +42,9 @@ class HeldBus : public bus::BusClient {
         held = std::move(kept);
         for (Held& one : gone) one.handler(bus::Answer{});
     }
+    void name_client(bus::ClientId client, std::string name) override {
+        names[client] = std::move(name);
+    }
     bus::LineStatus status() const override { return line; }
     bus::StationStatus station_status(std::uint8_t) const override { return {}; }
     std::vector<bus::TraceFrame> trace(std::size_t) const override { return {}; }
@@ -56,6 +62,7 @@ class HeldBus : public bus::BusClient {
     std::deque<Held> held;
     std::vector<bus::Request> seen;
     std::vector<bus::ClientId> cancelled;
+    std::map<bus::ClientId, std::string> names;
     std::optional<Bytes> instant;  ///< the reply to everything, without being held
     bus::LineStatus line;
 

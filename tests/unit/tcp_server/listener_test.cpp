@@ -65,6 +65,40 @@ TEST_F(ListenerTest, LetsAnAllowedPeerIn) {
     EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
 }
 
+TEST_F(ListenerTest, P9TellsTheBusesWhoAsksAndFromWhichAddress) {
+    lines[0].read_only.clear();
+    start();
+    Client first = connect();
+    Client second = connect();
+    Client other(context, listener->port(), 0, "127.0.0.2");
+    first.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until_held(1));
+    second.request(1, 0, "06 0000 0001"_hex);
+    ASSERT_TRUE(run_until_held(2));
+    other.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until_held(3));
+    EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
+    EXPECT_EQ(bus1.seen[1].host, bus1.seen[0].host);
+    EXPECT_EQ(bus1.seen[2].host, bus::host_of("127.0.0.2"));
+    EXPECT_NE(bus1.seen[2].host, bus1.seen[0].host);
+    EXPECT_THAT(bus1.names[bus1.seen[0].client], HasSubstr("modbus_tcp 127.0.0.1:"));
+    EXPECT_THAT(bus1.names[bus1.seen[1].client], HasSubstr("modbus_tcp 127.0.0.1:"))
+        << "a broadcast is somebody's too";
+}
+
+TEST_F(ListenerTest, P9TakesIpv4ForTheSameAddressOnAnIpv6Listener) {
+    settings.address = "::";
+    bus1.instant = reply_to_read(1);
+    try {
+        start();
+    } catch (const std::system_error&) {
+        GTEST_SKIP() << "no IPv6 here";
+    }
+    Client client = connect();
+    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
+}
+
 TEST_F(ListenerTest, RefusesTheNewestWhenItIsFull) {
     settings.max_connections = 2;
     bus1.instant = reply_to_read(1);

@@ -46,13 +46,15 @@ inline Bytes reply_to_read(std::uint16_t value) { return Writer().u8(3).u8(2).u1
 /// A client whose socket lives in the same thread: it runs the loop while it waits.
 class Client {
   public:
-    Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0)
+    Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0,
+           const char* own_address = "127.0.0.1")
         : context_(context), socket_(context) {
         const tcp::endpoint server(asio::ip::address_v4::loopback(), port);
         socket_.open(tcp::v4());
         if (receive_buffer != 0) {
             socket_.set_option(tcp::socket::receive_buffer_size(receive_buffer));
         }
+        socket_.bind({asio::ip::make_address(own_address), 0});
         socket_.connect(server);
         socket_.set_option(tcp::no_delay(true));
         socket_.non_blocking(true);
@@ -104,6 +106,8 @@ class Client {
             return closed_;
         });
     }
+    /// It was cut off: what was under way to it may be lost.
+    bool was_reset() const { return reset_; }
     /// Whether something has come that was not received yet.
     bool has_input() {
         pull();
@@ -118,6 +122,7 @@ class Client {
         error_code error;
         const std::size_t n = socket_.read_some(asio::buffer(chunk), error);
         if (error && error != asio::error::would_block) closed_ = true;
+        if (error == asio::error::connection_reset) reset_ = true;
         received_ += n;
         framer_.feed(ByteView(chunk.data(), n));
     }
@@ -128,6 +133,7 @@ class Client {
     std::uint16_t last_transaction_ = 100;
     std::size_t received_ = 0;
     bool closed_ = false;
+    bool reset_ = false;
 };
 
 /// A listener on a free loopback port with two lines: floor1 (stations 1 and 2, the second read

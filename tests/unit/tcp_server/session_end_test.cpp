@@ -8,7 +8,24 @@ namespace {
 using ::testing::ElementsAre;
 
 // Clients that leave, and clients that do not read.
-class SessionEnd : public Loopback {};
+class SessionEnd : public Loopback {
+  protected:
+    /// More than the session takes before it stops reading; the addresses tell them apart.
+    void send_hundred_reads(Client& client) {
+        Bytes stream;
+        for (std::uint16_t i = 0; i < 100; ++i) {
+            stream = stream + modbus::encode_mbap(i, 1, read_pdu(i));
+        }
+        client.send(stream);
+    }
+    void answer_and_receive(Client& client, std::uint16_t end) {
+        for (std::uint16_t i = 0; i < end; ++i) {
+            ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
+            bus1.answer(0, reply_to_read(i));
+            ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
+        }
+    }
+};
 
 TEST_F(SessionEnd, TakesItsRequestsBackWhenTheClientIsReset) {
     start();
@@ -46,6 +63,56 @@ TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatTheClientHasClosed) {
     bus1.answer(0, reply_to_read(0));
     ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
     EXPECT_TRUE(bus1.held.empty());
+}
+
+TEST_F(SessionEnd, P2NoticesAResetAlsoWhileItDoesNotRead) {
+    start();
+    Client client = connect();
+    send_hundred_reads(client);
+    ASSERT_TRUE(run_until_held(16));
+    client.socket().set_option(asio::socket_base::linger(true, 0));
+    client.socket().close();
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    EXPECT_TRUE(bus1.held.empty());
+    EXPECT_EQ(bus1.seen.size(), 16U) << "what waited in the session never starts";
+}
+
+TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatAClientHasClosedWhileItDidNotRead) {
+    settings.half_close_grace = 60s;
+    start();
+    Client client = connect();
+    send_hundred_reads(client);
+    ASSERT_TRUE(run_until_held(16));
+    client.socket().close();
+    bus1.answer(0, reply_to_read(0));
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    EXPECT_TRUE(bus1.held.empty());
+    EXPECT_EQ(bus1.seen.size(), 17U) << "one took the place of the one that was answered";
+}
+
+TEST_F(SessionEnd, AnswersEverythingAlsoWhenTheSendingSideWasClosedWhileItDidNotRead) {
+    settings.half_close_grace = 60s;
+    start();
+    Client client = connect();
+    send_hundred_reads(client);
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    answer_and_receive(client, 100);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+}
+
+TEST_F(SessionEnd, P2WhatStillWaitsAfterTheGraceIsAnsweredAndNeverStarts) {
+    settings.half_close_grace = 20ms;
+    start();
+    Client client = connect();
+    send_hundred_reads(client);
+    answer_and_receive(client, 60);  // forty are left
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    for (std::uint16_t i = 60; i < 100; ++i) {
+        ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, "83 0a"_hex}));
+    }
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(bus1.seen.size(), 76U);
 }
 
 TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <boost/asio/steady_timer.hpp>
 #include <random>
 
 #include "loopback.hpp"
@@ -20,22 +19,6 @@ TEST_F(Session, EchoesTransactionAndUnit) {
     EXPECT_NE(bus1.held[0].request.client, 0U);
     bus1.answer(0, reply_to_read(42));
     EXPECT_EQ(client.receive(), (modbus::Adu{0xBEEF, 101, reply_to_read(42)}));
-}
-
-TEST_F(Session, AnswersTheSeventeenthRequestBusyAndInItsOrder) {
-    start();
-    Client client = connect();
-    for (std::uint16_t i = 0; i < 17; ++i) client.request(i, 1, read_pdu(i));
-    client.request(17, 255, "03 0000 0001"_hex);  // another one that is answered at once
-    ASSERT_TRUE(run_until_held(16));
-    for (std::uint16_t i = 0; i < 16; ++i) bus1.answer(0, reply_to_read(i));
-    for (std::uint16_t i = 0; i < 16; ++i) {
-        EXPECT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
-    }
-    EXPECT_EQ(client.receive(), (modbus::Adu{16, 1, "83 06"_hex}));
-    EXPECT_EQ(client.receive(), (modbus::Adu{17, 255, "03 02 0001"_hex}));
-    EXPECT_EQ(bus1.seen.size(), 16U);
-    EXPECT_EQ(ask_bus(client, 1, read_pdu(1), reply_to_read(1)), reply_to_read(1)) << "room again";
 }
 
 TEST_F(Session, KeepsTheOrderWhenTheBusDoesNot) {
@@ -239,83 +222,6 @@ TEST_F(Session, PrefersAnAliasToTheDiagnosticsUnit) {
     start();
     Client client = connect();
     EXPECT_EQ(ask_bus(client, 255, read_pdu(3), reply_to_read(3)), reply_to_read(3));
-}
-
-// Framing errors: MBAP-05 to MBAP-07.
-
-TEST_F(Session, SkipsAnotherProtocolAndServesTheNextRequest) {
-    bus1.instant = reply_to_read(1);
-    start();
-    Client client = connect();
-    const Bytes foreign = "0001 0001 0006 01 03 0000 0001"_hex;
-    client.send(foreign + foreign);
-    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(listener->counters().protocol_errors, 2U);
-    client.send(foreign + foreign);
-    EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1)) << "a good one in between starts anew";
-    client.send(foreign + foreign + foreign);
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_EQ(listener->counters().protocol_errors, 7U);
-}
-
-class BadLength : public Loopback, public ::testing::WithParamInterface<std::uint16_t> {};
-
-TEST_P(BadLength, ClosesOnlyThatConnection) {
-    bus1.instant = reply_to_read(1);
-    start();
-    Client bystander = connect();
-    Client client = connect();
-    client.send(Writer().u16(1).u16(0).u16(GetParam()).u8(1).u8(3).take());
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_FALSE(client.has_input()) << "closed without a reply";
-    EXPECT_EQ(listener->counters().protocol_errors, 1U);
-    EXPECT_EQ(bystander.ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(listener->counters().connections, 1U);
-}
-INSTANTIATE_TEST_SUITE_P(Lengths, BadLength, ::testing::Values(0, 1, 255, 65535));
-
-TEST_F(Session, TakesTheShortestAndTheLongestLength) {
-    bus1.instant = "07 00"_hex;
-    start();
-    Client client = connect();
-    EXPECT_EQ(client.ask(1, "07"_hex), "07 00"_hex);
-    EXPECT_EQ(client.ask(1, "41"_hex + Bytes(252, 1)), "07 00"_hex);
-    EXPECT_EQ(bus1.seen.back().pdu.size(), 253U);
-}
-
-TEST_F(Session, ClosesAConnectionThatSendsHalfAnAdu) {
-    settings.partial_adu_timeout = 30ms;
-    bus1.instant = reply_to_read(1);
-    start();
-    Client idle = connect();
-    Client client = connect();
-    client.send("0001 0000"_hex);
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_EQ(listener->counters().protocol_errors, 1U);
-    EXPECT_EQ(idle.ask(1, read_pdu(1)), reply_to_read(1)) << "silence alone is no fault";
-}
-
-TEST_F(Session, DoesNotLetDribblingBytesStretchTheTime) {
-    settings.partial_adu_timeout = 50ms;
-    start();
-    Client client = connect();
-    client.send("0001 0000 00fe 01"_hex);
-    // The rest of the 260 bytes would take far longer than the time that an ADU has.
-    asio::steady_timer pace(context);
-    const Bytes byte = {0x41};
-    const std::function<void()> dribble = [&] {
-        pace.expires_after(std::chrono::milliseconds(5));
-        pace.async_wait([&](const error_code& error) {
-            if (!error && client.try_send(byte)) dribble();
-        });
-    };
-    dribble();
-    EXPECT_TRUE(run_until([&] { return listener->counters().protocol_errors == 1; }));
-    EXPECT_TRUE(client.sees_close());
-    EXPECT_TRUE(bus1.seen.empty());
-    pace.cancel();
-    context.restart();
-    context.poll();
 }
 
 }  // namespace

@@ -150,6 +150,15 @@ TEST_F(WebServer, GivesEverySessionItsOwnClientId) {
     EXPECT_EQ(bus.requests[0].client, bus.requests[2].client);
 }
 
+TEST_F(WebServer, P9TellsTheBusesFromWhichAddressASessionAsks) {
+    EXPECT_EQ(get(kRead).status(), 200u);
+    EXPECT_EQ(ask("PUT", kRead, R"({"values":[1]})").status(), 200u);
+    ASSERT_EQ(bus.requests.size(), 2u);
+    for (const bus::Request& request : bus.requests) {
+        EXPECT_EQ(request.host, bus::host_of("127.0.0.1"));
+    }
+}
+
 TEST_F(WebServer, P3AnswersARunningRequestBeforeItStops) {
     bus.script = [](const bus::Request&) { return std::nullopt; };
     Client idle = connect();

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <string>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/modbus/mbap.hpp"
+
+namespace panelgate::tcp_server {
+
+/// One connection as the buses see it: who asks, and which of them were asked.
+class Caller {
+  public:
+    /// `name` is its address with the port; connections from one address share a host.
+    Caller(std::string name, arbiter::Host host);
+
+    const std::string& name() const { return name_; }
+    /// Hands the PDU to a bus, for one of its stations; 0: all of them.
+    void transact(bus::BusClient* bus, std::uint8_t station, const modbus::Adu& adu,
+                  bus::AnswerHandler handler);
+    /// Takes back what still waits on the buses; it is answered Fault::cancelled.
+    void withdraw();
+
+  private:
+    std::string name_;
+    arbiter::Host host_;
+    bus::ClientId client_ = bus::next_client_id();
+    std::set<bus::BusClient*> used_;
+};
+
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,166 @@
+#include "pipeline.hpp"
+
+#include <cstdint>
+#include <utility>
+#include <variant>
+
+#include "diagnostics.hpp"
+#include "dispatch.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/rt/asio_clock.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+template <class... T>
+struct Overloaded : T... {
+    using T::operator()...;
+};
+
+Bytes exception_reply(std::uint8_t function, Fault fault) {
+    return modbus::encode_exception(function, modbus::to_exception(fault));
+}
+
+/// What a client is sent for a bus's answer. A reply that no MBAP frame can carry is refused as one
+/// that is too large to answer.
+Bytes reply_pdu(std::uint8_t function, const Result<Bytes>& pdu) {
+    if (!pdu) return exception_reply(function, pdu.error());
+    if (pdu->empty() || pdu->size() > modbus::kMaxPdu) {
+        return exception_reply(function, Fault::malformed);
+    }
+    return *pdu;
+}
+
+Bytes diagnose(ByteView request, const Shared& shared) {
+    Diagnostics state;
+    state.uptime = rt::now() - shared.started;
+    state.version = shared.hooks.version;
+    for (const bus::BusClient* line : shared.units.lines()) {
+        const bus::LineStatus status = line->status();
+        state.lines.push_back({status.up, status.queue_depth, status.load_percent});
+    }
+    return answer_diagnostics(request, state);
+}
+
+/// Gathers what the lines say of one broadcast.
+struct BroadcastOutcome {
+    std::size_t open = 0;  ///< lines that have not answered yet
+    std::optional<Bytes> sent;
+    std::optional<bus::Answer> failed;
+
+    void add(bus::Answer answer) {
+        --open;
+        if (answer.pdu) {
+            sent = *answer.pdu;
+        } else if (!failed || (answer.transmitted && !failed->transmitted)) {
+            failed = std::move(answer);  // the one whose outcome is unknown is worth telling
+        }
+    }
+    /// What the client is sent; nothing when the mode is silent and a frame may have left (TBC-06).
+    std::optional<Bytes> reply(std::uint8_t function, BroadcastMode mode) const {
+        const bool silent = mode == BroadcastMode::silent;
+        if (silent && (sent || failed->transmitted)) return std::nullopt;
+        return reply_pdu(function, sent ? Result<Bytes>(*sent) : failed->pdu);
+    }
+};
+
+}  // namespace
+
+Pipeline::Pipeline(std::shared_ptr<const Shared> shared, Caller caller,
+                   std::function<void()> on_answer)
+    : shared_(std::move(shared)), caller_(std::move(caller)), on_answer_(std::move(on_answer)) {}
+
+/// Replies that may leave take no room: they are output, which has a limit of its own.
+bool Pipeline::has_room() const {
+    const Settings& settings = shared_->settings;
+    return replies_.held() + waiting_.size() < settings.in_flight + settings.waiting;
+}
+
+void Pipeline::take(modbus::Adu adu) {
+    waiting_.push_back(std::move(adu));
+    admit();
+}
+
+/// Everything waits for a place on the buses, also what needs none: a refusal or the gateway's own
+/// registers are answered as things are when the requests before have started.
+void Pipeline::admit() {
+    const std::size_t places = shared_->settings.in_flight;
+    while (!waiting_.empty() && (turning_away_ || replies_.unanswered() < places)) {
+        const modbus::Adu adu = std::move(waiting_.front());
+        waiting_.pop_front();
+        serve(adu);
+    }
+}
+
+void Pipeline::serve(const modbus::Adu& adu) {
+    const auto push = [&](Bytes pdu) { replies_.push(adu.transaction, adu.unit, std::move(pdu)); };
+    std::visit(Overloaded{
+                   [&](const Refuse& refusal) {
+                       push(modbus::encode_exception(adu.pdu[0], refusal.code));
+                   },
+                   [&](const Diagnose&) { push(diagnose(adu.pdu, *shared_)); },
+                   [&](const Forward& forwarding) { forward(adu, forwarding.target); },
+                   [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting.lines); },
+               },
+               decide(adu.unit, adu.pdu, shared_->settings, shared_->units));
+}
+
+void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
+    replies_.push(adu.transaction, adu.unit, exception_reply(adu.pdu[0], fault));
+}
+
+void Pipeline::forward(const modbus::Adu& adu, const Target& target) {
+    if (turning_away_) return refuse(adu, Fault::cancelled);
+    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+    caller_.transact(
+        target.bus, target.station, adu,
+        [weak = weak_from_this(), ticket, function = adu.pdu[0]](const bus::Answer& answer) {
+            const auto self = weak.lock();
+            if (self) self->settle(ticket, reply_pdu(function, answer.pdu));
+        });
+}
+
+void Pipeline::broadcast(const modbus::Adu& adu, const std::vector<bus::BusClient*>& lines) {
+    if (turning_away_) return refuse(adu, Fault::cancelled);
+    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+    const auto outcome = std::make_shared<BroadcastOutcome>();
+    outcome->open = lines.size();
+    const auto on_answer = [weak = weak_from_this(), outcome, ticket,
+                            function = adu.pdu[0]](bus::Answer answer) {
+        outcome->add(std::move(answer));
+        const auto self = weak.lock();
+        if (!self || outcome->open != 0) return;
+        self->settle(ticket, outcome->reply(function, self->shared_->settings.broadcast));
+    };
+    for (bus::BusClient* line : lines) caller_.transact(line, 0, adu, on_answer);
+}
+
+void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
+    if (closed_) return;
+    if (pdu) {
+        replies_.settle(ticket, std::move(*pdu));
+    } else {
+        replies_.drop(ticket);
+    }
+    admit();
+    on_answer_();
+}
+
+void Pipeline::turn_away() {
+    turning_away_ = true;
+    admit();
+}
+
+void Pipeline::withdraw() {
+    turn_away();
+    caller_.withdraw();
+}
+
+void Pipeline::close() {
+    if (std::exchange(closed_, true)) return;
+    waiting_.clear();
+    caller_.withdraw();
+}
+
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "caller.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
+#include "reply_queue.hpp"
+#include "shared.hpp"
+
+namespace panelgate::tcp_server {
+
+/// The requests of one connection, from their arrival until their replies may leave: at most
+/// settings.in_flight are on the buses, the others wait in order and are judged when their turn
+/// comes, so nothing overtakes. Answers that come after its end are dropped.
+class Pipeline : public std::enable_shared_from_this<Pipeline> {
+  public:
+    /// `on_answer`: a bus has answered, so there may be a reply to pop, and room. Never called from
+    /// inside take(), and not after close().
+    Pipeline(std::shared_ptr<const Shared> shared, Caller caller, std::function<void()> on_answer);
+
+    /// One more request can be kept. Who takes none without room bounds the memory.
+    bool has_room() const;
+    void take(modbus::Adu adu);
+    /// The next reply ADU whose turn has come.
+    std::optional<Bytes> pop() { return replies_.pop(); }
+
+    /// Everything that was taken has been answered, and all replies were popped.
+    bool empty() const { return waiting_.empty() && replies_.empty(); }
+    std::size_t ready_bytes() const { return replies_.ready_bytes(); }
+    const std::string& client() const { return caller_.name(); }
+
+    /// From now on no request starts: those that wait here are answered Fault::cancelled.
+    void turn_away();
+    /// And those that wait on the buses are taken back.
+    void withdraw();
+    /// And nobody is told. May be called twice.
+    void close();
+
+  private:
+    void admit();
+    void serve(const modbus::Adu& adu);
+    void forward(const modbus::Adu& adu, const Target& target);
+    void broadcast(const modbus::Adu& adu, const std::vector<bus::BusClient*>& lines);
+    void refuse(const modbus::Adu& adu, Fault fault);
+    /// The reply to an open request; nothing: it gets none.
+    void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
+
+    std::shared_ptr<const Shared> shared_;
+    Caller caller_;
+    std::function<void()> on_answer_;
+    std::deque<modbus::Adu> waiting_;  ///< not judged yet
+    ReplyQueue replies_;
+    bool turning_away_ = false;
+    bool closed_ = false;
+};
+
+}  // namespace panelgate::tcp_server
