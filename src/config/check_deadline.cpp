@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "load_stations.hpp"
 #include "panelgate/base/serial_format.hpp"

@@ -1,5 +1,9 @@
 // What concerns everybody on the line.
 
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "rules.hpp"
 
 namespace panelgate::doctor {
