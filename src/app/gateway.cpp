@@ -126,6 +126,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         settings.device = "sim";
     }
     const bool remote = line.kind == config::Line::Kind::tcp && !simulates;
+    settings.arbiter.may_stall = remote;
     auto wire = remote ? line::make_tcp_line(executor_, std::move(device))
                        : line::make_tty_line(executor_, std::move(device));
     buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(wire)));

@@ -24,6 +24,8 @@ doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     doctor::LineFacts facts;
     facts.serial = settings.serial;
     facts.echo = echo_of(settings.echo);
+    facts.over_tcp = settings.may_stall;
+    facts.deadline = settings.queue.deadline;
     facts.response_timeout = settings.unlisted.response_timeout;
     for (const arbiter::StationSettings& station : settings.stations) {
         facts.response_timeouts[station.id] = station.response_timeout;
@@ -36,6 +38,7 @@ doctor::Sample sample_of(const arbiter::Arbiter& arbiter, line::Line& line) {
     for (const auto& [id, counters] : arbiter.station_counters()) {
         sample.stations.emplace_hint(sample.stations.end(), id, counters.symptoms);
     }
+    sample.broadcasts = arbiter.counters().broadcasts;
     sample.uart = line.counters().uart;
     return sample;
 }

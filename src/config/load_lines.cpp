@@ -112,6 +112,7 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         line.kind = Line::Kind::simulated;
     } else if (line.device.device.starts_with("tcp://")) {
         line.kind = Line::Kind::tcp;
+        line.arbiter.may_stall = true;
         if (!line::parse_tcp_device(line.device.device))
             in.problem("device",
                        "device must be tcp://HOST:PORT with a port from 1 to 65535, not '" +
@@ -131,6 +132,15 @@ arbiter::EchoMode load_echo(MapReader& in) {
     return kModes[in.choice_index("echo", kWords).value_or(0)];
 }
 
+arbiter::Quarantine load_quarantine(MapReader& in) {
+    using arbiter::Quarantine;
+    constexpr std::array<std::pair<std::string_view, Quarantine>, 3> kWords{
+        {{"auto", Quarantine::automatic},
+         {"line", Quarantine::line},
+         {"station", Quarantine::station}}};
+    return in.choice<Quarantine>("quarantine", kWords).value_or(Quarantine::automatic);
+}
+
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line");
     Line line;
@@ -146,10 +156,7 @@ Line load_line(Loading& loading, const Node& node) {
     line.arbiter.echo = load_echo(in);
     load_queue(loading, in, line.arbiter.queue);
     load_offline(loading, in, line.arbiter.offline);
-    constexpr std::array<std::string_view, 2> kQuarantine{"line", "station"};
-    if (in.choice_index("quarantine", kQuarantine) == std::size_t{1}) {
-        line.arbiter.quarantine = arbiter::Quarantine::station;
-    }
+    line.arbiter.quarantine = load_quarantine(in);
     constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
     line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
     if (const Node* faults = in.map("simulate")) {
@@ -159,6 +166,7 @@ Line load_line(Loading& loading, const Node& node) {
     }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
+    if (serial_known) warn_of_deadline(loading, node, line);
     return line;
 }
 

@@ -156,6 +156,7 @@ Station load_station(Loading& loading, const Node& node, const LineInWork& work)
     settings.max_registers =
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
+    settings.vouched = station.profile->name != "generic";  // which says what anybody could
     settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
     station.guard = in.boolean("guard").value_or(false);
     load_faults(loading, in, station.faults);

@@ -31,6 +31,10 @@ arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& 
 /// line's serial format has been read already.
 void load_stations(Loading& loading, yaml::MapReader& in, LineInWork work);
 
+/// Warns of what the queue's deadline makes impossible, once of each cause: a response timeout, or
+/// a read on this wire, that ends behind it. `node` is the whole line's.
+void warn_of_deadline(Loading& loading, const yaml::Node& node, const Line& line);
+
 /// `poll` and `points` of a station.
 void load_points(Loading& loading, yaml::MapReader& in, Station& station);
 /// The item that a required key names in the panel's notation.

@@ -1,5 +1,9 @@
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "load_stations.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -41,8 +45,12 @@ void load_response_timeout(MapReader& in, StationSettings& settings) {
     }
 }
 
-/// Nothing = auto. Less than the standard's silence is refused: the standard has no shorter frame
-/// gap (serial line V1.02, 2.5.1.1).
+/// 3.5 characters at any rate: what tells frames apart for a panel that counts its own characters.
+/// The standard's 1.75 ms above 19200 bit/s only spare it short timers (serial line
+/// V1.02, 2.5.1.1).
+Duration shortest_gap(const SerialFormat& serial) { return wire_time(serial, 7) / 2; }
+
+/// Nothing = auto. Where the wire does not begin at the gateway, any gap will do.
 void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
     if (is_word(in, "frame_gap", "auto")) {
         timing.frame_gap.reset();
@@ -52,10 +60,67 @@ void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
     if (!gap) return;
     timing.frame_gap = gap;
     const SerialFormat& serial = work.line.device.serial;
-    if (!work.serial_known || *gap >= silent_interval(serial)) return;
-    in.problem("frame_gap", "frame_gap must be at least " + at_least(silent_interval(serial)) +
-                                " (t3.5 at " + to_string(serial) + "), not " +
+    const bool free = work.line.kind != Line::Kind::serial || !work.serial_known;
+    if (free || *gap >= shortest_gap(serial)) return;
+    in.problem("frame_gap", "frame_gap must be at least " + at_least(shortest_gap(serial)) +
+                                " (3.5 characters at " + to_string(serial) + "), not " +
                                 yaml::format_duration(*gap));
+}
+
+Duration asked_gap(const SerialFormat& serial, const profile::PanelProfile& profile) {
+    const double characters = profile.timing.frame_gap_characters;
+    return std::chrono::duration_cast<Duration>(characters * character_time(serial));
+}
+
+void warn_of_gap(Loading& loading, yaml::Mark mark, Duration gap, Duration asked,
+                 const std::string& who) {
+    loading.warn(mark, "frame_gap " + yaml::format_duration(gap) + " is less than the " +
+                           at_least(asked) + " that " + who);
+}
+
+std::string standard(const SerialFormat& serial) {
+    return "the standard asks for (t3.5 at " + to_string(serial) + ")";
+}
+
+/// A panel that inherits its line's gap gets a warning of its own only when it asks for more than
+/// the standard does, and only the first of its kind: the line's key has had one.
+bool was_warned(const LineInWork& work, const Station& station, Duration gap, Duration asked) {
+    if (asked <= silent_interval(work.line.device.serial)) return true;
+    for (std::size_t i = 0; i < work.line.stations.size(); ++i) {
+        const bool alike = work.line.stations[i].profile == station.profile;
+        if (alike && work.line.arbiter.stations[i].frame_gap == gap) return true;
+    }
+    return false;
+}
+
+/// `timing` is the station's, its own keys already over the line's; `own` is where it says so
+/// itself.
+void check_gap(Loading& loading, const LineInWork& work, const Station& station,
+               const Timing& timing, std::optional<yaml::Mark> own, yaml::Mark place) {
+    const SerialFormat& serial = work.line.device.serial;
+    const Duration asked = asked_gap(serial, *station.profile);
+    const Duration wanted = std::max(silent_interval(serial), asked);
+    const Duration gap = timing.frame_gap.value_or(wanted);
+    if (!work.serial_known || gap >= wanted) return;
+    if (!own && was_warned(work, station, gap, asked)) return;
+    const bool by_panel = asked > silent_interval(serial);
+    warn_of_gap(loading, own.value_or(place), gap, wanted,
+                by_panel ? station.profile->name + " asks for" : standard(serial));
+}
+
+/// What no healthy way to the panels exceeds. A tty: a USB latency timer (16 ms), a busy machine,
+/// and the time of one chunk of an adapter's FIFO, because its bytes are handed over together: at
+/// low rates that alone is longer. TCP: a segment that is lost twice; the first retransmission
+/// comes after 200 ms at least, the second after twice as long (RFC 6298, 5.5; Linux).
+Duration automatic_hole(const Line& line) {
+    constexpr std::size_t kChunk = 32;
+    if (line.kind == Line::Kind::tcp) return 700ms;
+    return 60ms + wire_time(line.device.serial, kChunk);
+}
+
+void load_reply_hole(MapReader& in, Duration& hole) {
+    if (is_word(in, "reply_hole", "auto")) return;
+    hole = in.duration("reply_hole", 1ms, 10s).value_or(hole);
 }
 
 void load_late_window(MapReader& in, StationSettings& settings) {
@@ -77,41 +142,44 @@ void load_common(MapReader& in, const LineInWork& work, Timing& timing) {
 }  // namespace
 
 void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
+    const SerialFormat& serial = work.line.device.serial;
+    work.line.arbiter.reply_hole = automatic_hole(work.line);
     if (const Node* node = in.map("timing")) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(timing, work, work.timing);
+        load_reply_hole(timing, work.line.arbiter.reply_hole);
         Duration& turnaround = work.line.arbiter.broadcast_turnaround;
         turnaround = timing.duration("broadcast_turnaround", 1ms, 1min).value_or(turnaround);
         timing.finish();
+        const Duration gap = work.timing.frame_gap.value_or(silent_interval(serial));
+        if (work.serial_known && gap < silent_interval(serial))
+            warn_of_gap(loading, timing.mark("frame_gap"), gap, silent_interval(serial),
+                        standard(serial));
     }
     StationSettings& settings = work.timing.settings;
-    settings.frame_gap = work.timing.frame_gap.value_or(silent_interval(work.line.device.serial));
+    settings.frame_gap = work.timing.frame_gap.value_or(silent_interval(serial));
 }
 
 StationSettings load_station_timing(Loading& loading, MapReader& in, const LineInWork& work,
                                     const Station& station) {
     Timing timing = work.timing;
-    const Node* node = in.map("timing");
-    if (node != nullptr) {
+    std::optional<yaml::Mark> own_gap;
+    if (const Node* node = in.map("timing")) {
         MapReader own(*node, loading.problems, "a station's timing");
         load_common(own, work, timing);
-        if (own.has("broadcast_turnaround"))
-            own.problem("broadcast_turnaround",
-                        "broadcast_turnaround belongs to the line's timing: a broadcast goes to "
-                        "every station");
+        if (own.has("frame_gap")) own_gap = own.mark("frame_gap");
+        const auto refuse = [&](std::string_view key, const std::string& why) {
+            if (own.has(key))
+                own.problem(key, std::string(key) + " belongs to the line's timing: " + why);
+        };
+        refuse("broadcast_turnaround", "a broadcast goes to every station");
+        refuse("reply_hole", "the adapter or the network makes the holes, not a panel");
         own.finish();
     }
+    check_gap(loading, work, station, timing, own_gap, in.mark("timing"));
     const SerialFormat& serial = work.line.device.serial;
-    const double characters = station.profile->timing.frame_gap_characters;
-    const auto asked = std::chrono::duration_cast<Duration>(characters * character_time(serial));
-    const Duration automatic = std::max(silent_interval(serial), asked);
-    const bool too_short = timing.frame_gap && *timing.frame_gap >= silent_interval(serial) &&
-                           *timing.frame_gap < automatic;
-    if (work.serial_known && too_short) {
-        loading.warn(in.mark("timing"), "frame_gap " + yaml::format_duration(*timing.frame_gap) +
-                                            " is less than the " + at_least(automatic) + " that " +
-                                            station.profile->name + " asks for");
-    }
+    const Duration automatic =
+        std::max(silent_interval(serial), asked_gap(serial, *station.profile));
     timing.settings.frame_gap = timing.frame_gap.value_or(automatic);
     return timing.settings;
 }

@@ -11,6 +11,12 @@
 
 namespace panelgate::doctor {
 
+/// Whom a finding names: stations that the configuration does not list share entry 0 and have none.
+inline std::optional<std::uint8_t> named(std::uint8_t station) {
+    if (station == 0) return std::nullopt;
+    return station;
+}
+
 /// What one diagnosis works on. Rules add to `findings`, and look at what earlier ones have found:
 /// damage that is explained is not noise as well.
 struct Case {
@@ -28,9 +34,11 @@ struct Case {
         return std::ranges::any_of(findings, [&](const Finding& f) { return f.cause == cause; });
     }
     bool has(Cause cause, std::uint8_t station) const {
-        return std::ranges::any_of(
-            findings, [&](const Finding& f) { return f.cause == cause && f.station == station; });
+        return std::ranges::any_of(findings, [&](const Finding& f) {
+            return f.cause == cause && f.station == named(station);
+        });
     }
+    bool has_of_line(Cause cause) const { return has(cause, 0); }
     void add(Cause cause, std::optional<std::uint8_t> station, std::string text, std::string advice,
              std::string evidence) {
         findings.push_back(
@@ -56,14 +64,19 @@ Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 // Each adds at most one finding a line or a station.
 void find_echo(Case& c);
 void find_no_answer(Case& c);
-void find_all_damaged(Case& c);
 void find_other_master(Case& c);
 void find_collision(Case& c);
 void find_overrun(Case& c);
+void find_trailing_bytes(Case& c);
+void find_crc_order(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_all_damaged(Case& c);
 void find_noise(Case& c);
+void find_tcp_framing(Case& c);
+void find_wrong_reply(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_duplicate_address(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_short_timeout(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_short_gap(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_unasked_frames(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_silent_station(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 
 /// "12 of 345 replies (3.5 %)"

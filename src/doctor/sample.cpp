@@ -66,6 +66,7 @@ Sample difference(const Sample& later, const Sample& earlier) {
                                   : each(symptoms, before->second,
                                          [](std::uint64_t a, std::uint64_t b) { return a - b; });
     }
+    window.broadcasts = later.broadcasts - earlier.broadcasts;
     if (later.uart) window.uart = minus(*later.uart, earlier.uart.value_or(line::UartErrors{}));
     return window;
 }

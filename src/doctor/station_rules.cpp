@@ -10,11 +10,6 @@ using arbiter::Symptoms;
 
 namespace {
 
-std::optional<std::uint8_t> named(std::uint8_t station) {
-    if (station == 0) return std::nullopt;
-    return station;
-}
-
 /// The others would have had five damaged replies if the line damaged theirs as often (none by
 /// chance: 0.7 %), and have had a fifth of that at most. When only long replies are hit and nobody
 /// else has any, the line may be it nevertheless.
@@ -30,27 +25,47 @@ bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     return hit && others_fine && !unfair;
 }
 
+/// Damaged at least twice as often as the others, as far as there are any: not by the line alone.
+bool is_hit_more(const Case& c, const Symptoms& s) {
+    const std::uint64_t others = c.all.answered + c.all.damaged() - s.answered - s.damaged();
+    const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
+    return s.damaged() * others >= 2 * others_damaged * (s.answered + s.damaged());
+}
+
 void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
+    const std::string address = std::to_string(station);
+    const bool twice = s.doubled * 2 >= s.answered && s.doubled > 0;
+    const bool others_are_fine =
+        c.all.answered > s.answered && c.all.damaged() == s.damaged() && c.all.doubled == s.doubled;
     c.add(Cause::duplicate_address, station,
-          "Two panels seem to have the address " + std::to_string(station) + ".",
-          "Take the panel off the line: when the address still answers, find the other one and "
-          "change it. If nobody answers, look at this panel's cable and communication settings.",
+          s.doubled > 0 ? "Two panels seem to have the address " + address + "."
+                        : "Only the replies of station " + address +
+                              " are damaged: two panels may have its address.",
+          std::string("Take the panel off the line: when the address still answers, find the other "
+                      "one and change it. If nobody answers, ") +
+              (twice ? "this panel or a repeater sends everything twice: set its "
+                       "`timing.frame_gap` so long that the second reply has passed."
+                     : "look at this panel's cable and communication settings."),
           std::to_string(s.doubled) + " replies came twice; " + damage_text(c, s) +
-              "; the other stations are fine");
+              (others_are_fine ? "; the other stations are fine" : ""));
 }
 
 }  // namespace
 
 void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool line = c.has(Cause::wrong_baud) || c.has(Cause::wrong_parity) || c.has(Cause::echo);
-    const bool masters = c.has(Cause::other_master) && s.unasked * 2 >= s.doubled;
-    if (station == 0 || line || masters) return;
+    // Another master that reads what we read makes replies come twice.
+    const bool masters =
+        c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
+    if (station == 0 || line || masters || c.has(Cause::wrong_crc_order, station)) return;
     const Bar bar{c, Cause::duplicate_address, station};
-    const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3);
+    const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_hit_more(c, s);
     if (s.doubled >= bar.enough(3) || mixed) return add_duplicate(c, station, s);
+    // A connection that stalls cuts replies short; that takes no second panel.
+    if (c.facts.over_tcp && s.damaged_short * 2 >= s.damaged()) return;
     if (!only_this_is_damaged(c, bar, s)) return;
     const bool always = s.damaged() >= 5 && s.answered * 10 <= s.damaged();
-    if (!always || cause_of_damage(c, s) != Cause::wrong_parity)
+    if (!always || c.facts.over_tcp || cause_of_damage(c, s) != Cause::wrong_parity)
         return add_duplicate(c, station, s);
     c.add(Cause::wrong_parity, station,
           "All replies of station " + std::to_string(station) + " have wrong bytes.",
@@ -59,18 +74,41 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
           damage_text(c, s));
 }
 
+namespace {
+
+/// Beyond, one reply of a bad moment may have set the mark: no figure follows from it.
+constexpr Duration kClustered = 2s;
+
+/// In steps of 10 ms, a quarter more than what was needed.
+Duration enough_for(Duration lateness) { return (lateness * 5 / 4 + 10ms - 1ns) / 10ms * 10ms; }
+
+std::string timeout_advice(const LineFacts& facts, Duration timeout, Duration lateness) {
+    if (lateness > kClustered)
+        return "Find out what the panel does for so long; when it always needs it, raise its "
+               "`timing.response_timeout` (now " +
+               duration_text(timeout) + ") and `queue.deadline` (now " +
+               duration_text(facts.deadline) + ").";
+    const Duration advised = enough_for(timeout + lateness);
+    const std::string both = advised < facts.deadline ? "."
+                                                      : ", and `queue.deadline` above that (now " +
+                                                            duration_text(facts.deadline) + ").";
+    return "Set its `timing.response_timeout` to " + duration_text(advised) + both;
+}
+
+}  // namespace
+
+/// One late reply, or one of another master that looks like it, says nothing about the timeout.
 void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::timeout_too_short, named(station)};
-    if (s.late < bar.enough(3)) return;
+    if (s.late < bar.enough(3) || c.has(Cause::other_master)) return;
+    const std::uint64_t one_in = s.worst_lateness <= kClustered ? 10 : 2;
+    if (s.late * one_in * (bar.low ? 2 : 1) < s.attempts()) return;
     const auto found = c.facts.response_timeouts.find(station);
     const Duration timeout =
         found == c.facts.response_timeouts.end() ? c.facts.response_timeout : found->second;
-    // A quarter more than what was needed, in steps of 10 ms.
-    const Duration needed = (timeout + s.worst_lateness) * 5 / 4;
-    const Duration advised = (needed + 10ms - 1ns) / 10ms * 10ms;
     c.add(Cause::timeout_too_short, named(station),
           "The replies of " + station_text(station) + " come after the response timeout.",
-          "Set its `timing.response_timeout` to " + duration_text(advised) + ".",
+          timeout_advice(c.facts, timeout, s.worst_lateness),
           std::to_string(s.late) + " replies came up to " + duration_text(s.worst_lateness) +
               " after the timeout of " + duration_text(timeout) + "; " +
               std::to_string(s.answered) + " in time");
@@ -129,9 +167,43 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
                          "requests"));
 }
 
+/// A frame that is good, of the station that was asked, and not what was asked: the wire is fine.
+void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::wrong_reply, named(station)};
+    const bool masters = c.has(Cause::other_master) && s.wrong <= c.all.requests;
+    if (s.wrong < bar.enough(3) || s.wrong * 20 < s.answered || masters) return;
+    const std::string who = station == 0 ? "A station that the configuration does not list"
+                                         : "Station " + std::to_string(station);
+    c.add(Cause::wrong_reply, named(station),
+          who + " answers with frames that do not fit the request.",
+          "Compare the line's trace with the panel's manual: another function, length or address "
+          "than was asked comes back. Another function or a shorter read may be what it can do.",
+          share_text(s.wrong, s.attempts(), "requests") + " were answered so, " +
+              std::to_string(s.answered) + " rightly");
+}
+
+/// Late replies, doubled ones and another master's are known as such.
+void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
+    if (station == 0 || s.attempts() == 0 || c.has(Cause::other_master) || c.has(Cause::echo))
+        return;
+    const Bar bar{c, Cause::unasked_frames, station};
+    const std::uint64_t frames = s.unasked - std::min(s.unasked, s.wrong);
+    if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
+    c.add(Cause::unasked_frames, station,
+          "Station " + std::to_string(station) + " sends frames that nobody asked for.",
+          c.window.broadcasts > 0
+              ? "It may answer broadcasts, which no panel should (serial line V1.02, 2.1), or send "
+                "by itself: look for that in its settings."
+              : "Look in its settings for what it sends by itself.",
+          std::to_string(frames) + " good frames that belong to no request, " +
+              std::to_string(s.attempts()) + " requests to it and " +
+              std::to_string(c.window.broadcasts) + " broadcasts");
+}
+
 void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0 || c.has(Cause::no_answer_at_all) || s.attempts() == 0) return;
     const Bar bar{c, Cause::station_silent, station};
+    if (c.has(Cause::wrong_reply, station)) return;
     if (c.has(Cause::timeout_too_short, station) || s.mute_in_a_row < bar.enough(5)) return;
     bool other_answers = false;
     for (const auto& [id, other] : c.window.stations) {

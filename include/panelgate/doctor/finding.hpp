@@ -17,9 +17,14 @@ enum class Cause : std::uint8_t {
     collision,          ///< somebody speaks while the gateway does
     overrun,            ///< bytes came faster than they were fetched
     noise,              ///< some replies of everybody are damaged
+    tcp_framing,        ///< the same over TCP, where no wire of ours can be the reason
+    trailing_bytes,     ///< something follows the replies
+    wrong_crc_order,    ///< a panel sends the CRC's high byte first
+    wrong_reply,        ///< a panel's good frames do not answer what was asked
     duplicate_address,  ///< two panels answer to one address
     timeout_too_short,  ///< a panel answers after its response timeout
     gap_too_short,      ///< a panel does not hear what follows another frame closely
+    unasked_frames,     ///< a panel speaks when nobody has asked it
     station_silent,     ///< one panel is off or has another address: not a fault of the line
 };
 /// "wrong-baud": the word in REST and in the log. It never changes.

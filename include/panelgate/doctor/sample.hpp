@@ -17,6 +17,9 @@ struct LineFacts {
 
     SerialFormat serial;
     Echo echo = Echo::automatic;
+    /// RTU over TCP: the wire is behind a server, which nobody here can see or set.
+    bool over_tcp = false;
+    Duration deadline = 2s;  ///< of a request: no reply later than this is ever waited for
     Duration response_timeout = 500ms;  ///< of stations without an entry below
     std::map<std::uint8_t, Duration> response_timeouts;
 };
@@ -26,6 +29,7 @@ struct Sample {
     /// Entry 0: all stations that the configuration does not list.
     std::map<std::uint8_t, arbiter::Symptoms> stations;
     std::optional<line::UartErrors> uart;
+    std::uint64_t broadcasts = 0;  ///< sent: a panel should not answer these
 
     /// Of all stations together; mute_in_a_row and worst_lateness are the largest of them.
     arbiter::Symptoms total() const;

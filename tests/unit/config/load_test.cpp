@@ -41,6 +41,9 @@ TEST(ConfigLoad, FillsInTheDefaultsOfALine) {
     EXPECT_EQ(line.arbiter.queue.per_client, 32U);
     EXPECT_EQ(line.arbiter.queue.deadline, Duration(2s));
     EXPECT_EQ(line.arbiter.offline.after, 3);
+    EXPECT_EQ(line.arbiter.offline.probe_max, Duration(5s));
+    EXPECT_EQ(line.arbiter.quarantine, arbiter::Quarantine::automatic);
+    EXPECT_FALSE(line.arbiter.may_stall);
     EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(500ms));
     EXPECT_EQ(line.arbiter.unlisted.frame_gap, silent_interval(line.device.serial));
     EXPECT_EQ(line.arbiter.unlisted.late_window, std::nullopt);
@@ -59,6 +62,7 @@ TEST(ConfigLoad, FillsInTheDefaultsOfAStation) {
     const arbiter::StationSettings& settings = config.lines[0].arbiter.stations.at(0);
     EXPECT_EQ(settings.id, 7);
     EXPECT_FALSE(settings.retry_writes);
+    EXPECT_FALSE(settings.vouched);
     EXPECT_EQ(settings.max_registers, 125);
     EXPECT_EQ(settings.max_bits, 2000);
 }
@@ -84,7 +88,8 @@ TEST(ConfigLoad, ReadsEveryKeyOfALine) {
         "    serial: {baud: 250000, data_bits: 8, parity: odd, stop_bits: 1}\n"
         "    rs485: {mode: off}\n    echo: off\n    retries: 4\n    unlisted_stations: refuse\n"
         "    timing: {response_timeout: 1s, frame_gap: 5ms, broadcast_turnaround: 200ms,\n"
-        "             late_window: 700ms, think_time: 2ms}\n"
+        "             late_window: 700ms, think_time: 2ms, reply_hole: 120ms}\n"
+        "    quarantine: line\n"
         "    queue: {limit: 8, deadline: 5s}\n"
         "    offline: {after: 5, probe_min: 1min, probe_max: 2min}\n" +
         kServe);
@@ -95,6 +100,8 @@ TEST(ConfigLoad, ReadsEveryKeyOfALine) {
     EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(1s));
     EXPECT_EQ(line.arbiter.unlisted.frame_gap, Duration(5ms));
     EXPECT_EQ(line.arbiter.unlisted.late_window, Duration(700ms));
+    EXPECT_EQ(line.arbiter.reply_hole, Duration(120ms));
+    EXPECT_EQ(line.arbiter.quarantine, arbiter::Quarantine::line);
     EXPECT_EQ(line.arbiter.unlisted.retries, 4);
     EXPECT_EQ(line.arbiter.broadcast_turnaround, Duration(200ms));
     EXPECT_EQ(line.arbiter.queue.limit, 8U);
@@ -104,47 +111,6 @@ TEST(ConfigLoad, ReadsEveryKeyOfALine) {
     EXPECT_EQ(line.arbiter.offline.probe_min, Duration(1min));
     EXPECT_EQ(line.arbiter.offline.probe_max, Duration(2min));
     EXPECT_TRUE(line.refuse_unlisted);
-}
-
-TEST(ConfigLoad, AStationOverridesTheTimingOfItsLine) {
-    const Config config = load_valid(kFast +
-                                     "    timing: {response_timeout: 1s, late_window: 3s}\n"
-                                     "    retries: 2\n"
-                                     "    stations:\n"
-                                     "      - {id: 1}\n"
-                                     "      - id: 2\n"
-                                     "        retries: 0\n"
-                                     "        retry_writes: true\n"
-                                     "        access: read_only\n"
-                                     "        timing: {response_timeout: 50ms, frame_gap: 3ms,\n"
-                                     "                 late_window: auto}\n" +
-                                     kServe);
-    const auto& stations = config.lines[0].arbiter.stations;
-    ASSERT_EQ(stations.size(), 2U);
-    EXPECT_EQ(stations[0].response_timeout, Duration(1s));
-    EXPECT_EQ(stations[0].late_window, Duration(3s));
-    EXPECT_EQ(stations[0].retries, 2);
-    EXPECT_EQ(stations[0].frame_gap, Duration(1750us));
-    EXPECT_EQ(stations[1].response_timeout, Duration(50ms));
-    EXPECT_EQ(stations[1].late_window, std::nullopt);
-    EXPECT_EQ(stations[1].retries, 0);
-    EXPECT_TRUE(stations[1].retry_writes);
-    EXPECT_EQ(stations[1].frame_gap, Duration(3ms));
-    EXPECT_FALSE(config.lines[0].stations[0].read_only);
-    EXPECT_TRUE(config.lines[0].stations[1].read_only);
-}
-
-TEST(ConfigLoad, TheAutomaticFrameGapIsWhatThePanelAsksOrTheStandardWhicheverIsLonger) {
-    // The GT wants 4 characters (ARCT1F501E, 1.1.2): longer than t3.5 up to 19200 bit/s only.
-    const std::string gt = "    stations: [{id: 20, profile: panasonic-gt}, {id: 1}]\n";
-    const Config slow =
-        load_valid("lines:\n  - name: a\n    device: sim\n    serial: {baud: 9600, parity: odd}\n" +
-                   gt + kServe);
-    const SerialFormat& format = slow.lines[0].device.serial;
-    EXPECT_EQ(slow.lines[0].arbiter.stations[0].frame_gap, 4 * character_time(format));
-    EXPECT_EQ(slow.lines[0].arbiter.stations[1].frame_gap, silent_interval(format));
-    const Config fast = load_valid(kFast + gt + kServe);
-    EXPECT_EQ(fast.lines[0].arbiter.stations[0].frame_gap, Duration(1750us));
 }
 
 TEST(ConfigLoad, MergedReadsStayWithinTheStandardEvenWherePanelsTakeMore) {

@@ -3,9 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
-
-#include "case.hpp"
+#include "diagnose_case.hpp"
 
 namespace panelgate::doctor {
 namespace {
@@ -14,34 +12,6 @@ using arbiter::Symptoms;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using Stations = std::map<std::uint8_t, Symptoms>;
-using Causes = std::vector<std::string>;
-
-class Diagnose : public testing::Test {
-  protected:
-    Diagnose() { facts.serial = {9600, 8, Parity::even, 1}; }
-
-    std::vector<Finding> findings(Stations stations,
-                                  const std::vector<Finding>& standing = {}) const {
-        Sample window;
-        window.stations = std::move(stations);
-        window.uart = uart;
-        return diagnose(facts, window, standing);
-    }
-    /// "wrong-baud", or with its station "gap-too-short 2".
-    Causes causes(Stations stations, const std::vector<Finding>& standing = {}) const {
-        Causes list;
-        for (const Finding& f : findings(std::move(stations), standing)) {
-            std::string text(code(f.cause));
-            if (f.station) text += " " + std::to_string(*f.station);
-            list.push_back(std::move(text));
-        }
-        return list;
-    }
-
-    LineFacts facts;
-    std::optional<line::UartErrors> uart;
-};
 
 TEST_F(Diagnose, AHealthyLineHasNoFinding) {
     EXPECT_THAT(causes({}), IsEmpty());
@@ -223,20 +193,37 @@ TEST_F(Diagnose, LateRepliesAreATimeoutTooShortAndNoGap) {
     EXPECT_THAT(causes({{0, Mix().answered(9).late(3, 50ms)}}), ElementsAre("timeout-too-short"));
 }
 
-TEST_F(Diagnose, GoodFramesOfNobodyAreAnotherMaster) {
-    EXPECT_THAT(causes({{1, Mix().answered(50).with(&Symptoms::unasked, 3)}}),
-                ElementsAre("other-master"));
-    EXPECT_THAT(causes({{1, Mix().answered(50).with(&Symptoms::unasked, 2)}}), IsEmpty());
-    EXPECT_THAT(causes({{1, Mix().answered(50).damaged(5).with(&Symptoms::unasked, 9)}}),
+TEST_F(Diagnose, RequestsOfSomebodyElseAreAnotherMaster) {
+    const Symptoms disturbed = Mix().answered(50).with(&Symptoms::requests, 3);
+    EXPECT_THAT(causes({{1, disturbed}}), ElementsAre("other-master"));
+    EXPECT_THAT(findings({{1, disturbed}})[0].evidence, HasSubstr("3 requests of somebody else"));
+    EXPECT_THAT(causes({{1, Mix().answered(50).with(&Symptoms::requests, 2)}}), IsEmpty());
+    EXPECT_THAT(causes({{1, Mix().answered(50).damaged(5).with(&Symptoms::requests, 9)}}),
                 ElementsAre("other-master"))
         << "its frames damage ours";
     EXPECT_THAT(
-        causes({{1, Mix().answered(50).with(&Symptoms::unasked, 9).with(&Symptoms::doubled, 5)}}),
+        causes({{1, Mix().answered(50).with(&Symptoms::requests, 9).with(&Symptoms::doubled, 5)}}),
         ElementsAre("other-master"))
         << "it reads what we read";
     EXPECT_THAT(
-        causes({{1, Mix().answered(50).with(&Symptoms::doubled, 9).with(&Symptoms::unasked, 3)}}),
-        ElementsAre("duplicate-address 1"));
+        causes({{1, Mix().answered(50).with(&Symptoms::doubled, 9).with(&Symptoms::requests, 3)}}),
+        ElementsAre("other-master", "duplicate-address 1"));
+    EXPECT_THAT(causes({{1, Mix().answered(9).late(3, 9s).with(&Symptoms::requests, 3)},
+                        {2, Mix().answered(9).with(&Symptoms::wrong, 3)}}),
+                ElementsAre("other-master"))
+        << "what it is answered looks late or wrong";
+}
+
+TEST_F(Diagnose, FramesOfStationsThatNobodyAskedAreAnotherMasterToo) {
+    const Symptoms fine = Mix().answered(50);
+    const Symptoms stranger = Mix().with(&Symptoms::unasked, 3);
+    EXPECT_THAT(causes({{0, stranger}, {1, fine}}), ElementsAre("other-master"));
+    EXPECT_THAT(causes({{1, fine}, {2, stranger}}), ElementsAre("other-master"));
+    EXPECT_THAT(causes({{0, Mix().with(&Symptoms::unasked, 2)}, {1, fine}}), IsEmpty());
+    EXPECT_THAT(causes({{0, Mix().silent(9).with(&Symptoms::unasked, 3)}, {1, fine}}), IsEmpty())
+        << "those were asked, too";
+    broadcasts = 3;
+    EXPECT_THAT(causes({{0, stranger}, {1, fine}}), IsEmpty()) << "it may answer the broadcasts";
 }
 
 TEST_F(Diagnose, AnEchoThatTheConfigurationDeniesOrInvents) {
@@ -260,10 +247,17 @@ TEST_F(Diagnose, EveryFindingSaysWhatToDoAndWhy) {
     const auto more = [&](Stations stations) {
         for (Finding& f : findings(std::move(stations))) all.push_back(std::move(f));
     };
-    more({{1, Mix().answered(9).with(&Symptoms::echoes, 9).with(&Symptoms::unasked, 9)}});
+    more({{1, Mix().answered(9).with(&Symptoms::echoes, 9).with(&Symptoms::requests, 9)}});
     more({{1, Mix().answered(20).late(9, 1ms)}, {2, Mix().silent(9)}, {3, Mix().damaged(9)}});
     more({{1, Mix().answered(50).damaged(20)}, {2, Mix().lost(6, 0).answered(6)}});
-    EXPECT_GE(all.size(), 9u);
+    more({{1, Mix().damaged(9).with(&Symptoms::crc_swapped, 9)},
+          {2, Mix().with(&Symptoms::wrong, 9)},
+          {3, Mix().answered(9).with(&Symptoms::trailed, 9)},
+          {4, Mix().answered(9).with(&Symptoms::unasked, 9)},
+          {5, Mix().lost(9).late(9, 9s)}});
+    facts.over_tcp = true;
+    more({{1, Mix().damaged(9)}});
+    EXPECT_GE(all.size(), 15u);
     for (const Finding& f : all) {
         EXPECT_TRUE(f.text.ends_with(".")) << f.text;
         EXPECT_TRUE(f.advice.ends_with(".")) << f.advice;

@@ -111,7 +111,7 @@ TEST_F(DoctorTest, LooksOnceAStepAndNotBeforeItHasRested) {
 }
 
 TEST_F(DoctorTest, TheLikeliestAndWidestCauseIsFirst) {
-    one.answered(20).with(&Symptoms::unasked, 5);
+    one.answered(20).with(&Symptoms::requests, 5);
     counted.stations[1] = one;
     counted.stations[2] = Mix().silent(9);
     doctor.look(now + 5s, counted);
@@ -124,6 +124,8 @@ TEST(Sample, ADifferenceCountsWhatCameBetweenAndKeepsWhatIsNow) {
     after.stations[1] = Mix().answered(15, 0).silent(7).late(3, 60ms);
     after.stations[2] = Mix().damaged(4);
     after.uart = line::UartErrors{9, 8, 7, 6};
+    before.broadcasts = 4;
+    after.broadcasts = 6;
     const Sample window = difference(after, before);
     const Symptoms& one = window.stations.at(1);
     EXPECT_EQ(one.answered, 5u);
@@ -134,6 +136,7 @@ TEST(Sample, ADifferenceCountsWhatCameBetweenAndKeepsWhatIsNow) {
     EXPECT_EQ(one.worst_lateness, Duration(60ms));
     EXPECT_EQ(window.stations.at(2).damaged(), 4u);
     EXPECT_EQ(window.attempts(), 13u);
+    EXPECT_EQ(window.broadcasts, 2u);
     EXPECT_EQ(window.uart, (line::UartErrors{9, 8, 7, 6}));
     EXPECT_EQ(difference(after, after).attempts(), 0u);
     EXPECT_EQ(difference(after, after).uart, (line::UartErrors{}));

@@ -1,0 +1,166 @@
+// What the queue's deadline makes impossible: legal, and always answered 0B or 06.
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "load_stations.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using yaml::Mark;
+using yaml::Node;
+
+const Node* find(const Node* map, std::string_view key) {
+    if (map == nullptr) return nullptr;
+    for (const yaml::Entry& entry : map->entries) {
+        if (entry.key == key) return &entry.value;
+    }
+    return nullptr;
+}
+
+/// Where the `timing` of a line or a station sets the longest wait, if it does.
+std::optional<Mark> timeout_mark(const Node& body, const arbiter::StationSettings& settings) {
+    const Node* timing = find(&body, "timing");
+    const Node* ceiling = settings.adaptive_timeout ? find(timing, "adaptive_ceiling") : nullptr;
+    const Node* value = ceiling == nullptr ? find(timing, "response_timeout") : ceiling;
+    if (value == nullptr) return std::nullopt;
+    return value->mark;
+}
+
+Mark deadline_mark(const Node& line) {
+    const Node* deadline = find(find(&line, "queue"), "deadline");
+    return deadline == nullptr ? line.mark : deadline->mark;
+}
+
+/// Whole milliseconds: a time on the wire has no shorter text.
+std::string text(Duration duration) {
+    return yaml::format_duration(std::chrono::ceil<std::chrono::milliseconds>(duration));
+}
+
+struct Wait {
+    Duration timeout{};
+    Mark mark;
+};
+
+/// The longest wait of all stations. Where no key says so, the deadline itself is the odd one.
+Wait longest_wait(const Node& node, const Line& line) {
+    const arbiter::StationSettings& unlisted = line.arbiter.unlisted;
+    const Mark common = timeout_mark(node, unlisted).value_or(deadline_mark(node));
+    Wait longest;
+    if (!line.refuse_unlisted) longest = {unlisted.response_timeout, common};
+    const Node* list = find(&node, "stations");
+    for (std::size_t i = 0; i < line.arbiter.stations.size(); ++i) {
+        const arbiter::StationSettings& own = line.arbiter.stations[i];
+        if (own.response_timeout > longest.timeout)
+            longest = {own.response_timeout, timeout_mark(list->items[i], own).value_or(common)};
+    }
+    return longest;
+}
+
+constexpr std::size_t kReadRequest = 8;  // address, function, address, count, CRC
+constexpr std::size_t kReadReply = 5;    // address, function, byte count, CRC
+
+/// One read of a station, and how many bytes of values answer it.
+struct Read {
+    std::string what;
+    std::size_t count = 0;
+    bool bits = false;
+    Duration response_timeout{};
+
+    std::size_t bytes() const { return bits ? (count + 7) / 8 : 2 * count; }
+    /// Nothing but the two frames: no read is quicker.
+    Duration on_wire(const SerialFormat& serial) const {
+        return wire_time(serial, kReadRequest + kReadReply + bytes());
+    }
+};
+
+void keep_longer(std::optional<Read>& longest, Read read) {
+    if (!longest || read.bytes() > longest->bytes()) longest = std::move(read);
+}
+
+std::optional<Read> longest_poll(const Line& line) {
+    std::optional<Read> longest;
+    for (std::size_t i = 0; i < line.stations.size(); ++i) {
+        const Station& station = line.stations[i];
+        for (const points::Poll& poll : station.polls) {
+            keep_longer(
+                longest,
+                {"the poll of " + poll.read + " of station '" + station.name + '\'', poll.count,
+                 modbus::is_bit_table(poll.table), line.arbiter.stations[i].response_timeout});
+        }
+    }
+    return longest;
+}
+
+/// What a client may ask of any station.
+std::optional<Read> longest_read(const Line& line) {
+    std::optional<Read> longest;
+    const auto add = [&](const std::string& who, const arbiter::StationSettings& settings) {
+        const std::string what = "the longest read of " + who;
+        keep_longer(longest, {what, settings.max_registers, false, settings.response_timeout});
+        keep_longer(longest, {what, settings.max_bits, true, settings.response_timeout});
+    };
+    for (std::size_t i = 0; i < line.stations.size(); ++i)
+        add("station '" + line.stations[i].name + '\'', line.arbiter.stations[i]);
+    if (!line.refuse_unlisted) add("an unlisted station", line.arbiter.unlisted);
+    return longest;
+}
+
+/// How many items a read may have that can end before the deadline; 0 = none can.
+std::size_t most_items(const Line& line, bool bits) {
+    const Duration deadline = line.arbiter.queue.deadline - 1ns;
+    const auto characters = static_cast<std::size_t>(deadline / character_time(line.device.serial));
+    if (characters <= kReadRequest + kReadReply) return 0;
+    const std::size_t bytes = characters - kReadRequest - kReadReply;
+    return bits ? bytes * 8 : bytes / 2;
+}
+
+bool fits(const std::optional<Read>& read, const Line& line) {
+    return !read || read->on_wire(line.device.serial) < line.arbiter.queue.deadline;
+}
+
+void warn_of_read(Loading& loading, const Node& node, const Line& line, const Read& read) {
+    const SerialFormat& serial = line.device.serial;
+    const Duration wire = read.on_wire(serial);
+    const Duration enough = std::chrono::ceil<std::chrono::seconds>(wire + read.response_timeout);
+    const std::string noun = read.bits ? " bits" : " registers";
+    const std::size_t most = most_items(line, read.bits);
+    loading.warn(deadline_mark(node),
+                 read.what + " (" + std::to_string(read.count) + noun + ") takes " + text(wire) +
+                     " on the wire at " + to_string(serial) +
+                     " and can never be answered before the queue's deadline of " +
+                     text(line.arbiter.queue.deadline) + ": set queue: {deadline: " + text(enough) +
+                     "}" +
+                     (most == 0 ? "" : ", or ask for at most " + std::to_string(most) + noun));
+}
+
+}  // namespace
+
+void warn_of_deadline(Loading& loading, const Node& node, const Line& line) {
+    const Duration deadline = line.arbiter.queue.deadline;
+    const Wait wait = longest_wait(node, line);
+    if (wait.timeout >= deadline) {
+        loading.warn(wait.mark, "response_timeout " + text(wait.timeout) +
+                                    " is not below the queue's deadline of " + text(deadline) +
+                                    ": no reply that late is ever waited for; raise "
+                                    "queue.deadline above " +
+                                    text(wait.timeout) + ", or lower response_timeout");
+    }
+    const std::optional<Read> poll = longest_poll(line);
+    const std::optional<Read> read = longest_read(line);
+    if (!fits(poll, line)) {
+        warn_of_read(loading, node, line, *poll);
+    } else if (!fits(read, line)) {
+        warn_of_read(loading, node, line, *read);
+    }
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,163 @@
+// Replies that came and were damaged: by what, the whole line's or one panel's.
+
+#include "rules.hpp"
+
+namespace panelgate::doctor {
+
+using arbiter::Symptoms;
+
+namespace {
+
+/// Nearly everything that comes is damaged: one in ten may be good by chance.
+bool is_all_damaged(const Case& c, const Symptoms& s) {
+    const Bar bar{c, cause_of_damage(c, s)};
+    return s.damaged() >= bar.enough(5) && s.answered * 10 <= s.damaged();
+}
+
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// What one address or another cause explains tells nothing about the line.
+Symptoms unexplained(const Case& c) {
+    Sample rest;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        const bool explained = c.has(Cause::duplicate_address, id) ||
+                               c.has(Cause::wrong_parity, id) || c.has(Cause::wrong_crc_order, id);
+        if (explained) continue;
+        Symptoms& own = rest.stations[id] = symptoms;
+        if (c.has_of_line(Cause::trailing_bytes) || c.has(Cause::trailing_bytes, id))
+            own.strays -= std::min(own.strays, own.trailed);
+    }
+    return rest.total();
+}
+
+/// All of few damaged replies came from one of several stations: it may be that one, or chance.
+bool may_be_one_station(const Case& c, const Symptoms& s) {
+    constexpr std::uint64_t kFew = 8;
+    if (s.damaged() >= kFew) return false;
+    bool one = false, others = false;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        one = one || symptoms.damaged() == s.damaged();
+        others = others || (symptoms.answered > 0 && symptoms.damaged() == 0);
+    }
+    return one && others;
+}
+
+/// One damaged frame in a thousand is life; one in a hundred is a fault.
+bool is_too_often(const Case& c, const Bar& bar, const Symptoms& s, std::uint64_t damaged) {
+    return damaged >= bar.enough(3) && (bar.low || !may_be_one_station(c, s)) &&
+           share(damaged, damaged + s.answered) >= (bar.low ? 0.003 : 0.01);
+}
+
+/// A long reply is hit more often than by its length alone: what reflections do.
+bool hits_long_replies(const Symptoms& s) {
+    const std::uint64_t short_damaged = s.damaged() - s.long_damaged;
+    const std::uint64_t short_answered = s.answered - s.long_answered;
+    constexpr std::uint64_t kEnough = 10;
+    return s.long_damaged >= 3 && short_answered >= kEnough &&
+           share(s.long_damaged, s.long_damaged + s.long_answered) >
+               3 * share(short_damaged, short_damaged + short_answered);
+}
+
+bool has_better_than_noise(const Case& c) {
+    return c.has(Cause::echo) || c.has(Cause::wrong_baud) || c.has(Cause::other_master) ||
+           c.has(Cause::collision) || c.has_of_line(Cause::wrong_parity);
+}
+
+}  // namespace
+
+/// The length tells the pace, and zeros tell bytes that the parity check has thrown away.
+Cause cause_of_damage(const Case& c, const Symptoms& s) {
+    const bool same_pace = s.damaged_exact * 5 >= s.damaged() * 4;
+    // Bytes that pass a wrong parity check all have the same parity; what noise leaves has both.
+    const std::uint64_t left = s.damaged_bytes - s.damaged_zeros;
+    const bool alike = std::min(s.damaged_odd, left - s.damaged_odd) * 20 <= left;
+    const bool checked = c.facts.serial.parity != Parity::none;
+    if (c.window.uart && c.window.uart->parity + c.window.uart->framing >= 5) {
+        const line::UartErrors& uart = *c.window.uart;
+        return uart.parity > uart.framing ? Cause::wrong_parity : Cause::wrong_baud;
+    }
+    if (checked && same_pace && alike && s.damaged_zeros * 4 >= s.damaged_bytes)
+        return Cause::wrong_parity;
+    if (s.damaged_heads * 2 >= s.damaged()) return Cause::noise;
+    return same_pace ? Cause::wrong_parity : Cause::wrong_baud;
+}
+
+void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::wrong_crc_order, named(station)};
+    if (s.crc_swapped < bar.enough(3) || s.crc_swapped * 2 <= s.damaged()) return;
+    c.add(Cause::wrong_crc_order, named(station),
+          "The replies of " + station_text(station) + " carry the CRC's high byte first.",
+          "This version reads the standard's order only, low byte first: the panel needs firmware "
+          "that sends it, as Autonics GP panels do since June 2005.",
+          share_text(s.crc_swapped, s.damaged(), "damaged replies") +
+              " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
+              " replies were right");
+}
+
+void find_all_damaged(Case& c) {
+    const Symptoms s = unexplained(c);
+    if (c.facts.over_tcp || !is_all_damaged(c, s) || c.has(Cause::echo)) return;
+    const Cause cause = cause_of_damage(c, s);
+    const std::string evidence = damage_text(c, s);
+    const std::string now = to_string(c.facts.serial);
+    if (cause == Cause::wrong_parity) {
+        c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
+              "Set `serial.parity`, data and stop bits as in the panels' communication settings "
+              "(now " +
+                  now + ").",
+              evidence);
+    } else if (cause == Cause::wrong_baud) {
+        const bool breaks = c.window.uart && c.window.uart->breaks * 2 > c.window.uart->framing;
+        c.add(cause, {}, "What comes is no Modbus at this speed: the baud differs.",
+              std::string(breaks ? "A and B may be swapped. " : "") +
+                  "Set `serial.baud` as in the panels' communication settings (now " + now + ").",
+              evidence);
+    }
+}
+
+void find_noise(Case& c) {
+    if (has_better_than_noise(c)) return;
+    const Bar bar{c, Cause::noise};
+    const Symptoms s = unexplained(c);
+    const bool overrun =
+        c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
+    const bool damage = is_too_often(c, bar, s, s.damaged());
+    const bool strays = s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
+    if (overrun || (!damage && !strays)) return;
+    std::string advice =
+        "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
+        "what runs beside the cable.";
+    std::string evidence = damage_text(c, s);
+    if (hits_long_replies(s)) {
+        advice = "Long replies suffer most: look at the termination first. " + advice;
+        evidence += "; " + share_text(s.long_damaged, s.long_damaged + s.long_answered,
+                                      "replies of 32 bytes and more damaged");
+    }
+    if (strays) {
+        advice = "Bytes come when nobody speaks: look at the bias first. " + advice;
+        evidence += "; " + std::to_string(s.strays) + " times bytes around or between replies";
+    }
+    c.add(Cause::noise, {}, "Some of what comes is damaged.", std::move(advice),
+          std::move(evidence));
+}
+
+/// A connection that stalls or breaks leaves the beginning of a reply now and its rest later:
+/// nothing has been changed, so only what has the right length or more counts, unless nothing else
+/// ever comes.
+void find_tcp_framing(Case& c) {
+    if (has_better_than_noise(c)) return;
+    const Bar bar{c, Cause::tcp_framing};
+    const Symptoms s = unexplained(c);
+    const bool never_right = is_all_damaged(c, s) && s.silent + s.disturbed <= s.damaged();
+    const std::uint64_t changed = never_right ? s.damaged() : s.damaged_exact + s.damaged_long;
+    if (!is_too_often(c, bar, s, changed)) return;
+    c.add(Cause::tcp_framing, {}, "Bytes are changed on the way from the server.",
+          "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "
+          "`telnet(rfc2217)`), that no other client is connected to it, and that its own baud and "
+          "serial format are the panels'; then look at the line behind it.",
+          damage_text(c, s));
+}
+
+}  // namespace panelgate::doctor
