@@ -63,6 +63,10 @@ class Checker {
     double good_share(TimePoint now) const { return costs_.good_share(now - started_); }
     /// How long requests to sound panels have waited for their answers, hit ones too.
     const std::vector<Duration>& waits() const { return waits_; }
+    /// The longest that each station was not asked.
+    const std::map<std::uint8_t, Duration>& longest_unasked() const { return longest_unasked_; }
+    /// The longest silence while a request waited that nothing kept from going.
+    Duration longest_idle() const { return longest_idle_; }
 
   private:
     struct Open {
@@ -133,6 +137,9 @@ class Checker {
     std::uint64_t frames_ = 0;
     std::uint64_t collisions_ = 0;
     std::vector<Duration> waits_;
+    std::map<std::uint8_t, TimePoint> last_asked_;
+    std::map<std::uint8_t, Duration> longest_unasked_;
+    Duration longest_idle_{};
 };
 
 }  // namespace panelgate::scenario

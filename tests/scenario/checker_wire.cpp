@@ -67,7 +67,12 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     attempt_.was_silent = what == "retry" && attempt_.station == station
                               ? attempt_.was_silent
                               : watch_.is_silent(station);
-    attempt_.again = what == "retry";
+    attempt_.trusted = what == "request" && watch_.is_trusted(station);
+    const auto [asked, first] = last_asked_.try_emplace(station, now);
+    if (!first) {
+        longest_unasked_[station] = std::max(longest_unasked_[station], now - asked->second);
+        asked->second = now;
+    }
     attempt_.station = station;
     attempt_.started = now;
     attempt_.sent = sent_until_ = now + wire_time(settings_.serial, adu.size());
@@ -94,8 +99,8 @@ void Checker::check_moment(TimePoint now) {
 /// Who has been silent, or is nobody's panel, is waited for as long as it has ever needed.
 Duration Checker::least_wait() const {
     const std::uint8_t station = attempt_.station;
-    const bool trusted = watch_.is_known(station) && !attempt_.was_silent && !attempt_.again;
-    if (!trusted || adaptive_) return std::min<Duration>(watch_.own_slowest(station), 20ms);
+    if (!attempt_.trusted || adaptive_)
+        return std::min<Duration>(watch_.own_slowest(station), 20ms);
     return settings_.unlisted.response_timeout;
 }
 
@@ -108,19 +113,21 @@ void Checker::close_attempt(TimePoint now) {
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
     const std::string broken = costs_.on_unanswered(now, attempt_);
     if (!broken.empty()) fail(broken);
-    if (!attempt_.heard) watch_.on_silence(attempt_.station);
+    watch_.on_unanswered(attempt_.station, !attempt_.heard);
 }
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.
 void Checker::check_idling(TimePoint now) {
     constexpr Duration kSlack = 100ms;  // gaps that were lengthened for what follows replies
-    if (!calm_) return;
     const TimePoint since = std::max(sent_until_, heard_until_);
+    if (now <= since + kSlack || !good_work_waited(since)) return;
+    const Duration idle = now - since;
+    longest_idle_ = std::max(longest_idle_, idle);
     Duration most = kSlack;
     if (!attempt_.answered) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
-    if (now > since + most && good_work_waited(since))
-        fail("P5: the line was silent for " + std::to_string((now - since) / 1ms) +
+    if (calm_ && idle > most)
+        fail("P5: the line was silent for " + std::to_string(idle / 1ms) +
              " ms while a request waited");
 }
 

@@ -15,7 +15,7 @@ struct Attempt {
     TimePoint sent;           ///< its computed end
     bool dead = false;        ///< its panel could not answer
     bool was_silent = false;  ///< the station was silent before
-    bool again = false;       ///< the same request went before
+    bool trusted = false;     ///< it answered the last time
     bool answered = true;
     bool heard = false;  ///< anything
 };

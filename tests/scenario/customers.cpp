@@ -122,7 +122,9 @@ Bytes Customers::draw_read(const Customer& customer) {
             .u16(random_.between(1, 2))
             .take();
     }
-    return Writer().u8(function).u16(10 * random_.below(12)).u16(random_.between(1, 20)).take();
+    // One length more often than others: only what has the same shape can be mistaken.
+    const unsigned count = random_.chance(0.5) ? 4 : random_.between(1, 20);
+    return Writer().u8(function).u16(10 * random_.below(12)).u16(count).take();
 }
 
 /// Every write is another one, so that one that comes twice is seen.

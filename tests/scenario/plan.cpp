@@ -147,7 +147,9 @@ void draw_sound(Random& random, Plan& plan, Kind kind) {
         draw_company(random, plan);
         draw_unlisted(random, plan);
     }
-    s.echo = random.chance(0.7) ? arbiter::EchoMode::automatic : s.echo;
+    // A line with an echo that is said to have none confirms writes by themselves: no plan.
+    const bool learns = kind == Kind::receiver || random.chance(0.7);
+    s.echo = learns ? arbiter::EchoMode::automatic : arbiter::EchoMode::off;
     if (kind == Kind::voices && random.chance(0.2)) draw_extreme_rate(random, plan);
     s.unlisted.late_window = s.unlisted.response_timeout * 5 / 2 + 300ms;
     each_station(plan, [&](auto& station) { station.late_window = s.unlisted.late_window; });

@@ -30,12 +30,16 @@ void Watch::on_upset(TimePoint now) {
 void Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
     Station& s = stations_[station];
     if (s.disturbed) s.settled = now;
-    s.disturbed = s.silent = false;
+    s.disturbed = s.silent = s.failing = false;
     s.slowest = std::max(s.slowest.value_or(after), after);
     slowest_ = std::max(slowest_.value_or(after), after);
 }
 
-void Watch::on_silence(std::uint8_t station) { stations_[station].silent = true; }
+void Watch::on_unanswered(std::uint8_t station, bool silent) {
+    Station& s = stations_[station];
+    s.failing = true;
+    s.silent = s.silent || silent;
+}
 
 bool Watch::is_good(std::uint8_t station, TimePoint since) const {
     const Station* s = find(station);
@@ -55,6 +59,11 @@ bool Watch::is_silent(std::uint8_t station) const {
 bool Watch::is_known(std::uint8_t station) const {
     const Station* s = find(station);
     return s != nullptr && (s->listed || s->slowest);
+}
+
+bool Watch::is_trusted(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->slowest && !s->failing;
 }
 
 std::optional<Duration> Watch::slowest(std::uint8_t station) const {

@@ -39,18 +39,20 @@ void World::run() {
 
 /// One event, or one deadline of the arbiter. False when nothing is left to happen.
 bool World::step() {
+    constexpr int kMostSpins = 1000;
     const auto next = agenda_.next();
     if (!customers_.are_waiting() && uncalled_.empty() && (!next || is_over())) return false;
     const auto deadline = asleep_ ? std::nullopt : subject_.next_deadline();
     if (deadline && (!next || *deadline < *next)) {
         spins_ = *deadline > now() ? 0 : spins_ + 1;
-        if (spins_ > 1000) checker_.on_spin();
+        if (spins_ > kMostSpins) checker_.on_spin();
         agenda_.advance_to(*deadline);
         subject_.on_deadline(now());
         drain();
         return true;
     }
     if (!next) return false;
+    if (*next > now()) spins_ = 0;
     agenda_.happen_next();
     return true;
 }
