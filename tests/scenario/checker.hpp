@@ -1,114 +1,145 @@
 #pragma once
 
-#include <deque>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
-#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
+#include "costs.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "plan.hpp"
+#include "truth.hpp"
+#include "watch.hpp"
 
 namespace panelgate::scenario {
-
-/// Registers from here on are memory that clients write; below, each holds how many requests its
-/// station has served, plus something of its own: a value tells when it was read.
-inline constexpr std::uint16_t kMemory = 1000;
-inline constexpr std::uint16_t kMemoryCells = 16;
-/// What register `address` of a station holds when it has served `served` requests.
-std::uint16_t moving_value(std::uint8_t station, std::uint8_t function, std::uint16_t address,
-                           std::uint64_t served);
 
 /// Holds what an arbiter does against what it promises. Knows the truth (what the panels did and
 /// when) from the world and the claims (answers, frames) from the arbiter; shares no code with it.
 class Checker {
   public:
-    explicit Checker(const arbiter::Settings& settings);
+    explicit Checker(const Plan& plan);
 
     // Claims
     void on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job);
-    void on_transmit(TimePoint now, const Bytes& adu, bool probe);
+    void on_refused(TimePoint now, const arbiter::Job& job, Fault fault);
+    /// `what`: the word of its note. `dead`: no panel can hear it.
+    void on_transmit(TimePoint now, const Bytes& adu, std::string_view what, bool dead);
     void on_finish(TimePoint now, const arbiter::Finish& finish);
-    /// How many waited before and after a request was handed in.
-    void on_queue_depth(std::size_t before, std::size_t after);
-    void on_line(TimePoint now);
+    /// All that it had to say to a new request has been said.
+    void on_settled();
     /// It asks for the same instant again and again.
     void on_spin() { fail("it spins: its deadline passes and nothing changes"); }
     // Truth
     void on_heard(TimePoint now);
     /// A good answer to the request on the wire was delivered to its last byte.
     void on_answered(TimePoint now);
-    void on_served(TimePoint now, std::uint8_t station);
-    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu);
-    void on_exception(TimePoint now, std::uint8_t station);
-    /// `healthy`: none of the stations that it asks is ever dead, so that it must get answers.
-    void on_client(arbiter::Client client, bool healthy);
+    void on_served(TimePoint now, std::uint8_t station) { truth_.on_served(now, station); }
+    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) {
+        truth_.on_executed(now, station, pdu);
+    }
+    void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) {
+        truth_.on_exception(now, station, pdu);
+    }
+    void on_collision(TimePoint now, std::uint8_t station);
+    void on_line_down(TimePoint now);
+    void on_line_up(TimePoint now);
+    void on_stall(TimePoint now) { watch_.on_upset(now); }
+    /// Nobody called the arbiter between these two.
+    void on_paused(TimePoint from, TimePoint now);
+    void on_client(arbiter::Client client, const ClientPlan& plan);
     void on_client_gone(arbiter::Client client);
     /// Nothing more happens: everything must be answered.
-    void at_end(TimePoint now, bool has_dead);
+    void at_end(TimePoint now);
 
     bool failed() const { return !violation_.empty(); }
     /// The first one, "P1: …".
     const std::string& violation() const { return violation_; }
     std::uint64_t good_answers() const { return good_; }
     std::uint64_t frames() const { return frames_; }
+    std::uint64_t collisions() const { return collisions_; }
+    double good_share(TimePoint now) const { return costs_.good_share(now - started_); }
+    /// How long requests to sound panels have waited for their answers, hit ones too.
+    const std::vector<Duration>& waits() const { return waits_; }
+    /// The longest that each station was not asked.
+    const std::map<std::uint8_t, Duration>& longest_unasked() const { return longest_unasked_; }
+    /// The longest silence while a request waited that nothing kept from going.
+    Duration longest_idle() const { return longest_idle_; }
 
   private:
     struct Open {
         arbiter::Job job;
         TimePoint submitted;
         std::uint64_t served = 0;  ///< by its station, when it was submitted
-    };
-    struct Cell {
-        std::vector<std::pair<TimePoint, std::uint16_t>> values;
-        TimePoint asked{};  ///< when a write to it last left
-    };
-    struct Station {
-        std::uint64_t served = 0;
-        std::deque<std::pair<TimePoint, std::uint64_t>> history;
-        TimePoint last_exception{};
-        std::map<std::uint16_t, Cell> cells;
+        std::uint64_t turn = 0;    ///< frames sent until then
+        bool write = false;
+        bool sent = false;
+        bool gone = false;  ///< its client
     };
     struct Client {
-        TimePoint own_write{};  ///< executed and confirmed: it must not read older
+        std::map<std::uint8_t, TimePoint> own_write;  ///< executed and confirmed, by station
         std::uint64_t accepted = 0;
         std::uint64_t good = 0;
-        bool healthy = false;
+        unsigned open = 0;
+        bool healthy = false;  ///< none of its stations is ever dead
+        bool polite = false;
+        bool single = false;  ///< one request at a time
     };
 
     void fail(std::string what);
+    void close_attempt(TimePoint now);
+    // What may be sent when (checker_wire.cpp)
+    void check_moment(TimePoint now);
+    void check_idling(TimePoint now);
+    void check_turn(bool write);
+    void check_write_sent(std::uint8_t station, ByteView pdu);
+    void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
+    void mark_sent(std::uint8_t station, ByteView pdu);
+    bool good_work_waited(TimePoint since) const;
+    bool is_noisy(TimePoint now) const;
+    Duration least_wait() const;
+    // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
-    void check_moving(const Open& open, const Station& station, std::uint16_t address,
-                      std::uint16_t value, std::optional<Duration> age, TimePoint now);
-    void check_cell(const Open& open, const Station& station, std::uint16_t address,
-                    std::uint16_t value, std::optional<Duration> age, TimePoint now);
-    void check_write(TimePoint now, const Open& open, const arbiter::Finish& finish);
+    void check_write(TimePoint now, const Open& open);
+    void check_fault(TimePoint now, const Open& open, Fault fault);
+    void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;
 
-    arbiter::Settings settings_;
+    Plan plan_;
+    const arbiter::Settings& settings_;
+    bool calm_ = false;
     bool adaptive_ = false;
+    bool echoes_ = false;
     std::string violation_;
+    Truth truth_;
+    Watch watch_;
+    Costs costs_;
     std::map<arbiter::Ticket, Open> open_;
     arbiter::Ticket last_ticket_ = 0;
-    std::map<std::uint8_t, Station> stations_;
     std::map<arbiter::Client, Client> clients_;
-    std::map<std::string, TimePoint> executed_;  ///< station and PDU of every write
-    std::set<std::string> written_;              ///< that were on the wire
-    std::set<std::string> closed_writes_;        ///< answered: must not go on the wire any more
+    std::map<std::string, int> written_;             ///< times that each write was on the wire
+    std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
     std::map<std::string, arbiter::Ticket> open_writes_;
+    std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
+    Attempt attempt_;
     TimePoint sent_until_{};
     TimePoint heard_until_{};
-    bool answered_ = true;  ///< the request on the wire
-    bool heard_something_ = false;
-    TimePoint probe_started_{};
-    bool probing_ = false;
-    Duration probes_{};  ///< that nobody answered
+    TimePoint noisy_since_{};  ///< no silence since then
+    TimePoint last_transmit_{};
+    TimePoint paused_from_{};
+    TimePoint resumed_{};
+    std::uint64_t last_read_turn_ = 0;
     TimePoint started_{};
     std::uint64_t good_ = 0;
     std::uint64_t frames_ = 0;
+    std::uint64_t collisions_ = 0;
+    std::vector<Duration> waits_;
+    std::map<std::uint8_t, TimePoint> last_asked_;
+    std::map<std::uint8_t, Duration> longest_unasked_;
+    Duration longest_idle_{};
 };
 
 }  // namespace panelgate::scenario

@@ -226,8 +226,8 @@ void each_station(arbiter::Settings& settings, const auto& change) {
 }
 
 void only_writes(Plan& plan) {
-    plan.echo = true;
-    plan.damaged_echo = 0;
+    plan.line.echo = true;
+    plan.line.damaged_echo = 0;
     for (ClientPlan& client : plan.clients) client.writes = 1;
     for (PanelPlan& panel : plan.panels) panel.drop = 0.3;
 }
@@ -299,7 +299,7 @@ TEST_P(Mutation, IsCaught) {
         Plan plan = draw(mutant.kind, seed);
         mutant.shape(plan);
         const auto subject = mutant.make(plan.settings);
-        Checker checker(plan.settings);
+        Checker checker(plan);
         World world(plan, *subject, checker);
         world.run();
         if (checker.violation().starts_with(mutant.caught_as)) return;
@@ -311,23 +311,23 @@ TEST_P(Mutation, IsCaught) {
 INSTANTIATE_TEST_SUITE_P(Every, Mutation, testing::ValuesIn(kMutants),
                          [](const auto& info) { return std::string(info.param.name); });
 
-/// No setting of the arbiter exceeds the share of probes: the checker is told so directly.
-TEST(Checker, CatchesProbesThatTakeTooMuch) {
-    arbiter::Settings settings;
-    Checker checker(settings);
+/// No setting of the arbiter exceeds the share of the dead: the checker is told so directly.
+TEST(Checker, CatchesDeadStationsThatTakeTooMuch) {
+    Plan plan = draw(Kind::mass, 1);
+    plan.clients.clear();
+    Checker checker(plan);
     TimePoint now{1h};
-    checker.on_line(now);
-    const Bytes adu{1, 3, 0, 0, 0, 1, 0x84, 0x0A};
-    for (int second = 0; second < 60; ++second) {
+    checker.on_line_up(now);
+    for (int second = 0; second < 600; ++second) {
         now += 900ms;
-        checker.on_transmit(now, adu, true);
+        checker.on_transmit(now, {6, 3, 0, 0, 0, 1, 0x84, 0x0A}, "probe", true);
         now += 100ms;
-        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x39}, false);
+        checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x39}, "request", false);
         checker.on_answered(now + 50ms);
     }
     EXPECT_FALSE(checker.failed()) << checker.violation();
-    checker.at_end(now, true);
-    EXPECT_TRUE(checker.violation().starts_with("P4: probes")) << checker.violation();
+    checker.at_end(now);
+    EXPECT_TRUE(checker.violation().starts_with("P4: dead stations took")) << checker.violation();
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "panel.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 
@@ -13,75 +14,151 @@ std::uint16_t word(ByteView bytes, std::size_t at) {
 
 }  // namespace
 
-Panel::Panel(const PanelPlan& plan, const arbiter::Settings& line, Random& random, Checker& checker)
-    : plan_(plan), line_(line), random_(random), checker_(checker) {}
+Panel::Panel(const PanelPlan& plan, const Plan& all, Agenda& agenda, Wire& wire, Random& random,
+             Checker& checker)
+    : plan_(plan),
+      line_(all.settings),
+      agenda_(agenda),
+      wire_(wire),
+      random_(random),
+      checker_(checker),
+      voice_(plan, line_, random) {}
 
-bool Panel::is_dead(TimePoint now) const {
-    if (plan_.dead) return true;
+void Panel::start() {
+    if (plan_.reboots > Duration::zero())
+        agenda_.at(agenda_.now() + random_.between(1s, plan_.reboots), [this] { reboot(); });
+}
+
+bool Panel::is_dead() const {
+    if (plan_.dead || agenda_.now() < dark_until_) return true;
     if (plan_.flapping <= Duration::zero()) return false;
-    return (now.time_since_epoch() / plan_.flapping) % 2 == 1;
+    return ((agenda_.now() - agenda_.started()) / plan_.flapping) % 2 == 1;
 }
 
-std::vector<Utterance> Panel::hear(TimePoint now, ByteView adu) {
+void Panel::reboot() {
+    constexpr Duration kSilence = 8s;
+    dark_until_ = agenda_.now() + kSilence;
+    waiting_.clear();
+    agenda_.at(dark_until_, [this] {
+        Said text = voice_.text();
+        text.connection = wire_.connection();
+        wire_.say(std::move(text));
+    });
+    agenda_.at(agenda_.now() + kSilence + plan_.reboots, [this] { reboot(); });
+}
+
+void Panel::hear(ByteView adu, std::uint64_t connection) {
+    constexpr std::size_t kRing = 4;
     const ByteView pdu = adu.subspan(1, adu.size() - 3);
-    if (is_dead(now)) return {};
+    if (is_dead()) return;
     if (adu[0] == 0) {
-        write(now, pdu);
-        return {};
+        write(pdu);
+        if (plan_.answers_broadcasts) answer_broadcast(pdu, connection);
+        return;
     }
-    if (random_.chance(plan_.drop)) return {};
-    const Duration gap = silent_interval(line_.serial);
-    const Bytes reply = serve(now + gap, pdu);
-    if (random_.chance(plan_.mute)) return {};
-
-    std::vector<Utterance> said;
-    TimePoint at = std::max(now + gap + think(), busy_until_);
-    const auto say = [&](Bytes bytes, bool answer) {
-        const Duration takes = wire_time(line_.serial, bytes.size());
-        said.push_back({at, std::move(bytes), answer});
-        at += takes;
-    };
-    if (random_.chance(plan_.noise)) {
-        Bytes noise;
-        for (unsigned i = random_.between(1, 5); i > 0; --i)
-            noise.push_back(static_cast<std::uint8_t>(random_.next()));
-        say(std::move(noise), false);
-    }
-    if (random_.chance(plan_.foreign)) {
-        say(modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 100), reply), false);
-        at += gap;
-    }
-    const Bytes good = modbus::encode_adu(plan_.id, reply);
-    const bool other = random_.chance(plan_.wrong_id);
-    Bytes frame =
-        damage(other ? modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 101), reply) : good);
-    const bool whole = frame == good;
-    say(std::move(frame), whole);
-    if (random_.chance(plan_.duplicate)) {
-        at += random_.between(0us, gap);
-        say(good, false);
-    }
-    busy_until_ = at + gap;
-    return said;
+    if (random_.chance(plan_.drop)) return;
+    if (busy_ && (!plan_.ring || waiting_.size() >= kRing)) return;
+    waiting_.push_back({{pdu.begin(), pdu.end()}, agenda_.now(), connection});
+    if (!busy_) serve_next();
 }
 
-Bytes Panel::serve(TimePoint now, ByteView pdu) {
-    const auto exception = [&](std::uint8_t code) {
-        checker_.on_exception(now, plan_.id);
-        return Bytes{static_cast<std::uint8_t>(pdu[0] | 0x80), code};
-    };
-    if (random_.chance(plan_.exception)) return exception(6);
+void Panel::answer_broadcast(ByteView pdu, std::uint64_t connection) {
+    Said said;
+    said.bytes = modbus::encode_adu(plan_.id, pdu.first(5));
+    said.rate = plan_.own_rate;
+    said.connection = connection;
+    agenda_.at(agenda_.now() + random_.between(500us, Duration(8ms)),
+               [this, said = std::move(said)] { wire_.say(said); });
+}
+
+void Panel::serve_next() {
+    busy_ = !waiting_.empty();
+    if (!busy_) return;
+    Request request = std::move(waiting_.front());
+    waiting_.pop_front();
+    const Duration silence = plan_.eager ? Duration{} : silent_interval(line_.serial);
+    agenda_.at(std::max(agenda_.now(), request.arrived + silence),
+               [this, request = std::move(request)] { begin(request); });
+}
+
+/// How much later than a request its answer may begin: see PanelPlan::late_limit.
+Duration Panel::horizon() const {
+    const double timeout = static_cast<double>(line_.unlisted.response_timeout.count());
+    const Duration most(static_cast<Duration::rep>(timeout * plan_.late_limit));
+    return plan_.nap > 0 ? std::max<Duration>(most, 2100ms) : most;
+}
+
+void Panel::begin(Request request) {
+    const Duration thinking = think(request);
+    const bool too_old = agenda_.now() + thinking > request.arrived + horizon();
+    if (is_dead() || too_old) return serve_next();
+    const bool silent =
+        request.pdu[0] <= 4 && plan_.refusal == 0 && word(request.pdu, 3) > plan_.max_registers;
+    const Bytes reply = silent ? Bytes{} : serve(request.pdu);
+    const bool mute = silent || random_.chance(plan_.mute);
+    agenda_.at(agenda_.now() + thinking, [this, request = std::move(request), reply, mute] {
+        if (mute || is_dead()) {
+            serve_next();
+        } else {
+            answer(request, reply);
+        }
+    });
+}
+
+void Panel::answer(const Request& request, const Bytes& reply) {
+    const Duration timeout = line_.unlisted.response_timeout;
+    const Duration since = agenda_.now() - request.arrived;
+    // What is late already says nothing but the reply.
+    const Duration spare = timeout - since - silent_interval(line_.serial);
+    say_all(voice_.speak(reply, spare), 0, request.connection);
+}
+
+/// One piece after another; the last one is the gap.
+void Panel::say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t connection) {
+    while (next < all.size()) {
+        Utterance& piece = all[next];
+        if (piece.pause > Duration::zero()) {
+            const Duration pause = std::exchange(piece.pause, Duration{});
+            agenda_.at(agenda_.now() + pause, [this, all = std::move(all), next, connection] {
+                if (is_dead()) return serve_next();
+                say_all(all, next, connection);
+            });
+            return;
+        }
+        ++next;
+        if (piece.said.bytes.empty()) continue;
+        piece.said.connection = connection;
+        const TimePoint end = wire_.say(std::move(piece.said));
+        if (next == all.size())
+            return agenda_.at(end + silent_interval(line_.serial), [this] { serve_next(); });
+        agenda_.at(end, [this, all = std::move(all), next, connection] {
+            say_all(all, next, connection);
+        });
+        return;
+    }
+    agenda_.at(agenda_.now() + silent_interval(line_.serial), [this] { serve_next(); });
+}
+
+Bytes Panel::refuse(ByteView pdu, unsigned code) {
+    checker_.on_exception(agenda_.now(), plan_.id, pdu);
+    return {static_cast<std::uint8_t>(pdu[0] | 0x80), static_cast<std::uint8_t>(code)};
+}
+
+Bytes Panel::serve(ByteView pdu) {
+    if (random_.chance(plan_.wrong_function))
+        return {static_cast<std::uint8_t>(0x84 ^ (pdu[0] & 4)), 2};
+    if (random_.chance(plan_.exception)) return refuse(pdu, 6);
     if (pdu[0] > 4) {
-        write(now, pdu);
+        write(pdu);
         return {pdu.begin(), pdu.begin() + 5};
     }
-    if (word(pdu, 3) > plan_.max_registers) return exception(3);
-    checker_.on_served(now, plan_.id);
+    if (word(pdu, 3) > plan_.max_registers) return refuse(pdu, plan_.refusal);
+    checker_.on_served(agenda_.now(), plan_.id);
     ++served_;
     return read(pdu);
 }
 
-Bytes Panel::read(ByteView pdu) {
+Bytes Panel::read(ByteView pdu) const {
     Writer out;
     out.u8(pdu[0]).u8(2u * word(pdu, 3));
     for (unsigned i = 0; i < word(pdu, 3); ++i) {
@@ -92,35 +169,26 @@ Bytes Panel::read(ByteView pdu) {
     return out.take();
 }
 
-void Panel::write(TimePoint now, ByteView pdu) {
-    checker_.on_executed(now, plan_.id, pdu);
+void Panel::write(ByteView pdu) {
+    checker_.on_executed(agenda_.now(), plan_.id, pdu);
     if (pdu[0] == 5) return;
     const unsigned count = pdu[0] == 16 ? word(pdu, 3) : 1;
     for (unsigned i = 0; i < count; ++i)
         cells_.at(word(pdu, 1) + i - kMemory) = word(pdu, pdu[0] == 16 ? 6 + 2 * i : 3);
 }
 
-Duration Panel::think() {
-    if (!random_.chance(plan_.late)) return plan_.think;
-    const double most = plan_.late_limit - 0.5;
-    const double timeouts = 0.5 + most * random_.share();
-    return Duration(static_cast<Duration::rep>(
-               static_cast<double>(line_.unlisted.response_timeout.count()) * timeouts)) -
-           silent_interval(line_.serial);
-}
-
-/// Damage that a CRC-16 always detects: up to three bits, or a missing end. What it lets pass (one
-/// of 65536 of anything else) is no arbiter's affair.
-Bytes Panel::damage(Bytes adu) {
-    if (random_.chance(plan_.flip)) {
-        for (unsigned i = random_.between(1, 3); i > 0; --i) {
-            adu[random_.below(static_cast<unsigned>(adu.size()))] ^=
-                static_cast<std::uint8_t>(1u << random_.below(8));
-        }
+Duration Panel::think(const Request& request) {
+    const Duration waited = agenda_.now() - request.arrived;
+    const auto at = [&](Duration after) { return std::max(after - waited, Duration{}); };
+    if (random_.chance(plan_.nap)) return at(2s);
+    if (random_.chance(plan_.late)) {
+        const double timeout = static_cast<double>(line_.unlisted.response_timeout.count());
+        const double timeouts = 0.5 + (plan_.late_limit - 0.5) * random_.share();
+        return at(Duration(static_cast<Duration::rep>(timeout * timeouts)));
     }
-    if (random_.chance(plan_.truncate))
-        adu.resize(random_.between(1, static_cast<unsigned>(adu.size()) - 1));
-    return adu;
+    const bool slow = plan_.slow_think > Duration::zero() &&
+                      ((agenda_.now() - agenda_.started()) / plan_.swing) % 2 == 1;
+    return slow ? plan_.slow_think : plan_.think;
 }
 
 }  // namespace panelgate::scenario

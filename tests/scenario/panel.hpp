@@ -1,47 +1,66 @@
 #pragma once
 
 #include <array>
-#include <optional>
+#include <deque>
 #include <vector>
 
+#include "agenda.hpp"
 #include "checker.hpp"
 #include "plan.hpp"
 #include "random.hpp"
+#include "voice.hpp"
+#include "wire.hpp"
 
 namespace panelgate::scenario {
 
-/// Something a panel puts on the wire.
-struct Utterance {
-    TimePoint at;
-    Bytes bytes;
-    /// It is the good answer to the request, whole and undamaged.
-    bool answer = false;
-};
-
-/// One simulated panel in virtual time, with its faults. Tells the checker what it really did.
+/// One simulated panel in virtual time: serves one request after another, each at its own pace.
+/// Tells the checker what it really did.
 class Panel {
   public:
-    Panel(const PanelPlan& plan, const arbiter::Settings& line, Random& random, Checker& checker);
+    Panel(const PanelPlan& plan, const Plan& all, Agenda& agenda, Wire& wire, Random& random,
+          Checker& checker);
+    Panel(const Panel&) = delete;
+    Panel& operator=(const Panel&) = delete;
 
-    /// A frame for this panel (or a broadcast) has ended at `now`, undamaged.
-    std::vector<Utterance> hear(TimePoint now, ByteView adu);
-    bool is_dead(TimePoint now) const;
+    /// What it does unasked.
+    void start();
+    /// A frame for this panel (or a broadcast) has ended now, undamaged.
+    void hear(ByteView adu, std::uint64_t connection);
+    bool is_dead() const;
     std::uint8_t id() const { return plan_.id; }
 
   private:
-    Bytes serve(TimePoint now, ByteView pdu);
-    Bytes read(ByteView pdu);
-    void write(TimePoint now, ByteView pdu);
-    Duration think();
-    Bytes damage(Bytes adu);
+    struct Request {
+        Bytes pdu;
+        TimePoint arrived;
+        std::uint64_t connection = 0;
+    };
+    void serve_next();
+    void begin(Request request);
+    void answer(const Request& request, const Bytes& reply);
+    void say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t connection);
+    void answer_broadcast(ByteView pdu, std::uint64_t connection);
+    Bytes serve(ByteView pdu);
+    Bytes refuse(ByteView pdu, unsigned code);
+    Bytes read(ByteView pdu) const;
+    void write(ByteView pdu);
+    /// From now until it begins to speak.
+    Duration think(const Request& request);
+    Duration horizon() const;
+    void reboot();
 
     PanelPlan plan_;
-    arbiter::Settings line_;
+    const arbiter::Settings& line_;
+    Agenda& agenda_;
+    Wire& wire_;
     Random& random_;
     Checker& checker_;
+    Voice voice_;
     std::uint64_t served_ = 0;
     std::array<std::uint16_t, kMemoryCells + 2> cells_{};
-    TimePoint busy_until_{};  ///< with what it says; a later request is answered behind that
+    std::deque<Request> waiting_;
+    bool busy_ = false;
+    TimePoint dark_until_{};
 };
 
 }  // namespace panelgate::scenario

@@ -3,112 +3,43 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "panelgate/base/serial_format.hpp"
+#include "draw.hpp"
 #include "random.hpp"
 
 namespace panelgate::scenario {
-namespace {
 
-constexpr int kRates[] = {9600, 19200, 38400, 115200};
+bool PanelPlan::is_sound(Duration timeout, Duration reply_hole) const {
+    constexpr unsigned kLongestRead = 20;  // that a client asks for
+    const bool ever_silent = drop > 0 || mute > 0 || nap > 0 || late > 0 || dead ||
+                             flapping > Duration::zero() || reboots > Duration::zero() ||
+                             (refusal == 0 && max_registers < kLongestRead);
+    const bool ever_wrong = flip > 0 || truncate > 0 || noise > 0 || wrong_id > 0 || foreign > 0 ||
+                            wrong_function > 0 || damaged_first > 0 || padded_inside > 0;
+    const Duration slowest = std::max(think, slow_think) + (fragment > 0 ? 40ms : 10ms);
+    return !ever_silent && !ever_wrong && slowest < timeout &&
+           (hole == 0 || hole_limit + 16ms < reply_hole);
+}
 
-PanelPlan draw_faults(Random& random, PanelPlan panel, double much) {
-    const auto maybe = [&](double most) {
-        return random.chance(0.5) ? random.share() * most * much : 0;
+bool PanelPlan::only_dies() const {
+    return drop == 0 && mute == 0 && nap == 0 && late == 0 && flip == 0 && truncate == 0 &&
+           wrong_id == 0 && wrong_function == 0 && foreign == 0 && slow_think == Duration::zero();
+}
+
+bool Plan::is_sound(const PanelPlan& panel) const {
+    return panel.is_sound(settings.unlisted.response_timeout, settings.reply_hole);
+}
+
+bool Plan::is_calm() const {
+    const auto in_time = [](const PanelPlan& p) {
+        return p.late == 0 && p.nap == 0 && p.damaged_first == 0 &&
+               p.slow_think == Duration::zero();
     };
-    panel.late = maybe(0.10);
-    panel.drop = maybe(0.05);
-    panel.mute = maybe(0.05);
-    panel.flip = maybe(0.05);
-    panel.truncate = maybe(0.05);
-    panel.noise = maybe(0.05);
-    panel.wrong_id = maybe(0.03);
-    panel.foreign = maybe(0.05);
-    panel.duplicate = maybe(0.05);
-    panel.exception = maybe(0.03);
-    if (random.chance(0.2)) panel.max_registers = random.between(10, 60);
-    return panel;
+    const bool nothing_held = !settings.may_stall && line.pauses == 0 && line.losses == 0;
+    const bool alone =
+        line.idle_noise == 0 && !line.other_master && line.cut_echo == 0 && line.damaged_echo == 0;
+    return std::ranges::all_of(panels, in_time) && nothing_held && alone &&
+           settings.quarantine != arbiter::Quarantine::line;
 }
-
-void draw_line(Random& random, Plan& plan) {
-    arbiter::Settings& s = plan.settings;
-    s.serial.baud = kRates[random.below(4)];
-    s.serial.parity = random.chance(0.5) ? Parity::even : Parity::none;
-    s.paced = random.chance(0.5);
-    s.share_reads = random.chance(0.8);
-    s.broadcast_turnaround = random.between(20ms, 150ms);
-    s.queue.limit = random.between(8, 64);
-    s.queue.per_client = random.between(2, 32);
-    s.queue.deadline = random.between(500ms, 4s);
-    s.offline.after = static_cast<int>(random.between(2, 5));
-    s.offline.probe_min = random.between(100ms, 1s);
-    s.offline.probe_max = random.between(2s, 10s);
-    s.unlisted.response_timeout = random.between(50ms, 400ms);
-    s.unlisted.frame_gap = silent_interval(s.serial);
-    s.unlisted.retries = static_cast<int>(random.below(3));
-    // The quarantine has to reach as far as the latest reply: 3 timeouts are 2 of lateness, and
-    // what stands between a reply's first and last byte.
-    s.unlisted.late_window = s.unlisted.response_timeout * 5 / 2 + 300ms;
-}
-
-void draw_panels(Random& random, Plan& plan, double much) {
-    const unsigned count = random.between(2, 8);
-    for (unsigned i = 0; i < count; ++i) {
-        PanelPlan panel;
-        panel.id = static_cast<std::uint8_t>(i * 7 + random.between(1, 7));
-        panel.think = random.between(200us, 10ms);
-        panel = draw_faults(random, panel, much);
-        arbiter::StationSettings station = plan.settings.unlisted;
-        station.id = panel.id;
-        if (random.chance(0.3)) station.frame_gap = *station.frame_gap + random.between(0us, 4ms);
-        plan.settings.stations.push_back(station);
-        plan.panels.push_back(panel);
-    }
-}
-
-void draw_clients(Random& random, Plan& plan, unsigned most) {
-    const unsigned count = random.between(1, most);
-    for (unsigned i = 0; i < count; ++i) {
-        ClientPlan client;
-        client.in_flight = random.chance(0.6) ? 1 : random.between(2, 16);
-        client.writes = random.chance(0.5) ? random.share() * 0.4 : 0;
-        client.broadcasts = random.chance(0.2) ? 0.02 : 0;
-        client.polls = random.chance(0.2);
-        client.vanish = random.chance(0.3) ? 0.02 : 0;
-        client.pause = random.between(0us, 20ms);
-        for (const PanelPlan& panel : plan.panels) {
-            if (random.chance(0.6)) client.stations.push_back(panel.id);
-        }
-        if (client.stations.empty()) client.stations.push_back(plan.panels.front().id);
-        plan.clients.push_back(std::move(client));
-    }
-}
-
-/// The reply comes at most this late, and an automatic window reaches as far.
-void limit_lateness(Plan& plan, double timeouts) {
-    for (PanelPlan& panel : plan.panels) panel.late_limit = timeouts;
-}
-
-void draw_dead(Random& random, Plan& plan) {
-    for (std::size_t i = 1; i < plan.panels.size(); ++i) {
-        if (random.chance(0.5)) plan.panels[i].dead = true;
-        if (random.chance(0.3)) plan.panels[i].flapping = random.between(1s, 10s);
-    }
-}
-
-/// Every client keeps the line busy at a healthy panel, so that what dead ones cost is seen.
-void draw_healthy_load(Plan& plan) {
-    ClientPlan steady;
-    steady.in_flight = 2;
-    steady.writes = 0;
-    steady.pause = 0us;
-    steady.stations = {plan.panels.front().id};
-    PanelPlan healthy;
-    healthy.id = plan.panels.front().id;
-    plan.panels.front() = healthy;
-    plan.clients.push_back(steady);
-}
-
-}  // namespace
 
 std::string_view label(Kind kind) {
     switch (kind) {
@@ -124,52 +55,151 @@ std::string_view label(Kind kind) {
             return "crowd";
         case Kind::adaptive:
             return "adaptive";
+        case Kind::voices:
+            return "voices";
+        case Kind::receiver:
+            return "receiver";
+        case Kind::company:
+            return "company";
+        case Kind::loss:
+            return "loss";
+        case Kind::stall:
+            return "stall";
+        case Kind::flood:
+            return "flood";
+        case Kind::mass:
+            return "mass";
+        case Kind::writers:
+            return "writers";
+        case Kind::wild:
+            return "wild";
     }
     std::abort();
 }
+
+namespace {
+
+void each_station(Plan& plan, const auto& change) {
+    for (arbiter::StationSettings& station : plan.settings.stations) change(station);
+}
+
+/// The reply comes at most this late, and an automatic window reaches as far.
+void trust_automatic_window(Plan& plan) {
+    each_station(plan, [](auto& station) { station.late_window.reset(); });
+    for (PanelPlan& panel : plan.panels) panel.late_limit = 1.8;
+}
+
+void draw_echo(Random& random, Plan& plan) {
+    arbiter::Settings& s = plan.settings;
+    plan.line.echo = random.chance(0.8);
+    plan.line.damaged_echo = random.chance(0.5) ? 0.05 : 0;
+    s.echo =
+        plan.line.echo && random.chance(0.3) ? arbiter::EchoMode::on : arbiter::EchoMode::automatic;
+    for (ClientPlan& client : plan.clients) client.writes = std::max(client.writes, 0.3);
+}
+
+void draw_retried_writes(Random& random, Plan& plan) {
+    each_station(plan, [&](auto& station) { station.retry_writes = random.chance(0.3); });
+}
+
+void draw_everything(Random& random, Plan& plan) {
+    draw_manners(random, plan);
+    draw_company(random, plan);
+    if (random.chance(0.5)) draw_receiver(random, plan);
+    draw_losses(random, plan);
+    draw_retried_writes(random, plan);
+    draw_unlisted(random, plan);
+    if (random.chance(0.3)) draw_stalls(random, plan);
+    plan.settings.echo = arbiter::EchoMode::automatic;
+}
+
+/// Panels whose answers are all there: what goes wrong is somebody else's.
+void draw_sound(Random& random, Plan& plan, Kind kind) {
+    arbiter::Settings& s = plan.settings;
+    s.queue.deadline = random.between(2s, 6s);
+    if (kind == Kind::mass) {
+        draw_mass(random, plan);
+        draw_clients(random, plan, 6);
+        draw_healthy_load(plan);
+        plan.transactions = 3000;
+        if (random.chance(0.3)) {
+            ClientPlan scan;
+            scan.scans = true;
+            scan.writes = 0;
+            scan.pause = 20ms;
+            plan.clients.push_back(scan);
+        }
+        return;
+    }
+    draw_voices(random, plan);
+    // Those who count turns and places need panels that are quick to the point.
+    if (kind == Kind::flood || kind == Kind::writers) {
+        for (PanelPlan& panel : plan.panels) {
+            panel = plain_panel(panel.id);
+            panel.think = random.between(200us, 10ms);
+        }
+    }
+    draw_clients(random, plan, 6);
+    if (kind == Kind::flood) draw_flood(random, plan);
+    if (kind == Kind::writers) draw_writers(random, plan);
+    if (kind == Kind::receiver) draw_receiver(random, plan);
+    if (kind == Kind::company) {
+        draw_company(random, plan);
+        draw_unlisted(random, plan);
+    }
+    // A line with an echo that is said to have none confirms writes by themselves: no plan.
+    const bool learns = kind == Kind::receiver || random.chance(0.7);
+    s.echo = learns ? arbiter::EchoMode::automatic : arbiter::EchoMode::off;
+    if (kind == Kind::voices && random.chance(0.2)) draw_extreme_rate(random, plan);
+    s.unlisted.late_window = s.unlisted.response_timeout * 5 / 2 + 300ms;
+    each_station(plan, [&](auto& station) { station.late_window = s.unlisted.late_window; });
+}
+
+/// Panels with faults that spoil answers.
+void draw_faulty(Random& random, Plan& plan, Kind kind) {
+    draw_panels(random, plan, kind == Kind::crowd ? 0.1 : 1);
+    draw_clients(random, plan, kind == Kind::crowd ? 20 : 6);
+    plan.line.idle_noise = random.chance(0.3) ? 0.2 : 0;
+    plan.line.losses = random.chance(0.1) ? 0.02 : 0;
+    arbiter::Settings& s = plan.settings;
+    if (kind == Kind::faults && random.chance(0.5)) trust_automatic_window(plan);
+    if (kind == Kind::station) s.quarantine = arbiter::Quarantine::station;
+    if (kind == Kind::echo) draw_echo(random, plan);
+    if (kind == Kind::dead) {
+        draw_dead(random, plan);
+        draw_healthy_load(plan);
+    }
+    if (kind == Kind::crowd) {
+        each_station(plan, [&](auto& station) {
+            if (random.chance(0.5)) station.max_age = random.between(10ms, 2s);
+        });
+    }
+    if (kind == Kind::adaptive)
+        each_station(plan, [](auto& station) { station.adaptive_timeout = true; });
+    if (kind == Kind::loss) {
+        draw_losses(random, plan);
+        draw_retried_writes(random, plan);
+    }
+    if (kind == Kind::stall) draw_stalls(random, plan);
+    if (kind == Kind::wild) draw_everything(random, plan);
+}
+
+bool is_of_sound_panels(Kind kind) {
+    return kind == Kind::voices || kind == Kind::receiver || kind == Kind::company ||
+           kind == Kind::flood || kind == Kind::mass || kind == Kind::writers;
+}
+
+}  // namespace
 
 Plan draw(Kind kind, std::uint64_t seed) {
     Random random(seed * 31 + static_cast<std::uint64_t>(kind));
     Plan plan;
     plan.seed = seed;
     draw_line(random, plan);
-    draw_panels(random, plan, kind == Kind::crowd ? 0.1 : 1);
-    draw_clients(random, plan, kind == Kind::crowd ? 20 : 6);
-    plan.idle_noise = random.chance(0.3) ? 0.2 : 0;
-    plan.line_losses = random.chance(0.1) ? 0.02 : 0;
-    arbiter::Settings& s = plan.settings;
-    const auto each_station = [&](const auto& change) {
-        for (arbiter::StationSettings& station : s.stations) change(station);
-    };
-    switch (kind) {
-        case Kind::faults:
-            if (random.chance(0.5)) {
-                each_station([](auto& station) { station.late_window.reset(); });
-                limit_lateness(plan, 1.8);
-            }
-            break;
-        case Kind::station:
-            s.quarantine = arbiter::Quarantine::station;
-            break;
-        case Kind::echo:
-            plan.echo = random.chance(0.8);
-            plan.damaged_echo = random.chance(0.5) ? 0.05 : 0;
-            s.echo = plan.echo && random.chance(0.3) ? arbiter::EchoMode::on
-                                                     : arbiter::EchoMode::automatic;
-            for (ClientPlan& client : plan.clients) client.writes = std::max(client.writes, 0.3);
-            break;
-        case Kind::dead:
-            draw_dead(random, plan);
-            draw_healthy_load(plan);
-            break;
-        case Kind::crowd:
-            each_station([&](auto& station) {
-                if (random.chance(0.5)) station.max_age = random.between(10ms, 2s);
-            });
-            break;
-        case Kind::adaptive:
-            each_station([](auto& station) { station.adaptive_timeout = true; });
-            break;
+    if (is_of_sound_panels(kind)) {
+        draw_sound(random, plan, kind);
+    } else {
+        draw_faulty(random, plan, kind);
     }
     return plan;
 }

@@ -8,40 +8,147 @@
 
 namespace panelgate::scenario {
 
-/// How one simulated panel behaves: chances of each fault, by request.
+/// What one simulated panel does with a request: chances are by request.
 struct PanelPlan {
     std::uint8_t id = 1;
+    bool listed = true;  ///< the settings know it
+    // When it answers
     Duration think = 1ms;
-    double late = 0;  ///< answers after 0.5 to `late_limit` response timeouts
+    Duration slow_think{};  ///< what it needs in every other `swing`; 0 = always `think`
+    Duration swing = 5s;
+    bool eager = false;  ///< does not wait for the silence behind the request, as many don't
+    bool ring = true;    ///< takes requests while it thinks and serves them in turn; else deaf then
+    double late = 0;     ///< answers after 0.5 to `late_limit` response timeouts
+    /// In response timeouts: what would be answered later than this is forgotten. Beyond the late
+    /// window no gateway can tell an old reply from the new one, so no plan goes there.
     double late_limit = 3;
+    double nap = 0;       ///< thinks for 2 s
+    double own_rate = 1;  ///< its characters take this much longer than the line's
+    // Whether
     double drop = 0;       ///< neither executed nor answered
     double mute = 0;       ///< executed, not answered
-    double flip = 0;       ///< 1 to 3 bits of the reply: the CRC detects all of these
-    double truncate = 0;   ///< only a part of the reply
-    double noise = 0;      ///< bytes in front of the reply
-    double wrong_id = 0;   ///< the reply carries another address
-    double foreign = 0;    ///< a good frame of another address goes first
-    double duplicate = 0;  ///< the reply comes twice
-    double exception = 0;
-    unsigned max_registers = 125;  ///< more are refused with exception 3
+    double exception = 0;  ///< refuses with 06
+    unsigned max_registers = 125;
+    unsigned refusal = 3;       ///< the exception for more than those; 0 = silence
+    double wrong_function = 0;  ///< answers with an exception of another function
+    bool answers_broadcasts = false;
     bool dead = false;
     Duration flapping{};  ///< dead and alive in turns of this length; 0 = no
+    Duration reboots{};   ///< in each such time it is silent for 8 s and then says some text
+    // How it sounds
+    double flip = 0;           ///< 1 to 3 bits of the reply: the CRC detects all of these
+    double truncate = 0;       ///< only a part of the reply
+    double noise = 0;          ///< bytes in front of the reply
+    double wrong_id = 0;       ///< the reply carries another address
+    double foreign = 0;        ///< a good frame of another address goes first
+    double fragment = 0;       ///< its address and function, some time before the reply
+    double glitch_before = 0;  ///< one byte 00 or FF, right before or behind the reply
+    double glitch_behind = 0;
+    double hole = 0;  ///< a pause of up to `hole_limit` inside the reply
+    Duration hole_limit{};
+    double tail = 0;       ///< 1 to 3 bytes 0.5 to 5 ms behind the reply
+    double duplicate = 0;  ///< the reply comes twice, the second up to this much later:
+    Duration duplicate_delay{};
+    double damaged_first = 0;  ///< a damaged reply, and the good one 60 ms later
+    double padded_inside = 0;  ///< two bytes too many under the CRC
+    double padded_behind = 0;
+
+    /// Its answers come in time and a gateway can find each of them: all but single bytes around
+    /// them and pauses. `timeout`: of the line.
+    bool is_sound(Duration timeout, Duration reply_hole) const;
+    /// Never silent, unless it is dead.
+    bool only_dies() const;
 };
 
 struct ClientPlan {
     unsigned in_flight = 1;  ///< requests that it keeps open
     double writes = 0.1;
     double broadcasts = 0;
-    bool polls = false;    ///< its reads are of the poll class
-    double vanish = 0;     ///< chance, by answer, that it goes away and comes back as another
-    Duration pause = 1ms;  ///< between an answer and the next request, at most
+    bool polls = false;      ///< its reads are of the poll class
+    bool same_read = false;  ///< it always asks for the same items
+    bool scans = false;      ///< it asks all ids, one after another
+    double vanish = 0;       ///< chance, by answer, that it goes away and comes back as another
+    double leaves = 0;       ///< the same by second, at any moment
+    Duration pause = 1ms;    ///< between an answer and the next request, at most
+    std::uint64_t host = 0;  ///< 0: one of its own
+    bool polite = false;     ///< few requests: none of them may be refused
     std::vector<std::uint8_t> stations;
 };
 
-enum class Kind : std::uint8_t { faults, station, echo, dead, crowd, adaptive };
-inline constexpr Kind kKinds[] = {Kind::faults, Kind::station, Kind::echo,
-                                  Kind::dead,   Kind::crowd,   Kind::adaptive};
+/// What happens to the line as a whole.
+struct LinePlan {
+    double own_rate = 1;  ///< our characters take this much longer than computed
+    bool echo = false;
+    double damaged_echo = 0;  ///< by request
+    double cut_echo = 0;      ///< the echo lacks its last byte
+    double partial_echo = 0;  ///< the first 1 to 7 bytes come back
+    double idle_noise = 0;    ///< bursts of noise a second
+    double floating = 0;      ///< by second: it floats for 1 to 4 s, a byte each 1.5 ms of silence
+    double losses = 0;        ///< the device goes away, by second
+    double handover = 0;      ///< share of them: back at once, what is under way is heard
+    double stalls = 0;        ///< by second: nothing gets through for 0.3 to 4 s, then all of it
+    double pauses = 0;        ///< by second: nobody calls the arbiter for 0.1 to 5 s
+    Duration babble{};        ///< a good frame that nobody asked for, each such time
+    bool other_master = false;  ///< a polite one, with a panel of its own
+};
+
+enum class Kind : std::uint8_t {
+    faults,
+    station,
+    echo,
+    dead,
+    crowd,
+    adaptive,
+    voices,    ///< sound panels, oddly spoken
+    receiver,  ///< echoes of every sort
+    company,   ///< others on the wire
+    loss,      ///< line, process and clients come and go
+    stall,     ///< RTU over TCP that holds frames back
+    flood,     ///< one host against many
+    mass,      ///< several panels die in one instant
+    writers,   ///< endless writes
+    wild       ///< all of it
+};
+inline constexpr Kind kKinds[] = {Kind::faults,  Kind::station,  Kind::echo,   Kind::dead,
+                                  Kind::crowd,   Kind::adaptive, Kind::voices, Kind::receiver,
+                                  Kind::company, Kind::loss,     Kind::stall,  Kind::flood,
+                                  Kind::mass,    Kind::writers,  Kind::wild};
 std::string_view label(Kind kind);
+
+/// What exactly one panel of a line does.
+enum class Oddity : std::uint8_t {
+    none,
+    wrong_function,
+    padded_inside,
+    padded_behind,
+    doubled,
+    tails,
+    fragments,
+    glitches,
+    damaged_first,
+    holes,
+    naps,
+    mute,
+    drops,
+    flips,
+    reboots,
+    babbles,
+    answers_broadcasts,
+    dies,
+    refuses_long,
+    ignores_long,
+};
+inline constexpr Oddity kOddities[] = {Oddity::wrong_function, Oddity::padded_inside,
+                                       Oddity::padded_behind,  Oddity::doubled,
+                                       Oddity::tails,          Oddity::fragments,
+                                       Oddity::glitches,       Oddity::damaged_first,
+                                       Oddity::holes,          Oddity::naps,
+                                       Oddity::mute,           Oddity::drops,
+                                       Oddity::flips,          Oddity::reboots,
+                                       Oddity::babbles,        Oddity::answers_broadcasts,
+                                       Oddity::dies,           Oddity::refuses_long,
+                                       Oddity::ignores_long};
+std::string_view label(Oddity oddity);
 
 /// One run: a line, its panels, its clients. The same seed gives the same run.
 struct Plan {
@@ -49,12 +156,18 @@ struct Plan {
     arbiter::Settings settings;
     std::vector<PanelPlan> panels;
     std::vector<ClientPlan> clients;
-    bool echo = false;
-    double damaged_echo = 0;          ///< by request
-    double idle_noise = 0;            ///< bursts of noise a second
-    double line_losses = 0;           ///< the device goes away, by second
+    LinePlan line;
     std::size_t transactions = 1000;  ///< frames that the gateway sends before the run ends
+    std::uint8_t odd = 0;             ///< the one panel that is
+
+    bool is_sound(const PanelPlan& panel) const;
+    /// Nothing but silence of panels keeps a line idle: replies are never late, nothing is held.
+    bool is_calm() const;
 };
 Plan draw(Kind kind, std::uint64_t seed);
+/// A line on which one panel is odd, and all others are as good as panels get.
+Plan draw_odd(Oddity oddity, std::uint64_t seed);
+/// The same with that panel as good as the others.
+Plan without_oddity(Plan plan);
 
 }  // namespace panelgate::scenario

@@ -22,8 +22,8 @@ class Subject {
     }
     virtual std::optional<TimePoint> next_deadline() const { return arbiter_.next_deadline(); }
     virtual std::size_t queue_depth() const { return arbiter_.queue_depth(); }
-    void on_line_up(TimePoint now) { arbiter_.on_line_up(now); }
-    void on_line_down(TimePoint now) { arbiter_.on_line_down(now); }
+    virtual void on_line_up(TimePoint now) { arbiter_.on_line_up(now); }
+    virtual void on_line_down(TimePoint now) { arbiter_.on_line_down(now); }
 
   protected:
     arbiter::Arbiter arbiter_;

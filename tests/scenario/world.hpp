@@ -2,106 +2,80 @@
 
 #include <functional>
 #include <list>
-#include <memory>
-#include <optional>
-#include <queue>
 #include <string>
 #include <vector>
 
+#include "agenda.hpp"
 #include "checker.hpp"
+#include "customers.hpp"
 #include "panel.hpp"
 #include "plan.hpp"
 #include "random.hpp"
 #include "subject.hpp"
+#include "trouble.hpp"
+#include "wire.hpp"
 
 namespace panelgate::scenario {
 
-/// One half-duplex wire in virtual time: an arbiter on one end, panels on the other, clients
-/// behind the arbiter. Whoever speaks while another speaks damages both.
+/// One line in virtual time: an arbiter on one end, panels on the other, clients behind the
+/// arbiter.
 class World {
   public:
     World(const Plan& plan, Subject& subject, Checker& checker);
+    World(const World&) = delete;
+    World& operator=(const World&) = delete;
 
     /// Until the plan's number of frames were sent and everything is answered, or a promise broke.
     void run();
-    TimePoint now() const { return now_; }
-    /// Keeps the last things that happened, for a replay.
-    void keep_history() { keeps_history_ = true; }
-    std::string history() const;
+    TimePoint now() const { return agenda_.now(); }
+    void keep_history() { agenda_.keep_history(); }
+    std::string history() const { return agenda_.history(); }
 
   private:
-    struct Frame {
-        Bytes bytes;
-        TimePoint start;
-        TimePoint end;
-        std::optional<TimePoint> garbled_from;
-        bool answer = false;
-        bool ours = false;
-    };
-    using FramePtr = std::shared_ptr<Frame>;
-    struct Event {
-        TimePoint at;
-        std::uint64_t order = 0;
-        std::function<void()> happen;
-        bool operator>(const Event& other) const {
-            return at != other.at ? at > other.at : order > other.order;
-        }
-    };
-    struct Customer {
-        ClientPlan plan;
-        arbiter::Client id = 0;
-        unsigned open = 0;
-    };
-
-    void at(TimePoint when, std::function<void()> happen);
     bool step();
+    bool call_deadline();
     void drain();
     void act(const arbiter::Transmit& transmit);
     void act(const arbiter::Finish& finish);
     void act(const arbiter::Note& note);
     void act(const arbiter::Decision&) {}
-    void act(const arbiter::Reset&) { reset_line(); }
+    void act(const arbiter::Reset&);
     void act(const arbiter::StationEvent&) {}
 
-    FramePtr put_on_wire(Bytes bytes, bool ours, bool answer);
-    void deliver_in_chunks(const FramePtr& frame);
-    void deliver(const FramePtr& frame, std::size_t from, std::size_t to);
-    void on_request_left(const FramePtr& frame);
-    void tell(const std::string& what, ByteView bytes = {});
-    void make_noise();
-    void lose_line();
-    void reset_line();
+    void hear(ByteView bytes, bool answered);
+    void ask_panels(ByteView adu, std::uint64_t connection);
+    bool is_dead(std::uint8_t station) const;
+    /// As soon as the process runs.
+    void reach(std::function<void()> call);
 
-    void become(Customer& customer);
-    void ask(std::size_t index);
-    Bytes draw_request(const Customer& customer, std::uint8_t& station);
-    Bytes draw_write();
-    void on_answer(std::size_t index);
+    // What happens to the line and the process
+    void every_so_often(double per_second, const std::function<void()>& happen);
+    void lose_line();
+    void take_down(Duration pause);
+    void stall();
+    void pause();
+    void resume();
+
     /// Where everything is dead little is sent: then time ends it.
     bool is_over() const {
-        return checker_.frames() >= plan_.transactions || now_ - started_ > 10min;
+        return checker_.frames() >= plan_.transactions || now() - agenda_.started() > 10min;
     }
 
     Plan plan_;
     Subject& subject_;
     Checker& checker_;
     Random random_;
-    TimePoint now_{1h};
-    TimePoint started_{};
-    std::uint64_t order_ = 0;
-    std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
-    std::list<FramePtr> air_;
-    std::vector<Panel> panels_;
-    std::vector<Customer> customers_;
-    std::map<arbiter::Ticket, std::size_t> asked_by_;
+    Agenda agenda_;
+    Wire wire_;
+    std::list<Panel> panels_;
+    Customers customers_;
+    Trouble trouble_;
     std::string_view what_next_;  ///< the note of the frame that is transmitted next
-    arbiter::Client last_client_ = 0;
-    unsigned last_write_ = 0;
-    bool up_ = false;
-    bool keeps_history_ = false;
-    std::deque<std::string> history_;
-    int spins_ = 0;           ///< deadlines in a row that did not move time
-    std::uint64_t life_ = 0;  ///< of the line: what was said before it was lost is not heard
+    bool asleep_ = false;         ///< nobody calls the arbiter
+    TimePoint asleep_from_{};
+    Bytes unread_;  ///< what has come meanwhile
+    std::vector<std::function<void()>> uncalled_;
+    int spins_ = 0;  ///< deadlines in a row that did not move time
 };
 
 }  // namespace panelgate::scenario

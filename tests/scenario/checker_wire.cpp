@@ -1,0 +1,195 @@
+// What may be sent, and when.
+
+#include <algorithm>
+
+#include "checker.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/modbus/request.hpp"
+
+namespace panelgate::scenario {
+namespace {
+
+constexpr std::uint8_t kBroadcast = 0;
+constexpr std::size_t kLongestAdu = 256;
+
+}  // namespace
+
+void Checker::on_line_up(TimePoint now) {
+    if (started_ == TimePoint{}) started_ = now;
+    watch_.on_upset(now);
+    sent_until_ = heard_until_ = noisy_since_ = now;
+}
+
+void Checker::on_line_down(TimePoint now) {
+    watch_.on_upset(now);
+    attempt_.answered = true;
+}
+
+void Checker::on_paused(TimePoint from, TimePoint now) {
+    paused_from_ = from;
+    resumed_ = now;
+    watch_.on_upset(now);
+}
+
+void Checker::on_collision(TimePoint now, std::uint8_t station) {
+    ++collisions_;
+    watch_.on_collision(now, station);
+}
+
+void Checker::on_heard(TimePoint now) {
+    if (now > std::max(heard_until_, sent_until_) + gap()) noisy_since_ = now;
+    heard_until_ = now;
+    attempt_.heard = true;
+}
+
+void Checker::on_answered(TimePoint now) {
+    heard_until_ = now;
+    if (attempt_.answered) return;
+    attempt_.answered = true;
+    watch_.on_answered(now, attempt_.station, now - attempt_.sent);
+    if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
+}
+
+/// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
+/// (LAT-02).
+bool Checker::is_noisy(TimePoint now) const {
+    return now >= noisy_since_ + wire_time(settings_.serial, kLongestAdu);
+}
+
+void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what, bool dead) {
+    check_moment(now);
+    close_attempt(now);
+    check_idling(now);
+    ++frames_;
+    const std::uint8_t station = adu[0];
+    const ByteView pdu = ByteView(adu).subspan(1, adu.size() - 3);
+    check_again(station, pdu, what);
+    attempt_.was_silent = what == "retry" && attempt_.station == station
+                              ? attempt_.was_silent
+                              : watch_.is_silent(station);
+    attempt_.trusted = what == "request" && watch_.is_trusted(station);
+    const auto [asked, first] = last_asked_.try_emplace(station, now);
+    if (!first) {
+        longest_unasked_[station] = std::max(longest_unasked_[station], now - asked->second);
+        asked->second = now;
+    }
+    attempt_.station = station;
+    attempt_.started = now;
+    attempt_.sent = sent_until_ = now + wire_time(settings_.serial, adu.size());
+    attempt_.dead = dead;
+    attempt_.answered = station == kBroadcast;
+    attempt_.heard = false;
+    last_transmit_ = now;
+    const bool write = !modbus::is_pure_read(pdu);
+    check_turn(write);
+    if (write) check_write_sent(station, pdu);
+    mark_sent(station, pdu);
+    if (write) truth_.on_write_sent(now, station, pdu);
+}
+
+void Checker::check_moment(TimePoint now) {
+    if (now < sent_until_) fail("P5: transmitted while the last frame was still leaving");
+    if (now < sent_until_ + gap() || (now < heard_until_ + gap() && !is_noisy(now)))
+        fail("P5: transmitted within the silent interval");
+    // Without an answer a request is over after its timeout, or when what was heard has ended.
+    if (!attempt_.answered && !attempt_.heard && now < sent_until_ + least_wait())
+        fail("P1: transmitted while the last request was outstanding");
+}
+
+/// Who has been silent, or is nobody's panel, is waited for as long as it has ever needed.
+Duration Checker::least_wait() const {
+    const std::uint8_t station = attempt_.station;
+    if (!attempt_.trusted || adaptive_)
+        return std::min<Duration>(watch_.own_slowest(station), 20ms);
+    return settings_.unlisted.response_timeout;
+}
+
+void Checker::close_attempt(TimePoint now) {
+    if (attempt_.answered) return;
+    const Duration cost = now - attempt_.started;
+    const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
+    if (plain && attempt_.dead && cost > costs_.limit(attempt_) &&
+        good_work_waited(attempt_.started))
+        fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
+    const std::string broken = costs_.on_unanswered(now, attempt_);
+    if (!broken.empty()) fail(broken);
+    watch_.on_unanswered(attempt_.station, !attempt_.heard);
+}
+
+/// P5: what the line may be silent for while a request waits that nothing keeps from going.
+void Checker::check_idling(TimePoint now) {
+    constexpr Duration kSlack = 100ms;  // gaps that were lengthened for what follows replies
+    const TimePoint since = std::max(sent_until_, heard_until_);
+    if (now <= since + kSlack || !good_work_waited(since)) return;
+    const Duration idle = now - since;
+    longest_idle_ = std::max(longest_idle_, idle);
+    Duration most = kSlack;
+    if (!attempt_.answered) most += settings_.unlisted.response_timeout;
+    if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
+    if (calm_ && idle > most)
+        fail("P5: the line was silent for " + std::to_string(idle / 1ms) +
+             " ms while a request waited");
+}
+
+/// A request to a station that answers everything, that nobody has asked for it yet.
+bool Checker::good_work_waited(TimePoint since) const {
+    return std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        return !o.sent && !o.gone && o.submitted <= since && o.job.station != kBroadcast &&
+               !watch_.is_silent(o.job.station) && watch_.is_good(o.job.station, since) &&
+               !(o.write && echoes_);
+    });
+}
+
+/// P9: a waiting reader gets every fifth turn at least.
+void Checker::check_turn(bool write) {
+    constexpr std::uint64_t kWritesInARow = 4;
+    if (!write) {
+        last_read_turn_ = frames_;
+        return;
+    }
+    if (frames_ - last_read_turn_ <= kWritesInARow) return;
+    const bool starves = std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        const auto client = clients_.find(o.job.client);
+        return !o.sent && !o.gone && o.job.priority == arbiter::PriorityClass::read &&
+               o.turn + kWritesInARow < frames_ && client != clients_.end() &&
+               client->second.single && watch_.is_good(o.job.station, o.submitted);
+    });
+    if (starves) fail("P9: five writes in a row while a reader waits");
+}
+
+void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
+    const std::string key = key_of(station, pdu);
+    const int most = repeat_writes_.contains(station) ? 1 + settings_.unlisted.retries : 1;
+    if (++written_[key] > most) fail("P2: a write was transmitted twice");
+    if (closed_writes_.contains(key))
+        fail("P2: a write was transmitted after its answer, or for nobody");
+    if (!open_writes_.contains(key)) fail("P2: a write that nobody asked for");
+}
+
+/// Retries are for those who are there, and not for the silent.
+void Checker::check_again(std::uint8_t station, ByteView pdu, std::string_view what) {
+    if (what != "retry") return;
+    if (attempt_.station == station && attempt_.was_silent && watch_.only_dies(station) && calm_)
+        fail("P4: a silent station was asked again at once");
+    const auto span = arbiter::read_span(station, pdu);
+    const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        if (o.gone || o.job.station != station) return false;
+        const auto own = arbiter::read_span(station, o.job.pdu);
+        return span && own ? span->contains(*own) : std::ranges::equal(o.job.pdu, pdu);
+    });
+    if (!wanted) fail("P4: a request went out again for nobody");
+}
+
+void Checker::mark_sent(std::uint8_t station, ByteView pdu) {
+    const auto span = arbiter::read_span(station, pdu);
+    for (auto& [ticket, open] : open_) {
+        if (open.sent || open.job.station != station) continue;
+        const auto own = arbiter::read_span(station, open.job.pdu);
+        open.sent = span && own ? span->contains(*own) : std::ranges::equal(open.job.pdu, pdu);
+    }
+}
+
+}  // namespace panelgate::scenario

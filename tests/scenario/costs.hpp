@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "plan.hpp"
+#include "watch.hpp"
+
+namespace panelgate::scenario {
+
+/// One request on the wire, as anybody sees it.
+struct Attempt {
+    std::uint8_t station = 0;
+    TimePoint started;
+    TimePoint sent;           ///< its computed end
+    bool dead = false;        ///< its panel could not answer
+    bool was_silent = false;  ///< the station was silent before
+    bool trusted = false;     ///< it answered the last time
+    bool answered = true;
+    bool heard = false;  ///< anything
+};
+
+/// P4: what those who do not answer cost the others.
+class Costs {
+  public:
+    Costs(const Plan& plan, const Watch& watch);
+
+    /// What an unanswered attempt may cost while others wait.
+    Duration limit(const Attempt& attempt) const;
+    /// It has cost this much when the next one goes. Nothing, or what was broken.
+    std::string on_unanswered(TimePoint now, const Attempt& attempt);
+    void on_answered(TimePoint now, const Attempt& attempt);
+    std::string at_end(Duration elapsed) const;
+    /// Of the line, by those who never do anything wrong.
+    double good_share(Duration elapsed) const;
+
+  private:
+    Duration frames(const Attempt& attempt) const;
+    /// One silence that nobody could foresee.
+    Duration surprise() const;
+
+    arbiter::Settings settings_;
+    const Watch& watch_;
+    unsigned mortals_ = 0;  ///< stations that are dead at times
+    double deaths_ = 0;     ///< a second
+    bool scanned_ = false;
+    Duration dead_{};  ///< all attempts at dead stations together
+    Duration level_{};
+    TimePoint level_at_{};
+    Duration good_{};
+};
+
+}  // namespace panelgate::scenario

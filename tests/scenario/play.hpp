@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "plan.hpp"
+
+namespace panelgate::scenario {
+
+/// What one run came to.
+struct Outcome {
+    std::string violation;
+    std::string history;
+    std::uint64_t frames = 0;
+    std::uint64_t good = 0;
+    std::uint64_t collisions = 0;
+    double seconds = 0;
+    double good_share = 0;        ///< of the time, for sound panels
+    std::vector<Duration> waits;  ///< for answers of all panels but the odd one
+    /// The longest that each station was not asked.
+    std::map<std::uint8_t, Duration> longest_unasked;
+    /// The longest silence of the line while a request waited that could have gone.
+    Duration longest_idle{};
+};
+Outcome play(const Plan& plan, bool with_history = false);
+
+/// Of ten, the ninth.
+Duration p90(std::vector<Duration> waits);
+
+}  // namespace panelgate::scenario

@@ -1,0 +1,128 @@
+#include "voice.hpp"
+
+#include <utility>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::scenario {
+
+Duration Voice::time_of(std::size_t bytes) const { return wire_time(line_.serial, bytes); }
+
+Said Voice::said(Bytes bytes) const {
+    Said s;
+    s.bytes = std::move(bytes);
+    s.rate = plan_.own_rate;
+    s.station = plan_.id;
+    return s;
+}
+
+Bytes Voice::random_bytes(unsigned least, unsigned most) {
+    Bytes bytes;
+    for (unsigned i = random_.between(least, most); i > 0; --i)
+        bytes.push_back(static_cast<std::uint8_t>(random_.next()));
+    return bytes;
+}
+
+std::uint8_t Voice::glitch() { return random_.chance(0.5) ? 0x00 : 0xFF; }
+
+std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
+    std::vector<Utterance> all;
+    const Bytes good = modbus::encode_adu(plan_.id, reply_pdu);
+    add_preface(all, reply_pdu, spare);
+    // Behind a piece that could be this reply, the reply is a frame of its own.
+    const bool first = all.empty() || all.back().said.answer_to == 0;
+    all.push_back({first ? Duration{} : silent_interval(line_.serial), main_part(reply_pdu, good)});
+    add_epilogue(all, good);
+    return all;
+}
+
+/// What goes before the reply. It has to end in time: see `spare`.
+void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duration spare) {
+    const Bytes good = modbus::encode_adu(plan_.id, reply);
+    const Duration frame = time_of(good.size());
+    if (random_.chance(plan_.fragment)) {
+        const Duration pause = random_.between(1ms, 30ms);
+        if (pause + 2 * frame < spare) {
+            // Then silence: the pause in front of the next piece is put behind this one.
+            Said head = said({good[0], good[1]});
+            all.push_back({Duration{}, std::move(head)});
+            all.push_back({pause, said({})});
+        }
+    }
+    if (random_.chance(plan_.noise)) all.push_back({Duration{}, said(random_bytes(1, 5))});
+    if (random_.chance(plan_.foreign)) {
+        all.push_back({Duration{},
+                       said(modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 100), reply))});
+        all.push_back({silent_interval(line_.serial), said({})});
+    }
+    if (random_.chance(plan_.damaged_first) && 2 * frame + 60ms < spare) {
+        Bytes bad = good;
+        bad[2 + random_.below(static_cast<unsigned>(bad.size()) - 2)] ^=
+            static_cast<std::uint8_t>(1u << random_.below(8));
+        all.push_back({Duration{}, said(std::move(bad))});
+        all.push_back({60ms, said({})});
+    }
+}
+
+/// The reply itself, with what clings to it.
+Said Voice::main_part(const Bytes& reply, const Bytes& good) {
+    const bool other = random_.chance(plan_.wrong_id);
+    Bytes frame =
+        damage(other ? modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 101), reply) : good);
+    bool whole = frame == good;
+    if (random_.chance(plan_.padded_inside)) {
+        Bytes longer = reply;
+        longer.insert(longer.end(), {0, 0});
+        if (random_.chance(0.5) && reply[0] < 5)
+            longer[1] = static_cast<std::uint8_t>(longer[1] + 2);
+        frame = modbus::encode_adu(plan_.id, longer);
+        whole = false;
+    }
+    Said s = said({});
+    if (random_.chance(plan_.glitch_before)) s.bytes.push_back(glitch());
+    const std::size_t from = s.bytes.size();
+    s.bytes.insert(s.bytes.end(), frame.begin(), frame.end());
+    if (whole) {
+        s.answer_from = from;
+        s.answer_to = s.bytes.size();
+    }
+    if (frame.size() > 1 && random_.chance(plan_.hole)) {
+        s.hole_before = from + random_.between(1, static_cast<unsigned>(frame.size()) - 1);
+        s.hole = random_.between(0us, plan_.hole_limit);
+    }
+    if (random_.chance(plan_.padded_behind)) s.bytes.insert(s.bytes.end(), {0, 0});
+    if (random_.chance(plan_.glitch_behind)) s.bytes.push_back(glitch());
+    return s;
+}
+
+void Voice::add_epilogue(std::vector<Utterance>& all, const Bytes& good) {
+    if (random_.chance(plan_.duplicate)) {
+        all.push_back({random_.between(0us, plan_.duplicate_delay), said(good)});
+    }
+    if (random_.chance(plan_.tail))
+        all.push_back({random_.between(500us, Duration(5ms)), said(random_bytes(1, 3))});
+}
+
+/// Damage that a CRC-16 always detects: up to three bits, or a missing end. What it lets pass (one
+/// of 65536 of anything else) is no arbiter's affair.
+Bytes Voice::damage(Bytes adu) {
+    if (random_.chance(plan_.flip)) {
+        for (unsigned i = random_.between(1, 3); i > 0; --i) {
+            adu[random_.below(static_cast<unsigned>(adu.size()))] ^=
+                static_cast<std::uint8_t>(1u << random_.below(8));
+        }
+    }
+    if (random_.chance(plan_.truncate))
+        adu.resize(random_.between(1, static_cast<unsigned>(adu.size()) - 1));
+    return adu;
+}
+
+Said Voice::text() {
+    Bytes text;
+    while (text.size() < 40) text.push_back(static_cast<std::uint8_t>(random_.between(' ', '~')));
+    Said s = said(std::move(text));
+    s.station = 0;
+    return s;
+}
+
+}  // namespace panelgate::scenario

@@ -1,0 +1,84 @@
+#include "watch.hpp"
+
+#include <algorithm>
+
+namespace panelgate::scenario {
+
+Watch::Watch(const Plan& plan) {
+    for (const PanelPlan& panel : plan.panels) {
+        Station& s = stations_[panel.id];
+        s.listed = panel.listed;
+        s.sound = plan.is_sound(panel);
+        s.only_dies = panel.only_dies();
+    }
+}
+
+void Watch::on_collision(TimePoint now, std::uint8_t station) {
+    const auto found = stations_.find(station);
+    if (found == stations_.end()) return;
+    found->second.disturbed = true;
+    found->second.settled = now;
+}
+
+void Watch::on_upset(TimePoint now) {
+    for (auto& [id, s] : stations_) {
+        s.disturbed = true;
+        s.settled = now;
+    }
+}
+
+void Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
+    Station& s = stations_[station];
+    if (s.disturbed) s.settled = now;
+    s.disturbed = s.silent = s.failing = false;
+    s.slowest = std::max(s.slowest.value_or(after), after);
+    slowest_ = std::max(slowest_.value_or(after), after);
+}
+
+void Watch::on_unanswered(std::uint8_t station, bool silent) {
+    Station& s = stations_[station];
+    s.failing = true;
+    s.silent = s.silent || silent;
+}
+
+bool Watch::is_good(std::uint8_t station, TimePoint since) const {
+    const Station* s = find(station);
+    return s != nullptr && s->sound && !s->disturbed && s->settled < since;
+}
+
+bool Watch::only_dies(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s == nullptr || s->only_dies;
+}
+
+bool Watch::is_silent(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->silent;
+}
+
+bool Watch::is_known(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && (s->listed || s->slowest);
+}
+
+bool Watch::is_trusted(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->slowest && !s->failing;
+}
+
+std::optional<Duration> Watch::slowest(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->slowest ? s->slowest : slowest_;
+}
+
+Duration Watch::own_slowest(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->slowest ? *s->slowest : Duration{};
+}
+
+const Watch::Station* Watch::find(std::uint8_t station) const {
+    const auto found = stations_.find(station);
+    return found == stations_.end() ? nullptr : &found->second;
+}
+
+}  // namespace panelgate::scenario

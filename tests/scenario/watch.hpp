@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+
+#include "panelgate/base/time.hpp"
+#include "plan.hpp"
+
+namespace panelgate::scenario {
+
+/// What anybody who listens to the wire could know of each station, and what its plan says.
+class Watch {
+  public:
+    explicit Watch(const Plan& plan);
+
+    /// A request to it, or its answer, was hit by somebody else's bytes.
+    void on_collision(TimePoint now, std::uint8_t station);
+    /// The line, the way to it or the process were not there: that excuses everything for a while.
+    void on_upset(TimePoint now);
+    /// It answered `after` the computed end of the request.
+    void on_answered(TimePoint now, std::uint8_t station, Duration after);
+    void on_unanswered(std::uint8_t station, bool silent);
+
+    /// A gateway can get each of its answers, and nothing has hit it since then.
+    bool is_good(std::uint8_t station, TimePoint since) const;
+    /// It does nothing wrong but dying, so that its silence has no other reason.
+    bool only_dies(std::uint8_t station) const;
+    /// It has not answered since it was last silent.
+    bool is_silent(std::uint8_t station) const;
+    bool is_known(std::uint8_t station) const;
+    /// It answered the last time.
+    bool is_trusted(std::uint8_t station) const;
+    /// The longest that it has needed so far; of one that has never answered: any of the line.
+    std::optional<Duration> slowest(std::uint8_t station) const;
+    /// Of the station alone.
+    Duration own_slowest(std::uint8_t station) const;
+
+  private:
+    struct Station {
+        bool listed = false;
+        bool sound = false;
+        bool only_dies = false;
+        bool disturbed = false;
+        bool silent = false;
+        bool failing = false;
+        TimePoint settled{};  ///< the last disturbance was over
+        std::optional<Duration> slowest;
+    };
+    const Station* find(std::uint8_t station) const;
+
+    std::map<std::uint8_t, Station> stations_;
+    std::optional<Duration> slowest_;
+};
+
+}  // namespace panelgate::scenario

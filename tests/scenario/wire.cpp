@@ -1,0 +1,167 @@
+#include "wire.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::scenario {
+
+Duration Wire::time_of(std::size_t characters, double rate) const {
+    const Duration exact = wire_time(plan_.settings.serial, characters);
+    if (rate == 1) return exact;
+    return Duration(static_cast<Duration::rep>(static_cast<double>(exact.count()) * rate));
+}
+
+TimePoint Wire::Frame::end_of(std::size_t byte, const Wire& wire) const {
+    return start + wire.time_of(byte + 1, rate) + (byte >= hole_before ? hole : Duration{});
+}
+
+Wire::FramePtr Wire::put(Said said) {
+    auto frame = std::make_shared<Frame>(Frame{std::move(said), {}, {}, {}});
+    const TimePoint now = agenda_.now();
+    frame->start = now;
+    frame->end = frame->end_of(frame->bytes.size() - 1, *this);
+    spoken_until_ = std::max(spoken_until_, frame->end);
+    std::erase_if(air_, [&](const FramePtr& other) { return other->end <= now; });
+    for (const FramePtr& other : air_) {
+        if (!other->garbled_from) other->garbled_from = now;
+        frame->garbled_from = now;
+        checker_.on_collision(now, other->station);
+        checker_.on_collision(now, frame->station);
+    }
+    air_.push_back(frame);
+    return frame;
+}
+
+TimePoint Wire::say(Said said) {
+    const FramePtr frame = put(std::move(said));
+    deliver_in_chunks(frame);
+    return frame->end;
+}
+
+void Wire::whisper(Bytes bytes) {
+    if (agenda_.now() < spoken_until_) return;
+    auto frame = std::make_shared<Frame>();
+    frame->bytes = std::move(bytes);
+    frame->start = agenda_.now();
+    frame->connection = connection_;
+    deliver_in_chunks(frame);
+}
+
+void Wire::send(Bytes adu) {
+    if (agenda_.now() < stalled_until_) {
+        held_out_.push_back({std::move(adu), false, connection_});
+    } else {
+        leave(std::move(adu), connection_);
+    }
+}
+
+void Wire::leave(Bytes adu, std::uint64_t connection) {
+    Said said;
+    said.station = adu[0];
+    said.bytes = std::move(adu);
+    said.rate = plan_.line.own_rate;
+    said.connection = connection;
+    const FramePtr frame = put(std::move(said));
+    echo(frame);
+    agenda_.at(frame->end, [this, frame] {
+        if (!frame->garbled_from) ask_(frame->bytes, frame->connection);
+    });
+}
+
+/// What the gateway hears of its own frame: nothing, all, or what a receiver that is switched late
+/// lets through.
+void Wire::echo(const FramePtr& frame) {
+    const LinePlan& line = plan_.line;
+    if (line.echo) {
+        const bool damaged = random_.chance(line.damaged_echo);
+        const bool cut = random_.chance(line.cut_echo);
+        if (!damaged && !cut) return deliver_in_chunks(frame);
+        const auto heard = std::make_shared<Frame>(*frame);
+        const auto size = static_cast<unsigned>(heard->bytes.size());
+        if (damaged) heard->bytes[random_.below(size)] ^= 0x10;
+        if (cut) heard->bytes.pop_back();
+        checker_.on_collision(agenda_.now(), frame->station);
+        return deliver_in_chunks(heard);
+    }
+    if (!random_.chance(line.partial_echo)) return;
+    const auto part = std::make_shared<Frame>(*frame);
+    part->bytes.resize(random_.between(1, 7));
+    part->garbled_from.reset();
+    // As they are sent, or all of them from a buffer when the driver is switched off.
+    if (random_.chance(0.3)) return deliver_in_chunks(part);
+    const Duration later = random_.between(0us, 1ms);
+    agenda_.at(frame->end + later, [this, part] { deliver(part, 0, part->bytes.size()); });
+}
+
+/// Bytes reach the gateway in the pieces of a receive FIFO, each when its last byte is there; what
+/// an adapter holds back for longer than 15 ms looks like the end of the frame to anybody. A pause
+/// empties the FIFO.
+void Wire::deliver_in_chunks(const FramePtr& frame) {
+    const auto fits = static_cast<unsigned>(15ms / character_time(plan_.settings.serial));
+    const unsigned most = std::max(fits, 1u);
+    const std::size_t size = frame->bytes.size();
+    std::size_t from = 0;
+    while (from < size) {
+        std::size_t to =
+            from + random_.between(1, std::min(static_cast<unsigned>(size - from), most));
+        if (frame->hole > Duration::zero() && from < frame->hole_before)
+            to = std::min(to, frame->hole_before);
+        agenda_.at(frame->end_of(to - 1, *this),
+                   [this, frame, from, to] { deliver(frame, from, to); });
+        from = to;
+    }
+}
+
+void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
+    if (frame->garbled_from) garble(*frame, from, to);
+    const std::size_t end = frame->answer_to;
+    const bool answered = end > from && end <= to && !frame->garbled_from;
+    const ByteView part = ByteView(frame->bytes).subspan(from, to - from);
+    arrive({{part.begin(), part.end()}, answered, frame->connection});
+}
+
+/// Something else than what was said; never a good frame by chance: that is the CRC's affair.
+void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) {
+        if (frame.end_of(i, *this) > *frame.garbled_from)
+            frame.bytes[i] = static_cast<std::uint8_t>(random_.next());
+    }
+    const bool answer = frame.answer_to > 0;
+    const std::size_t begin = answer ? frame.answer_from : 0;
+    const std::size_t end = answer ? frame.answer_to : frame.bytes.size();
+    const bool last = end > from && end <= to && end - begin > 3;
+    if (last && modbus::crc_ok(ByteView(frame.bytes).subspan(begin, end - begin)))
+        frame.bytes[end - 1] ^= 1;
+}
+
+void Wire::arrive(Held held) {
+    if (!up_ || held.connection != connection_) return;
+    if (agenda_.now() < stalled_until_) {
+        held_in_.push_back(std::move(held));
+        return;
+    }
+    hear_(held.bytes, held.answered);
+}
+
+void Wire::stall(TimePoint until) {
+    stalled_until_ = until;
+    agenda_.at(until, [this] { release(); });
+}
+
+/// What was sent on a connection that is gone is lost, or executed with its reply unheard.
+void Wire::release() {
+    for (Held& held : std::exchange(held_in_, {})) arrive(std::move(held));
+    TimePoint next = agenda_.now();
+    for (Held& held : std::exchange(held_out_, {})) {
+        if (held.connection != connection_ && random_.chance(0.5)) continue;
+        agenda_.at(next, [this, held] { leave(held.bytes, held.connection); });
+        next += time_of(held.bytes.size(), plan_.line.own_rate) +
+                silent_interval(plan_.settings.serial) + random_.between(0us, 2ms);
+    }
+}
+
+bool Wire::is_quiet_for(Duration silence) const { return agenda_.now() >= spoken_until_ + silence; }
+
+}  // namespace panelgate::scenario

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <functional>
+#include <list>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "agenda.hpp"
+#include "checker.hpp"
+#include "plan.hpp"
+#include "random.hpp"
+
+namespace panelgate::scenario {
+
+/// Something that somebody puts on the wire.
+struct Said {
+    Bytes bytes;
+    double rate = 1;           ///< a character takes this much longer than the line's
+    std::uint8_t station = 0;  ///< whose transaction it is part of; 0 = nobody's
+    /// Where the good answer to the request lies, whole and undamaged; nowhere: both 0.
+    std::size_t answer_from = 0;
+    std::size_t answer_to = 0;
+    std::size_t hole_before = 0;  ///< this byte comes later by
+    Duration hole{};
+    std::uint64_t connection = 0;  ///< it is heard on this one only
+};
+
+/// A half-duplex wire and the way from it to the gateway. Whoever speaks while another speaks
+/// damages both.
+class Wire {
+  public:
+    /// Bytes reach the gateway; `answered` when a good answer has come to its last byte.
+    using Hear = std::function<void(ByteView bytes, bool answered)>;
+    /// A request has left undamaged, on this connection.
+    using Ask = std::function<void(ByteView adu, std::uint64_t connection)>;
+
+    Wire(const Plan& plan, Agenda& agenda, Random& random, Checker& checker)
+        : plan_(plan), agenda_(agenda), random_(random), checker_(checker) {}
+    void connect(Hear hear, Ask ask) {
+        hear_ = std::move(hear);
+        ask_ = std::move(ask);
+    }
+
+    /// The gateway sends.
+    void send(Bytes adu);
+    /// Anybody else speaks, now. When it ends.
+    TimePoint say(Said said);
+    /// Only the gateway hears it, and only when nobody speaks.
+    void whisper(Bytes bytes);
+    Duration time_of(std::size_t characters, double rate) const;
+
+    bool is_up() const { return up_; }
+    std::uint64_t connection() const { return connection_; }
+    void go_down() { up_ = false; }
+    /// Nothing that was said before, or is said in answer to something sent before, is heard.
+    void forget_connection() { ++connection_; }
+    void come_up() { up_ = true; }
+    /// Nothing gets through in either direction; then all of it, in order.
+    void stall(TimePoint until);
+    TimePoint stalled_until() const { return stalled_until_; }
+    /// Since when nobody has spoken; never in the future.
+    bool is_quiet_for(Duration silence) const;
+
+  private:
+    struct Frame : Said {
+        TimePoint start;
+        TimePoint end;
+        std::optional<TimePoint> garbled_from;
+        TimePoint end_of(std::size_t byte, const Wire& wire) const;
+    };
+    using FramePtr = std::shared_ptr<Frame>;
+    struct Held {
+        Bytes bytes;
+        bool answered = false;
+        std::uint64_t connection = 0;
+    };
+
+    FramePtr put(Said said);
+    void leave(Bytes adu, std::uint64_t connection);
+    void echo(const FramePtr& frame);
+    void deliver_in_chunks(const FramePtr& frame);
+    void deliver(const FramePtr& frame, std::size_t from, std::size_t to);
+    void garble(Frame& frame, std::size_t from, std::size_t to);
+    void arrive(Held held);
+    void release();
+
+    const Plan& plan_;
+    Agenda& agenda_;
+    Random& random_;
+    Checker& checker_;
+    Hear hear_;
+    Ask ask_;
+    std::list<FramePtr> air_;
+    TimePoint spoken_until_{};
+    TimePoint stalled_until_{};
+    std::vector<Held> held_in_;
+    std::vector<Held> held_out_;
+    std::uint64_t connection_ = 1;
+    bool up_ = true;
+};
+
+}  // namespace panelgate::scenario
