@@ -20,6 +20,7 @@ Arbiter::Arbiter(Settings settings)
       schedule_(settings_),
       quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu)),
       strays_(settings_.serial),
+      reception_(settings_),
       echo_memory_(settings_.echo),
       ledger_(settings_) {
     settings_.end_of_frame = std::max(settings_.end_of_frame, silent_interval(settings_.serial));
@@ -28,14 +29,21 @@ Arbiter::Arbiter(Settings settings)
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     if (!up_ || resetting_) return Fault::line_down;
-    if (const auto ticket = answer_from_memory(now, job)) return *ticket;
-    if (refuses(now, job)) return Fault::offline;
-    job.ticket = ++last_ticket_;
-    job.arrived = now;
-    job.deadline = now + settings_.queue.deadline;
-    job.start_by = job.deadline - shortest_transaction(job);
+    // Not while the client has something open there: it must not read older than its own write.
+    const bool waits = schedule_.backlog().has(job.client, job.station);
+    const bool open = waits || (active_ && active_->group().has(job.client, job.station));
+    const Duration max_age = open ? Duration::zero() : stations_.settings(job.station).max_age;
+    if (auto known = reception_.from_memory(now, job, max_age)) {
+        ledger_.finish_from_memory(known->ticket, std::move(known->hit.pdu), known->hit.age);
+        return known->ticket;
+    }
+    if (stations_.refuses(now, job)) {
+        ledger_.decide(now, [&] { return explain::offline(now, job, health(job.station)); });
+        return Fault::offline;
+    }
+    reception_.stamp(now, job);
     const Ticket ticket = job.ticket;
-    if (joins_active(now, job)) {
+    if (active_ && !waits && active_->takes_along(now, job)) {
         job.attempts = 1;
         ledger_.on_started(now, job);
         active_->group().jobs.push_back(std::move(job));
@@ -43,52 +51,16 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     }
     const JobQueue::Admission admission = schedule_.backlog().queue().push(job);
     if (admission.shed) {
-        if (ledger_.explains()) ledger_.decide(now, explain::shed(*admission.shed));
+        ledger_.decide(now, [&] { return explain::shed(*admission.shed); });
         const bool sent = admission.shed->attempts > 0;  // in a joined read that did not come about
         ledger_.finish(*admission.shed, sent ? Fault::timeout : Fault::busy);
     }
     if (!admission.taken) {
-        if (ledger_.explains())
-            ledger_.decide(now, explain::full(job, settings_.queue, queue_depth()));
+        ledger_.decide(now, [&] { return explain::full(job, settings_.queue, queue_depth()); });
         return Fault::busy;
     }
     step(now);
     return ticket;
-}
-
-/// The station is offline, and this is not to be its probe.
-bool Arbiter::refuses(TimePoint now, const Job& job) {
-    if (job.station == kBroadcast) return false;
-    stations_.forget_strangers(now);
-    const Station& station = stations_.of(job.station);
-    if (!station.health().offline()) return false;
-    const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
-    if (may_wake && stations_.take_half_open(now, job.station)) return false;
-    if (ledger_.explains()) ledger_.decide(now, explain::offline(now, job, station.health()));
-    return true;
-}
-
-/// A value that was read lately, where the station's max_age allows it. Not for polls, which are to
-/// bring new ones, and not while the client has something open there: it must not read older than
-/// its own write.
-std::optional<Ticket> Arbiter::answer_from_memory(TimePoint now, const Job& job) {
-    const Duration max_age = stations_.settings(job.station).max_age;
-    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
-    const auto span = read_span(job.station, job.pdu);
-    const bool on_wire = active_ && active_->group().has(job.client, job.station);
-    if (!span || on_wire || schedule_.backlog().has(job.client, job.station)) return std::nullopt;
-    auto hit = cache_.find(*span, now, max_age);
-    if (!hit) return std::nullopt;
-    ledger_.finish_from_memory(++last_ticket_, std::move(hit->pdu), hit->age);
-    return last_ticket_;
-}
-
-/// Not a repeated one: an answer to the first attempt may still come, and would be too old.
-bool Arbiter::joins_active(TimePoint now, const Job& job) const {
-    if (!active_ || now >= active_->timing().sent || active_->group().attempts != 1) return false;
-    return contained_in(active_->group().span, job) &&
-           !schedule_.backlog().has(job.client, job.station) &&
-           active_->group().jobs.size() < JobQueue::kMost;
 }
 
 void Arbiter::cancel(TimePoint now, Client client) {
@@ -113,7 +85,7 @@ void Arbiter::on_line_down(TimePoint now) {
     up_ = false;
     resetting_ = false;
     strays_.forget();
-    cache_.clear();
+    reception_.memory().clear();
     if (active_) {
         note(now, active_->take_strays());
         const Attempt attempt = take_active(now);
@@ -168,21 +140,9 @@ void Arbiter::check_active(TimePoint now) {
 void Arbiter::conclude(TimePoint now, Verdict verdict) {
     const std::vector<modbus::Unused> strays = active_->take_strays();
     ledger_.inside_attempt(true);
-    switch (verdict) {
-        case Verdict::open:
-            note(now, strays);
-            break;
-        case Verdict::replied:
-            settle(now);
-            note(now, strays);
-            break;
-        case Verdict::silent:
-        case Verdict::damaged:
-        case Verdict::wrong:
-            note(now, strays);
-            fail(now, verdict);
-            break;
-    }
+    if (verdict == Verdict::replied) settle(now);
+    note(now, strays);
+    if (verdict != Verdict::open && verdict != Verdict::replied) fail(now, verdict);
     ledger_.inside_attempt(false);
 }
 
@@ -206,8 +166,7 @@ void Arbiter::settle(TimePoint now) {
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
-    const Duration reply_time = wire_time(settings_.serial, reply.size() + kAduOverhead);
-    const Duration waited = std::max(now - attempt.timing().sent - reply_time, Duration::zero());
+    const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Station::Replied replied = station.on_reply(now, attempt, waited, think);
     stations_.on_reply(waited);
@@ -215,14 +174,10 @@ void Arbiter::settle(TimePoint now) {
     strays_.on_replied(group.station);
     quiet_.rest_until(station.trail_until());
     ledger_.on_answered(now, attempt, think, replied);
-    if (replied.back) ledger_.event(Kind::online, group.station);
-    if (replied.drift) ledger_.event(Kind::drift, group.station, station.slow_by());
-    if (replied.trail) ledger_.event(Kind::trail, group.station, station.trail());
-    if (!attempt.echoed() && (attempt.fragment_in_front() || attempt.clean_in_front()))
-        echo_memory_.on_reply_without_echo(group.pdu, attempt.fragment_in_front());
+    attempt.teach(echo_memory_);
     const bool exception = modbus::exception_of(reply).has_value();
     if (group.span && !exception && station.settings().max_age > Duration::zero())
-        cache_.store(*group.span, reply, group.started);
+        reception_.memory().store(*group.span, reply, group.started);
     if (exception) schedule_.give_back(group);
     for (const Job& job : group.jobs)
         ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
@@ -237,7 +192,10 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     station.owe(now, group.pdu, sent);
     stations_.on_failed(now, group.station, verdict, cost);
-    rest_others(now, group, sent);
+    if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
+        quiet_.quarantine(group.station, *until);
+        ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
+    }
     group.silent_after = verdict == Verdict::silent
                              ? std::min(now - sent, attempt.timing().patience) - latency_
                              : Duration::zero();
@@ -255,37 +213,18 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
 /// No further attempt: everybody is answered, and the station judged.
 void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     for (const Job& job : group.jobs) ledger_.finish(job, fault);
+    Backlog& backlog = schedule_.backlog();
     if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
-    const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
     if (group.learns_for != 0 && fault != Fault::damaged) {
         // P8: the write never left, and its station is silent.
-        for (const Job& job : schedule_.backlog().remove_if(asked)) ledger_.finish(job, fault);
+        const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
+        for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    const auto theirs = [&](const Job& job) { return job.station == group.station; };
     if (!station.on_given_up(now, fault)) return;
     if (!station.stranger()) ledger_.event(Kind::offline, group.station);
-    for (const Job& job : schedule_.backlog().remove_if(theirs))
-        ledger_.finish(job, Fault::offline);
-}
-
-/// P1: a late reply would collide with what others are told meanwhile, where such have come before,
-/// or where the configuration says so. A probe lets the others go on in any case. A timeout that
-/// was chosen short (adaptive) frees the others early, but not the station itself.
-void Arbiter::rest_others(TimePoint now, const Group& group, TimePoint sent) {
-    const Station& station = stations_.of(group.station);
-    const StationSettings& own = station.settings();
-    TimePoint until = station.rested();
-    if (settings_.quarantine == Quarantine::line && !group.probe) {
-        if (own.adaptive_timeout) until = std::min(until, now + station.response_timeout());
-    } else if (settings_.quarantine == Quarantine::automatic && group.first_silence &&
-               station.worst_lateness() > Duration::zero()) {
-        until = std::min(until, sent + own.response_timeout + station.worst_lateness() * 5 / 4);
-    } else {
-        return;
-    }
-    quiet_.quarantine(group.station, until);
-    if (ledger_.explains()) ledger_.decide(now, explain::line_rests(until - now, group));
+    const auto theirs = [&](const Job& job) { return job.station == group.station; };
+    for (const Job& job : backlog.remove_if(theirs)) ledger_.finish(job, Fault::offline);
 }
 
 /// The attempt is over: its time is accounted for, and what the echo filter held back is heard.
@@ -303,7 +242,7 @@ void Arbiter::expire(TimePoint now) {
     expire_active(now);
     for (const Job& job : schedule_.backlog().expire(now)) {
         const bool sent = job.attempts > 0;
-        if (ledger_.explains()) ledger_.decide(now, explain::expired(now, job, sent));
+        ledger_.decide(now, [&] { return explain::expired(now, job, sent); });
         ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
 }
@@ -312,11 +251,7 @@ void Arbiter::expire(TimePoint now) {
 /// broadcast that is leaving is answered when it has left.
 void Arbiter::expire_active(TimePoint now) {
     if (!active_ || active_->is_broadcast()) return;
-    std::vector<Job>& jobs = active_->group().jobs;
-    for (const Job& job : jobs) {
-        if (job.deadline <= now) ledger_.finish(job, Fault::timeout);
-    }
-    std::erase_if(jobs, [&](const Job& job) { return job.deadline <= now; });
+    for (const Job& job : active_->group().expire(now)) ledger_.finish(job, Fault::timeout);
 }
 
 Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
@@ -342,9 +277,7 @@ bool Arbiter::start_next(TimePoint now) {
     Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_, proved_);
     if (next.new_way) {
         resetting_ = true;
-        ledger_.reset(
-            "a request was not answered, and nothing since then: what was sent may "
-            "still be on its way");
+        ledger_.reset("nothing was answered since a request: it may still be on its way");
     }
     if (!next.group) return false;
     start(now, std::move(*next.group));
@@ -357,18 +290,9 @@ void Arbiter::start(TimePoint now, Group group) {
     for (Job& job : group.jobs) {
         if (job.attempts++ == 0) ledger_.on_started(now, job);
     }
-    Attempt::Timing timing;
-    timing.started = now;
-    timing.sent = now + lead_ + wire_time(settings_.serial, adu.size());
-    timing.end_of_frame = settings_.end_of_frame;
-    timing.hole = settings_.reply_hole;
-    timing.longest_reply =
-        2 * wire_time(settings_.serial, modbus::kMaxLongRtuAdu) + settings_.reply_hole;
+    Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
     timing.pause = now - quiet_.since();
-    timing.character = character_time(settings_.serial);
     timing.confirm_end = confirm_ends_;
-    // Rates may differ by 2 % (and both ends in the same direction), and what has left is computed.
-    if (settings_.paced) timing.tolerance = (timing.sent - now) * 3 / 100 + timing.character;
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
         station.on_asked(now, group);
@@ -377,9 +301,10 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }
-    if (!modbus::is_pure_read(group.pdu)) cache_.on_write(now, group.station, group.pdu);
-    const std::string why =
-        ledger_.explains() ? explain::start(now, group, schedule_.backlog().queue()) : "";
+    if (!modbus::is_pure_read(group.pdu))
+        reception_.memory().on_write(now, group.station, group.pdu);
+    std::string why;
+    if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
     const EchoFilter echo(adu, echo_memory_.expect(group.pdu));
@@ -401,24 +326,6 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
     if (!up_ || resetting_) return next;
     if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
     return next;
-}
-
-/// Request, gap, and the shortest thing a station can say.
-Duration Arbiter::shortest_transaction(const Job& job) const {
-    const std::size_t request = job.pdu.size() + kAduOverhead;
-    if (job.station == kBroadcast) return wire_time(settings_.serial, request);
-    return wire_time(settings_.serial, request + kShortestReplyAdu) +
-           silent_interval(settings_.serial);
-}
-
-StationHealth Arbiter::health(std::uint8_t id) const {
-    const Station* found = stations_.find(id);
-    return found == nullptr ? StationHealth(settings_.offline) : found->health();
-}
-
-Duration Arbiter::response_timeout(std::uint8_t id) const {
-    const Station* found = stations_.find(id);
-    return found == nullptr ? stations_.settings(id).response_timeout : found->response_timeout();
 }
 
 }  // namespace panelgate::arbiter

@@ -3,12 +3,28 @@
 #include <algorithm>
 #include <utility>
 
+#include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
 
 using modbus::Unused;
+
+Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::size_t size,
+                                   Duration lead) {
+    Timing timing;
+    const Duration leaving = lead + wire_time(line.serial, size);
+    timing.started = now;
+    timing.sent = now + leaving;
+    timing.end_of_frame = line.end_of_frame;
+    timing.hole = line.reply_hole;
+    timing.longest_reply = 2 * wire_time(line.serial, modbus::kMaxLongRtuAdu) + line.reply_hole;
+    timing.serial = line.serial;
+    // Rates may differ by 2 %, and both ends in the same direction.
+    if (line.paced) timing.tolerance = leaving * 3 / 100 + character_time(line.serial);
+    return timing;
+}
 
 Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
     : group_(std::move(group)),
@@ -19,6 +35,11 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
       first_byte_(timing.sent),
       last_byte_(timing.sent),
       end_confirmed_(!timing.confirm_end) {}
+
+bool Attempt::takes_along(TimePoint now, const Job& job) const {
+    return now < timing_.sent && group_.attempts == 1 && contained_in(group_.span, job) &&
+           group_.jobs.size() < JobQueue::kMost;
+}
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
@@ -135,6 +156,17 @@ void Attempt::on_end(TimePoint now, Duration left) {
     timing_.sent = end;
 }
 
+/// Nothing, when what stands in front of the reply may have been an echo that was damaged.
+void Attempt::teach(EchoMemory& memory) const {
+    const bool clean = !echo_.mismatch() && noise_in_front_ * 2 < echo_.frame().size();
+    if (!echoed() && (fragment_ || clean)) memory.on_reply_without_echo(group_.pdu, fragment_);
+}
+
+Duration Attempt::waited(TimePoint now) const {
+    const Duration reply = wire_time(timing_.serial, reply_->size() + kAduOverhead);
+    return std::max(now - timing_.sent - reply, Duration::zero());
+}
+
 void Attempt::reject_reply() {
     Unused part;
     part.kind = Unused::Kind::own;
@@ -147,7 +179,7 @@ void Attempt::reject_reply() {
 
 bool Attempt::is_stale(TimePoint now, std::size_t size) const {
     if (!timing_.tolerance || heard_) return false;
-    const Duration before = timing_.character * static_cast<int>(size - 1);
+    const Duration before = wire_time(timing_.serial, size - 1);
     return now - before < timing_.sent - *timing_.tolerance;
 }
 

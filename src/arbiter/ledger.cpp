@@ -81,10 +81,6 @@ void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
     actions_.push_back(StationEvent{kind, station, by});
 }
 
-void Ledger::decide(TimePoint now, std::string text) {
-    if (explain_) actions_.push_back(Decision{now, std::move(text)});
-}
-
 void Ledger::on_started(TimePoint now, const Job& job) {
     line_.queue_wait[static_cast<std::size_t>(job.priority)].observe(now - job.arrived);
 }

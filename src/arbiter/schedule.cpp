@@ -144,6 +144,18 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     return next;
 }
 
+std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& failed,
+                                                    TimePoint sent, const Station& station) const {
+    const StationSettings& own = station.settings();
+    const TimePoint rested = station.rested();
+    if (quarantine_ == Quarantine::line && !failed.probe) {
+        return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
+    }
+    const bool is_late = failed.first_silence && station.worst_lateness() > Duration::zero();
+    if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;
+    return std::min(rested, sent + own.response_timeout + station.worst_lateness() * 5 / 4);
+}
+
 void Schedule::retry(Group group) {
     other_first_ = quarantine_ != Quarantine::line;
     backlog_.retry(std::move(group));

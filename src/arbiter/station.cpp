@@ -78,13 +78,13 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();
-    result.drift = drift_.check(turnaround_, settings_.response_timeout);
+    if (drift_.check(turnaround_, settings_.response_timeout))
+        result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
-    const bool had_trail = trail_.hold() > Duration::zero();
     trail_.on_reply(now);
     copies_.on_reply(now, attempt.reply());
-    const bool has_trail = trail_.hold() > Duration::zero();
-    result.trail = has_trail && !had_trail && !std::exchange(trail_told_, true);
+    if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
+        result.trail = trail_.hold();
     if (owes()) {
         // Each attempt may be answered, and nobody knows which one this reply was for.
         owed_.pop_front();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "panelgate/modbus/request.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
@@ -51,8 +52,24 @@ bool Stations::may_spend(TimePoint now, std::uint8_t id) const {
     return station->may_spend(now);
 }
 
-bool Stations::take_half_open(TimePoint now, std::uint8_t id) {
-    return probes_.allows(now) && of(id).take_half_open(now);
+/// A client's request may be the probe once an interval, as far as the budget goes.
+bool Stations::refuses(TimePoint now, const Job& job) {
+    if (job.station == kBroadcast) return false;
+    forget_strangers(now);
+    Station& station = of(job.station);
+    if (!station.health().offline()) return false;
+    const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
+    return !may_wake || !probes_.allows(now) || !station.take_half_open(now);
+}
+
+StationHealth Stations::health(std::uint8_t id) const {
+    const Station* found = find(id);
+    return found == nullptr ? StationHealth(offline_) : found->health();
+}
+
+Duration Stations::response_timeout(std::uint8_t id) const {
+    const Station* found = find(id);
+    return found == nullptr ? settings(id).response_timeout : found->response_timeout();
 }
 
 void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost) {

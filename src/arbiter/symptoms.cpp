@@ -34,7 +34,10 @@ bool has_swapped_crc(ByteView heard) {
 
 void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
-    StationCounters& counters = of(attempt.group().station);
+    const std::uint8_t station = attempt.group().station;
+    actions_.push_back(Note{
+        now, Note::Direction::received, modbus::encode_adu(station, attempt.reply()), "reply", {}});
+    StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
     counters.turnaround.observe(think);
     counters.bus_transaction.observe(now - attempt.timing().started);
@@ -45,6 +48,9 @@ void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     if (attempt.echoed()) ++symptoms.echoes;
     if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (replied.trailed) ++symptoms.trailed;
+    if (replied.back) event(StationEvent::Kind::online, station);
+    if (replied.drift) event(StationEvent::Kind::drift, station, *replied.drift);
+    if (replied.trail) event(StationEvent::Kind::trail, station, *replied.trail);
     symptoms.mute_in_a_row = 0;
 }
 

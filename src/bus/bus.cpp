@@ -23,7 +23,6 @@ namespace asio = boost::asio;
 
 namespace {
 constexpr auto kRefusalPause = 1ms;
-
 }  // namespace
 
 ClientId next_client_id() {

@@ -13,7 +13,7 @@
 #include "panelgate/arbiter/ledger.hpp"
 #include "panelgate/arbiter/pace.hpp"
 #include "panelgate/arbiter/quiet.hpp"
-#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/reception.hpp"
 #include "panelgate/arbiter/schedule.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
@@ -96,22 +96,18 @@ class Arbiter {
         return ledger_.stations();
     }
     /// Of a station that was never asked: unknown.
-    StationHealth health(std::uint8_t id) const;
+    StationHealth health(std::uint8_t id) const { return stations_.health(id); }
     /// How long the next request to this station would wait for its reply to begin.
-    Duration response_timeout(std::uint8_t id) const;
+    Duration response_timeout(std::uint8_t id) const { return stations_.response_timeout(id); }
     const BusShares& shares() const { return ledger_.shares(); }
     EchoMemory::State echo() const { return echo_memory_.state(); }
     /// Aborts when what must always hold does not. For tests.
-    void check_invariants(TimePoint now) const;
+    void check_invariants() const;
 
   private:
     void step(TimePoint now);
     bool start_next(TimePoint now);
     void start(TimePoint now, Group group);
-    bool refuses(TimePoint now, const Job& job);
-    std::optional<Ticket> answer_from_memory(TimePoint now, const Job& job);
-    bool joins_active(TimePoint now, const Job& job) const;
-    Duration shortest_transaction(const Job& job) const;
 
     void check_active(TimePoint now);
     void conclude(TimePoint now, Verdict verdict);
@@ -119,7 +115,6 @@ class Arbiter {
     void settle(TimePoint now);
     void fail(TimePoint now, Verdict verdict);
     void give_up(TimePoint now, const Group& group, Fault fault);
-    void rest_others(TimePoint now, const Group& group, TimePoint sent);
     Attempt take_active(TimePoint now);
     void expire(TimePoint now);
     void expire_active(TimePoint now);
@@ -134,7 +129,7 @@ class Arbiter {
     Quiet quiet_;
     Strays strays_;
     Pace pace_;
-    ReadCache cache_;
+    Reception reception_;
     EchoMemory echo_memory_;
     Ledger ledger_;
     std::optional<Attempt> active_;
@@ -144,7 +139,6 @@ class Arbiter {
     Duration latency_{};
     Duration lead_{};
     bool confirm_ends_ = false;
-    Ticket last_ticket_ = 0;
 };
 
 }  // namespace panelgate::arbiter

@@ -7,7 +7,9 @@
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
@@ -38,12 +40,16 @@ class Attempt {
         Duration pause{};  ///< the silence before this attempt
         /// A reply cannot begin more than this before `sent`; nothing: the line is no real UART.
         std::optional<Duration> tolerance;
-        Duration character{};
+        SerialFormat serial;
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
     /// Not when it is the echo, a copy, or the late reply to an earlier request.
     using Ends = std::function<bool(ByteView adu)>;
+
+    /// Of a request of so many bytes that is handed over now and begins to leave after `lead`; how
+    /// long it is waited for is added.
+    static Timing timing_of(const Settings& line, TimePoint now, std::size_t size, Duration lead);
 
     Attempt(Group group, const Timing& timing, EchoFilter echo);
 
@@ -61,6 +67,10 @@ class Attempt {
     /// most.
     void on_end(TimePoint now, Duration left);
 
+    /// A read that comes while the request is still leaving shares it. Not a repeated one: an
+    /// answer to the first attempt may still come, and would be too old.
+    bool takes_along(TimePoint now, const Job& job) const;
+
     Group& group() { return group_; }
     const Group& group() const { return group_; }
     const Timing& timing() const { return timing_; }
@@ -68,18 +78,16 @@ class Attempt {
     /// The whole answer PDU; its first byte came before the request had left by our arithmetic.
     const Bytes& reply() const { return *reply_; }
     bool replied_early() const { return first_byte_ < timing_.sent; }
+    /// From the end of the request to the start of the reply, whose last byte came now.
+    Duration waited(TimePoint now) const;
     /// The reply is not to be believed: it counts as heard, and the attempt goes on.
     void reject_reply();
 
     const EchoFilter& echo() const { return echo_; }
     /// The whole echo came back, and nothing of it was needed to make the reply whole.
     bool echoed() const { return echo_.complete() && !borrowed_; }
-    /// A part of our own frame came back in front of the reply.
-    bool fragment_in_front() const { return fragment_; }
-    /// What stands in front of the reply is too little for an echo that was damaged.
-    bool clean_in_front() const {
-        return !echo_.mismatch() && noise_in_front_ * 2 < echo_.frame().size();
-    }
+    /// What its reply tells about the line's echo.
+    void teach(EchoMemory& memory) const;
     /// Something of the station was heard, good or not.
     bool heard() const { return heard_; }
     /// Bytes were heard that came before a reply could.

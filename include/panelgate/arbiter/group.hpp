@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <vector>
 
@@ -36,6 +37,14 @@ struct Group {
     }
     void on_gone(Client client) {
         for (Job& job : jobs) job.gone = job.gone || job.client == client;
+    }
+    /// Those whose own deadline has come; the others go on waiting.
+    std::vector<Job> expire(TimePoint now) {
+        const auto late = [&](const Job& job) { return job.deadline <= now; };
+        std::vector<Job> expired;
+        std::ranges::copy_if(jobs, std::back_inserter(expired), late);
+        std::erase_if(jobs, late);
+        return expired;
     }
     /// Nobody waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }

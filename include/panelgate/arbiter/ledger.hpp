@@ -28,8 +28,11 @@ class Ledger {
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
     void reset(std::string_view why) { actions_.push_back(Reset{why}); }
-    /// One line, when Settings::explain wants it.
-    void decide(TimePoint now, std::string text);
+    /// One line, put into words only when Settings::explain wants it.
+    template <class Text>
+    void decide(TimePoint now, const Text& text) {
+        if (explain_) actions_.push_back(Decision{now, text()});
+    }
     bool explains() const { return explain_; }
 
     // What happened on the wire

@@ -28,6 +28,12 @@ class Schedule {
     /// When that may say something else; nothing: when something happens.
     std::optional<TimePoint> next_start(const Stations& stations, const Quiet& quiet) const;
 
+    /// P1: where a late reply would collide with what others are told meanwhile, because such have
+    /// come before or the configuration says so, everybody rests until then. A probe lets the
+    /// others go on in any case; a timeout that was chosen short (adaptive) frees them early.
+    std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
+                                              const Station& station) const;
+
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
     /// The same request goes again; others may go in between where only its station rests.

@@ -65,10 +65,10 @@ class Station {
     void on_stray_bytes(TimePoint now) { trail_.on_stray(now); }
 
     struct Replied {
-        bool back = false;     ///< it was offline
-        bool drift = false;    ///< it has come near its response timeout
-        bool trail = false;    ///< something always stands behind its replies: that is new
-        bool trailed = false;  ///< something stood behind the reply before
+        bool back = false;              ///< it was offline
+        bool trailed = false;           ///< something stood behind the reply before
+        std::optional<Duration> drift;  ///< news: it has come that near its response timeout
+        std::optional<Duration> trail;  ///< news: so much always stands behind its replies
     };
     /// Its answer to an attempt. `waited`: from the end of the request to the start of the reply;
     /// `think`: without the silence that tells the panel that the request is over.
@@ -105,15 +105,12 @@ class Station {
     /// What it has ever needed, and some more; at most its response timeout.
     Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
     Duration response_timeout() const { return timeout(); }
-    /// What 95 of 100 of its replies need, lately.
-    Duration slow_by() const { return turnaround_.quantile(0.95); }
     Bytes probe_pdu() const;
     /// The longest read of this function that it has answered; items.
     std::uint32_t longest_read(std::uint8_t function) const;
     Duration worst_lateness() const { return late_.worst(); }
     /// Until when nobody should send, because of what follows its replies.
     TimePoint trail_until() const { return trail_.until(); }
-    Duration trail() const { return trail_.hold(); }
     std::optional<Duration> slowest() const {
         return health_.last_success() ? std::optional(slowest_) : std::nullopt;
     }

@@ -30,13 +30,15 @@ class Stations {
     }
     void on_reply(Duration waited) { slowest_ = std::max(slowest_.value_or(waited), waited); }
 
+    StationHealth health(std::uint8_t id) const;
+    Duration response_timeout(std::uint8_t id) const;
+    /// The station is offline, and this is not to be its probe. Of a stranger any request may be.
+    bool refuses(TimePoint now, const Job& job);
     /// How long the next attempt waits for its reply to begin.
     Duration patience(TimePoint now, const Group& group);
     /// The budgets of those that do not answer let this one be asked. A station that has only just
     /// fallen silent, or that keeps failing, is to wait for them only while others want the line.
     bool may_spend(TimePoint now, std::uint8_t id) const;
-    /// A request to a station that is offline may be its probe: once an interval, in the budget.
-    bool take_half_open(TimePoint now, std::uint8_t id);
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost);
 
