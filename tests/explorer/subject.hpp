@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/base/time.hpp"
+
+namespace panelgate::explorer {
+
+/// How an arbiter is broken on purpose, from outside.
+enum class Flaw : std::uint8_t {
+    none,
+    forgets_at_line_loss,     ///< what is owed does not outlive the line
+    repeats_at_partial_echo,  ///< the first bytes of a request that come back end its attempt
+    answers_twice,
+    loses_an_answer,
+    spins,  ///< names its first deadline for ever
+};
+
+/// Functions that this edition of the arbiter may not have yet.
+template <class A>
+void check_invariants(const A& arbiter) {
+    if constexpr (requires { arbiter.check_invariants(); }) arbiter.check_invariants();
+}
+template <class A>
+std::optional<std::uint64_t> inner_digest(const A& arbiter, TimePoint now) {
+    if constexpr (requires { arbiter.digest(now); }) return arbiter.digest(now);
+    return std::nullopt;
+}
+
+/// The arbiter that is explored: a value, so that a state is kept by copying it.
+class Subject {
+  public:
+    /// The settings must outlive it and its copies.
+    Subject(const arbiter::Settings& settings, Flaw flaw)
+        : settings_(&settings), arbiter_(settings), flaw_(flaw) {}
+
+    Result<arbiter::Ticket> submit(TimePoint now, arbiter::Job job) {
+        const Result<arbiter::Ticket> ticket = arbiter_.submit(now, std::move(job));
+        check_invariants(arbiter_);
+        if (!ticket) return ticket;
+        last_ticket_ = *ticket + renamed_;
+        return last_ticket_;
+    }
+    void cancel(TimePoint now, arbiter::Client client) {
+        arbiter_.cancel(now, client);
+        check_invariants(arbiter_);
+    }
+    void on_rx(TimePoint now, ByteView bytes);
+    void on_deadline(TimePoint now);
+    void on_line_up(TimePoint now) {
+        arbiter_.on_line_up(now);
+        check_invariants(arbiter_);
+    }
+    void on_line_down(TimePoint now);
+    std::optional<arbiter::Action> poll_action();
+    std::optional<TimePoint> next_deadline() const;
+
+    const arbiter::Arbiter& arbiter() const { return arbiter_; }
+
+  private:
+    std::optional<arbiter::Action> poll_arbiter();
+    void start_afresh();
+
+    const arbiter::Settings* settings_;
+    arbiter::Arbiter arbiter_;
+    Flaw flaw_;
+    std::vector<arbiter::Action> waiting_;  ///< told before what the arbiter says
+    std::uint64_t last_ticket_ = 0;
+    std::uint64_t renamed_ = 0;  ///< tickets of arbiters before this one
+    Bytes last_sent_;
+    std::optional<TimePoint> repeat_at_;
+    int finished_ = 0;
+};
+
+}  // namespace panelgate::explorer
