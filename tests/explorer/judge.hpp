@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <string_view>
@@ -56,6 +57,9 @@ class Judge {
 
     std::string_view violation() const { return violation_; }
     const Opens& open() const { return open_; }
+    bool is_open(arbiter::Ticket ticket) const {
+        return std::ranges::find(open_, ticket, &Open::ticket) != open_.end();
+    }
     std::uint16_t served(std::uint8_t station) const { return served_[station]; }
     TimePoint sent_until() const { return sent_until_; }
     TimePoint heard_until() const { return heard_until_; }

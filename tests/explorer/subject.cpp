@@ -13,11 +13,12 @@ using arbiter::Transmit;
 void Subject::on_rx(TimePoint now, ByteView bytes) {
     arbiter_.on_rx(now, bytes);
     check_invariants(arbiter_);
+    constexpr Duration kSilence = 10ms;  // a reply that begins before it is heard
     const bool read = last_sent_.size() > 1 && last_sent_[1] == 3;
-    const bool echo = read && bytes.size() < 4 && bytes.size() > 1 &&
-                      std::equal(bytes.begin(), bytes.end(), last_sent_.begin());
-    if (flaw_ == Flaw::repeats_at_partial_echo && echo)
-        repeat_at_ = now + silent_interval(settings_->serial);
+    const bool echo =
+        read && bytes.size() == 3 && std::equal(bytes.begin(), bytes.end(), last_sent_.begin());
+    repeat_at_.reset();
+    if (flaw_ == Flaw::repeats_at_partial_echo && echo) repeat_at_ = now + kSilence;
 }
 
 void Subject::on_deadline(TimePoint now) {
@@ -53,6 +54,7 @@ std::optional<Action> Subject::poll_arbiter() {
         if (flaw_ == Flaw::answers_twice) waiting_.emplace_back(*finish);
     } else if (const auto* transmit = std::get_if<Transmit>(&*action)) {
         last_sent_ = transmit->adu;
+        if (flaw_ == Flaw::sends_twice) waiting_.emplace_back(*transmit);
     }
     return action;
 }
@@ -68,6 +70,7 @@ std::optional<Action> Subject::poll_action() {
 
 std::optional<TimePoint> Subject::next_deadline() const {
     const auto next = arbiter_.next_deadline();
+    if (flaw_ == Flaw::spins && next) return TimePoint{};
     if (!repeat_at_) return next;
     return next ? std::min(*next, *repeat_at_) : *repeat_at_;
 }

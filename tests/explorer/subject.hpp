@@ -21,7 +21,9 @@ enum class Flaw : std::uint8_t {
     repeats_at_partial_echo,  ///< the first bytes of a request that come back end its attempt
     answers_twice,
     loses_an_answer,
-    spins,  ///< names its first deadline for ever
+    ignores_who_left,
+    sends_twice,
+    spins,  ///< names a deadline that has passed
 };
 
 /// Functions that this edition of the arbiter may not have yet.
@@ -50,6 +52,7 @@ class Subject {
         return last_ticket_;
     }
     void cancel(TimePoint now, arbiter::Client client) {
+        if (flaw_ == Flaw::ignores_who_left) return;
         arbiter_.cancel(now, client);
         check_invariants(arbiter_);
     }

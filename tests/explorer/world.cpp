@@ -29,8 +29,7 @@ World::World(const Rules& rules, const arbiter::Settings& told, Flaw flaw)
 }
 
 void World::play(Move move) {
-    const auto code = static_cast<std::uint64_t>(move.verb) * 8 + move.which + 1;
-    history_ = history_ << 8 | code;
+    was_half_ = move.verb == Verb::half;
     if (is_fault(move.verb)) ++faults_;
     switch (move.verb) {
         case Verb::submit:
@@ -140,15 +139,15 @@ void World::check_answered(const Reply& reply, const Judge::Opens& before) {
     if (reply.adu[1] != 3 && echo) return;
     const unsigned first = reply.adu[2] * 256u + reply.adu[3];
     const unsigned end = first + (reply.adu[1] == 3 ? reply.adu[5] : 1u);
+    bool asked = false;
     for (const Judge::Open& open : before) {
-        const bool asked = open.sent &&
-                           open.covers(reply.adu[0], reply.adu[1], open.wish.address) &&
-                           open.wish.address >= first && open.wish.address + open.wish.count <= end;
-        const auto& now_open = judge_.open();
-        if (asked &&
-            std::ranges::find(now_open, open.ticket, &Judge::Open::ticket) != now_open.end())
-            judge_.fail("P5: a good reply in time was not taken");
+        const Wish& wish = open.wish;
+        const bool its = open.sent && open.covers(reply.adu[0], reply.adu[1], wish.address) &&
+                         wish.address >= first && wish.address + unsigned{wish.count} <= end;
+        if (its && !judge_.is_open(open.ticket)) return;
+        asked = asked || its;
     }
+    if (asked) judge_.fail("P5: a good reply in time was not taken");
 }
 
 void World::noise(Verb verb) {

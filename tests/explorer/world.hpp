@@ -30,8 +30,8 @@ class World {
     void run_on();
     std::string_view violation() const { return judge_.violation(); }
     int faults() const { return faults_; }
-    /// Of everything that can be seen from outside, times counted from now on, and the last moves,
-    /// which stand for what cannot; or of the arbiter's own digest.
+    /// Of everything that can be seen from outside, times counted from now on, and of what cannot:
+    /// the arbiter's own digest, or how it goes on when everybody asks and nobody answers.
     std::uint64_t digest() const;
     std::string describe(Move move) const;
     /// From now on, what is done is written there.
@@ -56,6 +56,7 @@ class World {
     void add_noise(Moves& moves) const;
     bool allows(Verb verb) const;
     Duration half_way() const;
+    std::uint64_t prospect() const;
 
     void submit(const Wish& wish);
     void leave(std::uint8_t client);
@@ -91,7 +92,7 @@ class World {
     std::uint8_t gone_ = 0;  ///< bits of clients
     std::uint16_t writes_ = 0;
     int faults_ = 0;
-    std::uint64_t history_ = 0;  ///< the last eight moves
+    bool was_half_ = false;  ///< the last move
     std::vector<test::BusStep>* steps_ = nullptr;
 };
 

@@ -81,8 +81,7 @@ World::Moves World::moves() const {
     }
     const auto next = subject_.next_deadline();
     if (next) moves.push_back({Verb::deadline, 0});
-    const bool was_half = (history_ & 0xFF) == static_cast<std::uint64_t>(Verb::half) * 8 + 1;
-    if (allows(Verb::half) && !was_half && half_way() > 4ms) moves.push_back({Verb::half, 0});
+    if (allows(Verb::half) && !was_half_ && half_way() > 4ms) moves.push_back({Verb::half, 0});
     return moves;
 }
 
@@ -131,7 +130,6 @@ void World::add_noise(Moves& moves) const {
 std::uint64_t World::digest() const {
     constexpr Duration kQuiet = 60ms;
     constexpr Duration kOwed = kTimeout + kLateWindow;
-    constexpr std::uint64_t kLastMoves = 0xFFFFFF;  // three, of a byte each
     const arbiter::Arbiter& arbiter = subject_.arbiter();
     Hash hash;
     const auto next = subject_.next_deadline();
@@ -139,7 +137,7 @@ std::uint64_t World::digest() const {
     hash.add_age(now_, judge_.sent_until(), kQuiet);
     hash.add_age(now_, judge_.heard_until(), kQuiet);
     hash.add_age(now_, last_start_, kOwed);
-    hash.add(clean_, gone_);
+    hash.add(clean_, gone_, was_half_);
     for (const Judge::Open& open : judge_.open()) {
         hash.add(open.wish.client, open.wish.station, open.wish.address, open.wish.write, open.sent,
                  open.gone);
@@ -163,7 +161,27 @@ std::uint64_t World::digest() const {
         if (health.offline()) hash.add_age(now_, health.next_probe(), 0ms);
         hash.add(arbiter.response_timeout(station).count());
     }
-    hash.add(arbiter.queue_depth(), arbiter.echo(), history_ & kLastMoves);
+    hash.add(arbiter.queue_depth(), arbiter.echo(), prospect());
+    return hash.value();
+}
+
+std::uint64_t World::prospect() const {
+    constexpr int kDeadlines = 10;
+    World ahead(*this);
+    ahead.steps_ = nullptr;
+    for (const Wish& wish : rules_->wishes) {
+        if ((gone_ >> wish.client & 1) == 0 && !ahead.judge_.open().full()) ahead.submit(wish);
+    }
+    Hash hash;
+    for (int i = 0; i < kDeadlines; ++i) {
+        const auto next = ahead.subject_.next_deadline();
+        if (!next) break;
+        hash.add((*next - now_).count());
+        ahead.advance(*next);
+        hash.add_age(ahead.now_, ahead.last_start_, kTimeout);
+        hash.add(ahead.last_sent_[0], ahead.last_sent_[3], ahead.judge_.open().size());
+        for (const Judge::Open& open : ahead.judge_.open()) hash.add(open.wish.address, open.sent);
+    }
     return hash.value();
 }
 

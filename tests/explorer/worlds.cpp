@@ -38,9 +38,10 @@ Rules world(std::string name, std::uint32_t verbs, int faults) {
 
 std::vector<Rules> small_worlds() {
     std::vector<Rules> worlds;
-    worlds.push_back(world("Silence", bits({leave}), 0));
+    worlds.push_back(world("Silence", 0, 0));
     worlds.push_back(world("Noise", kNoise, 2));
     worlds.push_back(world("Line", kLine, 2));
+    worlds.push_back(world("Leaving", kLine | bits({leave, lost}), 2));
     worlds.push_back(world("BadReplies", kBadReplies, 2));
     worlds.push_back(world("All", kBadReplies | kNoise | kLine | bits({leave}), 3));
 
@@ -53,7 +54,7 @@ std::vector<Rules> small_worlds() {
     Rules learning = world("EchoIsLearned", kNoise | kLine | bits({damaged}), 2);
     learning.settings.echo = arbiter::EchoMode::automatic;
     worlds.push_back(learning);
-    Rules joined = world("TouchingReads", kBadReplies | bits({line_blinks, leave}), 2);
+    Rules joined = world("TouchingReads", kBadReplies | bits({line_blinks}), 2);
     joined.wishes = {kX, {.client = 2, .station = 1, .address = 11}, kWrite};
     joined.settings.stations[0].vouched = true;
     joined.open_per_client = 2;
