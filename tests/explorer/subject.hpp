@@ -28,8 +28,8 @@ enum class Flaw : std::uint8_t {
 
 /// Functions that this edition of the arbiter may not have yet.
 template <class A>
-void check_invariants(const A& arbiter) {
-    if constexpr (requires { arbiter.check_invariants(); }) arbiter.check_invariants();
+void check_invariants(const A& arbiter, TimePoint now) {
+    if constexpr (requires { arbiter.check_invariants(now); }) arbiter.check_invariants(now);
 }
 template <class A>
 std::optional<std::uint64_t> inner_digest(const A& arbiter, TimePoint now) {
@@ -46,7 +46,7 @@ class Subject {
 
     Result<arbiter::Ticket> submit(TimePoint now, arbiter::Job job) {
         const Result<arbiter::Ticket> ticket = arbiter_.submit(now, std::move(job));
-        check_invariants(arbiter_);
+        check_invariants(arbiter_, now);
         if (!ticket) return ticket;
         last_ticket_ = *ticket + renamed_;
         return last_ticket_;
@@ -54,13 +54,13 @@ class Subject {
     void cancel(TimePoint now, arbiter::Client client) {
         if (flaw_ == Flaw::ignores_who_left) return;
         arbiter_.cancel(now, client);
-        check_invariants(arbiter_);
+        check_invariants(arbiter_, now);
     }
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now);
     void on_line_up(TimePoint now) {
         arbiter_.on_line_up(now);
-        check_invariants(arbiter_);
+        check_invariants(arbiter_, now);
     }
     void on_line_down(TimePoint now);
     std::optional<arbiter::Action> poll_action();

@@ -118,22 +118,32 @@ void World::deliver(Verb verb, std::uint8_t station) {
     if (verb == Verb::damaged) adu[kFirstBytes] ^= 0x10;
     if (verb == Verb::behind_header) adu.insert(adu.begin(), {station, adu[1]});
     if (verb == Verb::behind_glitch) adu.insert(adu.begin(), 0);
+    const Reply was = reply;
+    const Judge::Opens before = judge_.open();
+    const bool must_do = is_the_answer(was) && verb != Verb::damaged && verb != Verb::cut;
     if (verb == Verb::hole) {
         reply.passed = kFirstBytes;
-        return say(adu);
+    } else {
+        waiting.pop_front();
     }
-    const Reply was = reply;
-    const bool alone = waiting.size() == 1;
-    const Judge::Opens before = judge_.open();
-    const bool clean =
-        clean_ && alone && !was.probe && was.adu == last_sent_ && was.asked == judge_.sent_until();
-    waiting.pop_front();
     say(adu);
-    if (verb == Verb::reply && clean && now_ <= was.asked + kTimeout) check_answered(was, before);
+    begun_ = verb == Verb::hole && must_do;
+    begun_at_ = now_;
+    if (verb != Verb::hole && must_do) check_answered(was, before);
 }
 
-/// The one reply to the one request that is out, whole, in time, and nothing else was heard. While
-/// nobody knows whether the line hears itself, what may be the echo of a write confirms nothing.
+/// The one reply to the one request that is out begins in time, or goes on after a hole that is to
+/// be waited for, and nothing else was heard.
+bool World::is_the_answer(const Reply& reply) const {
+    const bool alone = replies_[reply.adu[0]].size() == 1;
+    const bool last = reply.adu == last_sent_ && reply.asked == judge_.sent_until();
+    if (!alone || !last || reply.probe) return false;
+    if (reply.passed > 0) return is_in_hole();
+    return clean_ && now_ < reply.asked + kTimeout;
+}
+
+/// Somebody must have got it. While nobody knows whether the line hears itself, what may be the
+/// echo of a write confirms nothing.
 void World::check_answered(const Reply& reply, const Judge::Opens& before) {
     const bool echo = subject_.arbiter().echo() != arbiter::EchoMemory::State::absent;
     if (reply.adu[1] != 3 && echo) return;
@@ -169,7 +179,7 @@ void World::blink(bool keeps) {
         if (!waiting.empty() && waiting.front().passed > 0) waiting.pop_front();
         while (!waiting.empty() && waiting.back().asked > now_) waiting.erase(&waiting.back());
     }
-    clean_ = false;
+    clean_ = begun_ = false;
     note({.verb = test::BusStep::Verb::line_down});
     subject_.on_line_down(now_);
     drain();
@@ -188,7 +198,7 @@ void World::say(ByteView bytes) {
 
 void World::hear(ByteView bytes) {
     note({.verb = test::BusStep::Verb::hear, .bytes = Bytes(bytes.begin(), bytes.end())});
-    clean_ = false;
+    clean_ = begun_ = false;
     judge_.on_heard(now_);
     subject_.on_rx(now_, bytes);
     drain();
@@ -239,12 +249,25 @@ void World::act(const arbiter::Transmit& transmit) {
     const TimePoint end = now_ + wire(transmit.adu.size());
     const bool probe = std::exchange(probing_, false);
     judge_.on_transmit(now_, transmit.adu, end, !probe);
+    if (is_in_hole()) judge_.fail("P5: sent into a reply that had begun");
     std::copy_n(transmit.adu.begin(), last_sent_.size(), last_sent_.begin());
     last_start_ = now_;
     clean_ = true;
+    begun_ = false;
     const std::uint8_t station = transmit.adu[0];
     if (station >= replies_.size() || replies_[station].full()) return;
     replies_[station].push_back({.adu = last_sent_, .asked = end, .probe = probe});
+}
+
+void World::act(const arbiter::Finish& finish) {
+    const auto& opens = judge_.open();
+    const auto open = std::ranges::find(opens, finish.ticket, &Judge::Open::ticket);
+    const bool early = open != opens.end() && now_ < open->submitted + kDeadline && !open->gone;
+    const bool its =
+        early && open->sent && open->covers(last_sent_[0], last_sent_[1], open->wish.address);
+    if (is_in_hole() && its && !finish.pdu)
+        judge_.fail("P5: a reply that had begun was not waited for");
+    judge_.on_finish(now_, finish);
 }
 
 void World::act(const arbiter::Note& note) {

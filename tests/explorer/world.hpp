@@ -62,6 +62,9 @@ class World {
     void leave(std::uint8_t client);
     void deliver(Verb verb, std::uint8_t station);
     void check_answered(const Reply& reply, const Judge::Opens& before);
+    bool is_the_answer(const Reply& reply) const;
+    /// Its reply has begun, and the silence since then is no longer than a hole may be.
+    bool is_in_hole() const { return begun_ && now_ < begun_at_ + rules_->settings.reply_hole; }
     void noise(Verb verb);
     void blink(bool keeps);
     void say(ByteView bytes);
@@ -70,7 +73,7 @@ class World {
     void serve();
     void drain();
     void act(const arbiter::Transmit& transmit);
-    void act(const arbiter::Finish& finish) { judge_.on_finish(now_, finish); }
+    void act(const arbiter::Finish& finish);
     void act(const arbiter::Note& note);
     void act(const arbiter::Reset&) { reset_ = true; }
     void act(const arbiter::Decision&) {}
@@ -87,6 +90,8 @@ class World {
     TimePoint last_start_{};          ///< of the request sent last
     std::array<std::uint8_t, 6> last_sent_{};
     bool clean_ = false;     ///< nothing was heard since then, and the line stayed
+    bool begun_ = false;     ///< nothing but the beginning of its reply…
+    TimePoint begun_at_{};   ///< …and when that ended
     bool probing_ = false;   ///< the next frame is for nobody
     bool reset_ = false;     ///< the arbiter wants the line closed
     std::uint8_t gone_ = 0;  ///< bits of clients

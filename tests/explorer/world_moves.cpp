@@ -137,7 +137,8 @@ std::uint64_t World::digest() const {
     hash.add_age(now_, judge_.sent_until(), kQuiet);
     hash.add_age(now_, judge_.heard_until(), kQuiet);
     hash.add_age(now_, last_start_, kOwed);
-    hash.add(clean_, gone_, was_half_);
+    hash.add(clean_, gone_, was_half_, begun_);
+    if (begun_) hash.add_age(now_, begun_at_, kQuiet);
     for (const Judge::Open& open : judge_.open()) {
         hash.add(open.wish.client, open.wish.station, open.wish.address, open.wish.write, open.sent,
                  open.gone);
