@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -36,6 +37,9 @@ std::optional<std::uint64_t> inner_digest(const A& arbiter, TimePoint now) {
     if constexpr (requires { arbiter.digest(now); }) return arbiter.digest(now);
     return std::nullopt;
 }
+
+static_assert(std::is_copy_constructible_v<arbiter::Arbiter>,
+              "its parts hold no references to one another");
 
 /// The arbiter that is explored: a value, so that a state is kept by copying it.
 class Subject {
