@@ -1,6 +1,6 @@
 // Everything that can happen in a few small worlds, to a depth that is told.
 //
-// PANELGATE_EXPLORER_STATES  distinct states in all (default 1 200 000; a tenth with sanitizers)
+// PANELGATE_EXPLORER_STATES  distinct states in all (default 1 000 000; a tenth with sanitizers)
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ std::size_t number_from(const char* variable, std::size_t fallback) {
 
 std::size_t wanted_states() {
     const bool slow = number_from("PANELGATE_SANITIZED", 0) != 0;
-    const std::size_t all = number_from("PANELGATE_EXPLORER_STATES", 1'200'000);
+    const std::size_t all = number_from("PANELGATE_EXPLORER_STATES", 1'000'000);
     return slow ? all / 10 : all;
 }
 

@@ -59,7 +59,8 @@ struct Rules {
     std::size_t open_per_client = 1;
     std::uint32_t verbs = 0;  ///< bits of what may happen
     int faults = 2;           ///< in one script, at most 3
-    /// Replies come however late, until the way to the wire is closed (Settings::may_stall).
+    /// The way to the wire may hold back what it was given, in order and however long, until it is
+    /// closed (Settings::may_stall). What is behind it is as quick as ever.
     bool stalls = false;
     /// Bytes can come while a request is leaving: the line is no pair of wires.
     bool full_duplex = false;

@@ -119,6 +119,7 @@ void World::deliver(Verb verb, std::uint8_t station) {
     if (verb == Verb::behind_header) adu.insert(adu.begin(), {station, adu[1]});
     if (verb == Verb::behind_glitch) adu.insert(adu.begin(), 0);
     const Reply was = reply;
+    pass_on(was.asked);
     const Judge::Opens before = judge_.open();
     const bool must_do = is_the_answer(was) && verb != Verb::damaged && verb != Verb::cut;
     if (verb == Verb::hole) {
@@ -130,6 +131,15 @@ void World::deliver(Verb verb, std::uint8_t station) {
     begun_ = verb == Verb::hole && must_do;
     begun_at_ = now_;
     if (verb != Verb::hole && must_do) check_answered(was, before);
+}
+
+/// The way to the wire keeps the order of what it holds back.
+void World::pass_on(TimePoint asked) {
+    for (Replies& waiting : replies_) {
+        for (Reply& reply : waiting) {
+            if (reply.asked <= asked && reply.reached == TimePoint{}) reply.reached = now_;
+        }
+    }
 }
 
 /// The one reply to the one request that is out begins in time, or goes on after a hole that is to
@@ -232,9 +242,7 @@ void World::serve() {
             judge_.on_served(station, ByteView(reply.adu).subspan(1));
             reply.served = judge_.served(station);
         }
-        while (!rules_->stalls && !waiting.empty() &&
-               now_ > waiting.front().asked + kTimeout + kLateWindow)
-            waiting.pop_front();
+        while (!waiting.empty() && now_ > last_moment(waiting.front())) waiting.pop_front();
     }
 }
 

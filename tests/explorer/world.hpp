@@ -42,14 +42,18 @@ class World {
     struct Reply {
         std::array<std::uint8_t, 6> adu{};  ///< of the request, without CRC
         TimePoint asked{};                  ///< the request's last bit
-        std::uint16_t served = 0;           ///< the number of this service, once asked
-        std::uint8_t passed = 0;            ///< bytes of the reply that have come
+        /// Where a request may be held back: it had reached its panel by then, because one that was
+        /// sent later was answered. Nothing is held back for ever behind it.
+        TimePoint reached{};
+        std::uint16_t served = 0;  ///< the number of this service, once asked
+        std::uint8_t passed = 0;   ///< bytes of the reply that have come
         bool probe = false;
     };
     using Replies = Few<Reply, 2>;
 
     Bytes bytes_of(const Reply& reply) const;
     TimePoint ready(const Reply& reply) const;
+    TimePoint last_moment(const Reply& reply) const;
     bool comes_in_time(const Reply& reply) const;
     void add_submits(Moves& moves) const;
     void add_replies(Moves& moves) const;
@@ -62,6 +66,7 @@ class World {
     void leave(std::uint8_t client);
     void deliver(Verb verb, std::uint8_t station);
     void check_answered(const Reply& reply, const Judge::Opens& before);
+    void pass_on(TimePoint asked);
     bool is_the_answer(const Reply& reply) const;
     /// Its reply has begun, and the silence since then is no longer than a hole may be.
     bool is_in_hole() const { return begun_ && now_ < begun_at_ + rules_->settings.reply_hole; }

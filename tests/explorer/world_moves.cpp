@@ -59,11 +59,16 @@ Bytes World::bytes_of(const Reply& reply) const {
     return modbus::encode_adu(reply.adu[0], pdu.take());
 }
 
+TimePoint World::last_moment(const Reply& reply) const {
+    if (!rules_->stalls) return reply.asked + kTimeout + kLateWindow;
+    const bool held = reply.reached == TimePoint{};
+    return held ? TimePoint::max() : reply.reached + kTimeout + kLateWindow;
+}
+
 bool World::comes_in_time(const Reply& reply) const {
-    if (rules_->stalls) return true;
     const std::size_t size = reply.adu[1] == 3 ? 5 + std::size_t{2} * reply.adu[5] : 8;
     const TimePoint end = std::max(now_, ready(reply)) + static_cast<int>(size) * kCharacter;
-    return end <= reply.asked + kTimeout + kLateWindow;
+    return end <= last_moment(reply);
 }
 
 Duration World::half_way() const {
@@ -150,6 +155,7 @@ std::uint64_t World::digest() const {
             hash.add(reply.adu[1], reply.adu[3], reply.passed);
             if (reply.adu[1] == 3) hash.add(reply.adu[5]);
             hash.add_age(now_, reply.asked, kOwed);
+            if (rules_->stalls) hash.add_age(now_, reply.reached, kOwed);
         }
     }
     if (const auto inner = inner_digest(arbiter, now_)) {
