@@ -7,10 +7,14 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "support/bus_step.hpp"
 
 namespace panelgate::test {
 
@@ -23,11 +27,13 @@ class BusScript {
         arbiter_.on_line_up(now_);
         drain();
         run_for(100ms);  // past the first silent interval
+        steps.clear();
     }
 
     struct Sent {
         TimePoint at;
         Bytes adu;
+        std::string_view what;  ///< "request", "retry", "probe"…
     };
     struct Answer {
         TimePoint at;
@@ -50,24 +56,35 @@ class BusScript {
         job.pdu = std::move(pdu);
         job.client = client;
         job.priority = priority;
+        record({.verb = BusStep::Verb::submit,
+                .station = station,
+                .bytes = job.pdu,
+                .client = client,
+                .priority = priority});
         const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, std::move(job));
+        if (ticket) accepted.push_back(*ticket);
         drain();
         return ticket;
     }
     void cancel(arbiter::Client client) {
+        record({.verb = BusStep::Verb::cancel, .client = client});
         arbiter_.cancel(now_, client);
         drain();
     }
     void line_down() {
+        record({.verb = BusStep::Verb::line_down});
+        sent_until_ = std::min(sent_until_, now_);  // the rest of a frame never leaves
         arbiter_.on_line_down(now_);
         drain();
     }
     void line_up() {
+        record({.verb = BusStep::Verb::line_up});
         arbiter_.on_line_up(now_);
         drain();
     }
     /// Bytes arrive now.
     void hear(ByteView bytes) {
+        record({.verb = BusStep::Verb::hear, .bytes = Bytes(bytes.begin(), bytes.end())});
         arbiter_.on_rx(now_, bytes);
         heard_until_ = now_;
         drain();
@@ -84,6 +101,7 @@ class BusScript {
 
     void run_for(Duration span) { run_until(now_ + span); }
     void run_until(TimePoint end) {
+        record({.verb = BusStep::Verb::run_for, .span = end - now_});
         int spins = 0;
         while (true) {
             const auto next = arbiter_.next_deadline();
@@ -94,8 +112,37 @@ class BusScript {
             if (arbiter_.wants_end(now_)) arbiter_.on_end(now_, unsent());
             arbiter_.on_deadline(now_);
             drain();
+            if (deadlines_twice) arbiter_.on_deadline(now_);
+            drain();
         }
         now_ = std::max(now_, end);
+    }
+    /// Plays what was recorded; a submit gives its ticket, when it was accepted.
+    std::optional<arbiter::Ticket> play(const BusStep& step) {
+        switch (step.verb) {
+            case BusStep::Verb::submit: {
+                const auto ticket =
+                    try_submit(step.station, step.bytes, step.client, step.priority);
+                if (ticket) return *ticket;
+                break;
+            }
+            case BusStep::Verb::cancel:
+                cancel(step.client);
+                break;
+            case BusStep::Verb::hear:
+                hear(step.bytes);
+                break;
+            case BusStep::Verb::run_for:
+                run_for(step.span);
+                break;
+            case BusStep::Verb::line_down:
+                line_down();
+                break;
+            case BusStep::Verb::line_up:
+                line_up();
+                break;
+        }
+        return std::nullopt;
     }
     /// Runs until one more frame was sent (or the limit), and returns it.
     std::optional<Sent> next_sent(Duration limit = 60s) {
@@ -117,7 +164,11 @@ class BusScript {
 
     TimePoint now() const { return now_; }
     arbiter::Arbiter& arbiter() { return arbiter_; }
+    const arbiter::Settings& settings() const { return settings_; }
 
+    std::vector<BusStep> steps;  ///< all that was done, to be played again
+    std::vector<arbiter::Ticket> accepted;
+    bool deadlines_twice = false;  ///< a timer may fire again
     std::vector<Sent> sent;
     std::map<arbiter::Ticket, Answer> answers;
     std::vector<arbiter::Note> notes;
@@ -128,6 +179,7 @@ class BusScript {
     std::function<Duration()> unsent = [] { return Duration::zero(); };
 
   private:
+    void record(BusStep step) { steps.push_back(std::move(step)); }
     void drain() {
         while (auto action = arbiter_.poll_action()) {
             std::visit([this](auto& a) { act(a); }, *action);
@@ -136,14 +188,17 @@ class BusScript {
     void act(const arbiter::Transmit& transmit) {
         EXPECT_GE(now_ - std::max(sent_until_, heard_until_), silent_interval(settings_.serial))
             << "sent within the gap";
-        sent.push_back({now_, transmit.adu});
+        sent.push_back({now_, transmit.adu, what_});
         sent_until_ = now_ + wire_time(settings_.serial, transmit.adu.size());
     }
     void act(const arbiter::Finish& finish) {
         EXPECT_EQ(answers.count(finish.ticket), 0u) << "answered twice";
         answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
     }
-    void act(const arbiter::Note& note) { notes.push_back(note); }
+    void act(const arbiter::Note& note) {
+        notes.push_back(note);
+        if (note.direction == arbiter::Note::Direction::sent) what_ = note.what;
+    }
     void act(const arbiter::Decision& decision) { decisions.push_back(decision); }
     void act(const arbiter::StationEvent& event) { events.push_back(event); }
     void act(const arbiter::Reset&) { ++resets; }
@@ -153,6 +208,7 @@ class BusScript {
     TimePoint now_{1h};
     TimePoint sent_until_{};
     TimePoint heard_until_{};
+    std::string_view what_;  ///< the frame that leaves now is
 };
 
 }  // namespace panelgate::test
