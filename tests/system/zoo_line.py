@@ -1,5 +1,6 @@
 """A line of odd panels (tests/zoo) with the gateway on it, and clients that know every value."""
 import asyncio
+import concurrent.futures
 import contextlib
 import json
 import os
@@ -15,9 +16,11 @@ from collections import namedtuple
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
 import harness  # noqa: E402
 from clients import Client, percentile  # noqa: E402,F401
-from harness import read_registers  # noqa: E402
+from harness import read_registers, write_register  # noqa: E402
 
 ZOO_BUS = os.environ.get("ZOO_BUS", str(harness.ROOT / "build/release/zoo_bus"))
+Line = namedtuple("Line", "zoo program")
+Write = namedtuple("Write", "at unit pdu")
 WRITABLE = 0x8000  # registers and coils from here on are written by tests, those below are not
 
 
@@ -26,7 +29,10 @@ def holding(unit, address):
 
 
 def is_value(unit, pdu, reply):
-    """Whether this is what the panel holds: of reads of holding registers that nobody writes."""
+    """Whether this is what the panel holds: of reads of holding registers that nobody writes, and
+    of writes, that are confirmed by an echo of their head."""
+    if pdu[0] != 3:
+        return reply == pdu[:5]
     _, address, count = struct.unpack(">BHH", pdu)
     want = struct.pack(f">BB{count}H", 3, 2 * count,
                        *(holding(unit, a) for a in range(address, address + count)))
@@ -66,11 +72,9 @@ class Zoo:
         return json.loads(self.ask("stats"))
 
     def writes(self):
-        """[(unit, PDU)] that panels have executed, in that order."""
-        return [(unit, bytes.fromhex(pdu)) for _, unit, pdu in json.loads(self.ask("writes"))]
-
-
-Line = namedtuple("Line", "zoo program")
+        """What panels have executed, in that order; `at`: time.monotonic() when it had come."""
+        return [Write(at / 1e9, unit, bytes.fromhex(pdu))
+                for at, unit, pdu in json.loads(self.ask("writes"))]
 
 
 def configuration(device, baud, units, line="", stations=""):
@@ -83,13 +87,14 @@ def configuration(device, baud, units, line="", stations=""):
 
 
 @contextlib.contextmanager
-def odd_line(baud, units=range(1, 6), habits=None, tcp=False, line="", zoo=(), paced=True):
+def odd_line(baud, units=range(1, 6), habits=None, tcp=False, line="", zoo=(), wire_baud=None):
     """Panels and a gateway; `habits`: {unit or "all": names}; `line`: YAML of the line; `zoo`: more
-    options of zoo_bus."""
+    options of zoo_bus; `wire_baud`: where it is not what the gateway thinks, 0: unpaced."""
     with tempfile.TemporaryDirectory() as folder:
         numbers = ",".join(map(str, units))
         far_end = "tcp:0" if tcp else f"{folder}/tty"
-        options = [*zoo, "--baud", baud if paced else 0, "--bus", f"{far_end}={numbers}"]
+        pace = baud if wire_baud is None else wire_baud
+        options = [*zoo, "--baud", pace, "--bus", f"{far_end}={numbers}"]
         for unit, names in (habits or {}).items():
             options += ["--set", f"{unit}={names}"]
         with Zoo(*options) as panels:
@@ -161,3 +166,30 @@ async def read_all(port, units, seconds, readers=None, beside=None):
         for client in clients:
             client.close()
     return readers
+
+
+def in_parallel(work, cases):
+    """[work(case)], all at once: each has a line and a gateway of its own."""
+    with concurrent.futures.ThreadPoolExecutor(len(cases)) as pool:
+        return list(pool.map(work, cases))
+
+
+def every_kind_of_write(turn):
+    """05 06 15 16 in turn, to places that nobody else writes."""
+    address = WRITABLE + 4 * turn
+    return (struct.pack(">BHH", 5, address, 0xFF00 * (turn // 4 % 2)),
+            write_register(address, turn),
+            struct.pack(">BHHBB", 15, address, 8, 1, turn & 0xFF),
+            struct.pack(">BHHBHH", 16, address, 2, 4, turn, turn + 1))[turn % 4]
+
+
+def outcome(client, unit, pdu):
+    """"good", "wrong", or the exception."""
+    reply = client.ask(unit, pdu)
+    if reply[0] & 0x80:
+        return f"{pdu[0]:02}: exception {reply[1]:02X}"
+    return "good" if is_value(unit, pdu, reply) else f"{pdu[0]:02}: wrong"
+
+
+def counted(outcomes):
+    return {kind: outcomes.count(kind) for kind in sorted(set(outcomes))}
