@@ -174,7 +174,9 @@ def print_row(baud, name, seen, plain, said, broken):
 
 
 def measure_rate(baud, names, seconds, warm):
-    """Rows that broke a bar."""
+    """Rows that broke a bar. At least ten rounds are measured, and three before."""
+    round_time = len(UNITS) * (8 + REPLY) * 10 / baud
+    seconds, warm = max(seconds, 10 * round_time), max(warm, 3 * round_time)
     base, said = through_gateway(baud, None, seconds, warm)
     print_row(baud, "(none)", base, None, said, [])
     failed = []

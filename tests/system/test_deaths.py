@@ -1,12 +1,11 @@
 """The moment of dying, with all defaults: what the others' clients notice of it."""
 import asyncio
-import contextlib
 import itertools
 import time
 import unittest
 
 import harness
-from harness import read_registers, write_register
+from harness import write_register
 from zoo_line import (WRITABLE, Client, Reader, Summary, in_parallel, merged, odd_line,
                       read_all)
 
@@ -87,45 +86,6 @@ class OneOfFive(unittest.TestCase):
         self.assertLessEqual(max(slow.values()), 1)
         self.assertLess(back, 5.5)
 
-    def test_P4_a_write_to_a_dead_panel_costs_the_others_no_more_than_a_read(self):
-        async def beside(port, pdus, end):
-            client = await Client.connect(port)
-            for pdu in pdus:
-                if time.monotonic() >= end:
-                    break
-                await client.ask(DYING, pdu)
-                await asyncio.sleep(0.1)
-            client.close()
-
-        def run(pdus):
-            with odd_line(BAUD, UNITS) as line:
-                port, others = line.program.modbus_port(), [u for u in UNITS if u != DYING]
-                asyncio.run(read_all(port, UNITS, 0.5))  # its pace is known
-                line.zoo.set(DYING, "dead")
-                until_offline(line, DYING)
-                readers = asyncio.run(read_all(
-                    port, others, 8, beside=lambda end: beside(port, pdus, end)))
-                return merged(r.summary() for r in readers.values())
-        reads, writes = (run(pdus) for pdus in (
-            (read_registers(n) for n in itertools.count()),
-            (write_register(WRITABLE + n, n) for n in itertools.count())))
-        print(f"\n  reads to the dead one: {reads.good} answers of the others, longest "
-              f"{max(reads.seconds):.3f} s; writes: {writes.good}, {max(writes.seconds):.3f} s", end="")
-        self.assertEqual((reads.wrong, writes.wrong, writes.refused), (0, 0, {}))
-        self.assertGreater(writes.good, 0.95 * reads.good)
-        self.assertLess(max(writes.seconds), max(1.5 * max(reads.seconds), 0.3 * TIMEOUT))
-
-
-def until_offline(line, *units):
-    """Reads until all of them are."""
-    with contextlib.ExitStack() as stack:
-        clients = [(unit, stack.enter_context(line.program.client())) for unit in units]
-        while line.program.log.text().count("station offline") < len(units):
-            for unit, client in clients:
-                client.send(unit, read_registers(0))
-            for _, client in clients:
-                client.receive()
-
 
 @unittest.skipIf(harness.SANITIZED, "a sanitizer takes the time that is measured here")
 class ManyOfMany(unittest.TestCase):
@@ -151,55 +111,6 @@ class ManyOfMany(unittest.TestCase):
               f"{after.refused}", end="")
         self.assertEqual((after.wrong, after.refused), (0, {}))
         self.assertGreater(share, 0.9)
-
-    def test_P4_ten_dead_panels_that_are_written_cyclically_leave_the_wire_to_eight_readers(self):
-        healthy, dead = range(1, 9), range(11, 21)
-
-        async def write_cyclically(port, end):
-            client = await Client.connect(port)
-            for turn in itertools.count():
-                if time.monotonic() >= end:
-                    break
-                await client.ask(dead[turn % len(dead)], write_register(WRITABLE, turn))
-                await asyncio.sleep(0.02)
-            client.close()
-        with odd_line(BAUD, [*healthy, *dead]) as line:
-            port = line.program.modbus_port()
-            base = asyncio.run(read_all(port, healthy, 3))
-            for unit in dead:
-                line.zoo.set(unit, "dead")
-            until_offline(line, *dead)
-            seen = asyncio.run(read_all(port, healthy, 8,
-                                        beside=lambda end: write_cyclically(port, end)))
-        rates = [merged(r.summary() for r in readers.values()).good / seconds
-                 for readers, seconds in ((base, 3), (seen, 8))]
-        print(f"\n  beside writes to ten dead ones: {rates[1] / rates[0]:.3f} of the rate", end="")
-        self.assertGreater(rates[1], 0.95 * rates[0])
-
-
-@unittest.skipIf(harness.SANITIZED, "a sanitizer takes the time that is measured here")
-class Broadcasts(unittest.TestCase):
-    def test_P4_a_panel_that_answers_broadcasts_costs_nobody_more_than_a_gap(self):
-        async def broadcast(port, end):
-            client = await Client.connect(port)
-            while time.monotonic() < end:
-                await asyncio.sleep(0.4)
-                await client.ask(0, write_register(WRITABLE, 1))
-            client.close()
-
-        def run(habit):
-            with odd_line(BAUD, UNITS, {DYING: habit}) as line:
-                port = line.program.modbus_port()
-                readers = asyncio.run(read_all(port, UNITS, 6,
-                                               beside=lambda end: broadcast(port, end)))
-            return merged(r.summary() for r in readers.values())
-        plain, odd = run("-"), run("bcast-reply")
-        longest = max(odd.seconds) / max(plain.seconds)
-        print(f"\n  {odd.good / plain.good:.3f} of the rate beside broadcasts that nobody answers, "
-              f"longest wait {longest:.2f} times", end="")
-        self.assertEqual((odd.wrong, odd.refused), (0, {}))
-        self.assertGreater(odd.good, 0.95 * plain.good)
-        self.assertLess(longest, 1.5)
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ class Neighbours(unittest.TestCase):
         broken = []
         for habit, held in self.HABITS.items():
             with odd_line(38400, habits={self.ODD: habit}, zoo=("--think", "1")) as line:
-                seen, wrong, took = self.measure(line, 3)
+                seen, wrong, took = self.measure(line, 2.5)
             share = seen.good / took / rate * (round_time + held) / round_time
             slower = seen.quantile(0.9) / (base.quantile(0.9) + held)
             print(f"\n  {habit}: {share:.2f} of the rate, p90 {slower:.2f} times, refused "

@@ -68,8 +68,8 @@ class Zoo:
         """`unit`: a number or "all"; `habits`: names with commas between, "-" for none."""
         self.tell(f"set {unit} {habits}")
 
-    def stats(self):
-        return json.loads(self.ask("stats"))
+    def stats(self, bus=0):
+        return json.loads(self.ask(f"@{bus} stats"))
 
     def writes(self):
         """What panels have executed, in that order; `at`: time.monotonic() when it had come."""
