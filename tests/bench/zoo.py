@@ -93,7 +93,7 @@ async def broadcast(port, end):
 
 
 def seen_of(readers, since, seconds):
-    parts = {unit: reader.summary(since) for unit, reader in readers.items()}
+    parts = {unit: reader.summary(since, since + seconds) for unit, reader in readers.items()}
     others = [s for unit, s in parts.items() if unit != ODD] or list(parts.values())
     healthy = zoo_line.merged(others)
     wrong = {unit: s.wrong for unit, s in parts.items() if s.wrong}
@@ -109,11 +109,10 @@ def through_gateway(baud, name, seconds, warm):
     with zoo_line.odd_line(baud, units, habits, zoo=options()) as line:
         port = line.program.modbus_port()
         beside = (lambda end: broadcast(port, end)) if name == "bcast-reply" else None
-        start = time.monotonic()
+        since = time.monotonic() + warm
         readers = asyncio.run(zoo_line.read_all(port, units, warm + seconds, beside=beside))
-        took = time.monotonic() - start - warm
         found = line.program.get("/api/v1/lines/zoo")[1].get("findings", [])
-    return seen_of(readers, start + warm, took), findings(found)
+    return seen_of(readers, since, seconds), findings(found)
 
 
 def findings(found):

@@ -122,8 +122,9 @@ class Reader:
             if pause:
                 await asyncio.sleep(pause)
 
-    def summary(self, since=0.0):
-        return Summary([a for a in self.asked if a.answered and a.sent >= since])
+    def summary(self, since=0.0, until=float("inf")):
+        """Of what was answered then."""
+        return Summary([a for a in self.asked if a.answered and since <= a.answered < until])
 
 
 class Summary:
