@@ -41,8 +41,9 @@ class Returns(unittest.TestCase):
         for tcp, seen in zip((True, False), in_parallel(self.ask_through_cuts, (True, False))):
             what = "tcp" if tcp else "serial"
             print(f"\n  {what}, five times gone and back: {counted([o for _, o in seen])}", end="")
-            self.assertNotIn("03: wrong", [o for _, o in seen], what)
-            self.assertTrue(last_good(seen), f"{what}: {seen[-10:]}")
+            with self.subTest(what):
+                self.assertNotIn("03: wrong", counted([o for _, o in seen]))
+                self.assertTrue(last_good(seen), seen[-10:])
 
 
 class Refused(unittest.TestCase):
@@ -82,7 +83,8 @@ class Pieces(unittest.TestCase):
         habits = ("split-30-60", "split-200-200")
         for habit, seen in zip(habits, in_parallel(reads, habits)):
             print(f"\n  {habit}: {seen}", end="")
-            self.assertEqual(seen, {"good": 12}, habit)
+            with self.subTest(habit):
+                self.assertEqual(seen, {"good": 12})
 
 
 if __name__ == "__main__":

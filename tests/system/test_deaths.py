@@ -73,7 +73,8 @@ class OneOfFive(unittest.TestCase):
     def judge(self, what, reads, writes, revived):
         healthy = [a for a in reads if a.unit != DYING]
         longest = max(a.seconds for a in healthy + writes)
-        slow = {unit: sum(a.seconds > 0.3 for a in healthy + writes if a.unit == unit)
+        slow = {unit: max(sum(a.seconds > 0.3 for a in asked if a.unit == unit)
+                          for asked in (healthy, writes))  # of one client
                 for unit in UNITS if unit != DYING}
         lost = sum(not a.is_good for a in writes)
         summary = Summary(healthy)

@@ -33,8 +33,9 @@ class Paces(unittest.TestCase):
 
     def expect_good(self, seen, what):
         print(f"\n  {what}: {seen}", end="")
-        self.assertEqual(list(seen), ["good"], what)
-        self.assertGreater(seen["good"], 20, what)
+        with self.subTest(what):
+            self.assertEqual(list(seen), ["good"])
+            self.assertGreater(seen["good"], 20)
 
     def test_P1_quick_and_slow_panels_on_one_line_are_all_heard(self):
         habits = {1: "think-0.2ms", 2: "think-5ms", 3: "think-0.5ms", 4: "think-80ms", 5: "think-1ms",

@@ -32,9 +32,10 @@ class Stalls(unittest.TestCase):
                                      in_parallel(self.read_through, ("stall", "sever"))):
             what = "acknowledged" if how == "stall" else "not acknowledged"
             print(f"\n  {what}: {seen.good} good, {seen.wrong} wrong, refused {seen.refused}", end="")
-            self.assertEqual(seen.wrong, 0, what)
-            self.assertEqual(last.refused, {}, f"{what}: at the end")
-            self.assertGreater(last.good, 10, f"{what}: at the end")
+            with self.subTest(what):
+                self.assertEqual(seen.wrong, 0)
+                self.assertEqual(last.refused, {}, "at the end")
+                self.assertGreater(last.good, 10, "at the end")
 
 
 if __name__ == "__main__":

@@ -22,8 +22,9 @@ class Echoes(unittest.TestCase):
                 return counted([outcome(client, 5, read_registers(10 * a)) for a in addresses])
         for heard, seen in zip(range(2, 8), in_parallel(sixty_reads, range(2, 8))):
             print(f"\n  {heard} bytes of echo: {seen}", end="")
-            self.assertNotIn("03: wrong", seen, f"{heard} bytes of echo")
-            self.assertGreater(seen.get("good", 0), 30, f"{heard} bytes of echo")
+            with self.subTest(bytes_of_echo=heard):
+                self.assertNotIn("03: wrong", seen)
+                self.assertGreater(seen.get("good", 0), 30)
 
     def test_P8_a_glitch_behind_replies_does_not_cost_the_writes(self):
         def reads_and_writes(glitch):
@@ -35,7 +36,8 @@ class Echoes(unittest.TestCase):
             return counted(seen), executed
         for glitch, (seen, executed) in zip(("00", "FF"), in_parallel(reads_and_writes, ("00", "FF"))):
             print(f"\n  {glitch} behind each reply: {seen}, {executed} of 24 writes executed", end="")
-            self.assertEqual((list(seen), executed), (["good"], 24))
+            with self.subTest(glitch):
+                self.assertEqual((list(seen), executed), (["good"], 24))
 
 
 @unittest.skipIf(harness.SANITIZED, "a sanitizer takes the time that is measured here")
