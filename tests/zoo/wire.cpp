@@ -11,12 +11,19 @@ Time at_or_zero(const std::vector<Time>& times, std::size_t i) {
 
 }  // namespace
 
-Time Wire::say(const Speech& speech) {
-    Time at = speech.start;
+// Nobody says two things at once: the earliest moment from `start` on with so much time.
+Time Wire::free_from(Time start, Time duration, int speaker) const {
     for (const Character& c : coming_) {
-        if (c.speaker == speech.speaker && c.start <= at) at = std::max(at, c.end);
+        if (c.speaker == speaker && c.start < start + duration && start < c.end) start = c.end;
     }
+    return start;
+}
+
+Time Wire::say(const Speech& speech) {
     const auto length = static_cast<Time>(static_cast<double>(character_) / speech.rate);
+    Time duration = length * static_cast<Time>(speech.bytes.size());
+    for (const Time pause : speech.pauses) duration += pause;
+    Time at = free_from(speech.start, duration, speech.speaker);
     for (std::size_t i = 0; i < speech.bytes.size(); ++i) {
         at += at_or_zero(speech.pauses, i);
         const Character one{.start = at,

@@ -55,6 +55,7 @@ class Wire {
     std::uint64_t collisions() const { return collisions_; }
 
   private:
+    Time free_from(Time start, Time duration, int speaker) const;
     bool meets_another(const Character& one) const;
 
     Time character_;
