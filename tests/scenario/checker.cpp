@@ -94,7 +94,9 @@ void Checker::on_settled() {
             end = std::max(end, spans[i].second);
         }
     }
-    if (waiting > settings_.queue.limit + 1) fail("P9: more requests wait than the limit allows");
+    if (waiting > settings_.queue.limit + 1)
+        fail("P9: more requests wait than the limit allows: " + std::to_string(waiting) + " of " +
+             std::to_string(settings_.queue.limit));
 }
 
 void Checker::on_client(arbiter::Client id, const ClientPlan& plan) {
@@ -201,6 +203,9 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
     const Truth::Read read{open.job.station, pdu[0], now, since, open.served, finish.age};
     for (std::uint16_t i = 0; i < count; ++i) {
         const std::uint16_t value = word(reply, 2 + std::size_t{2} * i);
+        // What one copy has displaced comes one late, until the next silence.
+        const auto excused = excused_from_.find(open.job.station);
+        if (excused != excused_from_.end() && now < excused->second + 1s) return;
         const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
         if (fault != nullptr) return fail(fault);
     }

@@ -33,7 +33,7 @@ class Checker {
     /// It asks for the same instant again and again.
     void on_spin() { fail("it spins: its deadline passes and nothing changes"); }
     // Truth
-    void on_heard(TimePoint now);
+    void on_heard(TimePoint now, std::size_t bytes);
     /// A good answer to the request on the wire was delivered to its last byte.
     void on_answered(TimePoint now);
     void on_served(TimePoint now, std::uint8_t station) { truth_.on_served(now, station); }
@@ -43,6 +43,8 @@ class Checker {
     void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) {
         truth_.on_exception(now, station, pdu);
     }
+    /// A second copy of an answer was delivered to its last byte.
+    void on_copy(TimePoint now, std::uint8_t station);
     void on_collision(TimePoint now, std::uint8_t station);
     void on_line_down(TimePoint now);
     void on_line_up(TimePoint now);
@@ -62,6 +64,9 @@ class Checker {
     std::uint64_t collisions() const { return collisions_; }
     double good_share(TimePoint now) const { return costs_.good_share(now - started_); }
     /// How long requests to sound panels have waited for their answers, hit ones too.
+    /// Copies that came instead of an answer before anybody could know that this panel says its
+    /// replies twice.
+    std::uint64_t excused() const { return excused_; }
     const std::vector<Duration>& waits() const { return waits_; }
     /// The longest that each station was not asked.
     const std::map<std::uint8_t, Duration>& longest_unasked() const { return longest_unasked_; }
@@ -124,6 +129,9 @@ class Checker {
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
     std::map<std::string, arbiter::Ticket> open_writes_;
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
+    std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
+    std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
+    std::uint64_t excused_ = 0;
     Attempt attempt_;
     TimePoint sent_until_{};
     TimePoint heard_until_{};

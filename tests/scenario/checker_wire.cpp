@@ -36,18 +36,29 @@ void Checker::on_collision(TimePoint now, std::uint8_t station) {
     watch_.on_collision(now, station);
 }
 
-void Checker::on_heard(TimePoint now) {
-    if (now > std::max(heard_until_, sent_until_) + gap()) noisy_since_ = now;
+void Checker::on_heard(TimePoint now, std::size_t bytes) {
+    const TimePoint first = now - wire_time(settings_.serial, bytes);
+    if (first > std::max(heard_until_, sent_until_) + gap()) noisy_since_ = first;
     heard_until_ = now;
     attempt_.heard = true;
 }
 
 void Checker::on_answered(TimePoint now) {
-    heard_until_ = now;
+    on_heard(now, 1);
     if (attempt_.answered) return;
     attempt_.answered = true;
     watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
+}
+
+/// The first copy of all, in place of the answer to a question of the same shape, is that answer
+/// for any gateway. From the first one on that came when nobody was asked, or from an odd answer
+/// on, it can know better.
+void Checker::on_copy(TimePoint now, std::uint8_t station) {
+    const bool awaited = !attempt_.answered && attempt_.station == station;
+    if (!doublers_.insert(station).second || !awaited) return;
+    ++excused_;
+    excused_from_[station] = now;
 }
 
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
@@ -67,7 +78,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     attempt_.was_silent = what == "retry" && attempt_.station == station
                               ? attempt_.was_silent
                               : watch_.is_silent(station);
-    attempt_.trusted = what == "request" && watch_.is_trusted(station);
+    attempt_.trusted = what == "request" && watch_.is_trusted(now, station);
     const auto [asked, first] = last_asked_.try_emplace(station, now);
     if (!first) {
         longest_unasked_[station] = std::max(longest_unasked_[station], now - asked->second);
@@ -113,7 +124,7 @@ void Checker::close_attempt(TimePoint now) {
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
     const std::string broken = costs_.on_unanswered(now, attempt_);
     if (!broken.empty()) fail(broken);
-    watch_.on_unanswered(attempt_.station, !attempt_.heard);
+    watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
 }
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.

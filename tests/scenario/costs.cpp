@@ -32,7 +32,9 @@ Duration Costs::limit(const Attempt& attempt) const {
     const Duration timeout = settings_.unlisted.response_timeout;
     const auto slowest = watch_.slowest(attempt.station);
     const bool first = !attempt.was_silent && watch_.is_known(attempt.station);
-    if (first || !slowest) return timeout + frames(attempt);
+    // Of one that is listed and has never answered, nobody knows how long it needs.
+    const bool unknown = watch_.is_known(attempt.station) && !watch_.has_answered(attempt.station);
+    if (first || unknown || !slowest) return timeout + frames(attempt);
     return std::min(timeout, 3 * (*slowest + 10ms)) + frames(attempt);
 }
 

@@ -55,7 +55,9 @@ void draw_panels(Random& random, Plan& plan, double much) {
         panel = draw_faults(random, panel, much);
         add_station(plan, panel);
         arbiter::StationSettings& station = plan.settings.stations.back();
-        if (random.chance(0.3)) station.frame_gap = *station.frame_gap + random.between(0us, 4ms);
+        if (random.chance(0.3))
+            station.frame_gap =
+                silent_interval(plan.settings.serial) + random.between(0us, Duration(4ms));
     }
 }
 

@@ -21,6 +21,7 @@ Outcome play(const Plan& plan, bool with_history) {
     outcome.frames = checker.frames();
     outcome.good = checker.good_answers();
     outcome.collisions = checker.collisions();
+    outcome.excused = checker.excused();
     outcome.seconds = to_seconds(world.now() - start);
     outcome.good_share = checker.good_share(world.now());
     outcome.waits = checker.waits();

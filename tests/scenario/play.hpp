@@ -17,6 +17,7 @@ struct Outcome {
     std::uint64_t frames = 0;
     std::uint64_t good = 0;
     std::uint64_t collisions = 0;
+    std::uint64_t excused = 0;  ///< wrong values that no gateway could have excluded, at most
     double seconds = 0;
     double good_share = 0;        ///< of the time, for sound panels
     std::vector<Duration> waits;  ///< for answers of all panels but the odd one

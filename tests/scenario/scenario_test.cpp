@@ -49,13 +49,14 @@ TEST_P(Scenario, KeepsItsPromises) {
         all.frames += one.frames;
         all.good += one.good;
         all.collisions += one.collisions;
+        all.excused += one.excused;
         all.seconds += one.seconds;
         all.good_share += one.good_share * one.seconds;
         if (only != 0) break;
     }
     std::cout << "  " << label(kind) << ": " << all.frames << " transactions, " << all.good
-              << " good answers, 0 violations, " << all.collisions << " collisions, "
-              << all.seconds / 3600 << " h of virtual time, "
+              << " good answers, 0 violations, " << all.collisions << " collisions, " << all.excused
+              << " first copies, " << all.seconds / 3600 << " h of virtual time, "
               << std::lround(100 * all.good_share / all.seconds) << " % of it for sound panels, "
               << (only == 0 ? seed - 1 : 1) << " seeds\n";
     EXPECT_GT(all.good, 0u);

@@ -97,7 +97,10 @@ Said Voice::main_part(const Bytes& reply, const Bytes& good) {
 
 void Voice::add_epilogue(std::vector<Utterance>& all, const Bytes& good) {
     if (random_.chance(plan_.duplicate)) {
-        all.push_back({random_.between(0us, plan_.duplicate_delay), said(good)});
+        Said copy = said(good);
+        copy.copy = true;
+        // Always about as much later: what has been seen once can be waited for.
+        all.push_back({plan_.duplicate_delay * random_.between(85, 100) / 100, std::move(copy)});
     }
     if (random_.chance(plan_.tail))
         all.push_back({random_.between(500us, Duration(5ms)), said(random_bytes(1, 3))});

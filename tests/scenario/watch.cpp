@@ -35,7 +35,8 @@ void Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
     slowest_ = std::max(slowest_.value_or(after), after);
 }
 
-void Watch::on_unanswered(std::uint8_t station, bool silent) {
+void Watch::on_unanswered(TimePoint now, std::uint8_t station, bool silent) {
+    last_unanswered_ = now;
     Station& s = stations_[station];
     s.failing = true;
     s.silent = s.silent || silent;
@@ -61,9 +62,14 @@ bool Watch::is_known(std::uint8_t station) const {
     return s != nullptr && (s->listed || s->slowest);
 }
 
-bool Watch::is_trusted(std::uint8_t station) const {
+bool Watch::has_answered(std::uint8_t station) const {
     const Station* s = find(station);
-    return s != nullptr && s->slowest && !s->failing;
+    return s != nullptr && s->slowest;
+}
+
+bool Watch::is_trusted(TimePoint now, std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->slowest && !s->failing && now > last_unanswered_ + 10s;
 }
 
 std::optional<Duration> Watch::slowest(std::uint8_t station) const {

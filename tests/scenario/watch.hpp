@@ -20,7 +20,7 @@ class Watch {
     void on_upset(TimePoint now);
     /// It answered `after` the computed end of the request.
     void on_answered(TimePoint now, std::uint8_t station, Duration after);
-    void on_unanswered(std::uint8_t station, bool silent);
+    void on_unanswered(TimePoint now, std::uint8_t station, bool silent);
 
     /// A gateway can get each of its answers, and nothing has hit it since then.
     bool is_good(std::uint8_t station, TimePoint since) const;
@@ -29,8 +29,9 @@ class Watch {
     /// It has not answered since it was last silent.
     bool is_silent(std::uint8_t station) const;
     bool is_known(std::uint8_t station) const;
-    /// It answered the last time.
-    bool is_trusted(std::uint8_t station) const;
+    bool has_answered(std::uint8_t station) const;
+    /// It answered the last time, and no other has just fallen silent: several may have died.
+    bool is_trusted(TimePoint now, std::uint8_t station) const;
     /// The longest that it has needed so far; of one that has never answered: any of the line.
     std::optional<Duration> slowest(std::uint8_t station) const;
     /// Of the station alone.
@@ -51,6 +52,7 @@ class Watch {
 
     std::map<std::uint8_t, Station> stations_;
     std::optional<Duration> slowest_;
+    TimePoint last_unanswered_{};
 };
 
 }  // namespace panelgate::scenario

@@ -51,7 +51,7 @@ void Wire::whisper(Bytes bytes) {
 
 void Wire::send(Bytes adu) {
     if (agenda_.now() < stalled_until_) {
-        held_out_.push_back({std::move(adu), false, connection_});
+        held_out_.push_back({std::move(adu), false, connection_, 0});
     } else {
         leave(std::move(adu), connection_);
     }
@@ -119,7 +119,9 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
     const std::size_t end = frame->answer_to;
     const bool answered = end > from && end <= to && !frame->garbled_from;
     const ByteView part = ByteView(frame->bytes).subspan(from, to - from);
-    arrive({{part.begin(), part.end()}, answered, frame->connection});
+    const bool copied = frame->copy && to == frame->bytes.size() && !frame->garbled_from;
+    const std::uint8_t copy_of = copied ? frame->station : 0;
+    arrive({{part.begin(), part.end()}, answered, frame->connection, copy_of});
 }
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
@@ -142,6 +144,7 @@ void Wire::arrive(Held held) {
         held_in_.push_back(std::move(held));
         return;
     }
+    if (held.copy_of != 0) checker_.on_copy(agenda_.now(), held.copy_of);
     hear_(held.bytes, held.answered);
 }
 

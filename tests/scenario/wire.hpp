@@ -21,6 +21,7 @@ struct Said {
     /// Where the good answer to the request lies, whole and undamaged; nowhere: both 0.
     std::size_t answer_from = 0;
     std::size_t answer_to = 0;
+    bool copy = false;            ///< it was said before
     std::size_t hole_before = 0;  ///< this byte comes later by
     Duration hole{};
     std::uint64_t connection = 0;  ///< it is heard on this one only
@@ -74,6 +75,7 @@ class Wire {
         Bytes bytes;
         bool answered = false;
         std::uint64_t connection = 0;
+        std::uint8_t copy_of = 0;  ///< the station whose answer it repeats
     };
 
     FramePtr put(Said said);

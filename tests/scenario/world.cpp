@@ -111,7 +111,7 @@ void World::hear(ByteView bytes, bool answered) {
     if (answered) {
         checker_.on_answered(now());
     } else {
-        checker_.on_heard(now());
+        checker_.on_heard(now(), bytes.size());
     }
     agenda_.tell(answered ? "heard, the answer's end" : "heard", bytes);
     subject_.on_rx(now(), bytes);
@@ -197,7 +197,7 @@ void World::resume() {
     agenda_.tell("the process goes on, with", unread_);
     const Bytes bytes = std::exchange(unread_, {});
     if (!bytes.empty()) {
-        checker_.on_heard(now());
+        checker_.on_heard(now(), bytes.size());
         subject_.on_rx(now(), bytes);
         drain();
     }
