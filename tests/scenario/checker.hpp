@@ -133,6 +133,7 @@ class Checker {
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     std::uint64_t excused_ = 0;
     Attempt attempt_;
+    std::map<std::uint8_t, bool> silent_before_;  ///< each station's transaction began
     TimePoint sent_until_{};
     TimePoint heard_until_{};
     TimePoint noisy_since_{};  ///< no silence since then

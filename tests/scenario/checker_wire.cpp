@@ -75,9 +75,10 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     const std::uint8_t station = adu[0];
     const ByteView pdu = ByteView(adu).subspan(1, adu.size() - 3);
     check_again(station, pdu, what);
-    attempt_.was_silent = what == "retry" && attempt_.station == station
-                              ? attempt_.was_silent
-                              : watch_.is_silent(station);
+    // A retry belongs to the silence that it follows, whoever was asked between.
+    bool& was_silent = silent_before_[station];
+    if (what != "retry") was_silent = watch_.is_silent(station);
+    attempt_.was_silent = was_silent;
     attempt_.trusted = what == "request" && watch_.is_trusted(now, station);
     const auto [asked, first] = last_asked_.try_emplace(station, now);
     if (!first) {
@@ -182,7 +183,9 @@ void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
 /// Retries are for those who are there, and not for the silent.
 void Checker::check_again(std::uint8_t station, ByteView pdu, std::string_view what) {
     if (what != "retry") return;
-    if (attempt_.station == station && attempt_.was_silent && watch_.only_dies(station) && calm_)
+    const auto before = silent_before_.find(station);
+    const bool was_silent = before != silent_before_.end() && before->second;
+    if (was_silent && watch_.only_dies(station) && calm_)
         fail("P4: a silent station was asked again at once");
     const auto span = arbiter::read_span(station, pdu);
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {

@@ -84,7 +84,8 @@ void draw_voices(Random& random, Plan& plan) {
         panel.hole = maybe(0.2);
         panel.hole_limit = bearable_hole(plan);
         panel.tail = maybe(0.2);
-        panel.duplicate = maybe(0.1);
+        // Seldom enough to be forgotten between two, each would be the first for any gateway.
+        panel.duplicate = random.chance(0.3) ? 0.1 + 0.9 * random.share() : 0;
         panel.duplicate_delay = random.between(0us, 30ms);
         panel.padded_behind = maybe(0.2);
         if (random.chance(0.3)) {
@@ -106,7 +107,7 @@ void draw_manners(Random& random, Plan& plan) {
         panel.fragment = maybe(0.2);
         panel.tail = maybe(0.3);
         panel.glitch_behind = maybe(0.3);
-        panel.duplicate = maybe(0.2);
+        panel.duplicate = random.chance(0.2) ? 0.1 + 0.9 * random.share() : 0;
         panel.duplicate_delay = random.between(0us, 30ms);
         panel.hole = maybe(0.1);
         panel.hole_limit = 2 * plan.settings.reply_hole;

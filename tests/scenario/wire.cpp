@@ -144,6 +144,7 @@ void Wire::arrive(Held held) {
         held_in_.push_back(std::move(held));
         return;
     }
+    if (held.copy_of != 0) agenda_.tell("next ends the copy of what was said before");
     if (held.copy_of != 0) checker_.on_copy(agenda_.now(), held.copy_of);
     hear_(held.bytes, held.answered);
 }
