@@ -207,8 +207,17 @@ void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finis
         const auto excused = excused_from_.find(open.job.station);
         if (excused != excused_from_.end() && now < excused->second + 1s) return;
         const char* fault = truth_.fault_of(read, static_cast<std::uint16_t>(first + i), value);
+        if (fault != nullptr && is_luck()) return;
         if (fault != nullptr) return fail(fault);
     }
+}
+
+/// One in 65536 of what two speakers make of each other's frames passes the CRC: no arbiter's
+/// affair, as long as it is that seldom.
+bool Checker::is_luck() {
+    constexpr std::uint64_t kSeldom = 10000;
+    const bool only_garbled = !attempt_.answered && garbled_ >= attempt_.started;
+    return only_garbled && ++lucky_ <= 1 + collisions_ / kSeldom;
 }
 
 void Checker::at_end(TimePoint now) {

@@ -21,6 +21,8 @@ namespace panelgate::scenario {
 class Checker {
   public:
     explicit Checker(const Plan& plan);
+    Checker(const Checker&) = delete;
+    Checker& operator=(const Checker&) = delete;
 
     // Claims
     void on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job);
@@ -45,6 +47,8 @@ class Checker {
     }
     /// A second copy of an answer was delivered to its last byte.
     void on_copy(TimePoint now, std::uint8_t station);
+    /// Bytes were delivered that nobody said.
+    void on_garbled(TimePoint now) { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station);
     void on_line_down(TimePoint now);
     void on_line_up(TimePoint now);
@@ -108,6 +112,7 @@ class Checker {
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
+    bool is_luck();
     void check_write(TimePoint now, const Open& open);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -132,6 +137,8 @@ class Checker {
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     std::uint64_t excused_ = 0;
+    TimePoint garbled_{};
+    std::uint64_t lucky_ = 0;  ///< see is_luck()
     Attempt attempt_;
     std::map<std::uint8_t, bool> silent_before_;  ///< each station's transaction began
     TimePoint sent_until_{};

@@ -126,6 +126,7 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
 void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
+    checker_.on_garbled(agenda_.now());
     for (std::size_t i = from; i < to; ++i) {
         if (frame.end_of(i, *this) > *frame.garbled_from)
             frame.bytes[i] = static_cast<std::uint8_t>(random_.next());
