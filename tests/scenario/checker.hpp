@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <set>
@@ -113,6 +115,7 @@ class Checker {
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
     bool is_luck();
+    std::size_t waiting() const;
     void check_write(TimePoint now, const Open& open);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -129,6 +132,8 @@ class Checker {
     Costs costs_;
     std::map<arbiter::Ticket, Open> open_;
     arbiter::Ticket last_ticket_ = 0;
+    static constexpr std::size_t kNobodyCame = SIZE_MAX;
+    std::size_t waiting_before_ = kNobodyCame;  ///< the newcomer that was taken last
     std::map<arbiter::Client, Client> clients_;
     std::map<std::string, int> written_;             ///< times that each write was on the wire
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
