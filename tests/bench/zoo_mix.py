@@ -32,8 +32,8 @@ SILENT = {"mute", "dead", "reboot", "think-2000ms"}  # in the table; here only n
 class Mix:
     """One gateway, its lines, and who changes them."""
 
-    def __init__(self, folder, lines, baud, tcp, seed):
-        self.lines, self._dice = range(lines), random.Random(seed)
+    def __init__(self, folder, lines, baud, tcp, seed, names):
+        self.lines, self._dice, self._names = range(lines), random.Random(seed), names
         self.habits = {}  # of a unit, as it is now
         command = ["--baud", baud, "--think", 1]
         for n in self.lines:
@@ -55,7 +55,7 @@ class Mix:
 
     def change(self, line):
         """Another habit for one panel of this line, or for all, or none any more."""
-        name = self._dice.choice(list(zoo.ROWS))
+        name = self._dice.choice(self._names)
         if name in SILENT and self._dice.randrange(4):
             name = "think-0.1ms"
         who, habits = list(zoo.settings_of(name).items())[0]
@@ -75,6 +75,17 @@ class Mix:
         return sum(self.zoo.stats(line)["requests"] for line in self.lines)
 
 
+def origin_of(asked, before):
+    """Whose value a wrong one is: of which of this client's earlier requests, and what came of it."""
+    unit, value = asked.unit, int.from_bytes(asked.reply[2:4], "big")
+    address = (value - unit * 257 - 7) * pow(31, -1, 0x10000) & 0xFFFF
+    for earlier in reversed(before):
+        if int.from_bytes(earlier.pdu[1:3], "big") == address:
+            came = "answered" if earlier.is_good else f"refused {earlier.exception:02X}"
+            return f"{came}, asked {asked.answered - earlier.sent:.2f} s before"
+    return "of nobody here"
+
+
 async def run(mix, port, transactions):
     """([Reader], {habits of a panel: wrong values then}), when they have been asked so often."""
     readers = [zoo_line.Reader(unit) for line in mix.lines for unit in mix.units(line)]
@@ -87,6 +98,8 @@ async def run(mix, port, transactions):
             reader.asked.append(asked)
             if asked.is_good and not zoo_line.is_value(asked.unit, asked.pdu, asked.reply):
                 wrong[mix.habits.get(reader.unit, "-")] += 1
+                print(f"  wrong: unit {asked.unit}, {mix.habits.get(asked.unit, '-')}: the value of "
+                      f"one {origin_of(asked, reader.asked[:-1])}", flush=True)
 
     async def change():
         while mix.asked() < transactions:
@@ -100,13 +113,14 @@ async def run(mix, port, transactions):
     return readers, wrong
 
 
-def measure(lines, baud, tcp, transactions, seed):
+def measure(chosen, baud, transactions):
     """(transactions, Summary, wrong values by habit, seconds)"""
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
-        mix = Mix(folder, lines, baud, tcp, seed)
+        names = [name for name in zoo.ROWS if name not in chosen.without]
+        mix = Mix(folder, chosen.lines, baud, chosen.tcp, chosen.seed, names)
         stack.enter_context(mix.zoo)
         program = stack.enter_context(harness.configured(mix.text))
-        program.log.wait_for("line up", lines)
+        program.log.wait_for("line up", chosen.lines)
         start = time.monotonic()
         readers, wrong = asyncio.run(run(mix, program.modbus_port(), transactions))
         return (mix.asked(), zoo_line.merged(r.summary() for r in readers), dict(wrong),
@@ -121,6 +135,7 @@ def main():
     parser.add_argument("--baud", type=int, nargs="+", default=[38400, 115200])
     parser.add_argument("--lines", type=int, default=16)
     parser.add_argument("--tcp", action="store_true", help="device servers instead of ttys")
+    parser.add_argument("--without", nargs="+", default=[], choices=zoo.ROWS, metavar="HABIT")
     parser.add_argument("--seed", type=int, default=1)
     chosen = parser.parse_args()
     if chosen.panelgate:
@@ -130,7 +145,7 @@ def main():
     wrong = 0
     for baud in chosen.baud:
         share = chosen.transactions // len(chosen.baud)
-        asked, seen, by_habit, took = measure(chosen.lines, baud, chosen.tcp, share, chosen.seed)
+        asked, seen, by_habit, took = measure(chosen, baud, share)
         wrong += seen.wrong
         print(f"{chosen.lines} lines at {baud}{' over tcp' if chosen.tcp else ''}: {asked} "
               f"transactions, {seen.good} good answers, {seen.wrong} wrong values {by_habit or ''}, "

@@ -45,7 +45,7 @@ class DeadWrites(unittest.TestCase):
                 line.zoo.set(DEAD, "dead")
                 until_offline(line, DEAD)
                 readers = asyncio.run(read_all(
-                    port, others, 8, beside=lambda end: beside(port, pdus, end)))
+                    port, others, 5, beside=lambda end: beside(port, pdus, end)))
                 return merged(r.summary() for r in readers.values())
         reads, writes = (run(pdus) for pdus in (
             (read_registers(n) for n in itertools.count()),
@@ -79,7 +79,7 @@ class DeadWrites(unittest.TestCase):
             for unit in dead:
                 line.zoo.set(unit, "dead")
             until_offline(line, *dead)
-            after = rate_of(line, 8, beside=lambda end: write_cyclically(port, end))
+            after = rate_of(line, 6, beside=lambda end: write_cyclically(port, end))
         print(f"\n  beside writes to ten dead ones: {after / before:.3f} of the rate", end="")
         self.assertGreater(after, 0.95 * before)
 
