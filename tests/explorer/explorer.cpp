@@ -1,8 +1,34 @@
 #include "explorer.hpp"
 
+#include <csignal>
+#include <cstdio>
+
 namespace panelgate::explorer {
+namespace {
+
+const Explorer* at_work = nullptr;
+
+/// An arbiter that checks itself ends the program: where was it?
+void tell_where(int) {
+    if (at_work != nullptr) std::fputs(at_work->where().c_str(), stderr);
+}
+
+}  // namespace
+
+Explorer::~Explorer() {
+    if (at_work == this) at_work = nullptr;
+}
+
+std::string Explorer::where() const {
+    const World start(rules_, told_, flaw_);
+    std::string text = rules_.name + ": it came to that by this, or behind it when all ask\n";
+    for (const Move move : path_) text += "    // " + start.describe(move) + "\n";
+    return text;
+}
 
 std::optional<Found> Explorer::run(std::size_t states, int depth) {
+    at_work = this;
+    std::signal(SIGABRT, tell_where);
     limit_ = states;
     const World start(rules_, told_, flaw_);
     while (depth_ < depth && !enough()) {

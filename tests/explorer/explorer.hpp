@@ -29,6 +29,9 @@ class Explorer {
     /// `told`: what the arbiter believes.
     Explorer(const Rules& rules, const arbiter::Settings& told, Flaw flaw)
         : rules_(rules), told_(told), flaw_(flaw) {}
+    Explorer(const Explorer&) = delete;
+    Explorer& operator=(const Explorer&) = delete;
+    ~Explorer();
 
     /// Until so many states were seen, or all scripts of `depth` moves tried, or one went wrong.
     std::optional<Found> run(std::size_t states, int depth = 100);
@@ -38,6 +41,8 @@ class Explorer {
     /// All scripts of so many moves were tried.
     int depth() const { return depth_; }
 
+    /// The script that is being tried, in words.
+    std::string where() const;
     /// The script in words, and as the body of a test with a BusScript.
     std::string tell(const std::vector<Move>& moves) const;
     /// The same as steps of a BusScript.

@@ -12,7 +12,7 @@ using arbiter::Transmit;
 
 void Subject::on_rx(TimePoint now, ByteView bytes) {
     arbiter_.on_rx(now, bytes);
-    check_invariants(arbiter_, now);
+    arbiter_.check_invariants();
     constexpr Duration kSilence = 10ms;  // a reply that begins before it is heard
     const bool read = last_sent_.size() > 1 && last_sent_[1] == 3;
     const bool echo =
@@ -27,12 +27,12 @@ void Subject::on_deadline(TimePoint now) {
         waiting_.emplace_back(Transmit{last_sent_});
     }
     arbiter_.on_deadline(now);
-    check_invariants(arbiter_, now);
+    arbiter_.check_invariants();
 }
 
 void Subject::on_line_down(TimePoint now) {
     arbiter_.on_line_down(now);
-    check_invariants(arbiter_, now);
+    arbiter_.check_invariants();
     repeat_at_.reset();
     if (flaw_ == Flaw::forgets_at_line_loss) start_afresh();
 }

@@ -27,13 +27,6 @@ enum class Flaw : std::uint8_t {
     spins,  ///< names a deadline that has passed
 };
 
-/// Whether Arbiter::check_invariants is there to be called after every verb.
-inline constexpr bool kChecksItself = false;
-template <class A>
-void check_invariants(const A& arbiter, TimePoint now) {
-    if constexpr (kChecksItself && requires { arbiter.check_invariants(now); })
-        arbiter.check_invariants(now);
-}
 /// An arbiter that can tell its state: times counted from `now`, without tickets and counters.
 template <class A>
 std::optional<std::uint64_t> inner_digest(const A& arbiter, TimePoint now) {
@@ -53,7 +46,7 @@ class Subject {
 
     Result<arbiter::Ticket> submit(TimePoint now, arbiter::Job job) {
         const Result<arbiter::Ticket> ticket = arbiter_.submit(now, std::move(job));
-        check_invariants(arbiter_, now);
+        arbiter_.check_invariants();
         if (!ticket) return ticket;
         last_ticket_ = *ticket + renamed_;
         return last_ticket_;
@@ -61,13 +54,13 @@ class Subject {
     void cancel(TimePoint now, arbiter::Client client) {
         if (flaw_ == Flaw::ignores_who_left) return;
         arbiter_.cancel(now, client);
-        check_invariants(arbiter_, now);
+        arbiter_.check_invariants();
     }
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now);
     void on_line_up(TimePoint now) {
         arbiter_.on_line_up(now);
-        check_invariants(arbiter_, now);
+        arbiter_.check_invariants();
     }
     void on_line_down(TimePoint now);
     std::optional<arbiter::Action> poll_action();

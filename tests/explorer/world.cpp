@@ -128,7 +128,9 @@ void World::deliver(Verb verb, std::uint8_t station) {
         waiting.pop_front();
     }
     say(adu);
-    begun_ = verb == Verb::hole && must_do;
+    const bool waits = std::ranges::any_of(
+        judge_.open(), [&](const Judge::Open& open) { return is_asked(open, was); });
+    begun_ = verb == Verb::hole && must_do && waits;
     begun_at_ = now_;
     if (verb != Verb::hole && must_do) check_answered(was, before);
 }
@@ -157,17 +159,22 @@ bool World::is_the_answer(const Reply& reply) const {
 void World::check_answered(const Reply& reply, const Judge::Opens& before) {
     const bool echo = subject_.arbiter().echo() != arbiter::EchoMemory::State::absent;
     if (reply.adu[1] != 3 && echo) return;
-    const unsigned first = reply.adu[2] * 256u + reply.adu[3];
-    const unsigned end = first + (reply.adu[1] == 3 ? reply.adu[5] : 1u);
     bool asked = false;
     for (const Judge::Open& open : before) {
-        const Wish& wish = open.wish;
-        const bool its = open.sent && open.covers(reply.adu[0], reply.adu[1], wish.address) &&
-                         wish.address >= first && wish.address + unsigned{wish.count} <= end;
-        if (its && !judge_.is_open(open.ticket)) return;
-        asked = asked || its;
+        if (!is_asked(open, reply)) continue;
+        if (!judge_.is_open(open.ticket)) return;
+        asked = true;
     }
     if (asked) judge_.fail("P5: a good reply in time was not taken");
+}
+
+/// This request went out with the one that is replied to.
+bool World::is_asked(const Judge::Open& open, const Reply& reply) {
+    const Wish& wish = open.wish;
+    const unsigned first = reply.adu[2] * 256u + reply.adu[3];
+    const unsigned end = first + (reply.adu[1] == 3 ? reply.adu[5] : 1u);
+    return open.sent && open.covers(reply.adu[0], reply.adu[1], wish.address) &&
+           wish.address >= first && wish.address + unsigned{wish.count} <= end;
 }
 
 void World::noise(Verb verb) {

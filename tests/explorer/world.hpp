@@ -66,6 +66,7 @@ class World {
     void leave(std::uint8_t client);
     void deliver(Verb verb, std::uint8_t station);
     void check_answered(const Reply& reply, const Judge::Opens& before);
+    static bool is_asked(const Judge::Open& open, const Reply& reply);
     void pass_on(TimePoint asked);
     bool is_the_answer(const Reply& reply) const;
     /// Its reply has begun, and the silence since then is no longer than a hole may be.
