@@ -108,7 +108,7 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
         const Verdict verdict = active_->on_rx(now, bytes, ends_attempt(now));
         quiet_.on_heard(std::max(active_->timing().sent, now));
         if (active_->echo().mismatch() && !was_wrong) {
-            ledger_.on_echo_mismatch(active_->group().station);
+            ledger_.on_echo_mismatch(now, active_->group().station);
             echo_memory_.on_mismatch();
         }
         if (const Bytes stale = active_->take_stale(); !stale.empty()) hear_idle(now, stale);
@@ -158,18 +158,18 @@ void Arbiter::end_broadcast(TimePoint now) {
 void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
-    if (early && !settings_.paced && pace_.believed() && station.is_early_copy(now, *active_)) {
-        active_->reject_reply();
-        return;
-    }
+    const bool too_early = early && !settings_.paced && pace_.believed();
+    if (station.may_be_copy(now, *active_, too_early)) return active_->reject_reply();
     pace_.on_reply(early);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
     const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
-    const Station::Replied replied = station.on_reply(now, attempt, waited, think);
-    stations_.on_reply(waited);
+    const Duration needed = attempt.first_sign(now);
+    const Station::Replied replied = station.on_reply(now, attempt, needed, think);
+    if (group.silent_after == Duration::zero()) stations_.on_reply(needed);
+    if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
     proved_ = std::max(proved_, attempt.timing().started);
     strays_.on_replied(group.station);
     quiet_.rest_until(station.trail_until());
@@ -234,6 +234,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
         ledger_.event(Kind::echo, attempt.group().station);
+    if (const auto noise = attempt.early_noise()) stations_.on_trail(*noise, strays_.replied());
     strays_.hear(attempt.release_echo());
     return attempt;
 }

@@ -51,6 +51,7 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
         lender_->feed(ByteView(&lent, 1));
     }
     if (rest.empty()) return Verdict::open;
+    if (now < timing_.sent) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
         stale_.insert(stale_.end(), rest.begin(), rest.end());
@@ -175,6 +176,7 @@ void Attempt::reject_reply() {
     strays_.push_back(std::move(part));
     reply_.reset();
     heard_ = false;
+    disturbed_ = true;
 }
 
 bool Attempt::is_stale(TimePoint now, std::size_t size) const {

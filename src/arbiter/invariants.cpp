@@ -26,8 +26,7 @@ void Arbiter::check_invariants() const {
     backlog.each_retry([&](const Group& group) {
         must(!group.jobs.empty(), "somebody waits for each retry");
         must(group.attempts > 0, "what is repeated was sent before");
-        const Station* station = stations_.find(group.station);
-        must(station != nullptr && station->owes(), "what is repeated is owed");
+        must(stations_.find(group.station) != nullptr, "its station is known");
     });
     if (active_) {
         const Group& group = active_->group();

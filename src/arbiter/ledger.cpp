@@ -35,6 +35,7 @@ std::string_view word(const Group& group) {
     if (group.learns_for != 0) return "learn echo";
     if (group.station == kBroadcast) return "broadcast";
     if (group.probe) return "probe";
+    if (group.settles) return "settle";
     return group.attempts > 1 ? "retry" : "request";
 }
 
@@ -97,8 +98,11 @@ void Ledger::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
     }
 }
 
-void Ledger::on_echo_mismatch(std::uint8_t station) {
+void Ledger::on_echo_mismatch(TimePoint now, std::uint8_t station) {
+    constexpr Duration kPause = 10s;
     ++of(station).echo_mismatches;
+    if (told_collision_ && now < *told_collision_ + kPause) return;
+    told_collision_ = now;
     event(StationEvent::Kind::collision, station);
 }
 

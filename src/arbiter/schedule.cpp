@@ -59,6 +59,7 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
     }
     if (Next job = next_job(now, stations, quiet, echo, proved); job.group || job.new_way)
         return job;
+    if (auto group = next_settling(now, stations, quiet)) return {std::move(group), false};
     if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
     if (due && now >= *due) return {next_probe(now, stations, quiet), false};
     return {};
@@ -80,13 +81,35 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     return group;
 }
 
+/// For somebody who waits for a station that rests only because of what it may still say.
+std::optional<Group> Schedule::next_settling(TimePoint now, const Stations& stations,
+                                             Quiet& quiet) const {
+    if (now < quiet.quarantined_until()) return std::nullopt;
+    std::optional<Group> settling;
+    backlog_.queue().each_first([&](const Job& job) {
+        const Station* station = stations.find(job.station);
+        if (settling || station == nullptr || now >= station->rested()) return;
+        if (backlog_.has_retry(job.station)) return;
+        if (Bytes pdu = station->settling_pdu(); !pdu.empty()) {
+            settling.emplace();
+            settling->station = job.station;
+            settling->span = read_span(job.station, pdu);
+            settling->pdu = std::move(pdu);
+            settling->settles = true;
+        }
+    });
+    if (settling && !gap_is_over(now, settling->station, stations, quiet)) return std::nullopt;
+    return settling;
+}
+
 /// Not while a late reply could be taken for the answer (P1).
 JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
                                   const Quiet& quiet) const {
-    return [&, now](const Job& job) {
+    return [&, this, now](const Job& job) {
         if (now < quiet.quarantined_until()) return false;
         const Station* station = stations.find(job.station);
-        return station == nullptr || now >= station->rested();
+        const bool rested = station == nullptr || now >= station->rested();
+        return rested && !backlog_.has_retry(job.station);
     };
 }
 
@@ -135,8 +158,10 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     };
     backlog_.each_retry([&](const Group& group) { earlier(repeat_from(group, stations)); });
     backlog_.queue().each_first([&](const Job& job) {
+        if (backlog_.has_retry(job.station)) return;
         const Station* station = stations.find(job.station);
-        const TimePoint rested = station == nullptr ? free : station->rested();
+        const bool waits = station != nullptr && station->settling_pdu().empty();
+        const TimePoint rested = waits ? station->rested() : free;
         earlier(std::max(quiet.quarantined_until(), rested));
     });
     if (const auto probe = stations.next_probe())
@@ -151,9 +176,12 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
-    const bool is_late = failed.first_silence && station.worst_lateness() > Duration::zero();
+    // Longer than another timeout is no worth: a collision costs one.
+    const Duration worst = station.worst_lateness();
+    const bool is_late =
+        failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
     if (quarantine_ != Quarantine::automatic || !is_late) return std::nullopt;
-    return std::min(rested, sent + own.response_timeout + station.worst_lateness() * 5 / 4);
+    return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
 }
 
 void Schedule::retry(Group group) {

@@ -10,11 +10,9 @@
 
 namespace panelgate::arbiter {
 
-Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
-                 Duration slack)
+Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed)
     : settings_(settings),
       listed_(listed),
-      slack_(slack),
       health_(offline),
       late_(settings.late_window, settings.response_timeout),
       adaptive_(settings.timeout_floor, settings.response_timeout) {}
@@ -22,6 +20,7 @@ Station::Station(const StationSettings& settings, const OfflineSettings& offline
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
     owed_pdu_ = pdu;
+    proved_ = false;
     owed_.push_back(sent);
     if (owed_.size() > kMost) owed_.pop_front();
     rest_for_owed(now);
@@ -31,6 +30,12 @@ void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
 /// replies may be late.
 void Station::rest_for_owed(TimePoint now) {
     not_before_ = std::max(now, owed_.back() + settings_.response_timeout) + late_.value();
+}
+
+void Station::on_proved(TimePoint now, TimePoint sent) {
+    if (!owes() || proved_ || owed_.back() >= sent) return;
+    proved_ = true;
+    not_before_ = std::max(not_before_, now + settings_.response_timeout + late_.value());
 }
 
 void Station::on_asked(TimePoint now, const Group& group) {
@@ -49,13 +54,13 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     Heard heard;
     heard.stray = judge(now, pdu);
     if (heard.stray != Stray::late) {
-        if (copies_.on_unasked(now, pdu)) heard.stray = Stray::copy;
+        copies_.on_unasked(now, pdu);
         if (heard.stray == Stray::copy) trail_.on_stray(now);
         return heard;
     }
     // Panels serve in turn: it is the oldest one that is owed.
     const TimePoint due = owed_.front() + settings_.response_timeout;
-    slowest_ = std::max(slowest_, now - owed_.front());
+    slowest_ = std::max(slowest_.value_or(0s), now - owed_.front());
     owed_.pop_front();
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
@@ -74,7 +79,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     probes_ = 0;
     failed_in_a_row_ = 0;
     budget_.clear();
-    slowest_ = std::max(slowest_, waited);
+    // What answers a retry may be the reply to the attempt before: it tells nothing.
+    if (group.silent_after == Duration::zero()) slowest_ = std::max(slowest_.value_or(0s), waited);
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();
@@ -85,6 +91,9 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     copies_.on_reply(now, attempt.reply());
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
+    audible_ = true;
+    if (group.settles) owed_.clear();
+    if (group.settles) not_before_ = now;
     if (owes()) {
         // Each attempt may be answered, and nobody knows which one this reply was for.
         owed_.pop_front();
@@ -96,13 +105,47 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (!group.span || modbus::exception_of(attempt.reply())) return result;
     std::uint32_t& longest = longest_read_.at(group.span->function);
     longest = std::max(longest, group.span->count);
-    const auto known = read_span(0, cheapest_read_);
-    if (!known || group.span->count < known->count) cheapest_read_ = group.pdu;
+    remember_read(*group.span, group.pdu);
     return result;
+}
+
+namespace {
+
+/// The reply to one of these reads cannot answer the other.
+bool tells_apart(ByteView a, ByteView b) {
+    return a[0] != b[0] ||
+           modbus::reply_length_from_request(a) != modbus::reply_length_from_request(b);
+}
+
+}  // namespace
+
+/// The cheapest read to probe with, and the cheapest one of another shape.
+void Station::remember_read(const ReadSpan& span, const Bytes& pdu) {
+    const auto known = read_span(0, cheapest_read_);
+    if (known && span.count >= known->count) {
+        const auto other = read_span(0, other_read_);
+        const bool cheaper = !other || span.count < other->count;
+        if (cheaper && tells_apart(pdu, cheapest_read_)) other_read_ = pdu;
+        return;
+    }
+    if (known && tells_apart(pdu, cheapest_read_)) other_read_ = cheapest_read_;
+    cheapest_read_ = pdu;
+}
+
+Bytes Station::settling_pdu() const {
+    if (!owes() || !audible_ || cheapest_read_.empty()) return {};
+    if (tells_apart(cheapest_read_, owed_pdu_)) return cheapest_read_;
+    if (!other_read_.empty() && tells_apart(other_read_, owed_pdu_)) return other_read_;
+    auto part = read_span(0, cheapest_read_);
+    if (part->count < 2) return {};
+    --part->count;
+    Bytes pdu = encode_span(*part);
+    return tells_apart(pdu, owed_pdu_) ? pdu : Bytes{};
 }
 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
+    audible_ = verdict != Verdict::silent;
     if (health_.offline()) ++probes_;
     if (failing()) budget_.spend(now, cost);
 }
@@ -127,7 +170,7 @@ Duration Station::short_wait(std::optional<Duration> line) const {
     const std::optional<Duration> own = slowest();
     const Duration whole = settings_.response_timeout;
     if (!own && !line) return whole;
-    return std::min(whole, std::max<Duration>(20ms, 3 * own.value_or(*line) + 10ms) + slack_);
+    return std::min(whole, std::max<Duration>(20ms, 3 * (own ? *own : *line) + 10ms));
 }
 
 Duration Station::patience(const Group& group, std::optional<Duration> line, bool hurry) const {
@@ -144,7 +187,9 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         return std::min(whole, short_wait(line) * (1 << (probes_ % kDoublings)));
     }
     if (health_.offline() || suspect() || stranger()) return short_wait(line);
-    if (hurry && slowest()) return std::min(timeout(), short_wait(line));
+    // Not a write: what it needs may be longer, and its outcome is worth waiting for.
+    if (hurry && slowest() && modbus::is_pure_read(group.pdu))
+        return std::min(timeout(), short_wait(line));
     return timeout();
 }
 

@@ -7,16 +7,10 @@
 
 namespace panelgate::arbiter {
 
-namespace {
-/// A receiver hands bytes over when so many are there, or after a pause: 16550 and its kin.
-constexpr std::size_t kFifo = 16;
-}  // namespace
-
 Stations::Stations(const Settings& settings)
     : offline_(settings.offline),
       unlisted_(settings.unlisted),
-      standard_gap_(silent_interval(settings.serial)),
-      slack_(wire_time(settings.serial, kFifo)) {
+      standard_gap_(silent_interval(settings.serial)) {
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
 }
 
@@ -29,7 +23,7 @@ Station& Stations::of(std::uint8_t id) {
     const auto found = stations_.find(id);
     if (found != stations_.end()) return found->second;
     const bool listed = configured_.contains(id);
-    return stations_.try_emplace(id, settings(id), offline_, listed, slack_).first->second;
+    return stations_.try_emplace(id, settings(id), offline_, listed).first->second;
 }
 
 const Station* Stations::find(std::uint8_t id) const {
@@ -91,7 +85,7 @@ std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
     TimePoint earliest = TimePoint::max();
     for (const auto& [id, station] : stations_) {
         if (!station.health().offline() || station.stranger()) continue;
-        const TimePoint due = std::max(station.health().next_probe(), station.rested());
+        const TimePoint due = station.probe_due();
         if (due > now || due >= earliest) continue;
         earliest = due;
         best = id;
@@ -103,8 +97,7 @@ std::optional<TimePoint> Stations::next_probe() const {
     std::optional<TimePoint> next;
     for (const auto& [id, station] : stations_) {
         if (!station.health().offline() || station.stranger()) continue;
-        const TimePoint due =
-            std::max({station.health().next_probe(), station.rested(), probes_.next()});
+        const TimePoint due = std::max(station.probe_due(), probes_.next());
         if (!next || due < *next) next = due;
     }
     return next;

@@ -57,16 +57,17 @@ Part Strays::judge(const Unused& part, const Stations& stations) const {
 
 void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, Stations& stations,
                   Quiet& quiet, Ledger& ledger) const {
+    const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
         const Part what = judge(part, stations);
         if (what != Part::unasked) {
             ledger.on_stray(now, part, what, quiet.station());
-            if (what == Part::damaged && idle) stations.on_trail(now, replied_);
+            if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
         const Station::Heard heard =
-            stations.of(part.station).on_stray_frame(now, pdu_of(part.bytes));
+            stations.of(part.station).on_stray_frame(heard_at, pdu_of(part.bytes));
         ledger.on_stray(now, part, part_of(heard.stray), quiet.station(), heard.lateness);
         if (heard.stray == Stray::late) ledger.event(Kind::late, part.station, heard.lateness);
         if (heard.back) ledger.event(Kind::online, part.station);

@@ -42,7 +42,7 @@ void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     counters.turnaround.observe(think);
     counters.bus_transaction.observe(now - attempt.timing().started);
     if (const auto code = modbus::exception_of(attempt.reply())) ++counters.exceptions[*code];
-    ++symptoms.answered;
+    ++(attempt.echo().mismatch() ? symptoms.collided : symptoms.answered);
     ++symptoms.answered_after[pause_class(attempt.timing().pause)];
     if (attempt.reply().size() + kAduOverhead >= Symptoms::kLongReply) ++symptoms.long_answered;
     if (attempt.echoed()) ++symptoms.echoes;

@@ -80,6 +80,16 @@ class Attempt {
     bool replied_early() const { return first_byte_ < timing_.sent; }
     /// From the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
+    /// From the end of the request to the first sign of a reply, as it reached us: adapters hold
+    /// bytes back.
+    Duration first_sign(TimePoint now) const {
+        return std::max(waited(now), first_byte_ - timing_.sent);
+    }
+    /// When the last byte came that could be no reply yet: our frame was still leaving. Nothing:
+    /// none did, or what began then was the reply.
+    std::optional<TimePoint> early_noise() const {
+        return reply_ && replied_early() ? std::nullopt : early_;
+    }
     /// The reply is not to be believed: it counts as heard, and the attempt goes on.
     void reject_reply();
 
@@ -128,6 +138,7 @@ class Attempt {
     Bytes stale_;
     TimePoint computed_end_;
     TimePoint first_byte_;
+    std::optional<TimePoint> early_;
     TimePoint last_byte_;
     bool heard_ = false;
     bool disturbed_ = false;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
@@ -25,6 +27,10 @@ class Backlog {
     /// The same request goes again. At most one a station.
     void retry(Group group) { retries_.push_back(std::move(group)); }
     bool has_retries() const { return !retries_.empty(); }
+    bool has_retry(std::uint8_t station) const {
+        return std::ranges::any_of(retries_,
+                                   [&](const Group& group) { return group.station == station; });
+    }
     std::optional<Group> take_retry(const std::function<bool(const Group&)>& may_go);
     void each_retry(const std::function<void(const Group&)>& show) const;
 

@@ -10,53 +10,68 @@
 
 namespace panelgate::arbiter {
 
-/// Finds out that a station says its replies twice, and for how long after a reply the second copy
-/// has to be waited for: it could pass for the answer to a request of the same shape (P1). Only
-/// what repeats the reply to the letter is a copy; it is forgotten when copies stop coming. Pure.
+/// Finds out that a station says its replies twice, or that two panels speak for one address, and
+/// for how long after a reply the second one has to be waited for: it could pass for the answer to
+/// a request of the same shape (P1). What repeats a reply to the letter is a copy at once; what
+/// only has its shape has to come twice, for others speak as well. Forgotten when it stops. Pure.
 class CopyGuard {
   public:
     static constexpr std::size_t kReplies = 8;
     static constexpr Duration kLongest = 500ms;  ///< later, it is something else
 
     void on_reply(TimePoint now, Bytes reply) {
-        delays_[next_++ % kReplies] = last_;
-        last_ = {};
-        before_ = std::exchange(at_, now);
-        repeated_ = reply == reply_ && now - before_ <= kLongest;
-        reply_ = std::move(reply);
+        Slot& slot = slots_[next_++ % kReplies];
+        slot = {};
+        slot.at = now;
+        slot.reply = std::move(reply);
     }
-    /// It repeats the reply taken last, to the letter and soon.
+    /// It repeats a reply of the last moments to the letter.
     bool is_copy(TimePoint now, ByteView reply) const {
-        return !reply_.empty() && now - at_ <= kLongest && std::ranges::equal(reply, reply_);
+        return std::ranges::any_of(slots_, [&](const Slot& slot) {
+            return slot.is_recent(now) && std::ranges::equal(reply, slot.reply);
+        });
     }
     /// Of the shape of the reply taken last, and soon: perhaps another panel with the same address.
     bool is_second(TimePoint now, ByteView reply) const {
-        return !reply_.empty() && now - at_ <= kLongest && reply.size() == reply_.size() &&
-               reply[0] == reply_[0];
+        const Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
+        return last.is_recent(now) && reply.size() == last.reply.size() &&
+               reply[0] == last.reply[0];
     }
-    /// A good frame that nobody asked for and nothing was owed for. True when it tells that this
-    /// station speaks twice: it is a copy, or it is what the reply taken last should have been,
-    /// because that one was a copy itself.
-    bool on_unasked(TimePoint now, ByteView reply) {
-        if (is_copy(now, reply)) {
-            last_ = std::max(last_, now - at_);
-            return true;
+    /// A good frame that nobody asked for and nothing was owed for.
+    void on_unasked(TimePoint now, ByteView reply) {
+        for (Slot& slot : slots_) {
+            if (!slot.is_recent(now) || !std::ranges::equal(reply, slot.reply)) continue;
+            slot.copy = std::max(slot.copy, now - slot.at);
+            return;
         }
-        const bool late_for_copy = repeated_ && is_second(now, reply);
-        if (late_for_copy) last_ = std::max(last_, now - before_);
-        return late_for_copy;
+        Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
+        if (is_second(now, reply)) last.second = std::max(last.second, now - last.at);
     }
+    /// It has spoken twice lately.
+    bool suspicious() const { return hold() > Duration::zero(); }
     /// How long after a reply the station is left alone.
-    Duration hold() const { return std::max(last_, *std::ranges::max_element(delays_)) * 3 / 2; }
+    Duration hold() const {
+        Duration copy{};
+        Duration second{};
+        int seconds = 0;
+        for (const Slot& slot : slots_) {
+            copy = std::max(copy, slot.copy);
+            second = std::max(second, slot.second);
+            seconds += slot.second > Duration::zero() ? 1 : 0;
+        }
+        return (seconds >= 2 ? std::max(copy, second) : copy) * 3 / 2;
+    }
 
   private:
-    std::array<Duration, kReplies> delays_{};
+    struct Slot {
+        TimePoint at{};
+        Bytes reply;
+        Duration copy{};    ///< behind it came the same once more
+        Duration second{};  ///< ... or another one of its shape
+        bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
+    };
+    std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
-    Duration last_{};  ///< behind the reply taken last
-    TimePoint at_{};
-    TimePoint before_{};
-    Bytes reply_;
-    bool repeated_ = false;  ///< the reply taken last is the one before, to the letter
 };
 
 }  // namespace panelgate::arbiter

@@ -21,26 +21,30 @@ class LateWindow {
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {
         worst_ = std::max(worst_, lateness);
+        ++late_;
         window_ = std::clamp(lateness * 3 / 2, window_, std::max(window_, 8 * timeout_));
         timely_ = 0;
     }
     void on_timely() {
-        if (++timely_ < kForget) return;
+        ++timely_;
+        if (timely_ % kHabit == 0) late_ /= 2;
+        if (late_ == 0) worst_ = {};
+        if (timely_ < kForget) return;
         timely_ = 0;
         window_ = std::max(timeout_, window_ * 2 / 3);
-        worst_ = worst_ * 2 / 3 < kNegligible ? Duration::zero() : worst_ * 2 / 3;
     }
-    /// The longest lateness seen lately; 0: it keeps its timeout.
-    Duration worst() const { return worst_; }
+    /// The longest lateness seen lately; 0: to be late is no habit of this station.
+    Duration worst() const { return late_ < 2 ? Duration::zero() : worst_; }
 
   private:
-    static constexpr Duration kNegligible = 1ms;
+    static constexpr int kHabit = 64;  ///< replies in time, after which half is forgiven
 
     std::optional<Duration> fixed_;
     Duration timeout_;
     Duration window_;
     Duration worst_{};
     int timely_ = 0;
+    int late_ = 0;  ///< replies, lately
 };
 
 }  // namespace panelgate::arbiter

@@ -43,7 +43,8 @@ class Ledger {
     void on_answered(TimePoint now, const Attempt& attempt, Duration think,
                      const Station::Replied& replied);
     void on_failed(const Attempt& attempt, Verdict verdict);
-    void on_echo_mismatch(std::uint8_t station);
+    /// Told once in a while: each one would be a line in somebody's log.
+    void on_echo_mismatch(TimePoint now, std::uint8_t station);
 
     /// What a good frame is that nobody waits for, or that some bytes are damaged.
     enum class Part : std::uint8_t { damaged, echo, request, late, copy, unasked, unknown };
@@ -64,6 +65,7 @@ class Ledger {
 
     bool explain_;
     bool inside_attempt_ = false;
+    std::optional<TimePoint> told_collision_;
     std::deque<Action> actions_;
     LineCounters line_;
     BusShares shares_;

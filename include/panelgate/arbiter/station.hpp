@@ -28,9 +28,7 @@ enum class Stray : std::uint8_t {
 /// it is. It owns these states: each changes in its verbs only. Pure.
 class Station {
   public:
-    /// `slack`: what a receiver may hold back of a reply that has begun (its FIFO).
-    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
-            Duration slack);
+    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed);
 
     // What it owes (P1)
 
@@ -40,6 +38,11 @@ class Station {
     bool owes() const { return !owed_.empty(); }
     /// From then on another request may go there; until then only the very same.
     TimePoint rested() const { return not_before_; }
+    /// When its next probe may go: as a rule it is the request that is owed.
+    TimePoint probe_due() const {
+        const TimePoint next = health_.next_probe();
+        return owes() && probe_pdu() == owed_pdu_ ? next : std::max(next, not_before_);
+    }
     bool may_ask(TimePoint now, const Bytes& pdu) const {
         return now >= not_before_ || (owes() && pdu == owed_pdu_);
     }
@@ -48,6 +51,15 @@ class Station {
     /// It owes a reply to a request that nothing proves to have passed: none that was sent later
     /// than `proved` has been answered since.
     bool doubtful(TimePoint proved) const { return owes() && owed_.back() >= proved; }
+    /// The way to the wire was proved free now, by a request that left at `sent`: what was owed
+    /// from before may only now have reached the station.
+    void on_proved(TimePoint now, TimePoint sent);
+
+    /// A read whose reply cannot be taken for what is owed, of something that it has answered
+    /// before. Panels serve in turn: when this is answered, nothing that was asked before can come
+    /// any more, and nobody has to wait for that to be over. Empty: it may be silent, or nothing is
+    /// known that could tell.
+    Bytes settling_pdu() const;
 
     // What comes of it
 
@@ -70,16 +82,18 @@ class Station {
         std::optional<Duration> drift;  ///< news: it has come that near its response timeout
         std::optional<Duration> trail;  ///< news: so much always stands behind its replies
     };
-    /// Its answer to an attempt. `waited`: from the end of the request to the start of the reply;
+    /// Its answer to an attempt. `waited`: from the end of the request to its first sign;
     /// `think`: without the silence that tells the panel that the request is over.
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
     /// The whole transaction failed. True when that took it offline.
     bool on_given_up(TimePoint now, Fault fault);
-    /// This early frame repeats the reply before: perhaps the request never got through.
-    bool is_early_copy(TimePoint now, const Attempt& attempt) const {
-        return attempt.group().attempts == 1 && copies_.is_copy(now, attempt.reply());
+    /// This answer repeats the reply before, soon, where that may be a second copy of it and not
+    /// another one: the request may never have got through.
+    bool may_be_copy(TimePoint now, const Attempt& attempt, bool too_early) const {
+        return attempt.group().attempts == 1 && copies_.is_copy(now, attempt.reply()) &&
+               (too_early || copies_.suspicious());
     }
 
     // How it is to be asked
@@ -111,9 +125,7 @@ class Station {
     Duration worst_lateness() const { return late_.worst(); }
     /// Until when nobody should send, because of what follows its replies.
     TimePoint trail_until() const { return trail_.until(); }
-    std::optional<Duration> slowest() const {
-        return health_.last_success() ? std::optional(slowest_) : std::nullopt;
-    }
+    std::optional<Duration> slowest() const { return slowest_; }
 
     static constexpr int kFailing = 2;  ///< transactions in a row
     static constexpr Duration kForgetStranger = 60s;
@@ -124,11 +136,11 @@ class Station {
                                           : settings_.response_timeout;
     }
     void rest_for_owed(TimePoint now);
+    void remember_read(const ReadSpan& span, const Bytes& pdu);
     Duration short_wait(std::optional<Duration> line) const;
 
     StationSettings settings_;
     bool listed_;
-    Duration slack_;
     StationHealth health_;
     LateWindow late_;
     Turnaround turnaround_;
@@ -140,11 +152,14 @@ class Station {
     std::deque<TimePoint> owed_;  ///< when the requests left whose replies may still come
     Bytes owed_pdu_;              ///< they are one and the same
     TimePoint not_before_{};
+    bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};
-    Bytes cheapest_read_;  ///< that it has answered
-    Bytes last_read_;      ///< what to probe with before it has answered any
+    bool audible_ = false;  ///< what came last of it, in answer to a request, was a sound
+    Bytes cheapest_read_;   ///< that it has answered
+    Bytes other_read_;      ///< ... and one whose reply has another shape
+    Bytes last_read_;       ///< what to probe with before it has answered any
     std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
-    Duration slowest_{};                           ///< from request to reply
+    std::optional<Duration> slowest_;  ///< from request to first sign of the reply, ever
     int failed_in_a_row_ = 0;
     bool trail_told_ = false;
     int probes_ = 0;  ///< in vain, since it was heard last

@@ -28,6 +28,10 @@ class Stations {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_stray_bytes(now);
     }
+    /// A request that left at `sent` was answered now, on a line that may hold things back.
+    void on_proved(TimePoint now, TimePoint sent) {
+        for (auto& [id, station] : stations_) station.on_proved(now, sent);
+    }
     void on_reply(Duration waited) { slowest_ = std::max(slowest_.value_or(waited), waited); }
 
     StationHealth health(std::uint8_t id) const;
@@ -54,7 +58,6 @@ class Stations {
     OfflineSettings offline_;
     StationSettings unlisted_;
     Duration standard_gap_;
-    Duration slack_;
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     ProbeBudget probes_{ProbeBudget::kOffline};

@@ -22,6 +22,7 @@ class Strays {
     void on_sent(ByteView adu) { last_frame_.assign(adu.begin(), adu.end()); }
     /// Who answered last: what stands behind that is its trail.
     void on_replied(std::uint8_t station) { replied_ = station; }
+    std::uint8_t replied() const { return replied_; }
     void forget() { idle_.clear(); }
 
     /// Bytes that nobody asked for (MST-04): counted, never matched with a later request.
