@@ -1,6 +1,7 @@
 #include "mutant.hpp"
 
 #include "checker.hpp"
+#include "play.hpp"
 #include "world.hpp"
 
 namespace panelgate::scenario {
@@ -15,7 +16,10 @@ std::string not_caught(const Mutant& mutant) {
         Checker checker(plan);
         World world(plan, *subject, checker);
         world.run();
-        if (checker.violation().starts_with(mutant.caught_as)) return {};
+        // A seed on which the arbiter as it is breaks the same promise shows nothing.
+        if (checker.violation().starts_with(mutant.caught_as) &&
+            !play(plan).violation.starts_with(mutant.caught_as))
+            return {};
         if (checker.failed()) others += "\n  " + checker.violation();
     }
     return "not caught in " + std::to_string(kSeeds) + " seeds as: " + mutant.caught_as + others;

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -105,20 +104,6 @@ struct IgnoresThatClientsLeft : Subject {
     void cancel(TimePoint, arbiter::Client) override {}
 };
 
-/// Nothing is done before the line has been silent for 10 ms.
-struct DefersToNoise : Subject {
-    using Subject::Subject;
-    void on_rx(TimePoint now, ByteView bytes) override {
-        heard_ = now;
-        Subject::on_rx(now, bytes);
-    }
-    std::optional<TimePoint> next_deadline() const override {
-        const auto next = Subject::next_deadline();
-        return next ? std::optional(std::max(*next, heard_ + 10ms)) : next;
-    }
-    TimePoint heard_{};
-};
-
 struct ComesLate : Subject {
     using Subject::Subject;
     std::optional<TimePoint> next_deadline() const override {
@@ -180,12 +165,6 @@ void eager(Plan& plan) {
     }
 }
 
-void floating(Plan& plan) {
-    plan.line = {};
-    plan.line.floating = 1;
-    plan.settings.queue.deadline = 800ms;
-}
-
 void stalling(Plan& plan) {
     for (PanelPlan& panel : plan.panels)
         panel = PanelPlan{.id = panel.id, .think = 5ms, .late_limit = 1.8};
@@ -240,7 +219,6 @@ const Mutant kMutants[] = {
      misled(
          [](arbiter::Settings& s) { each_station(s, [](auto& station) { station.retries = 3; }); }),
      writes_again},
-    {"StopsInNoise", "P5: nothing was sent", Kind::company, tampered<DefersToNoise>(), floating},
     {"ComesLate", "P5: the line was silent", Kind::writers, tampered<ComesLate>()},
     {"RefusesGoodStations", "P4: a good station was refused", Kind::writers,
      tampered<RefusesGoodStations>()},
