@@ -18,7 +18,7 @@ Arbiter::Arbiter(Settings settings)
     : settings_(std::move(settings)),
       stations_(settings_),
       schedule_(settings_),
-      quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu)),
+      quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu), silent_interval(settings_.serial)),
       strays_(settings_.serial),
       reception_(settings_),
       echo_memory_(settings_.echo),
@@ -42,6 +42,7 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
         return Fault::offline;
     }
     reception_.stamp(now, job);
+    job.alone = job.alone || !settings_.share_reads;
     const Ticket ticket = job.ticket;
     if (active_ && !waits && active_->takes_along(now, job)) {
         job.attempts = 1;
@@ -50,10 +51,10 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
         return ticket;
     }
     const JobQueue::Admission admission = schedule_.backlog().queue().push(job);
-    if (admission.shed) {
-        ledger_.decide(now, [&] { return explain::shed(*admission.shed); });
-        const bool sent = admission.shed->attempts > 0;  // in a joined read that did not come about
-        ledger_.finish(*admission.shed, sent ? Fault::timeout : Fault::busy);
+    for (const Job& shed : admission.shed) {
+        ledger_.decide(now, [&] { return explain::shed(shed); });
+        const bool sent = shed.attempts > 0;  // in a joined read that did not come about
+        ledger_.finish(shed, sent ? Fault::timeout : Fault::busy);
     }
     if (!admission.taken) {
         ledger_.decide(now, [&] { return explain::full(job, settings_.queue, queue_depth()); });
@@ -159,7 +160,8 @@ void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
     const bool too_early = early && !settings_.paced && pace_.believed();
-    if (station.may_be_copy(now, *active_, too_early)) return active_->reject_reply();
+    if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
+    if (station.may_be_copy(now, *active_)) return active_->hold_reply();
     pace_.on_reply(early);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
@@ -34,6 +35,7 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
+      echo_possible_(echo_.expected()),
       end_confirmed_(!timing.confirm_end) {}
 
 bool Attempt::takes_along(TimePoint now, const Job& job) const {
@@ -77,8 +79,21 @@ Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
 Verdict Attempt::accept(std::optional<Bytes> reply) {
     collect();
     if (!reply) return Verdict::open;
+    if (may_be_echo(*reply)) {
+        own_frame_seen_ = true;
+        return Verdict::open;
+    }
+    if (const auto copy = std::exchange(held_, std::nullopt)) stray_frame(*copy);
     reply_ = std::move(reply);
     return Verdict::replied;
+}
+
+/// P8: bytes of somebody else may stand in front of the echo, and the filter does not know it then.
+/// The first frame that is our own confirms nothing, unless a part of the echo has come before it.
+bool Attempt::may_be_echo(ByteView reply) const {
+    const bool accounted = !echo_possible_ || echo_.complete() || fragment_ || own_frame_seen_;
+    return !accounted &&
+           std::ranges::equal(modbus::encode_adu(group_.station, reply), echo_.frame());
 }
 
 /// What is pending becomes strays. Was it what the station said instead of the reply?
@@ -93,7 +108,11 @@ Verdict Attempt::judge_pending(const Ends& ends) {
 void Attempt::judge_strays(std::size_t from, const Ends& ends) {
     for (; from < strays_.size(); ++from) {
         const Unused& part = strays_[from];
-        wrong_ = wrong_ || (part.kind == Unused::Kind::own && ends(part.bytes));
+        if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
+        // What has nothing to do with the request may be babble: the reply has its usual time.
+        const bool other = (part.bytes[1] & ~modbus::kExceptionBit) != group_.pdu[0];
+        (other ? disturbed_ : wrong_) = true;
+        strange_ = strange_ || other;
     }
 }
 
@@ -119,7 +138,8 @@ TimePoint Attempt::deadline() const {
     if (is_broadcast()) return timing_.sent;
     const TimePoint over = give_up();
     if (!is_hearing()) return in_doubt() ? std::min(over, timing_.sent + timing_.usual) : over;
-    const bool hole = framer_.has_candidate() && framer_.knows_length();
+    // What the echo filter holds back begins like the reply, too.
+    const bool hole = echo_.pending() || (framer_.has_candidate() && framer_.knows_length());
     const TimePoint silent =
         std::max(timing_.sent, last_byte_) + (hole ? timing_.hole : timing_.end_of_frame);
     // What may be the reply is heard to its end, also after its time, but not for ever.
@@ -138,11 +158,17 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         if (accept(framer_.on_silence()) == Verdict::replied) return Verdict::replied;
         judge_strays(before, ends);
     }
+    const bool usual_is_over = now >= timing_.sent + timing_.usual;
+    if (held_ && usual_is_over) {
+        reply_ = std::exchange(held_, std::nullopt);
+        return Verdict::replied;
+    }
     if (wrong_) return Verdict::wrong;
     const bool damaged = framer_.was_damaged() || echo_.mismatch();
     if (framer_.was_damaged_whole()) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
+    if (strange_) return Verdict::wrong;
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 
@@ -168,14 +194,23 @@ Duration Attempt::waited(TimePoint now) const {
     return std::max(now - timing_.sent - reply, Duration::zero());
 }
 
-void Attempt::reject_reply() {
+void Attempt::stray_frame(const Bytes& pdu) {
     Unused part;
     part.kind = Unused::Kind::own;
     part.station = group_.station;
-    part.bytes = modbus::encode_adu(group_.station, *reply_);
+    part.bytes = modbus::encode_adu(group_.station, pdu);
     strays_.push_back(std::move(part));
-    reply_.reset();
+}
+
+void Attempt::reject_reply() {
+    stray_frame(*std::exchange(reply_, std::nullopt));
     heard_ = false;
+    disturbed_ = true;
+}
+
+void Attempt::hold_reply() {
+    held_ = std::exchange(reply_, std::nullopt);
+    held_back_ = true;
     disturbed_ = true;
 }
 

@@ -13,11 +13,12 @@ JobQueue::Admission JobQueue::push(Job job) {
     Entry entry = entry_of(std::move(job));
     if (!entry.span || !reads_.carries(*entry.span)) {
         if (counting_of(entry.job.client) >= settings_.per_client) return admission;
-        if (size_ >= settings_.limit) {
+        while (size_ >= settings_.limit) {
             const auto victim = find_victim(entry.job);
-            if (!victim) return admission;
-            admission.shed = take(victim->place, victim->index);
+            if (!victim) break;
+            admission.shed.push_back(take(victim->place, victim->index));
         }
+        if (size_ >= settings_.limit && admission.shed.empty()) return admission;
     }
     admission.taken = true;
     insert(std::move(entry));

@@ -88,12 +88,16 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
     trail_.on_reply(now);
-    copies_.on_reply(now, attempt.reply());
+    if (attempt.was_held() && copies_.is_copy(now, attempt.reply())) copies_.on_confirmed();
+    copies_.on_reply(now, group.pdu, attempt.reply());
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
-    audible_ = true;
-    if (group.settles) owed_.clear();
-    if (group.settles) not_before_ = now;
+    const bool exception = modbus::exception_of(attempt.reply()).has_value();
+    audible_ = !group.settles;          // once is enough where it does not tell
+    if (group.settles && !exception) {  // an exception may be that to what was owed
+        owed_.clear();
+        not_before_ = now;
+    }
     if (owes()) {
         // Each attempt may be answered, and nobody knows which one this reply was for.
         owed_.pop_front();
@@ -102,7 +106,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     } else {
         not_before_ = std::max(not_before_, now + copies_.hold());
     }
-    if (!group.span || modbus::exception_of(attempt.reply())) return result;
+    if (!group.span || exception) return result;
     std::uint32_t& longest = longest_read_.at(group.span->function);
     longest = std::max(longest, group.span->count);
     remember_read(*group.span, group.pdu);

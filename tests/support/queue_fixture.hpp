@@ -54,7 +54,7 @@ class QueueFixture : public testing::Test {
         const Ticket ticket = job.ticket;
         const auto admission = queue_.push(std::move(job));
         EXPECT_TRUE(admission.taken);
-        EXPECT_FALSE(admission.shed);
+        EXPECT_TRUE(admission.shed.empty());
         EXPECT_TRUE(queue_.consistent());
         return ticket;
     }

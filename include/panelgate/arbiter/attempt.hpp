@@ -90,8 +90,11 @@ class Attempt {
     std::optional<TimePoint> early_noise() const {
         return reply_ && replied_early() ? std::nullopt : early_;
     }
-    /// The reply is not to be believed: it counts as heard, and the attempt goes on.
+    /// The reply is a copy of an earlier one: it counts as heard, and the attempt goes on.
     void reject_reply();
+    /// It may be one: when nothing else comes in the usual time, it is the answer all the same.
+    void hold_reply();
+    bool was_held() const { return held_back_; }
 
     const EchoFilter& echo() const { return echo_; }
     /// The whole echo came back, and nothing of it was needed to make the reply whole.
@@ -117,7 +120,9 @@ class Attempt {
   private:
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
+    bool may_be_echo(ByteView reply) const;
     Verdict judge_pending(const Ends& ends);
+    void stray_frame(const Bytes& pdu);
     void judge_strays(std::size_t from, const Ends& ends);
     void collect();
     bool is_stale(TimePoint now, std::size_t size) const;
@@ -133,6 +138,8 @@ class Attempt {
     /// for it.
     std::optional<modbus::ReplyFramer> lender_;
     std::optional<Bytes> reply_;
+    std::optional<Bytes> held_;  ///< a reply that may be a copy
+    bool held_back_ = false;
     std::vector<modbus::Unused> strays_;
     Bytes damaged_bytes_;
     Bytes stale_;
@@ -143,9 +150,12 @@ class Attempt {
     bool heard_ = false;
     bool disturbed_ = false;
     bool fragment_ = false;
+    bool own_frame_seen_ = false;  ///< behind something else, where only its echo was expected
+    bool echo_possible_ = true;
     std::size_t noise_in_front_ = 0;  ///< bytes
     bool borrowed_ = false;
     bool wrong_ = false;
+    bool strange_ = false;  ///< the station said something that has nothing to do with the request
     bool end_confirmed_ = true;
 };
 

@@ -13,16 +13,21 @@ namespace panelgate::arbiter {
 /// Finds out that a station says its replies twice, or that two panels speak for one address, and
 /// for how long after a reply the second one has to be waited for: it could pass for the answer to
 /// a request of the same shape (P1). What repeats a reply to the letter is a copy at once; what
-/// only has its shape has to come twice, for others speak as well. Forgotten when it stops. Pure.
+/// only has its shape has to come twice, for others speak as well. Forgotten some minutes after it
+/// stopped. Pure.
 class CopyGuard {
   public:
     static constexpr std::size_t kReplies = 8;
     static constexpr Duration kLongest = 500ms;  ///< later, it is something else
+    static constexpr Duration kForget = 2min;
+    static constexpr int kConfirmations = 3;  ///< that make equal answers credible
 
-    void on_reply(TimePoint now, Bytes reply) {
+    void on_reply(TimePoint now, Bytes request, Bytes reply) {
+        if (now - learned_at_ > kForget) learned_ = {};
         Slot& slot = slots_[next_++ % kReplies];
         slot = {};
         slot.at = now;
+        slot.request = std::move(request);
         slot.reply = std::move(reply);
     }
     /// It repeats a reply of the last moments to the letter.
@@ -39,39 +44,50 @@ class CopyGuard {
     }
     /// A good frame that nobody asked for and nothing was owed for.
     void on_unasked(TimePoint now, ByteView reply) {
-        for (Slot& slot : slots_) {
+        for (const Slot& slot : slots_) {
             if (!slot.is_recent(now) || !std::ranges::equal(reply, slot.reply)) continue;
-            slot.copy = std::max(slot.copy, now - slot.at);
-            return;
+            return learn(now, now - slot.at);
         }
+        if (!is_second(now, reply)) return;
         Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
-        if (is_second(now, reply)) last.second = std::max(last.second, now - last.at);
+        last.second = true;
+        if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last.at);
     }
     /// It has spoken twice lately.
-    bool suspicious() const { return hold() > Duration::zero(); }
-    /// How long after a reply the station is left alone.
-    Duration hold() const {
-        Duration copy{};
-        Duration second{};
-        int seconds = 0;
-        for (const Slot& slot : slots_) {
-            copy = std::max(copy, slot.copy);
-            second = std::max(second, slot.second);
-            seconds += slot.second > Duration::zero() ? 1 : 0;
-        }
-        return (seconds >= 2 ? std::max(copy, second) : copy) * 3 / 2;
+    bool known() const { return hold() > Duration::zero(); }
+    /// This answer repeats that to another request, and the station has not shown yet that it gives
+    /// equal ones.
+    bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
+        if (confirmed_ >= kConfirmations) return false;
+        return std::ranges::any_of(slots_, [&](const Slot& slot) {
+            return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
+                   !std::ranges::equal(request, slot.request);
+        });
     }
+    /// Nothing else came: it was no copy.
+    void on_confirmed() { ++confirmed_; }
+    /// How long after a reply the station is left alone.
+    Duration hold() const { return learned_ * 3 / 2; }
 
   private:
     struct Slot {
         TimePoint at{};
+        Bytes request;
         Bytes reply;
-        Duration copy{};    ///< behind it came the same once more
-        Duration second{};  ///< ... or another one of its shape
+        bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
+    void learn(TimePoint now, Duration delay) {
+        learned_ = std::max(learned_, delay);
+        learned_at_ = now;
+        confirmed_ = 0;
+    }
+
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
+    int confirmed_ = 0;
+    Duration learned_{};  ///< from a reply to its second copy
+    TimePoint learned_at_{};
 };
 
 }  // namespace panelgate::arbiter

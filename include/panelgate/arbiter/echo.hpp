@@ -28,6 +28,8 @@ class EchoFilter {
 
     /// Bytes are held back that may still turn out not to be the echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
+    /// It watches for the echo, as long as nothing else has come.
+    bool expected() const { return expect_ != Expect::nothing; }
     /// The frame that it watches for: the one sent last.
     ByteView frame() const { return frame_; }
     /// The whole frame came back.

@@ -47,11 +47,11 @@ class JobQueue {
 
     explicit JobQueue(const QueueSettings& settings) : settings_(settings) {}
 
-    /// What came of push(): taken or refused; taken at the cost of another, which is to be answered
-    /// busy.
+    /// What came of push(): taken or refused; taken at the cost of others, which are to be answered
+    /// busy: one, or more where reads that others rode on count in their place.
     struct Admission {
         bool taken = false;
-        std::optional<Job> shed;
+        std::vector<Job> shed;
     };
     Admission push(Job job);
     /// A job that was taken before: ahead of its client's younger ones for that station; never

@@ -11,13 +11,14 @@ namespace panelgate::arbiter {
 /// has to rest for. Pure.
 class Quiet {
   public:
-    /// `longest`: of a frame. Bytes without a pause for longer than that are no frame but a line
-    /// that floats, and nobody has to wait for their end (LAT-02).
-    explicit Quiet(Duration longest) : longest_(longest) {}
+    /// `longest`: of a frame. Bytes without a pause, not even one as long as the standard's gap,
+    /// for longer than that are no frame but a line that floats, and nobody has to wait for their
+    /// end (LAT-02).
+    Quiet(Duration longest, Duration pause) : longest_(longest), pause_(pause) {}
 
     /// The line was opened: one silent interval before the first frame (MST-01).
     void on_open(TimePoint now) {
-        *this = Quiet(longest_);
+        *this = Quiet(longest_, pause_);
         since_ = now;
         until_ = now;
     }
@@ -35,7 +36,7 @@ class Quiet {
     }
     /// Something is heard that nobody asked for.
     void on_noise(TimePoint now) {
-        if (now > since_ + kPause || noise_ == TimePoint{}) noise_ = now;
+        if (now >= since_ + pause_ || noise_ == TimePoint{}) noise_ = now;
         since_ = std::max(since_, now);
     }
     void rest_until(TimePoint until) { until_ = std::max(until_, until); }
@@ -65,9 +66,8 @@ class Quiet {
     TimePoint quarantined_until() const { return quarantined_until_; }
 
   private:
-    static constexpr Duration kPause = 20ms;  ///< what an adapter holds back is no pause
-
     Duration longest_;
+    Duration pause_;
     TimePoint since_{};
     TimePoint until_{};
     TimePoint noise_{};  ///< the first of the bytes that came without a pause

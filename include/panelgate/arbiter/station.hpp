@@ -89,11 +89,15 @@ class Station {
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
     /// The whole transaction failed. True when that took it offline.
     bool on_given_up(TimePoint now, Fault fault);
-    /// This answer repeats the reply before, soon, where that may be a second copy of it and not
-    /// another one: the request may never have got through.
-    bool may_be_copy(TimePoint now, const Attempt& attempt, bool too_early) const {
-        return attempt.group().attempts == 1 && copies_.is_copy(now, attempt.reply()) &&
-               (too_early || copies_.suspicious());
+    /// This answer repeats an earlier reply, soon, and copies come from this station, or from a
+    /// line where it came `too_early`: the request may never have got through.
+    bool is_copy(TimePoint now, const Attempt& attempt, bool too_early) const {
+        const bool again = attempt.group().attempts > 1;
+        return !again && copies_.is_copy(now, attempt.reply()) && (too_early || copies_.known());
+    }
+    /// ... or it has not shown yet that it gives equal answers to different requests.
+    bool may_be_copy(TimePoint now, const Attempt& attempt) const {
+        return !attempt.was_held() && copies_.suspicious(now, attempt.group().pdu, attempt.reply());
     }
 
     // How it is to be asked

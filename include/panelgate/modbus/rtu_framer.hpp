@@ -58,9 +58,10 @@ class ReplyFramer {
     /// Bytes wait for more, or for the silence that judges them.
     bool has_pending() const { return !heard_.empty(); }
     /// Some of them may be the beginning of the reply.
-    bool has_candidate() const { return !starts_.empty(); }
-    /// ... and its own first bytes tell how long it is: a silence inside is only a hole.
-    bool knows_length() const { return open_length_; }
+    bool has_candidate() const { return !starts_.empty() || ends_with_address(); }
+    /// ... and its length is known, or will be by its own first bytes: a silence inside is only a
+    /// hole.
+    bool knows_length() const { return starts_.empty() ? ends_with_address() : open_length_; }
     /// Bytes were given up that held the address and function of the reply but no good frame.
     bool was_damaged() const { return damaged_; }
     /// ... and as many of them as the reply has, or nothing tells how many that are: the reply
@@ -80,6 +81,7 @@ class ReplyFramer {
     std::size_t frame_size(ByteView rest, bool silence) const;
     std::optional<Bytes> judge(std::size_t start, bool silence, bool& open) const;
     std::optional<Bytes> answering(ByteView frame) const;
+    bool ends_with_address() const { return !heard_.empty() && heard_.back() == station_; }
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
     void collect_starts();

@@ -18,6 +18,11 @@ const Bytes kWrite = "06 00 01 00 03"_hex;
 /// A read of three registers that touches no other one with another number.
 Bytes read_at(unsigned number) { return Writer().u8(3).u16(100 * number).u16(3).take(); }
 
+/// Three registers, other ones each time.
+Bytes reply_number(std::size_t number) {
+    return Writer().u8(3).u8(6).u16(static_cast<unsigned>(number)).u16(2).u16(3).take();
+}
+
 Settings settings_38400() {
     Settings settings;
     settings.serial = {38400, 8, Parity::none, 1};
@@ -401,7 +406,7 @@ TEST_F(ArbiterTest, ClientsTakeTurns) {
     std::vector<int> order;
     while (order.size() < 4) {
         bus.run_to_end_of_request();
-        bus.hear_reply(bus.sent.back().adu[0], kReply);
+        bus.hear_reply(bus.sent.back().adu[0], reply_number(order.size()));
         ASSERT_TRUE(bus.next_sent());
         order.push_back(bus.sent.back().adu[0]);
     }

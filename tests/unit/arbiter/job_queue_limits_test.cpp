@@ -21,11 +21,11 @@ class JobQueueLimits : public test::QueueFixture {
         const auto admission = queue_.push(std::move(job));
         EXPECT_TRUE(admission.taken);
         EXPECT_TRUE(queue_.consistent());
-        return admission.shed ? admission.shed->ticket : 0;
+        return admission.shed.empty() ? 0 : admission.shed.front().ticket;
     }
     bool refuses(Job job) {
         const auto admission = queue_.push(std::move(job));
-        EXPECT_FALSE(!admission.taken && admission.shed);
+        EXPECT_TRUE(admission.taken || admission.shed.empty());
         EXPECT_TRUE(queue_.consistent());
         return !admission.taken;
     }
@@ -179,7 +179,7 @@ TEST_F(JobQueueLimits, P9AHostWhoseReadsAreAllDoubledStillMakesRoom) {
         }
     }
     EXPECT_NE(shed_for(read(3, 1, 200)), 0u);
-    EXPECT_EQ(queue_.waiting(), 16u);
+    EXPECT_EQ(queue_.size(), 8u);
 }
 
 /// 40 connections of one host, 16 requests each at once and again with every answer; a polite
@@ -197,8 +197,10 @@ void plays_beside_a_flood(Host flood, Host polite, PriorityClass priority) {
         job.priority = as;
         job.pdu = Writer().u8(3).u16(static_cast<unsigned>(ticket * 7 % 60000)).u16(1).take();
         auto admission = queue.push(std::move(job));
-        EXPECT_FALSE(admission.shed && admission.shed->client == 1000);
-        if (admission.shed) --open[admission.shed->client];
+        for (const Job& shed : admission.shed) {
+            EXPECT_NE(shed.client, 1000u);
+            --open[shed.client];
+        }
         if (admission.taken) ++open[client];
         return admission.taken;
     };
