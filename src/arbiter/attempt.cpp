@@ -110,7 +110,8 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         const Unused& part = strays_[from];
         if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
         // What has nothing to do with the request may be babble: the reply has its usual time.
-        const bool other = (part.bytes[1] & ~modbus::kExceptionBit) != group_.pdu[0];
+        const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
+        const bool other = !exception && part.bytes[1] != group_.pdu[0];
         (other ? disturbed_ : wrong_) = true;
         strange_ = strange_ || other;
     }
@@ -208,7 +209,8 @@ void Attempt::reject_reply() {
     disturbed_ = true;
 }
 
-void Attempt::hold_reply() {
+void Attempt::hold_reply(Duration needed) {
+    timing_.usual = std::min(timing_.usual, needed);
     held_ = std::exchange(reply_, std::nullopt);
     held_back_ = true;
     disturbed_ = true;

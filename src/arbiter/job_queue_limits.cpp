@@ -13,16 +13,30 @@ JobQueue::Admission JobQueue::push(Job job) {
     Entry entry = entry_of(std::move(job));
     if (!entry.span || !reads_.carries(*entry.span)) {
         if (counting_of(entry.job.client) >= settings_.per_client) return admission;
-        while (size_ >= settings_.limit) {
-            const auto victim = find_victim(entry.job);
-            if (!victim) break;
-            admission.shed.push_back(take(victim->place, victim->index));
-        }
-        if (size_ >= settings_.limit && admission.shed.empty()) return admission;
+        if (size_ >= settings_.limit && !make_room(entry.job, admission.shed)) return {};
     }
     admission.taken = true;
     insert(std::move(entry));
     return admission;
+}
+
+/// Where others rode on what goes, they count in its place and may have to go as well: all of it,
+/// or nothing.
+bool JobQueue::make_room(const Job& newcomer, std::vector<Job>& shed) {
+    const auto first = find_victim(newcomer);
+    if (!first) return false;
+    if (first->merit.makes_room) {
+        shed.push_back(take(first->place, first->index));
+        return true;
+    }
+    JobQueue after = *this;
+    while (after.size_ >= settings_.limit) {
+        const auto victim = after.find_victim(newcomer);
+        if (!victim) return false;
+        shed.push_back(after.take(victim->place, victim->index));
+    }
+    *this = std::move(after);
+    return true;
 }
 
 std::size_t JobQueue::counting_of(Client client) const {

@@ -26,6 +26,16 @@ void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     rest_for_owed(now);
 }
 
+/// Of those that it may be the reply to, the oldest that could still come: one of long ago must not
+/// make a later one look late.
+TimePoint Station::answered_request(TimePoint now) const {
+    const auto open = [&](TimePoint sent) {
+        return now < sent + settings_.response_timeout + late_.value();
+    };
+    const auto found = std::ranges::find_if(owed_, open);
+    return found == owed_.end() ? owed_.back() : *found;
+}
+
 /// Until what left last can no longer be answered: within its timeout, and so much later as its
 /// replies may be late.
 void Station::rest_for_owed(TimePoint now) {
@@ -59,8 +69,9 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
         return heard;
     }
     // Panels serve in turn: it is the oldest one that is owed.
-    const TimePoint due = owed_.front() + settings_.response_timeout;
-    slowest_ = std::max(slowest_.value_or(0s), now - owed_.front());
+    const TimePoint asked = answered_request(now);
+    const TimePoint due = asked + settings_.response_timeout;
+    slowest_ = std::max(slowest_.value_or(0s), now - asked);
     owed_.pop_front();
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);

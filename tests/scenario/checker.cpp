@@ -97,10 +97,12 @@ std::size_t Checker::waiting() const {
 }
 
 /// What was taken for a joined read and refused by the panel waits again, and what rode along with
-/// a read that has gone counts again: beyond the limit, but then a newcomer takes a place.
+/// a read that has gone counts again: beyond the limit, but then a newcomer takes a place. Where
+/// one has gone in the same moment nobody can tell which it was.
 void Checker::on_settled() {
     const std::size_t before = std::exchange(waiting_before_, kNobodyCame);
-    if (before == kNobodyCame || open_.size() <= settings_.queue.limit) return;
+    const bool gone = std::exchange(frames_settled_, frames_) != frames_;
+    if (before == kNobodyCame || gone || open_.size() <= settings_.queue.limit) return;
     const std::size_t after = waiting();
     if (after > settings_.queue.limit && after > before)
         fail("P9: more requests wait than the limit allows: " + std::to_string(after) + " of " +

@@ -133,6 +133,7 @@ class Checker {
     std::map<arbiter::Ticket, Open> open_;
     arbiter::Ticket last_ticket_ = 0;
     static constexpr std::size_t kNobodyCame = SIZE_MAX;
+    std::uint64_t frames_settled_ = 0;          ///< frames_ when everything had settled last
     std::size_t waiting_before_ = kNobodyCame;  ///< the newcomer that was taken last
     std::map<arbiter::Client, Client> clients_;
     std::map<std::string, int> written_;             ///< times that each write was on the wire

@@ -92,8 +92,9 @@ class Attempt {
     }
     /// The reply is a copy of an earlier one: it counts as heard, and the attempt goes on.
     void reject_reply();
-    /// It may be one: when nothing else comes in the usual time, it is the answer all the same.
-    void hold_reply();
+    /// It may be one: when nothing else comes until `needed` after the request, as long as the
+    /// station has ever needed, it is the answer all the same.
+    void hold_reply(Duration needed);
     bool was_held() const { return held_back_; }
 
     const EchoFilter& echo() const { return echo_; }

@@ -44,10 +44,12 @@ class CopyGuard {
     }
     /// A good frame that nobody asked for and nothing was owed for.
     void on_unasked(TimePoint now, ByteView reply) {
+        TimePoint said{};
         for (const Slot& slot : slots_) {
-            if (!slot.is_recent(now) || !std::ranges::equal(reply, slot.reply)) continue;
-            return learn(now, now - slot.at);
+            if (slot.is_recent(now) && std::ranges::equal(reply, slot.reply))
+                said = std::max(said, slot.at);
         }
+        if (said != TimePoint{}) return learn(now, now - said);
         if (!is_second(now, reply)) return;
         Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
         last.second = true;

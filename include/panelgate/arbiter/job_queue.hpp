@@ -169,6 +169,7 @@ class JobQueue {
     void forget(const Entry& entry);
 
     std::size_t counting_of(Client client) const;
+    bool make_room(const Job& newcomer, std::vector<Job>& shed);
     std::optional<Victim> find_victim(const Job& newcomer) const;
     std::optional<Victim> greediest(const Ask& may_lose, const Ask& writes_too) const;
     std::optional<Victim> victim_of(const Holder& holder, bool writes_too) const;

@@ -89,15 +89,19 @@ class Station {
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
     /// The whole transaction failed. True when that took it offline.
     bool on_given_up(TimePoint now, Fault fault);
-    /// This answer repeats an earlier reply, soon, and copies come from this station, or from a
-    /// line where it came `too_early`: the request may never have got through.
+    /// This answer repeats an earlier reply, soon, and it came `too_early`: the request may never
+    /// have got through.
     bool is_copy(TimePoint now, const Attempt& attempt, bool too_early) const {
         const bool again = attempt.group().attempts > 1;
-        return !again && copies_.is_copy(now, attempt.reply()) && (too_early || copies_.known());
+        return too_early && !again && copies_.is_copy(now, attempt.reply());
     }
-    /// ... or it has not shown yet that it gives equal answers to different requests.
+    /// It repeats one, and copies come from this station, or it has not shown yet that it gives
+    /// equal answers to different requests.
     bool may_be_copy(TimePoint now, const Attempt& attempt) const {
-        return !attempt.was_held() && copies_.suspicious(now, attempt.group().pdu, attempt.reply());
+        const Bytes& reply = attempt.reply();
+        const bool known = copies_.known() && copies_.is_copy(now, reply);
+        return !attempt.was_held() &&
+               (known || copies_.suspicious(now, attempt.group().pdu, reply));
     }
 
     // How it is to be asked
@@ -122,6 +126,8 @@ class Station {
     Duration patience(const Group& group, std::optional<Duration> line, bool hurry) const;
     /// What it has ever needed, and some more; at most its response timeout.
     Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
+    /// ... and not more than that, but for what a receiver holds back.
+    Duration needed() const { return slowest_.value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }
     Bytes probe_pdu() const;
     /// The longest read of this function that it has answered; items.
@@ -139,6 +145,7 @@ class Station {
         return settings_.adaptive_timeout ? adaptive_.value(turnaround_)
                                           : settings_.response_timeout;
     }
+    TimePoint answered_request(TimePoint now) const;
     void rest_for_owed(TimePoint now);
     void remember_read(const ReadSpan& span, const Bytes& pdu);
     Duration short_wait(std::optional<Duration> line) const;
