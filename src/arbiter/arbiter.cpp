@@ -236,7 +236,8 @@ Attempt Arbiter::take_active(TimePoint now) {
     ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
         ledger_.event(Kind::echo, attempt.group().station);
-    if (const auto noise = attempt.early_noise()) stations_.on_trail(*noise, strays_.replied());
+    if (const auto noise = attempt.early_noise())
+        stations_.on_trail(*noise, strays_.replied_before());
     strays_.hear(attempt.release_echo());
     return attempt;
 }
@@ -270,7 +271,7 @@ void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
 void Arbiter::judge_idle(TimePoint now) { note(now, strays_.take(quiet_.station())); }
 
 void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
-    const bool idle = !active_ || now < active_->timing().sent;
+    const bool idle = !active_;
     strays_.note(now, parts, idle, stations_, quiet_, ledger_);
 }
 

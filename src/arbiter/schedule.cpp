@@ -27,6 +27,16 @@ Group probe_of(std::uint8_t station, const Stations& stations) {
     return group;
 }
 
+/// For somebody who waits for a station that rests only because of what it may still say.
+Group settling(std::uint8_t id, const Station& station) {
+    Group group;
+    group.station = id;
+    group.pdu = station.settling_pdu();
+    group.span = read_span(id, group.pdu);
+    group.settles = true;
+    return group;
+}
+
 /// At once when the reply that its station owes is to this very request, else behind that (P1).
 TimePoint repeat_from(const Group& group, const Stations& stations) {
     const Station* station = stations.find(group.station);
@@ -59,7 +69,6 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
     }
     if (Next job = next_job(now, stations, quiet, echo, proved); job.group || job.new_way)
         return job;
-    if (auto group = next_settling(now, stations, quiet)) return {std::move(group), false};
     if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
     if (due && now >= *due) return {next_probe(now, stations, quiet), false};
     return {};
@@ -81,34 +90,14 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     return group;
 }
 
-/// For somebody who waits for a station that rests only because of what it may still say.
-std::optional<Group> Schedule::next_settling(TimePoint now, const Stations& stations,
-                                             Quiet& quiet) const {
-    if (now < quiet.quarantined_until()) return std::nullopt;
-    std::optional<Group> settling;
-    backlog_.queue().each_first([&](const Job& job) {
-        const Station* station = stations.find(job.station);
-        if (settling || station == nullptr || now >= station->rested()) return;
-        if (backlog_.has_retry(job.station)) return;
-        if (Bytes pdu = station->settling_pdu(); !pdu.empty()) {
-            settling.emplace();
-            settling->station = job.station;
-            settling->span = read_span(job.station, pdu);
-            settling->pdu = std::move(pdu);
-            settling->settles = true;
-        }
-    });
-    if (settling && !gap_is_over(now, settling->station, stations, quiet)) return std::nullopt;
-    return settling;
-}
-
 /// Not while a late reply could be taken for the answer (P1).
 JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
                                   const Quiet& quiet) const {
     return [&, this, now](const Job& job) {
         if (now < quiet.quarantined_until()) return false;
         const Station* station = stations.find(job.station);
-        const bool rested = station == nullptr || now >= station->rested();
+        const bool rested =
+            station == nullptr || now >= station->rested() || !station->settling_pdu().empty();
         return rested && !backlog_.has_retry(job.station);
     };
 }
@@ -124,6 +113,8 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     const Job* next = backlog_.queue().peek(test);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
+    const Station* asked = stations.find(next->station);
+    if (asked != nullptr && now < asked->rested()) return {settling(next->station, *asked), false};
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
         return {std::nullopt, true};
     other_first_ = false;

@@ -148,7 +148,8 @@ void Station::remember_read(const ReadSpan& span, const Bytes& pdu) {
 }
 
 Bytes Station::settling_pdu() const {
-    if (!owes() || !audible_ || cheapest_read_.empty()) return {};
+    // A second copy of what is owed would come behind it all the same.
+    if (!owes() || !audible_ || copies_.known() || cheapest_read_.empty()) return {};
     if (tells_apart(cheapest_read_, owed_pdu_)) return cheapest_read_;
     if (!other_read_.empty() && tells_apart(other_read_, owed_pdu_)) return other_read_;
     auto part = read_span(0, cheapest_read_);

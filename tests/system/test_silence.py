@@ -22,6 +22,7 @@ lines:
     timing: {response_timeout: 200ms, broadcast_turnaround: 300ms}
     retries: 2
     queue: {deadline: 5s}
+    %s
     stations:
       - {id: 1, name: good, profile: generic}
       - {id: 2, name: bad, profile: generic}
@@ -42,10 +43,10 @@ def holding(*values):
 
 
 @contextlib.contextmanager
-def gateway_and_bus(panels):
+def gateway_and_bus(panels, more=""):
     with tempfile.TemporaryDirectory() as folder:
         link = pathlib.Path(folder) / "tty"
-        with RtuBus(link, panels) as bus, harness.configured(CONFIG % link) as program:
+        with RtuBus(link, panels) as bus, harness.configured(CONFIG % (link, more)) as program:
             program.log.wait_for("line up")
             # A line that has carried a read before anything else happens.
             with program.client() as client:
@@ -69,8 +70,25 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(client.ask(1, read_registers(9)), holding(9))  # all is quiet again
             self.assertEqual([f.bytes for f in bus.frames(2)], [harness.rtu(2, write_register(4, 5))])
 
-    def test_other_clients_are_answered_when_no_late_reply_can_come(self):
+    def test_other_clients_wait_for_one_timeout_at_most(self):
         with gateway_and_bus({1: echo_address}) as (program, bus), contextlib.ExitStack() as stack:
+            patient, *others = [stack.enter_context(program.client()) for _ in range(4)]
+            patient.send(2, read_registers(0))
+            bus.wait_for(1, station=2)
+            for address, other in enumerate(others, 20):
+                other.send(1, read_registers(2 * address))
+            self.assertEqual(patient.receive()[2], fault(3, NO_REPLY))
+            for address, other in enumerate(others, 20):
+                self.assertEqual(other.receive()[2], holding(2 * address))
+            frames = bus.frames()[1:]
+            order = [f.bytes[0] for f in frames]
+            self.assertEqual(order[:2], [2, 1])  # a retry lets one other go first
+            self.assertEqual(sorted(order), [1] * len(others) + [2] * (RETRIES + 1))
+            self.assertGreaterEqual(frames[1].at - frames[0].at, TIMEOUT * 5 / 6)
+
+    def test_P1_where_the_line_rests_all_wait_until_no_late_reply_can_come(self):
+        with gateway_and_bus({1: echo_address}, "quarantine: line") as (program, bus), \
+                contextlib.ExitStack() as stack:
             patient, *others = [stack.enter_context(program.client()) for _ in range(4)]
             patient.send(2, read_registers(0))
             bus.wait_for(1, station=2)
@@ -173,7 +191,7 @@ class Device(unittest.TestCase):
     def test_P7_one_that_is_missing_at_start_may_come_later(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with harness.configured(CONFIG % link) as program, program.client() as client:
+            with harness.configured(CONFIG % (link, "")) as program, program.client() as client:
                 self.assertEqual(program.get("/readyz")[0], 200)
                 self.assertEqual(client.ask(1, read_registers(5)), fault(3, NO_PATH))
                 with RtuBus(link, {1: echo_address}):
@@ -186,7 +204,7 @@ class Device(unittest.TestCase):
             with contextlib.ExitStack() as stack:
                 first = contextlib.ExitStack()
                 first.enter_context(RtuBus(link, {1: echo_address}))
-                program = stack.enter_context(harness.configured(CONFIG % link))
+                program = stack.enter_context(harness.configured(CONFIG % (link, "")))
                 client = stack.enter_context(program.client())
                 program.log.wait_for("line up")
                 self.assertEqual(client.ask(1, read_registers(5)), holding(5))
@@ -209,7 +227,7 @@ class Ending(unittest.TestCase):
         text = CONFIG.replace("200ms", "4s")
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with RtuBus(link, {1: slow}) as bus, harness.configured(text % link) as program:
+            with RtuBus(link, {1: slow}) as bus, harness.configured(text % (link, "")) as program:
                 program.log.wait_for("line up")
                 with program.client() as client:
                     client.send(1, read_registers(5))

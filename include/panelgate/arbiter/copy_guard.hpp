@@ -70,6 +70,10 @@ class CopyGuard {
     void on_confirmed() { ++confirmed_; }
     /// How long after a reply the station is left alone.
     Duration hold() const { return learned_ * 3 / 2; }
+    /// Behind the reply taken last: until then.
+    TimePoint rest_until() const {
+        return slots_[(next_ + kReplies - 1) % kReplies].at + learned_ * 5 / 4;
+    }
 
   private:
     struct Slot {

@@ -44,7 +44,6 @@ class Schedule {
   private:
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
-    std::optional<Group> next_settling(TimePoint now, const Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
                   TimePoint proved);
     JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <optional>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "panelgate/arbiter/ledger.hpp"
@@ -19,10 +20,14 @@ class Strays {
     explicit Strays(const SerialFormat& serial) : serial_(serial) {}
 
     /// The frame sent last: its echo may come late.
-    void on_sent(ByteView adu) { last_frame_.assign(adu.begin(), adu.end()); }
-    /// Who answered last: what stands behind that is its trail.
+    void on_sent(ByteView adu) {
+        last_frame_.assign(adu.begin(), adu.end());
+        replied_before_ = std::exchange(replied_, std::uint8_t{0});
+    }
+    /// What stands behind this answer is its station's trail.
     void on_replied(std::uint8_t station) { replied_ = station; }
-    std::uint8_t replied() const { return replied_; }
+    /// Who answered what was sent before the frame on the wire; 0: nobody.
+    std::uint8_t replied_before() const { return replied_before_; }
     void forget() { idle_.clear(); }
 
     /// Bytes that nobody asked for (MST-04): counted, never matched with a later request.
@@ -49,7 +54,8 @@ class Strays {
     SerialFormat serial_;
     Bytes idle_;
     Bytes last_frame_;
-    std::uint8_t replied_ = 0;
+    std::uint8_t replied_ = 0;  ///< what was sent last; 0: nobody, or not yet
+    std::uint8_t replied_before_ = 0;
 };
 
 }  // namespace panelgate::arbiter
