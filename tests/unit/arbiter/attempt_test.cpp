@@ -112,12 +112,12 @@ TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
     EXPECT_EQ(attempt_.reply(), kOtherReply);
 }
 
-TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheUsualTime) {
+TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
-    attempt_.hold_reply();
+    attempt_.hold_reply(60ms);
     Attempt other = attempt_;
     EXPECT_EQ(run_to_verdict(), Verdict::replied);
-    EXPECT_EQ(ended_, attempt_.timing().usual);
+    EXPECT_EQ(ended_, Duration(60ms));
     EXPECT_EQ(attempt_.reply(), kReply);
     std::swap(attempt_, other);
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);

@@ -89,20 +89,23 @@ TEST_F(CopyGuardTest, P1AnEqualAnswerToAnotherRequestIsSuspiciousForAMoment) {
     EXPECT_FALSE(guard_.suspicious(now_ + CopyGuard::kLongest + 1ns, kOtherRequest, kReply));
 }
 
-TEST_F(CopyGuardTest, AStationThatWasSeenToGiveEqualAnswersIsBelieved) {
+TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSpeaksTwice) {
     reply();
     for (int i = 0; i < CopyGuard::kConfirmations; ++i) {
         EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
         guard_.on_confirmed();
     }
     EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
-}
-
-TEST_F(CopyGuardTest, P1OneThatSpeaksTwiceHasToShowAnewThatItsEqualAnswersAreAnswers) {
-    for (int i = 0; i < CopyGuard::kConfirmations; ++i) guard_.on_confirmed();
-    reply();
     unasked(20ms, kReply);
     EXPECT_TRUE(guard_.suspicious(now_ + 30ms, kOtherRequest, kReply));
+}
+
+TEST_F(CopyGuardTest, ACopyIsThatOfTheLatestReplyThatItRepeats) {
+    reply();
+    guard_.on_reply(now_ + 200ms, kOtherRequest, kReply);
+    unasked(220ms, kReply);
+    EXPECT_TRUE(guard_.known());
+    EXPECT_LT(guard_.hold(), Duration(60ms));
 }
 
 }  // namespace

@@ -67,6 +67,7 @@ TEST_F(StationTest, P1EachAttemptIsOwedAReplyAndTheLastOneThatComesEndsTheRest) 
     answer(group_of(kId, kRead, 3), kReply);  // nobody knows to which of the three
     const auto first = station_.on_stray_frame(now_ + 10ms, kReply);
     EXPECT_EQ(first.stray, Stray::late);
+    EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
     EXPECT_FALSE(first.settled);
     EXPECT_FALSE(station_.may_ask(now_ + 10ms, kOther));
     const auto second = station_.on_stray_frame(now_ + 20ms, kReply);
