@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include "panelgate/arbiter/read_cache.hpp"
-#include "panelgate/arbiter/turnaround.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 
@@ -121,48 +120,6 @@ TEST(Memory, IsEmptyAfterTheLineWasLost) {
     bus.run_for(10ms);
     const Ticket read = bus.submit(17, kRead, 1);
     EXPECT_FALSE(bus.answered(read));
-}
-
-TEST(Turnaround, KnowsTheQuantilesOfTheLastReplies) {
-    Turnaround seen;
-    EXPECT_FALSE(seen.known());
-    for (int i = 1; i <= 200; ++i) seen.add(i * 1ms);
-    EXPECT_TRUE(seen.known());
-    EXPECT_EQ(seen.quantile(1), Duration(200ms));
-    EXPECT_EQ(seen.quantile(0.5), Duration(169ms));
-}
-
-TEST(AdaptiveTimeout, FollowsTheTurnaroundBetweenFloorAndCeiling) {
-    AdaptiveTimeout timeout(20ms, 500ms);
-    Turnaround seen;
-    EXPECT_EQ(timeout.value(seen), Duration(500ms)) << "nothing is known yet";
-    for (int i = 0; i < 10; ++i) seen.add(5ms);
-    EXPECT_EQ(timeout.value(seen), Duration(30ms));
-    timeout.on_timeout();
-    EXPECT_EQ(timeout.value(seen), Duration(60ms));
-    for (int i = 0; i < 100; ++i) timeout.on_timeout();
-    EXPECT_EQ(timeout.value(seen), Duration(500ms));
-    timeout.on_reply();
-    EXPECT_EQ(timeout.value(seen), Duration(30ms));
-}
-
-TEST(DriftAlarm, TellsOnceUntilTheStationHasRecovered) {
-    DriftAlarm alarm;
-    Turnaround seen;
-    int told = 0;
-    const auto replies = [&](int count, Duration think) {
-        for (int i = 0; i < count; ++i) {
-            seen.add(think);
-            told += alarm.check(seen, 100ms) ? 1 : 0;
-        }
-    };
-    replies(100, 10ms);
-    EXPECT_EQ(told, 0);
-    replies(100, 85ms);
-    EXPECT_EQ(told, 1);
-    replies(100, 10ms);
-    replies(100, 85ms);
-    EXPECT_EQ(told, 2);
 }
 
 TEST(AdaptiveTimeout, OfALineAnswersTheClientEarlyAndStillWaitsForALateReply) {

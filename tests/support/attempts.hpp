@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <utility>
+
+#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::test {
+
+/// One job alone, sent `attempts` times with this one.
+inline arbiter::Group group_of(std::uint8_t station, Bytes pdu, int attempts = 1) {
+    arbiter::Job job;
+    job.ticket = 1;
+    job.client = 1;
+    job.station = station;
+    job.pdu = pdu;
+    arbiter::Group group;
+    group.station = station;
+    group.span = arbiter::read_span(station, pdu);
+    group.pdu = std::move(pdu);
+    group.attempts = attempts;
+    group.jobs.push_back(std::move(job));
+    return group;
+}
+
+/// An attempt that began in time to have left at `sent`, and was answered at `now`.
+inline arbiter::Attempt answered(TimePoint sent, TimePoint now, arbiter::Group group,
+                                 const Bytes& reply) {
+    arbiter::Attempt::Timing timing =
+        arbiter::Attempt::timing_of(arbiter::Settings{}, sent, 0, Duration::zero());
+    timing.patience = timing.usual = 1min;
+    const Bytes adu = modbus::encode_adu(group.station, reply);
+    arbiter::Attempt attempt(std::move(group), timing, {});
+    attempt.on_rx(now, adu, [](ByteView) { return false; });
+    return attempt;
+}
+
+}  // namespace panelgate::test

@@ -1,0 +1,130 @@
+#include "panelgate/arbiter/backlog.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "support/queue_fixture.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+constexpr TimePoint kStart{1h};
+
+class BacklogTest : public test::QueueFixture {
+  protected:
+    /// Waits for its first turn.
+    Ticket wait(Job job) {
+        const Ticket ticket = job.ticket;
+        EXPECT_TRUE(backlog_.queue().push(std::move(job)).taken);
+        return ticket;
+    }
+    /// Was sent, and goes again.
+    void retry(std::vector<Job> jobs) {
+        Group group;
+        group.station = jobs.front().station;
+        group.pdu = jobs.front().pdu;
+        group.attempts = 1;
+        group.jobs = std::move(jobs);
+        backlog_.retry(std::move(group));
+    }
+    static Job until(Job job, TimePoint start_by, TimePoint deadline) {
+        job.start_by = start_by;
+        job.deadline = deadline;
+        return job;
+    }
+    /// Of the retry that is taken, 0 when none may go.
+    int take(const std::function<bool(const Group&)>& may_go) {
+        const auto group = backlog_.take_retry(may_go);
+        return group ? group->station : 0;
+    }
+
+    Backlog backlog_{QueueSettings{}};
+};
+
+TEST_F(BacklogTest, HoldsWhatWaitsAndWhatGoesAgain) {
+    EXPECT_TRUE(backlog_.empty());
+    wait(read(1, 17));
+    retry({read(2, 18)});
+    EXPECT_FALSE(backlog_.empty());
+    EXPECT_TRUE(backlog_.has(1, 17));
+    EXPECT_FALSE(backlog_.has(1, 18));
+    EXPECT_TRUE(backlog_.has(2, 18));
+    EXPECT_FALSE(backlog_.has(2, 17));
+    EXPECT_TRUE(backlog_.has_retry(18));
+    EXPECT_FALSE(backlog_.has_retry(17)) << "it was not sent yet";
+}
+
+TEST_F(BacklogTest, TheOldestRetryThatMayGoIsTaken) {
+    retry({read(1, 17)});
+    retry({read(1, 18)});
+    retry({read(1, 19)});
+    const auto nobody = [](const Group&) { return false; };
+    const auto not_17 = [](const Group& group) { return group.station != 17; };
+    EXPECT_EQ(take(nobody), 0);
+    EXPECT_EQ(take(not_17), 18);
+    EXPECT_EQ(take(not_17), 19);
+    EXPECT_EQ(take(not_17), 0);
+    EXPECT_TRUE(backlog_.has_retries());
+    EXPECT_EQ(take([](const Group&) { return true; }), 17);
+    EXPECT_FALSE(backlog_.has_retries());
+}
+
+TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHave) {
+    const Job shared = read(1, 17);
+    const Job other = read(2, 17);
+    const Ticket waits = wait(read(1, 18));
+    wait(read(2, 18));
+    retry({shared, other});
+    retry({read(1, 19)});
+    const auto cancelled = tickets(backlog_.cancel(1));
+    EXPECT_EQ(cancelled.size(), 3u);
+    EXPECT_EQ(cancelled.front(), waits);
+    EXPECT_FALSE(backlog_.has(1, 17) || backlog_.has(1, 18) || backlog_.has(1, 19));
+    EXPECT_TRUE(backlog_.has(2, 17) && backlog_.has(2, 18));
+    EXPECT_FALSE(backlog_.has_retry(19)) << "nobody waits for it any more";
+    EXPECT_TRUE(backlog_.cancel(1).empty());
+}
+
+TEST_F(BacklogTest, P3WhatWasNotSentExpiresWhenItCanNoLongerBeStarted) {
+    const Ticket first = wait(until(read(1, 17), kStart + 1s, kStart + 5s));
+    wait(until(read(2, 17), kStart + 2s, kStart + 3s));
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 1s);
+    EXPECT_TRUE(backlog_.expire(kStart + 1s - 1ns).empty());
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 1s)), std::vector<Ticket>{first});
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 2s);
+}
+
+TEST_F(BacklogTest, P3WhatWasSentExpiresOnlyAtItsDeadlineEachJobAtItsOwn) {
+    const Job first = until(read(1, 17), kStart + 1s, kStart + 2s);
+    const Job second = until(read(2, 17), kStart + 1s, kStart + 4s);
+    retry({first, second});
+    EXPECT_EQ(backlog_.first_expiry(), kStart + 2s);
+    EXPECT_TRUE(backlog_.expire(kStart + 2s - 1ns).empty());
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 2s)), std::vector<Ticket>{first.ticket});
+    EXPECT_TRUE(backlog_.has_retry(17)) << "one still waits for it";
+    EXPECT_EQ(tickets(backlog_.expire(kStart + 4s)), std::vector<Ticket>{second.ticket});
+    EXPECT_FALSE(backlog_.has_retry(17));
+    EXPECT_FALSE(backlog_.first_expiry());
+}
+
+TEST_F(BacklogTest, OnlyWhatWaitsForItsFirstTurnIsRemoved) {
+    const Ticket waits = wait(read(1, 17));
+    retry({read(1, 17)});
+    EXPECT_EQ(tickets(backlog_.remove_if(test::any)), std::vector<Ticket>{waits});
+    EXPECT_TRUE(backlog_.has_retry(17));
+}
+
+TEST_F(BacklogTest, P7GivesEverythingWhenItIsCleared) {
+    wait(read(1, 17));
+    wait(write(2, 18));
+    retry({read(3, 17), read(4, 17)});
+    EXPECT_EQ(backlog_.clear().size(), 4u);
+    EXPECT_TRUE(backlog_.empty());
+    EXPECT_TRUE(backlog_.clear().empty());
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,112 @@
+#include "panelgate/arbiter/copy_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+const Bytes kRequest = "03 00 6B 00 01"_hex;
+const Bytes kOtherRequest = "03 00 6C 00 01"_hex;
+const Bytes kReply = "03 02 00 01"_hex;
+const Bytes kOtherReply = "03 02 00 02"_hex;
+const Bytes kOfOtherShape = "03 04 00 01 00 02"_hex;
+
+class CopyGuardTest : public testing::Test {
+  protected:
+    void reply(const Bytes& pdu = kReply) {
+        now_ += 1s;
+        guard_.on_reply(now_, kRequest, pdu);
+    }
+    void unasked(Duration behind, const Bytes& pdu) { guard_.on_unasked(now_ + behind, pdu); }
+
+    CopyGuard guard_;
+    TimePoint now_{1h};
+};
+
+TEST_F(CopyGuardTest, P1WhatRepeatsAReplyOfTheLastMomentsToTheLetterIsACopy) {
+    EXPECT_FALSE(guard_.is_copy(now_, kReply));
+    reply();
+    guard_.on_reply(now_ + 50ms, kOtherRequest, kOtherReply);
+    EXPECT_TRUE(guard_.is_copy(now_ + 60ms, kReply)) << "also of the one before";
+    EXPECT_TRUE(guard_.is_copy(now_ + 60ms, kOtherReply));
+    EXPECT_FALSE(guard_.is_copy(now_ + 60ms, "03 02 00 03"_hex));
+    EXPECT_FALSE(guard_.is_copy(now_ + CopyGuard::kLongest + 1ns, kReply));
+}
+
+TEST_F(CopyGuardTest, P1OneCopyTellsThatTheStationSpeaksTwiceAndHowLongItHasToBeLeftAlone) {
+    reply();
+    unasked(20ms, kReply);
+    EXPECT_TRUE(guard_.known());
+    EXPECT_GT(guard_.hold(), Duration(20ms));
+    EXPECT_LT(guard_.hold(), Duration(60ms));
+    reply();
+    unasked(80ms, kReply);
+    EXPECT_GT(guard_.hold(), Duration(80ms)) << "as long as the longest";
+    reply();
+    unasked(5ms, kReply);
+    EXPECT_GT(guard_.hold(), Duration(80ms));
+}
+
+TEST_F(CopyGuardTest, P1WhatOnlyHasTheShapeOfTheReplyHasToComeTwice) {
+    reply();
+    EXPECT_TRUE(guard_.is_second(now_ + 20ms, kOtherReply));
+    unasked(20ms, kOtherReply);
+    EXPECT_FALSE(guard_.known());
+    reply();
+    unasked(30ms, kOtherReply);
+    EXPECT_TRUE(guard_.known());
+    EXPECT_GT(guard_.hold(), Duration(30ms));
+}
+
+TEST_F(CopyGuardTest, WhatHasAnotherShapeOrComesLongAfterTeachesNothing) {
+    for (int i = 0; i < 5; ++i) {
+        reply();
+        EXPECT_FALSE(guard_.is_second(now_ + 20ms, kOfOtherShape));
+        unasked(20ms, kOfOtherShape);
+        unasked(CopyGuard::kLongest + 1ns, kReply);
+    }
+    EXPECT_FALSE(guard_.known());
+    EXPECT_EQ(guard_.hold(), Duration(0));
+}
+
+TEST_F(CopyGuardTest, IsForgottenSomeMinutesAfterItStopped) {
+    reply();
+    unasked(20ms, kReply);
+    const TimePoint last = now_;
+    while (now_ < last + CopyGuard::kForget - 1s) reply();
+    EXPECT_TRUE(guard_.known());
+    for (int i = 0; i < 3; ++i) reply();
+    EXPECT_FALSE(guard_.known());
+}
+
+TEST_F(CopyGuardTest, P1AnEqualAnswerToAnotherRequestIsSuspiciousForAMoment) {
+    reply();
+    EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
+    EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kRequest, kReply));
+    EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kOtherRequest, kOtherReply));
+    EXPECT_FALSE(guard_.suspicious(now_ + CopyGuard::kLongest + 1ns, kOtherRequest, kReply));
+}
+
+TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSpeaksTwice) {
+    reply();
+    for (int i = 0; i < CopyGuard::kConfirmations; ++i) {
+        EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
+        guard_.on_confirmed();
+    }
+    EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
+    unasked(20ms, kReply);
+    EXPECT_TRUE(guard_.suspicious(now_ + 30ms, kOtherRequest, kReply));
+}
+
+TEST_F(CopyGuardTest, ACopyIsThatOfTheLatestReplyThatItRepeats) {
+    reply();
+    guard_.on_reply(now_ + 200ms, kOtherRequest, kReply);
+    unasked(220ms, kReply);
+    EXPECT_TRUE(guard_.known());
+    EXPECT_LT(guard_.hold(), Duration(60ms));
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,32 @@
+#include "panelgate/arbiter/pace.hpp"
+
+#include <gtest/gtest.h>
+
+namespace panelgate::arbiter {
+namespace {
+
+constexpr bool kEarly = true;
+
+TEST(Pace, IsNotBelievedBeforeSomethingWasHeard) { EXPECT_FALSE(Pace().believed()); }
+
+TEST(Pace, IsBelievedAfterSomeRepliesInTimeNotAfterOne) {
+    Pace pace;
+    pace.on_reply(!kEarly);
+    EXPECT_FALSE(pace.believed());
+    for (int i = 0; i < 10; ++i) pace.on_reply(!kEarly);
+    EXPECT_TRUE(pace.believed());
+}
+
+TEST(Pace, P1OneReplyThatCameTooEarlySettlesIt) {
+    for (const int before : {0, 1, 100}) {
+        Pace pace;
+        for (int i = 0; i < before; ++i) pace.on_reply(!kEarly);
+        pace.on_reply(kEarly);
+        EXPECT_FALSE(pace.believed());
+        for (int i = 0; i < 1000; ++i) pace.on_reply(!kEarly);
+        EXPECT_FALSE(pace.believed());
+    }
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

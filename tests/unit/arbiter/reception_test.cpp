@@ -1,0 +1,104 @@
+#include "panelgate/arbiter/reception.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+constexpr TimePoint kNow{1h};
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+
+Settings at(int baud) {
+    Settings settings;
+    settings.serial.baud = baud;
+    return settings;
+}
+
+Job job_of(Bytes pdu, std::uint8_t station = 17) {
+    Job job;
+    job.station = station;
+    job.pdu = std::move(pdu);
+    return job;
+}
+
+Job stamped(const Settings& settings, Bytes pdu, std::uint8_t station = 17) {
+    Reception reception(settings);
+    Job job = job_of(std::move(pdu), station);
+    reception.stamp(kNow, job);
+    return job;
+}
+
+Duration room(const Job& job) { return job.deadline - job.start_by; }
+
+class ReceptionTest : public testing::Test {
+  protected:
+    void remember() { reception_.memory().store(*read_span(17, kRead), kReply, kNow); }
+    Reception reception_{Settings{}};
+};
+
+TEST_F(ReceptionTest, TicketsAreNeverUsedTwiceAlsoNotForAnswersFromMemory) {
+    remember();
+    Ticket last = 0;
+    for (int i = 0; i < 10; ++i) {
+        Job job = job_of(kRead);
+        reception_.stamp(kNow, job);
+        EXPECT_GT(job.ticket, last);
+        const auto hit = reception_.from_memory(kNow, job, 1s);
+        ASSERT_TRUE(hit);
+        EXPECT_GT(hit->ticket, job.ticket);
+        last = hit->ticket;
+    }
+}
+
+TEST_F(ReceptionTest, P3TheDeadlineCountsFromTheArrival) {
+    Settings settings;
+    settings.queue.deadline = 700ms;
+    const Job job = stamped(settings, kRead);
+    EXPECT_EQ(job.arrived, kNow);
+    EXPECT_EQ(job.deadline, kNow + 700ms);
+}
+
+TEST_F(ReceptionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByTheShortestReply) {
+    for (const int baud : {1200, 9600, 115200}) {
+        const Settings settings = at(baud);
+        const Job job = stamped(settings, kRead);
+        const Duration request = wire_time(settings.serial, kRead.size() + 3);
+        const Duration exception = wire_time(settings.serial, 5);
+        EXPECT_GE(room(job), request + silent_interval(settings.serial) + exception) << baud;
+        EXPECT_LE(room(job), 2 * (request + silent_interval(settings.serial) + exception)) << baud;
+    }
+}
+
+TEST_F(ReceptionTest, ALongerRequestHasToStartEarlier) {
+    const Bytes write = Writer().u8(0x10).u16(0).u16(100).u8(200).raw(Bytes(200)).take();
+    EXPECT_GT(room(stamped(at(9600), write)), room(stamped(at(9600), kRead)));
+    EXPECT_GT(room(stamped(at(1200), kRead)), room(stamped(at(9600), kRead)));
+}
+
+TEST_F(ReceptionTest, ABroadcastOnlyHasToLeaveInTime) {
+    const Bytes write = "06 00 6B 00 01"_hex;
+    const Settings settings = at(9600);
+    EXPECT_EQ(room(stamped(settings, write, 0)), wire_time(settings.serial, write.size() + 3));
+}
+
+TEST_F(ReceptionTest, P6MemoryAnswersOnlyReadsOfClientsAndWhereTheStationAllowsIt) {
+    remember();
+    Job job = job_of(kRead);
+    const auto hit = reception_.from_memory(kNow + 1s, job, 1s);
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->hit.pdu, kReply);
+    EXPECT_EQ(hit->hit.age, Duration(1s));
+    EXPECT_FALSE(reception_.from_memory(kNow, job, 0s));
+    EXPECT_FALSE(reception_.from_memory(kNow, job_of("06 00 6B 00 01"_hex), 1s));
+    EXPECT_FALSE(reception_.from_memory(kNow, job_of(kRead, 18), 1s));
+    job.priority = PriorityClass::poll;
+    EXPECT_FALSE(reception_.from_memory(kNow, job, 1s));
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

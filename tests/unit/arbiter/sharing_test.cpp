@@ -1,0 +1,136 @@
+#include "panelgate/arbiter/sharing.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+#include <vector>
+
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+#include "support/queue_fixture.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+Bytes registers(unsigned address, unsigned count) {
+    return Writer().u8(3).u16(address).u16(count).take();
+}
+
+class SharingTest : public test::QueueFixture {
+  protected:
+    /// One whose profile vouches for this many registers; 0: nobody does.
+    static Station station_that_takes(std::uint16_t count) {
+        StationSettings settings;
+        settings.id = 1;
+        settings.vouched = count > 0;
+        if (count > 0) settings.max_registers = count;
+        return {settings, OfflineSettings{}, true};
+    }
+    Group gather(const Bytes& leader) { return gather(leader, station_); }
+    Group gather(const Bytes& leader, const Station& station) {
+        return sharing_.gather(read_of(9, leader), station, queue_);
+    }
+    void wait(const Bytes& pdu) { EXPECT_TRUE(queue_.push(read_of(++client_, pdu)).taken); }
+
+    Sharing sharing_{true};
+    Station station_ = station_that_takes(125);
+    Client client_ = 100;
+};
+
+TEST_F(SharingTest, P6ContainedReadsComeAlongWhateverIsKnownOfTheStation) {
+    wait(registers(12, 3));
+    wait(registers(10, 10));
+    const Group group = gather(registers(10, 10), station_that_takes(0));
+    EXPECT_EQ(group.jobs.size(), 3u);
+    EXPECT_EQ(group.pdu, registers(10, 10));
+    EXPECT_FALSE(group.joined());
+    EXPECT_TRUE(queue_.empty());
+}
+
+TEST_F(SharingTest, P6ReadsThatTouchAreJoinedAlsoByOneThatLiesBetween) {
+    wait(registers(14, 2));
+    wait(registers(12, 2));
+    const Group group = gather(registers(10, 2));
+    EXPECT_EQ(group.jobs.size(), 3u);
+    EXPECT_EQ(group.pdu, registers(10, 6));
+    EXPECT_TRUE(group.joined());
+}
+
+TEST_F(SharingTest, P6NothingIsReadThatNobodyAskedFor) {
+    wait(registers(13, 2));
+    wait("04 00 0C 00 01"_hex);
+    wait("06 00 0A 00 01"_hex);
+    const Group group = gather(registers(10, 2));
+    EXPECT_EQ(group.jobs.size(), 1u);
+    EXPECT_EQ(group.pdu, registers(10, 2));
+    EXPECT_EQ(queue_.waiting(), 3u);
+}
+
+TEST_F(SharingTest, P6NoLongerReadIsMadeThanTheProfileVouchesForOrTheStationHasAnswered) {
+    const auto joined = [&](const Station& station) {
+        wait(registers(12, 2));
+        const std::size_t jobs = gather(registers(10, 2), station).jobs.size();
+        queue_.remove_if(test::any);
+        return jobs == 2;
+    };
+    EXPECT_FALSE(joined(station_that_takes(3)));
+    EXPECT_TRUE(joined(station_that_takes(4)));
+    Station station = station_that_takes(0);
+    EXPECT_FALSE(joined(station));
+    const Bytes reply = Writer().u8(3).u8(8).raw(Bytes(8)).take();
+    const TimePoint now{1h};
+    station.on_reply(now, test::answered(now, now, test::group_of(1, registers(50, 4)), reply), 5ms,
+                     5ms);
+    EXPECT_TRUE(joined(station));
+}
+
+TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
+    wait(registers(12, 2));
+    wait(registers(14, 2));
+    Group group = gather(registers(10, 2));
+    std::vector<Job> parts = sharing_.split(group);
+    EXPECT_TRUE(group.jobs.empty());
+    ASSERT_EQ(parts.size(), 3u);
+    for (Job& part : parts) {
+        EXPECT_TRUE(part.alone);
+        queue_.put_back(std::move(part));
+    }
+    EXPECT_EQ(gather(registers(10, 6)).jobs.size(), 1u) << "they are to go alone";
+    queue_.remove_if(test::any);
+    wait(registers(12, 2));
+    wait(registers(14, 2));
+    EXPECT_LT(gather(registers(10, 2)).jobs.size(), 3u) << "the whole was refused";
+}
+
+TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
+    wait(registers(10, 2));
+    wait(registers(12, 1));
+    Group group = gather(registers(10, 4));
+    const std::vector<Job> parts = sharing_.split(group);
+    EXPECT_EQ(parts.size(), 2u);
+    ASSERT_EQ(group.jobs.size(), 1u);
+    EXPECT_EQ(group.jobs[0].pdu, registers(10, 4));
+    for (const Job& part : parts) wait(part.pdu);
+    EXPECT_EQ(gather(registers(10, 4)).jobs.size(), 3u) << "no join was refused";
+}
+
+TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
+    sharing_ = Sharing(false);
+    wait(registers(10, 2));
+    const Group group = gather(registers(10, 2));
+    EXPECT_EQ(group.jobs.size(), 1u);
+    EXPECT_EQ(group.pdu, registers(10, 2));
+}
+
+TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {
+    wait(registers(12, 1));
+    const Group group = gather(registers(10, 2));
+    const Bytes reply = "03 06 00 0A 00 0B 00 0C"_hex;
+    EXPECT_EQ(Sharing::part_for(group, reply, group.jobs[0]), "03 04 00 0A 00 0B"_hex);
+    EXPECT_EQ(Sharing::part_for(group, reply, group.jobs[1]), "03 02 00 0C"_hex);
+    for (const Job& job : group.jobs)
+        EXPECT_EQ(Sharing::part_for(group, "83 06"_hex, job), "83 06"_hex);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,168 @@
+#include "panelgate/arbiter/station.hpp"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::group_of;
+
+constexpr std::uint8_t kId = 17;
+constexpr Duration kTimeout = 500ms;
+const Bytes kRead = "03 00 6B 00 01"_hex;
+const Bytes kOther = "03 00 00 00 01"_hex;
+const Bytes kLong = "03 00 00 00 03"_hex;
+const Bytes kWrite = "06 00 6B 00 01"_hex;
+const Bytes kReply = "03 02 02 2B"_hex;
+const Bytes kLongReply = "03 06 00 01 00 02 00 03"_hex;
+
+Station station(bool listed) { return {StationSettings{}, OfflineSettings{}, listed}; }
+
+class StationTest : public testing::Test {
+  protected:
+    /// A request left 30 ms ago, and this answers it now.
+    void answer(Group group, const Bytes& reply) {
+        now_ += 1s;
+        const auto attempt = test::answered(now_ - 30ms, now_, std::move(group), reply);
+        station_.on_reply(now_, attempt, 30ms, 25ms);
+    }
+    void answer(const Bytes& request, const Bytes& reply) { answer(group_of(kId, request), reply); }
+    /// A request was waited for in vain.
+    void miss(const Bytes& request, Verdict verdict = Verdict::silent) {
+        const TimePoint sent = now_;
+        now_ += kTimeout;
+        station_.on_failed(now_, verdict, kTimeout);
+        station_.owe(now_, request, sent);
+    }
+    Duration patience(const Bytes& request) const {
+        return station_.patience(group_of(kId, request), std::nullopt, false);
+    }
+
+    Station station_ = station(true);
+    TimePoint now_{1h};
+};
+
+TEST_F(StationTest, P1WhatOwesAReplyMayOnlyBeAskedTheVerySameUntilItHasRested) {
+    EXPECT_TRUE(station_.may_ask(now_, kOther));
+    miss(kRead);
+    const TimePoint rested = station_.rested();
+    EXPECT_GE(rested, now_ + kTimeout) << "so much later it may still come";
+    EXPECT_TRUE(station_.may_ask(now_, kRead));
+    EXPECT_FALSE(station_.may_ask(rested - 1ns, kOther));
+    station_.on_asked(rested - 1ns, group_of(kId, kRead));
+    EXPECT_TRUE(station_.owes());
+    EXPECT_TRUE(station_.may_ask(rested, kOther));
+    station_.on_asked(rested, group_of(kId, kOther));
+    EXPECT_FALSE(station_.owes()) << "it has lapsed";
+}
+
+TEST_F(StationTest, P1EachAttemptIsOwedAReplyAndTheLastOneThatComesEndsTheRest) {
+    miss(kRead);
+    miss(kRead);
+    answer(group_of(kId, kRead, 3), kReply);  // nobody knows to which of the three
+    const auto first = station_.on_stray_frame(now_ + 10ms, kReply);
+    EXPECT_EQ(first.stray, Stray::late);
+    EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
+    EXPECT_FALSE(first.settled);
+    EXPECT_FALSE(station_.may_ask(now_ + 10ms, kOther));
+    const auto second = station_.on_stray_frame(now_ + 20ms, kReply);
+    EXPECT_EQ(second.stray, Stray::late);
+    EXPECT_TRUE(second.settled);
+    EXPECT_FALSE(station_.owes());
+    EXPECT_TRUE(station_.may_ask(now_ + 20ms, kOther));
+}
+
+TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
+    const TimePoint sent = now_;
+    miss(kRead);
+    EXPECT_TRUE(station_.doubtful(TimePoint{}));
+    EXPECT_TRUE(station_.doubtful(sent));
+    EXPECT_FALSE(station_.doubtful(sent + 1ns));
+    const TimePoint rested = station_.rested();
+    now_ = rested + 1h;
+    station_.on_proved(now_, sent - 1ns);
+    EXPECT_EQ(station_.rested(), rested) << "that one had left before";
+    station_.on_proved(now_, sent + 1ns);
+    EXPECT_GE(station_.rested(), now_ + kTimeout) << "it may have reached the station only now";
+}
+
+TEST_F(StationTest, P1AReadOfAnotherShapeThatIsAnsweredShowsThatNothingIsOwed) {
+    miss(kLong, Verdict::damaged);
+    EXPECT_TRUE(station_.settling_pdu().empty()) << "nothing is known that it answers";
+    answer(kRead, kReply);
+    answer(kLong, kLongReply);
+    miss(kRead, Verdict::damaged);
+    EXPECT_EQ(station_.settling_pdu(), kLong);
+    Group settling = group_of(kId, kLong);
+    settling.settles = true;
+    answer(settling, "83 02"_hex);
+    EXPECT_TRUE(station_.owes()) << "the exception may be that to what is owed";
+    answer(settling, kLongReply);
+    EXPECT_FALSE(station_.owes());
+    EXPECT_TRUE(station_.may_ask(now_, kOther));
+}
+
+TEST_F(StationTest, TellsWhatAFrameIsThatNobodyWaitsForAndChangesNothingByThat) {
+    EXPECT_EQ(station_.judge(now_, kReply), Stray::unasked);
+    answer(kRead, kReply);
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_EQ(station_.judge(now_ + 20ms, kReply), Stray::copy);
+        EXPECT_EQ(station_.judge(now_ + 20ms, "03 02 00 00"_hex), Stray::second);
+        EXPECT_EQ(station_.judge(now_ + 20ms, kLongReply), Stray::unasked);
+        EXPECT_EQ(station_.judge(now_ + 1min, kReply), Stray::unasked);
+    }
+    miss(kLong);
+    EXPECT_EQ(station_.judge(now_, kLongReply), Stray::late);
+    EXPECT_EQ(station_.judge(now_, kLongReply), Stray::late);
+    EXPECT_TRUE(station_.owes());
+}
+
+TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHasEverNeeded) {
+    answer(kRead, kReply);
+    EXPECT_EQ(patience(kRead), kTimeout);
+    EXPECT_TRUE(station_.may_retry(group_of(kId, kRead)));
+    EXPECT_FALSE(station_.may_retry(group_of(kId, kWrite)));
+    station_.on_given_up(now_, Fault::timeout);
+    EXPECT_TRUE(station_.suspect());
+    EXPECT_FALSE(station_.may_retry(group_of(kId, kRead)));
+    EXPECT_GE(patience(kRead), Duration(30ms));
+    EXPECT_LT(patience(kRead), kTimeout / 2);
+    answer(kRead, kReply);
+    EXPECT_FALSE(station_.suspect());
+    EXPECT_EQ(patience(kRead), kTimeout);
+}
+
+TEST_F(StationTest, P4OneThatKeepsFailingWithoutBeingSilentHasAFifthOfTheBus) {
+    for (int i = 0; i < 2 * Station::kFailing; ++i) {
+        station_.on_failed(now_, Verdict::damaged, 100ms);
+        EXPECT_FALSE(station_.on_given_up(now_, Fault::damaged));
+    }
+    EXPECT_TRUE(station_.failing());
+    station_.on_failed(now_, Verdict::damaged, 100ms);
+    EXPECT_FALSE(station_.may_spend(now_ + 399ms));
+    EXPECT_TRUE(station_.may_spend(now_ + 401ms));
+    EXPECT_FALSE(station_.may_retry(group_of(kId, kRead)));
+    answer(kRead, kReply);
+    EXPECT_FALSE(station_.failing());
+}
+
+TEST_F(StationTest, OnlyAStrangerIsForgottenWhenNobodyHasAskedForItForAMinute) {
+    Station stranger = station(false);
+    stranger.on_asked(now_, group_of(kId, kRead));
+    station_.on_asked(now_, group_of(kId, kRead));
+    EXPECT_FALSE(stranger.forgettable(now_ + Station::kForgetStranger - 1ns));
+    EXPECT_TRUE(stranger.forgettable(now_ + Station::kForgetStranger));
+    EXPECT_FALSE(station_.forgettable(now_ + 1h));
+    stranger.owe(now_, kRead, now_);
+    EXPECT_FALSE(stranger.forgettable(now_ + 1h)) << "it owes something";
+    stranger.on_stray_frame(now_ + 1s, kReply);
+    EXPECT_FALSE(stranger.forgettable(now_ + 1h)) << "it was heard";
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
