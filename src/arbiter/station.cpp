@@ -50,6 +50,7 @@ void Station::on_proved(TimePoint now, TimePoint sent) {
 
 void Station::on_asked(TimePoint now, const Group& group) {
     if (now >= not_before_) owed_.clear();
+    if (!owes()) damaged_ = false;
     asked_ = now;
     if (group.span) last_read_ = group.pdu;
 }
@@ -149,7 +150,7 @@ void Station::remember_read(const ReadSpan& span, const Bytes& pdu) {
 
 Bytes Station::settling_pdu() const {
     // A second copy of what is owed would come behind it all the same.
-    if (!owes() || !audible_ || copies_.known() || cheapest_read_.empty()) return {};
+    if (!owes() || !audible_ || damaged_ || copies_.known() || cheapest_read_.empty()) return {};
     if (tells_apart(cheapest_read_, owed_pdu_)) return cheapest_read_;
     if (!other_read_.empty() && tells_apart(other_read_, owed_pdu_)) return other_read_;
     auto part = read_span(0, cheapest_read_);
@@ -161,7 +162,9 @@ Bytes Station::settling_pdu() const {
 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
-    audible_ = verdict != Verdict::silent;
+    audible_ = false;
+    // Some say a damaged reply once more, behind what else they have been asked since.
+    damaged_ = damaged_ || verdict != Verdict::silent;
     if (health_.offline()) ++probes_;
     if (failing()) budget_.spend(now, cost);
 }
@@ -186,7 +189,7 @@ Duration Station::short_wait(std::optional<Duration> line) const {
     const std::optional<Duration> own = slowest();
     const Duration whole = settings_.response_timeout;
     if (!own && !line) return whole;
-    return std::min(whole, std::max<Duration>(20ms, 3 * (own ? *own : *line) + 10ms));
+    return std::min(whole, std::max<Duration>(20ms, (own ? *own : *line) * 3 / 2 + 8ms));
 }
 
 Duration Station::patience(const Group& group, std::optional<Duration> line, bool hurry) const {

@@ -168,6 +168,7 @@ class Station {
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};
+    bool damaged_ = false;  ///< one of those that are owed has come, but was damaged
     bool audible_ = false;  ///< what came last of it, in answer to a request, was a sound
     Bytes cheapest_read_;   ///< that it has answered
     Bytes other_read_;      ///< ... and one whose reply has another shape
