@@ -116,6 +116,8 @@ TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatThe
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
     attempt_.hold_reply(60ms);
     Attempt other = attempt_;
+    EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
+    EXPECT_EQ(attempt_.on_deadline(attempt_.timing().sent + 60ms - 1ns, ends_), Verdict::open);
     EXPECT_EQ(run_to_verdict(), Verdict::replied);
     EXPECT_EQ(ended_, Duration(60ms));
     EXPECT_EQ(attempt_.reply(), kReply);
