@@ -299,7 +299,7 @@ void Arbiter::start(TimePoint now, Group group) {
     timing.confirm_end = confirm_ends_;
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
-        station.on_asked(now, group);
+        station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));
         if (group.attempts == 1)
             group.first_silence = !station.suspect() && !station.health().offline();
         timing.patience = stations_.patience(now, group) + latency_;

@@ -48,8 +48,8 @@ void Station::on_proved(TimePoint now, TimePoint sent) {
     not_before_ = std::max(not_before_, now + settings_.response_timeout + late_.value());
 }
 
-void Station::on_asked(TimePoint now, const Group& group) {
-    if (now >= not_before_) owed_.clear();
+void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
+    if (now >= not_before_ && !held_back) owed_.clear();
     if (!owes()) damaged_ = false;
     asked_ = now;
     if (group.span) last_read_ = group.pdu;

@@ -47,7 +47,8 @@ class Station {
         return now >= not_before_ || (owes() && pdu == owed_pdu_);
     }
     /// A request goes there, and what was owed before has lapsed if it could not come any more.
-    void on_asked(TimePoint now, const Group& group);
+    /// `held_back`: it may still be on its way, whatever the time.
+    void on_asked(TimePoint now, const Group& group, bool held_back = false);
     /// It owes a reply to a request that nothing proves to have passed: none that was sent later
     /// than `proved` has been answered since.
     bool doubtful(TimePoint proved) const { return owes() && owed_.back() >= proved; }
