@@ -236,7 +236,9 @@ Attempt Arbiter::take_active(TimePoint now) {
     ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
         ledger_.event(Kind::echo, attempt.group().station);
-    if (const auto noise = attempt.early_noise())
+    // Where a reply may come before the request has left, early bytes tell nothing.
+    const bool keeps_pace = settings_.paced || pace_.believed();
+    if (const auto noise = attempt.early_noise(); noise && keeps_pace)
         stations_.on_trail(*noise, strays_.replied_before());
     strays_.hear(attempt.release_echo());
     return attempt;

@@ -201,9 +201,11 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
     if (health_.offline() && !slowest()) {
-        // Nobody knows how long it needs: one probe after the other waits twice as long.
+        // Nobody knows how long it needs: now and then one waits longer, and longer each time.
+        constexpr int kOneIn = 4;
         constexpr int kDoublings = 6;
-        return std::min(whole, short_wait(line) * (1 << (probes_ % kDoublings)));
+        const int longer = probes_ % kOneIn == kOneIn - 1 ? 1 + probes_ / kOneIn % kDoublings : 0;
+        return std::min(whole, short_wait(line) * (1 << longer));
     }
     if (health_.offline() || suspect() || stranger()) return short_wait(line);
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.

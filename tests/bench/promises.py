@@ -146,8 +146,10 @@ Reads = namedtuple("Reads", "answers_a_transaction registers_a_second")
 
 
 def reads_of_one_station(tools, folder, baud, starts, seconds=2):
-    """P6: one client for each start, that reads ten registers of station 1 from there."""
+    """P6: one client for each start, that reads ten registers of station 1 from there. Station 1
+    has shown before that it answers reads of 80 registers: else nothing is joined."""
     async def ask(clients):
+        await clients[0].ask(1, read_registers(0, 80))
         begin = time.monotonic()
         await asyncio.gather(*(c.ask_until(begin + seconds, lambda a=s: (1, read_registers(a, 10)))
                                for c, s in zip(clients, starts)))
