@@ -72,7 +72,9 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     // Panels serve in turn: it is the oldest one that is owed.
     const TimePoint asked = answered_request(now);
     const TimePoint due = asked + settings_.response_timeout;
-    slowest_ = std::max(slowest_.value_or(0s), now - asked);
+    // Behind a wait that was cut short it tells how long the panel needs; what was held up for
+    // longer than the whole timeout does not.
+    if (now <= due) slowest_ = std::max(slowest_.value_or(0s), now - asked);
     owed_.pop_front();
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
