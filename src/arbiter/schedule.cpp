@@ -19,21 +19,22 @@ bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, 
     return false;
 }
 
-Group probe_of(std::uint8_t station, const Stations& stations) {
+/// A read that no client asked for.
+Group read_for_nobody(std::uint8_t station, Bytes pdu) {
     Group group;
     group.station = station;
-    group.pdu = stations.find(station)->probe_pdu();
-    group.span = read_span(station, group.pdu);
+    group.span = read_span(station, pdu);
+    group.pdu = std::move(pdu);
     return group;
 }
 
-/// For somebody who waits for a station that rests only because of what it may still say.
-Group settling(std::uint8_t id, const Station& station) {
-    Group group;
-    group.station = id;
-    group.pdu = station.settling_pdu();
-    group.span = read_span(id, group.pdu);
-    group.settles = true;
+/// P8: nobody knows yet whether this line hears itself, and this job could be confirmed by its own
+/// echo. A read of the same station tells.
+Group learning_for(const Job& job, const Station& station) {
+    Bytes pdu = station.probe_pdu();
+    if (!teaches_echo(pdu)) pdu = modbus::encode_read(modbus::Table::holding_registers, 0, 1);
+    Group group = read_for_nobody(job.station, std::move(pdu));
+    group.learns_for = job.ticket;
     return group;
 }
 
@@ -85,7 +86,7 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     if (now < quiet.quarantined_until()) return std::nullopt;
     const auto station = stations.next_to_probe(now);
     if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = probe_of(*station, stations);
+    Group group = read_for_nobody(*station, stations.find(*station)->probe_pdu());
     group.probe = true;
     return group;
 }
@@ -114,21 +115,18 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
     const Station* asked = stations.find(next->station);
-    if (asked != nullptr && now < asked->rested()) return {settling(next->station, *asked), false};
+    if (asked != nullptr && now < asked->rested()) {
+        // It rests only because of what it may still say.
+        Group group = read_for_nobody(next->station, asked->settling_pdu());
+        group.settles = true;
+        return {std::move(group), false};
+    }
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
         return {std::nullopt, true};
     other_first_ = false;
     if (!broadcast && echo.must_be_learned_before(next->pdu, next->ticket == learned_for_)) {
-        // P8: nobody knows yet whether this line hears itself, and what is next could be confirmed
-        // by its own echo. A read of the same station tells.
-        stations.of(next->station);
-        Group group = probe_of(next->station, stations);
-        if (!teaches_echo(group.pdu)) {
-            group.pdu = modbus::encode_read(modbus::Table::holding_registers, 0, 1);
-            group.span = read_span(group.station, group.pdu);
-        }
-        learned_for_ = group.learns_for = next->ticket;
-        return {std::move(group), false};
+        learned_for_ = next->ticket;
+        return {learning_for(*next, stations.of(next->station)), false};
     }
     Job job = *backlog_.queue().pop(test);
     if (broadcast) {

@@ -70,9 +70,13 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(client.ask(1, read_registers(9)), holding(9))  # all is quiet again
             self.assertEqual([f.bytes for f in bus.frames(2)], [harness.rtu(2, write_register(4, 5))])
 
-    def test_other_clients_wait_for_one_timeout_at_most(self):
-        with gateway_and_bus({1: echo_address}) as (program, bus), contextlib.ExitStack() as stack:
-            patient, *others = [stack.enter_context(program.client()) for _ in range(4)]
+    OTHERS = 3
+
+    def ask_beside_a_silent_one(self, program, bus):
+        """One client asks the silent station, others a good one; the frames from then on."""
+        with contextlib.ExitStack() as stack:
+            patient, *others = [stack.enter_context(program.client())
+                                for _ in range(1 + self.OTHERS)]
             patient.send(2, read_registers(0))
             bus.wait_for(1, station=2)
             for address, other in enumerate(others, 20):
@@ -80,25 +84,20 @@ class SilentStation(unittest.TestCase):
             self.assertEqual(patient.receive()[2], fault(3, NO_REPLY))
             for address, other in enumerate(others, 20):
                 self.assertEqual(other.receive()[2], holding(2 * address))
-            frames = bus.frames()[1:]
+            return bus.frames()[1:]
+
+    def test_other_clients_wait_for_one_timeout_at_most(self):
+        with gateway_and_bus({1: echo_address}) as (program, bus):
+            frames = self.ask_beside_a_silent_one(program, bus)
             order = [f.bytes[0] for f in frames]
             self.assertEqual(order[:2], [2, 1])  # a retry lets one other go first
-            self.assertEqual(sorted(order), [1] * len(others) + [2] * (RETRIES + 1))
+            self.assertEqual(sorted(order), [1] * self.OTHERS + [2] * (RETRIES + 1))
             self.assertGreaterEqual(frames[1].at - frames[0].at, TIMEOUT * 5 / 6)
 
     def test_P1_where_the_line_rests_all_wait_until_no_late_reply_can_come(self):
-        with gateway_and_bus({1: echo_address}, "quarantine: line") as (program, bus), \
-                contextlib.ExitStack() as stack:
-            patient, *others = [stack.enter_context(program.client()) for _ in range(4)]
-            patient.send(2, read_registers(0))
-            bus.wait_for(1, station=2)
-            for address, other in enumerate(others, 20):
-                other.send(1, read_registers(2 * address))
-            self.assertEqual(patient.receive()[2], fault(3, NO_REPLY))
-            for address, other in enumerate(others, 20):
-                self.assertEqual(other.receive()[2], holding(2 * address))
-            frames = bus.frames()[1:]
-            self.assertEqual([f.bytes[0] for f in frames], [2] * (RETRIES + 1) + [1] * len(others))
+        with gateway_and_bus({1: echo_address}, "quarantine: line") as (program, bus):
+            frames = self.ask_beside_a_silent_one(program, bus)
+            self.assertEqual([f.bytes[0] for f in frames], [2] * (RETRIES + 1) + [1] * self.OTHERS)
             last_attempt, first_other = frames[RETRIES:RETRIES + 2]
             self.assertGreaterEqual(first_other.at - last_attempt.at, TIMEOUT * 5 / 6)
 

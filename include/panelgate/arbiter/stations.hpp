@@ -52,7 +52,6 @@ class Stations {
     std::optional<TimePoint> next_probe() const;
     /// Drops the strangers that nobody has asked for lately.
     void forget_strangers(TimePoint now);
-    std::size_t size() const { return stations_.size(); }
 
   private:
     OfflineSettings offline_;
