@@ -7,7 +7,7 @@
 namespace panelgate::scenario {
 
 std::string not_caught(const Mutant& mutant) {
-    constexpr std::uint64_t kSeeds = 60;
+    constexpr std::uint64_t kSeeds = 400;
     std::string others;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
         Plan plan = draw(mutant.kind, seed);
