@@ -76,6 +76,7 @@ void Arbiter::on_line_up(TimePoint now) {
     resetting_ = false;
     proved_ = now;
     quiet_.on_open(now);
+    stations_.on_back();
     pace_ = {};
     echo_memory_.forget();
     step(now);
@@ -170,7 +171,9 @@ void Arbiter::settle(TimePoint now) {
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
-    if (group.silent_after == Duration::zero()) stations_.on_reply(needed);
+    const bool tells = group.silent_after == Duration::zero();
+    stations_.on_reply(now, tells ? std::optional(needed) : std::nullopt);
+    if (replied.back) stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
     proved_ = std::max(proved_, attempt.timing().started);
     strays_.on_replied(group.station);

@@ -74,7 +74,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     const TimePoint due = asked + settings_.response_timeout;
     // Behind a wait that was cut short it tells how long the panel needs; what was held up for
     // longer than the whole timeout does not.
-    if (now <= due) slowest_ = std::max(slowest_.value_or(0s), now - asked);
+    if (now <= due) slowest_.add(now - asked);
     owed_.pop_front();
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
@@ -94,7 +94,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     failed_in_a_row_ = 0;
     budget_.clear();
     // What answers a retry may be the reply to the attempt before: it tells nothing.
-    if (group.silent_after == Duration::zero()) slowest_ = std::max(slowest_.value_or(0s), waited);
+    if (group.silent_after == Duration::zero()) slowest_.add(waited);
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();

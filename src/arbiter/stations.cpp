@@ -36,7 +36,7 @@ Duration Stations::gap(std::uint8_t id) const {
 }
 
 Duration Stations::patience(TimePoint now, const Group& group) {
-    return of(group.station).patience(group, slowest_, now < hurry_until_);
+    return of(group.station).patience(group, slowest(), now < hurry_until_);
 }
 
 bool Stations::may_spend(TimePoint now, std::uint8_t id) const {
@@ -53,7 +53,7 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     Station& station = of(job.station);
     if (!station.health().offline()) return false;
     const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
-    return !may_wake || !probes_.allows(now) || !station.take_half_open(now);
+    return !may_wake || !probes().allows(now) || !station.take_half_open(now);
 }
 
 StationHealth Stations::health(std::uint8_t id) const {
@@ -71,6 +71,7 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Durati
     station.on_failed(now, verdict, cost);
     if (station.health().offline()) {
         probes_.spend(now, cost);
+        alone_.spend(now, cost);
     } else if (station.suspect()) {
         suspects_.spend(now, cost);
     } else if (verdict == Verdict::silent) {
@@ -95,12 +96,20 @@ std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
 
 std::optional<TimePoint> Stations::next_probe() const {
     std::optional<TimePoint> next;
+    const TimePoint allowed = probes().next();
     for (const auto& [id, station] : stations_) {
         if (!station.health().offline() || station.stranger()) continue;
-        const TimePoint due = std::max(station.probe_due(), probes_.next());
+        const TimePoint due = std::max(station.probe_due(), allowed);
         if (!next || due < *next) next = due;
     }
     return next;
+}
+
+bool Stations::anyone_online() const {
+    return std::ranges::any_of(stations_, [](const auto& entry) {
+        const StationHealth& health = entry.second.health();
+        return !health.offline() && health.last_success();
+    });
 }
 
 void Stations::forget_strangers(TimePoint now) {

@@ -70,7 +70,10 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
             stations.of(part.station).on_stray_frame(heard_at, pdu_of(part.bytes));
         ledger.on_stray(now, part, part_of(heard.stray), quiet.station(), heard.lateness);
         if (heard.stray == Stray::late) ledger.event(Kind::late, part.station, heard.lateness);
-        if (heard.back) ledger.event(Kind::online, part.station);
+        if (heard.back) {
+            stations.on_back();
+            ledger.event(Kind::online, part.station);
+        }
         if (heard.settled) quiet.lift(part.station);
     }
 }

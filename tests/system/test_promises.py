@@ -64,10 +64,12 @@ class Promises(PacedBus):
                       end="")
                 self.assertGreater(gaps.count, 10)
                 self.assertLessEqual(gaps.median, 0.101)
+                self.assertGreaterEqual(gaps.median, 0.1)
                 self.assertEqual((stats["gap_violations"], stats["collisions"]), (0, 0))
                 return (gaps.shortest,)
             # When the bus wakes up late for the broadcast, the gap behind it looks shorter.
-            self.assertGreaterEqual(best_of_three(shortest, 0.1)[0], 0.1)
+            least = 0.1 - 150e-6
+            self.assertGreaterEqual(best_of_three(shortest, least)[0], least)
 
     def test_P6_many_equal_readers_cost_as_one(self):
         # A wave: all have their answer from one transaction, ask again at once, and are all there

@@ -10,6 +10,8 @@ class ProbeBudget {
   public:
     /// Of stations that are offline, together (P4: at most 5 %, aiming at 3 %).
     static constexpr double kOffline = 0.03;
+    /// ... for the time in which an outage of all has only just begun: a network may have hung.
+    static constexpr double kAlone = 0.5;
     /// Of stations that have just fallen silent, together; and of each one that keeps failing.
     static constexpr double kFailing = 0.2;
 

@@ -10,6 +10,7 @@
 #include "panelgate/arbiter/late_window.hpp"
 #include "panelgate/arbiter/probe_budget.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
@@ -125,10 +126,10 @@ class Station {
     /// How long the next attempt waits for its reply to begin. `line`: the longest think time of
     /// all stations of the line so far; `hurry`: others have just fallen silent, and waited for.
     Duration patience(const Group& group, std::optional<Duration> line, bool hurry) const;
-    /// What it has ever needed, and some more; at most its response timeout.
+    /// What it has needed, and some more; at most its response timeout.
     Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
     /// ... and not more than that, but for what a receiver holds back.
-    Duration needed() const { return slowest_.value_or(settings_.response_timeout) + 10ms; }
+    Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }
     Bytes probe_pdu() const;
     /// The longest read of this function that it has answered; items.
@@ -139,7 +140,7 @@ class Station {
         const bool copies = copies_.hold() > Duration::zero() && copies_.hold() <= Trail::kLongest;
         return std::max(trail_.until(), copies ? copies_.rest_until() : TimePoint{});
     }
-    std::optional<Duration> slowest() const { return slowest_; }
+    std::optional<Duration> slowest() const { return slowest_.value(); }
 
     static constexpr int kFailing = 2;  ///< transactions in a row
     static constexpr Duration kForgetStranger = 60s;
@@ -175,7 +176,7 @@ class Station {
     Bytes other_read_;      ///< ... and one whose reply has another shape
     Bytes last_read_;       ///< what to probe with before it has answered any
     std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
-    std::optional<Duration> slowest_;  ///< from request to first sign of the reply, ever
+    Slowest slowest_;                              ///< from request to first sign of the reply
     int failed_in_a_row_ = 0;
     bool trail_told_ = false;
     int probes_ = 0;  ///< in vain, since it was heard last

@@ -5,6 +5,7 @@
 
 #include "panelgate/arbiter/probe_budget.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/arbiter/station.hpp"
 
 namespace panelgate::arbiter {
@@ -22,7 +23,7 @@ class Stations {
     /// The silence that this station wants in front of a request and behind its reply.
     Duration gap(std::uint8_t id) const;
     /// The longest that any station of the line has needed.
-    std::optional<Duration> slowest() const { return slowest_; }
+    std::optional<Duration> slowest() const { return slowest_.value(); }
     /// Bytes of nobody behind this station's reply.
     void on_trail(TimePoint now, std::uint8_t id) {
         const auto found = stations_.find(id);
@@ -32,7 +33,14 @@ class Stations {
     void on_proved(TimePoint now, TimePoint sent) {
         for (auto& [id, station] : stations_) station.on_proved(now, sent);
     }
-    void on_reply(Duration waited) { slowest_ = std::max(slowest_.value_or(waited), waited); }
+    /// One was offline and answers again, or the line is open again: what ailed it may have ailed
+    /// others, which are asked at once.
+    void on_back() { probes_.clear(); }
+    /// `waited` from request to first sign; nothing: that cannot be told.
+    void on_reply(TimePoint now, std::optional<Duration> waited) {
+        heard_ = now;
+        if (waited) slowest_.add(*waited);
+    }
 
     StationHealth health(std::uint8_t id) const;
     Duration response_timeout(std::uint8_t id) const;
@@ -54,14 +62,25 @@ class Stations {
     void forget_strangers(TimePoint now);
 
   private:
+    bool anyone_online() const;
+    /// What those that are offline may take: more while an outage of all has only just begun.
+    const ProbeBudget& probes() const {
+        const bool all_just_died = !anyone_online() && alone_.next() < heard_ + kOutage;
+        return all_just_died ? alone_ : probes_;
+    }
+
+    static constexpr Duration kOutage = 30s;
+
     OfflineSettings offline_;
     StationSettings unlisted_;
     Duration standard_gap_;
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     ProbeBudget probes_{ProbeBudget::kOffline};
+    ProbeBudget alone_{ProbeBudget::kAlone};
     ProbeBudget suspects_{ProbeBudget::kFailing};
-    std::optional<Duration> slowest_;
+    Slowest slowest_;
+    TimePoint heard_{};        ///< any of them
     TimePoint hurry_until_{};  ///< one has just been waited for in vain: the next ones are not
 };
 

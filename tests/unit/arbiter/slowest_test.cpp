@@ -1,0 +1,26 @@
+#include "panelgate/arbiter/slowest.hpp"
+
+#include <gtest/gtest.h>
+
+namespace panelgate::arbiter {
+namespace {
+
+TEST(Slowest, KnowsNothingAtFirst) { EXPECT_EQ(Slowest().value(), std::nullopt); }
+
+TEST(Slowest, IsTheLongest) {
+    Slowest slowest;
+    for (const Duration seen : {3ms, 9ms, 5ms}) slowest.add(seen);
+    EXPECT_EQ(slowest.value(), 9ms);
+}
+
+TEST(Slowest, RemembersForAWindowAndForgetsAfterTwo) {
+    Slowest slowest;
+    slowest.add(400ms);
+    for (int i = 0; i < Slowest::kWindow; ++i) slowest.add(2ms);
+    EXPECT_EQ(slowest.value(), 400ms);
+    for (int i = 0; i < Slowest::kWindow; ++i) slowest.add(2ms);
+    EXPECT_EQ(slowest.value(), 2ms);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

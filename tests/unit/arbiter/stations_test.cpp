@@ -1,0 +1,79 @@
+#include "panelgate/arbiter/stations.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+const Bytes kRead = "03 00 6B 00 01"_hex;
+const Bytes kReply = "03 02 02 2B"_hex;
+
+constexpr std::array<std::uint8_t, 3> kIds{1, 2, 3};
+
+Settings three_stations() {
+    Settings settings;
+    for (const std::uint8_t id : kIds) {
+        StationSettings station;
+        station.id = id;
+        settings.stations.push_back(station);
+    }
+    return settings;
+}
+
+class StationsTest : public testing::Test {
+  protected:
+    void answer(std::uint8_t id) {
+        now_ += 1s;
+        const auto attempt = test::answered(now_ - 30ms, now_, test::group_of(id, kRead), kReply);
+        stations_.on_reply(now_, 30ms);
+        if (stations_.of(id).on_reply(now_, attempt, 30ms, 25ms).back) stations_.on_back();
+    }
+    /// It has failed until it is offline; the attempts cost so much each.
+    void kill(std::uint8_t id, Duration cost) {
+        for (int i = 0; i < 10; ++i) {
+            now_ += cost;
+            stations_.on_failed(now_, id, Verdict::silent, cost);
+            stations_.of(id).on_given_up(now_, Fault::timeout);
+        }
+        ASSERT_TRUE(stations_.health(id).offline());
+    }
+    Duration wait_for_probe() const { return *stations_.next_probe() - now_; }
+
+    Stations stations_{three_stations()};
+    TimePoint now_{1h};
+};
+
+TEST_F(StationsTest, P4ProbesTakeThreePercentOfALineOnWhichOthersAnswer) {
+    answer(1);
+    kill(2, 500ms);
+    EXPECT_GE(wait_for_probe(), 15s);
+}
+
+TEST_F(StationsTest, P4WhereAllHaveJustFallenSilentProbesGoOn) {
+    for (const std::uint8_t id : kIds) answer(id);
+    for (const std::uint8_t id : kIds) kill(id, 300ms);
+    EXPECT_LE(wait_for_probe(), 1s);
+}
+
+TEST_F(StationsTest, P4WhereAllAreSilentForLongTheyTakeThreePercent) {
+    for (const std::uint8_t id : kIds) answer(id);
+    now_ += 1min;
+    for (const std::uint8_t id : kIds) kill(id, 500ms);
+    EXPECT_GE(wait_for_probe(), 15s);
+}
+
+TEST_F(StationsTest, P4WhenOneIsBackTheOthersAreAskedAtOnce) {
+    for (const std::uint8_t id : kIds) answer(id);
+    for (const std::uint8_t id : kIds) kill(id, 800ms);
+    answer(2);
+    now_ += OfflineSettings{}.probe_max;
+    EXPECT_LE(wait_for_probe(), 0s);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
