@@ -77,6 +77,7 @@ void Arbiter::on_line_up(TimePoint now) {
     proved_ = now;
     quiet_.on_open(now);
     stations_.on_back();
+    if (settings_.may_stall) stations_.on_proved(now, now);
     pace_ = {};
     echo_memory_.forget();
     step(now);
@@ -162,7 +163,11 @@ void Arbiter::settle(TimePoint now) {
     const bool early = active_->replied_early();
     const bool too_early = early && !settings_.paced && pace_.believed();
     if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
-    if (station.may_be_copy(now, *active_)) return active_->hold_reply(station.needed());
+    if (station.may_be_copy(now, *active_)) {
+        const bool again = station.repeats_itself(now, *active_) &&
+                           active_->group().attempts == 1 && station.may_retry(active_->group());
+        return active_->hold_reply(station.needed(), again);
+    }
     pace_.on_reply(early);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();

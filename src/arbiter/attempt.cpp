@@ -160,6 +160,10 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_strays(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
+    if (held_ && usual_is_over && doubted_) {
+        stray_frame(*std::exchange(held_, std::nullopt));
+        return Verdict::wrong;
+    }
     if (held_ && usual_is_over) {
         reply_ = std::exchange(held_, std::nullopt);
         return Verdict::replied;
@@ -209,7 +213,8 @@ void Attempt::reject_reply() {
     disturbed_ = true;
 }
 
-void Attempt::hold_reply(Duration needed) {
+void Attempt::hold_reply(Duration needed, bool doubted) {
+    doubted_ = doubted;
     timing_.usual = std::min(timing_.usual, needed);
     held_ = std::exchange(reply_, std::nullopt);
     held_back_ = true;

@@ -10,12 +10,14 @@
 
 namespace panelgate::arbiter {
 
-Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed)
+Station::Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
+                 Duration frame)
     : settings_(settings),
       listed_(listed),
       health_(offline),
       late_(settings.late_window, settings.response_timeout),
-      adaptive_(settings.timeout_floor, settings.response_timeout) {}
+      adaptive_(settings.timeout_floor, settings.response_timeout),
+      trail_(frame) {}
 
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
@@ -56,16 +58,20 @@ void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
 }
 
 Stray Station::judge(TimePoint now, ByteView pdu) const {
+    const bool copy = copies_.is_copy(now, pdu);
+    if (copy && copies_.known()) return Stray::copy;  // what is owed comes all the same
     if (owes() && modbus::answers(owed_pdu_, pdu)) return Stray::late;
-    if (copies_.is_copy(now, pdu)) return Stray::copy;
+    if (copy) return Stray::copy;
     return copies_.is_second(now, pdu) ? Stray::second : Stray::unasked;
 }
 
 Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     Heard heard;
     heard.stray = judge(now, pdu);
+    const bool may_be_copy = copies_.is_copy(now, pdu);
     if (heard.stray != Stray::late) {
         copies_.on_unasked(now, pdu);
+        not_before_ = std::max(not_before_, copies_.rest_until());
         if (heard.stray == Stray::copy) trail_.on_stray(now);
         return heard;
     }
@@ -75,14 +81,28 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     // Behind a wait that was cut short it tells how long the panel needs; what was held up for
     // longer than the whole timeout does not.
     if (now <= due) slowest_.add(now - asked);
-    owed_.pop_front();
     heard.lateness = std::max(now - due, Duration::zero());
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
+    // What repeats the reply before it may be that once more, and what is owed still comes.
+    if (may_be_copy) {
+        copies_.on_doubt(now, pdu);
+    } else {
+        owed_.pop_front();
+    }
     heard.settled = owed_.empty();
-    if (heard.settled) not_before_ = now;
+    copies_.on_reply(now, owed_pdu_, Bytes(pdu.begin(), pdu.end()));
+    if (heard.settled) not_before_ = now + copies_.hold();
     heard.back = health_.on_reply(now);
     probes_ = 0;
     return heard;
+}
+
+void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
+    const Bytes* copy = copies_.copy_in(now, id, bytes);
+    if (copy == nullptr) return;
+    const Bytes reply = *copy;
+    if (owes()) return copies_.on_doubt(now, reply);
+    copies_.on_unasked(now, reply);
 }
 
 Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Duration waited,
@@ -118,7 +138,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         owed_.push_back(attempt.timing().sent);
         rest_for_owed(now);
     } else {
-        not_before_ = std::max(not_before_, now + copies_.hold());
+        not_before_ = std::max(not_before_, now + copies_.take_doubt());
     }
     if (!group.span || exception) return result;
     std::uint32_t& longest = longest_read_.at(group.span->function);

@@ -7,10 +7,15 @@
 
 namespace panelgate::arbiter {
 
+namespace {
+constexpr std::size_t kUsualReply = 45;  // bytes: 20 registers
+}
+
 Stations::Stations(const Settings& settings)
     : offline_(settings.offline),
       unlisted_(settings.unlisted),
-      standard_gap_(silent_interval(settings.serial)) {
+      standard_gap_(silent_interval(settings.serial)),
+      frame_(wire_time(settings.serial, kUsualReply)) {
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
 }
 
@@ -23,7 +28,7 @@ Station& Stations::of(std::uint8_t id) {
     const auto found = stations_.find(id);
     if (found != stations_.end()) return found->second;
     const bool listed = configured_.contains(id);
-    return stations_.try_emplace(id, settings(id), offline_, listed).first->second;
+    return stations_.try_emplace(id, settings(id), offline_, listed, frame_).first->second;
 }
 
 const Station* Stations::find(std::uint8_t id) const {
@@ -77,7 +82,8 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Durati
     } else if (verdict == Verdict::silent) {
         // It may be one of several that have died together: the others are not waited for longer
         // than they have ever needed, for as long as this one has taken a fifth of.
-        hurry_until_ = now + static_cast<int>(1 / ProbeBudget::kFailing) * cost;
+        hurry_until_ =
+            now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost, kHurry);
     }
 }
 

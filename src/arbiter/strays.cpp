@@ -62,6 +62,7 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
         const Part what = judge(part, stations);
         if (what != Part::unasked) {
             ledger.on_stray(now, part, what, quiet.station());
+            if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;

@@ -141,6 +141,7 @@ class Checker {
     std::map<std::string, arbiter::Ticket> open_writes_;
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
+    std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     std::uint64_t excused_ = 0;
     TimePoint garbled_{};

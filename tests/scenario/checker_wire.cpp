@@ -21,6 +21,7 @@ void Checker::on_line_up(TimePoint now) {
 }
 
 void Checker::on_line_down(TimePoint now) {
+    if (!attempt_.answered) watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
     watch_.on_upset(now);
     attempt_.answered = true;
 }
@@ -53,9 +54,10 @@ void Checker::on_answered(TimePoint now) {
 
 /// The first copy of all, in place of the answer to a question of the same shape, is that answer
 /// for any gateway. From the first one on that came when nobody was asked, or from an odd answer
-/// on, it can know better.
+/// on, it can know better: but not from one behind a retry, which may be the reply to that.
 void Checker::on_copy(TimePoint now, std::uint8_t station) {
     const bool awaited = !attempt_.answered && attempt_.station == station;
+    if (!awaited && retried_.contains(station)) return;
     if (!doublers_.insert(station).second || !awaited) return;
     ++excused_;
     excused_from_[station] = now;
@@ -78,6 +80,11 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     // A retry belongs to the silence that it follows, whoever was asked between.
     bool& was_silent = silent_before_[station];
     if (what != "retry") was_silent = watch_.is_silent(station);
+    if (what == "retry") {
+        retried_.insert(station);
+    } else {
+        retried_.erase(station);
+    }
     attempt_.was_silent = was_silent;
     attempt_.trusted = what == "request" && watch_.is_trusted(now, station);
     const auto [asked, first] = last_asked_.try_emplace(station, now);
@@ -130,12 +137,14 @@ void Checker::close_attempt(TimePoint now) {
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.
 void Checker::check_idling(TimePoint now) {
-    constexpr Duration kSlack = 100ms;  // gaps that were lengthened for what follows replies
+    // Gaps that were lengthened for what follows replies: at slow rates that takes its own time.
+    constexpr std::size_t kReply = 45;
+    const Duration slack = 100ms + wire_time(settings_.serial, kReply);
     const TimePoint since = std::max(sent_until_, heard_until_);
-    if (now <= since + kSlack || !good_work_waited(since)) return;
+    if (now <= since + slack || !good_work_waited(since)) return;
     const Duration idle = now - since;
     longest_idle_ = std::max(longest_idle_, idle);
-    Duration most = kSlack;
+    Duration most = slack;
     if (!attempt_.answered) most += settings_.unlisted.response_timeout;
     if (attempt_.station == kBroadcast) most += settings_.broadcast_turnaround;
     if (calm_ && idle > most)

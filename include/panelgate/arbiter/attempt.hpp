@@ -94,7 +94,8 @@ class Attempt {
     void reject_reply();
     /// It may be one: when nothing else comes until `needed` after the request, as long as the
     /// station has ever needed, it is the answer all the same.
-    void hold_reply(Duration needed);
+    /// `doubted`: then it is asked once more instead.
+    void hold_reply(Duration needed, bool doubted);
     bool was_held() const { return held_back_; }
 
     const EchoFilter& echo() const { return echo_; }
@@ -141,6 +142,7 @@ class Attempt {
     std::optional<Bytes> reply_;
     std::optional<Bytes> held_;  ///< a reply that may be a copy
     bool held_back_ = false;
+    bool doubted_ = false;  ///< what is held
     std::vector<modbus::Unused> strays_;
     Bytes damaged_bytes_;
     Bytes stale_;

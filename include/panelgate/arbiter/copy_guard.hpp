@@ -36,6 +36,11 @@ class CopyGuard {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply);
         });
     }
+    /// ... so soon as copies come from this station.
+    bool repeats_itself(TimePoint now, ByteView reply) const {
+        const TimePoint said = said_at(now, reply);
+        return said != TimePoint{} && now < said + 2 * hold();
+    }
     /// Of the shape of the reply taken last, and soon: perhaps another panel with the same address.
     bool is_second(TimePoint now, ByteView reply) const {
         const Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
@@ -44,16 +49,29 @@ class CopyGuard {
     }
     /// A good frame that nobody asked for and nothing was owed for.
     void on_unasked(TimePoint now, ByteView reply) {
-        TimePoint said{};
-        for (const Slot& slot : slots_) {
-            if (slot.is_recent(now) && std::ranges::equal(reply, slot.reply))
-                said = std::max(said, slot.at);
-        }
+        const TimePoint said = said_at(now, reply);
         if (said != TimePoint{}) return learn(now, now - said);
         if (!is_second(now, reply)) return;
         Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
         last.second = true;
         if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last.at);
+    }
+    /// A reply of the last moments that stands, as address and PDU, amid bytes that are no frame;
+    /// nothing: none does.
+    const Bytes* copy_in(TimePoint now, std::uint8_t station, ByteView bytes) const {
+        for (const Slot& slot : slots_) {
+            if (!slot.is_recent(now)) continue;
+            Bytes said{station};
+            said.insert(said.end(), slot.reply.begin(), slot.reply.end());
+            if (!std::ranges::search(bytes, said).empty()) return &slot.reply;
+        }
+        return nullptr;
+    }
+    /// A copy, or a reply that was owed and has the same values: nobody knows. The next reply is
+    /// waited out for as long as its copy would take; if there is none, that was all.
+    void on_doubt(TimePoint now, ByteView reply) {
+        const TimePoint said = said_at(now, reply);
+        if (said != TimePoint{}) doubt_ = (now - said) * 3 / 2;
     }
     /// It has spoken twice lately.
     bool known() const { return hold() > Duration::zero(); }
@@ -70,6 +88,8 @@ class CopyGuard {
     void on_confirmed() { ++confirmed_; }
     /// How long after a reply the station is left alone.
     Duration hold() const { return learned_ * 3 / 2; }
+    /// ... after this one, for what is in doubt too.
+    Duration take_doubt() { return std::max(hold(), std::exchange(doubt_, Duration::zero())); }
     /// Behind the reply taken last: until then.
     TimePoint rest_until() const {
         return slots_[(next_ + kReplies - 1) % kReplies].at + learned_ * 5 / 4;
@@ -83,6 +103,15 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
+    /// When it said this last; the beginning of time: not lately.
+    TimePoint said_at(TimePoint now, ByteView reply) const {
+        TimePoint said{};
+        for (const Slot& slot : slots_) {
+            if (slot.is_recent(now) && std::ranges::equal(reply, slot.reply))
+                said = std::max(said, slot.at);
+        }
+        return said;
+    }
     void learn(TimePoint now, Duration delay) {
         learned_ = std::max(learned_, delay);
         learned_at_ = now;
@@ -92,6 +121,7 @@ class CopyGuard {
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
     int confirmed_ = 0;
+    Duration doubt_{};
     Duration learned_{};  ///< from a reply to its second copy
     TimePoint learned_at_{};
 };

@@ -29,7 +29,9 @@ enum class Stray : std::uint8_t {
 /// it is. It owns these states: each changes in its verbs only. Pure.
 class Station {
   public:
-    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed);
+    /// `frame`: what a usual reply takes on this line.
+    Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
+            Duration frame = {});
 
     // What it owes (P1)
 
@@ -78,6 +80,9 @@ class Station {
     /// Bytes of nobody behind its reply.
     void on_stray_bytes(TimePoint now) { trail_.on_stray(now); }
 
+    /// Bytes that are no frame; `id`: its own address.
+    void on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes);
+
     struct Replied {
         bool back = false;              ///< it was offline
         bool trailed = false;           ///< something stood behind the reply before
@@ -100,10 +105,13 @@ class Station {
     /// It repeats one, and copies come from this station, or it has not shown yet that it gives
     /// equal answers to different requests.
     bool may_be_copy(TimePoint now, const Attempt& attempt) const {
-        const Bytes& reply = attempt.reply();
-        const bool known = copies_.known() && copies_.is_copy(now, reply);
-        return !attempt.was_held() &&
-               (known || copies_.suspicious(now, attempt.group().pdu, reply));
+        return repeats_itself(now, attempt) ||
+               (!attempt.was_held() &&
+                copies_.suspicious(now, attempt.group().pdu, attempt.reply()));
+    }
+    /// ... and copies come from this station.
+    bool repeats_itself(TimePoint now, const Attempt& attempt) const {
+        return !attempt.was_held() && copies_.repeats_itself(now, attempt.reply());
     }
 
     // How it is to be asked
@@ -136,10 +144,7 @@ class Station {
     std::uint32_t longest_read(std::uint8_t function) const;
     Duration worst_lateness() const { return late_.worst(); }
     /// Until when nobody should send, because of what follows its replies.
-    TimePoint trail_until() const {
-        const bool copies = copies_.hold() > Duration::zero() && copies_.hold() <= Trail::kLongest;
-        return std::max(trail_.until(), copies ? copies_.rest_until() : TimePoint{});
-    }
+    TimePoint trail_until() const { return trail_.until(); }
     std::optional<Duration> slowest() const { return slowest_.value(); }
 
     static constexpr int kFailing = 2;  ///< transactions in a row

@@ -29,6 +29,10 @@ class Stations {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_stray_bytes(now);
     }
+    /// Bytes that are no frame.
+    void on_damaged(TimePoint now, ByteView bytes) {
+        for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);
+    }
     /// A request that left at `sent` was answered now, on a line that may hold things back.
     void on_proved(TimePoint now, TimePoint sent) {
         for (auto& [id, station] : stations_) station.on_proved(now, sent);
@@ -70,10 +74,12 @@ class Stations {
     }
 
     static constexpr Duration kOutage = 30s;
+    static constexpr Duration kHurry = 5s;  ///< at most
 
     OfflineSettings offline_;
     StationSettings unlisted_;
     Duration standard_gap_;
+    Duration frame_;  ///< what a usual reply takes on this line
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     ProbeBudget probes_{ProbeBudget::kOffline};

@@ -18,6 +18,10 @@ class Trail {
     static constexpr int kOften = 3;            ///< of them: no accident
     static constexpr Duration kLongest = 60ms;  ///< later, it is something else
 
+    /// `frame`: what a usual reply takes on this line; its copy ends that much later.
+    explicit Trail(Duration frame = {}) : longest_(kLongest + frame) {}
+
+    Duration longest() const { return longest_; }
     /// A reply ended. What was seen behind the one before is remembered.
     void on_reply(TimePoint now) {
         delays_[next_++ % kReplies] = last_;
@@ -28,7 +32,7 @@ class Trail {
     /// Bytes that belong to nobody, their last one now.
     void on_stray(TimePoint now) {
         const Duration delay = now - at_;
-        if (delay <= Duration::zero() || delay > kLongest) return;
+        if (delay <= Duration::zero() || delay > longest_) return;
         last_ = std::max(last_, delay);
         seen_ = true;
     }
@@ -43,6 +47,7 @@ class Trail {
     bool seen() const { return seen_; }
 
   private:
+    Duration longest_;
     std::array<Duration, kReplies> delays_{};
     std::size_t next_ = 0;
     Duration last_{};

@@ -114,7 +114,7 @@ TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
 
 TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
-    attempt_.hold_reply(60ms);
+    attempt_.hold_reply(60ms, false);
     Attempt other = attempt_;
     EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
     EXPECT_EQ(attempt_.on_deadline(attempt_.timing().sent + 60ms - 1ns, ends_), Verdict::open);
@@ -124,6 +124,16 @@ TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatThe
     std::swap(attempt_, other);
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kOtherReply);
+    const auto strays = attempt_.take_strays();
+    ASSERT_EQ(strays.size(), 1u);
+    EXPECT_EQ(strays[0].bytes, encode_adu(kStation, kReply));
+}
+
+TEST_F(AttemptTest, P1WhereCopiesAreKnownTheReplyThatIsHeldIsNoAnswer) {
+    ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
+    attempt_.hold_reply(60ms, true);
+    EXPECT_EQ(run_to_verdict(), Verdict::wrong) << "and it is asked once more";
+    EXPECT_EQ(ended_, Duration(60ms));
     const auto strays = attempt_.take_strays();
     ASSERT_EQ(strays.size(), 1u);
     EXPECT_EQ(strays[0].bytes, encode_adu(kStation, kReply));

@@ -100,6 +100,31 @@ TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSp
     EXPECT_TRUE(guard_.suspicious(now_ + 30ms, kOtherRequest, kReply));
 }
 
+TEST_F(CopyGuardTest, P1WhatIsInDoubtIsWaitedForBehindOneMoreReply) {
+    reply();
+    guard_.on_doubt(now_ + 20ms, kReply);
+    EXPECT_FALSE(guard_.known());
+    EXPECT_GE(guard_.take_doubt(), Duration(20ms));
+    EXPECT_EQ(guard_.take_doubt(), Duration(0));
+}
+
+TEST_F(CopyGuardTest, P1AStationRepeatsItselfAsSoonAsItsCopiesComeAndNotMuchLater) {
+    reply();
+    EXPECT_FALSE(guard_.repeats_itself(now_ + 1ms, kReply)) << "not known";
+    unasked(20ms, kReply);
+    EXPECT_TRUE(guard_.repeats_itself(now_ + 40ms, kReply));
+    EXPECT_FALSE(guard_.repeats_itself(now_ + 40ms, kOtherReply));
+    EXPECT_FALSE(guard_.repeats_itself(now_ + 100ms, kReply));
+}
+
+TEST_F(CopyGuardTest, P1FindsACopyAmidOtherBytes) {
+    reply();
+    const Bytes amid = "00 FF 11 03 02 00 01 12 34 00"_hex;
+    EXPECT_NE(guard_.copy_in(now_ + 20ms, 0x11, amid), nullptr);
+    EXPECT_EQ(guard_.copy_in(now_ + 20ms, 0x12, amid), nullptr);
+    EXPECT_EQ(guard_.copy_in(now_ + CopyGuard::kLongest + 1ns, 0x11, amid), nullptr);
+}
+
 TEST_F(CopyGuardTest, ACopyIsThatOfTheLatestReplyThatItRepeats) {
     reply();
     guard_.on_reply(now_ + 200ms, kOtherRequest, kReply);

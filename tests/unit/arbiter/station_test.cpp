@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
 
@@ -19,6 +20,8 @@ const Bytes kOther = "03 00 00 00 01"_hex;
 const Bytes kLong = "03 00 00 00 03"_hex;
 const Bytes kWrite = "06 00 6B 00 01"_hex;
 const Bytes kReply = "03 02 02 2B"_hex;
+const Bytes kOtherValue = "03 02 02 2C"_hex;
+const Bytes kThirdValue = "03 02 02 2D"_hex;
 const Bytes kLongReply = "03 06 00 01 00 02 00 03"_hex;
 
 Station station(bool listed) { return {StationSettings{}, OfflineSettings{}, listed}; }
@@ -65,16 +68,48 @@ TEST_F(StationTest, P1EachAttemptIsOwedAReplyAndTheLastOneThatComesEndsTheRest) 
     miss(kRead);
     miss(kRead);
     answer(group_of(kId, kRead, 3), kReply);  // nobody knows to which of the three
-    const auto first = station_.on_stray_frame(now_ + 10ms, kReply);
+    const auto first = station_.on_stray_frame(now_ + 10ms, kOtherValue);
     EXPECT_EQ(first.stray, Stray::late);
     EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
     EXPECT_FALSE(first.settled);
     EXPECT_FALSE(station_.may_ask(now_ + 10ms, kOther));
-    const auto second = station_.on_stray_frame(now_ + 20ms, kReply);
+    const auto second = station_.on_stray_frame(now_ + 20ms, kThirdValue);
     EXPECT_EQ(second.stray, Stray::late);
     EXPECT_TRUE(second.settled);
     EXPECT_FALSE(station_.owes());
     EXPECT_TRUE(station_.may_ask(now_ + 20ms, kOther));
+}
+
+TEST_F(StationTest, P1WhatRepeatsTheReplyBeforeItMayBeACopyAndWhatIsOwedStillComes) {
+    miss(kRead);
+    answer(group_of(kId, kRead, 2), kReply);
+    const auto same = station_.on_stray_frame(now_ + 20ms, kReply);
+    EXPECT_EQ(same.stray, Stray::late) << "as a rule";
+    EXPECT_FALSE(same.settled);
+    EXPECT_TRUE(station_.owes());
+    const auto other = station_.on_stray_frame(now_ + 40ms, kOtherValue);
+    EXPECT_TRUE(other.settled);
+    EXPECT_TRUE(station_.may_ask(now_ + 40ms, kOther)) << "copies are not its habit yet";
+}
+
+TEST_F(StationTest, P1ACopyThatIsHeardAmidBytesThatAreNoFrameTellsThatTheStationSpeaksTwice) {
+    answer(kRead, kReply);
+    Bytes heard = "23 03"_hex;
+    const Bytes adu = modbus::encode_adu(kId, kReply);
+    heard.insert(heard.end(), adu.begin(), adu.end());
+    heard.push_back(0x07);
+    station_.on_damaged_bytes(now_ + 20ms, kId, heard);
+    answer(kOther, kOtherValue);
+    EXPECT_FALSE(station_.may_ask(now_ + 20ms, kOther));
+    EXPECT_TRUE(station_.may_ask(now_ + 100ms, kOther));
+}
+
+TEST_F(StationTest, P1ACopyThatIsKnownOnlyBehindTheReplyThatItPrecededHoldsTheStationAllTheSame) {
+    answer(kRead, kReply);
+    answer(kOther, kOtherValue);
+    EXPECT_TRUE(station_.may_ask(now_ + 10ms, kRead));
+    station_.on_stray_frame(now_ + 20ms, kOtherValue);
+    EXPECT_FALSE(station_.may_ask(now_ + 20ms, kRead));
 }
 
 TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
