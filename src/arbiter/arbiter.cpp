@@ -200,7 +200,11 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     Station& station = stations_.of(group.station);
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
-    station.owe(now, group.pdu, sent);
+    if (attempt.came_damaged()) {
+        station.on_damaged_reply(now, group.pdu, sent);
+    } else {
+        station.owe(now, group.pdu, sent);
+    }
     stations_.on_failed(now, group.station, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(group.station, *until);

@@ -36,9 +36,6 @@ std::string start(TimePoint now, const Group& group, const JobQueue& queue) {
     if (group.learns_for != 0)
         return "a write is next and nobody knows whether this line has an echo";
     if (group.probe) return "the station is offline and its probe is due";
-    if (group.settles)
-        return "nobody knows whether a reply to an earlier request is still to come: this one's "
-               "comes behind it";
     const Job& leader = group.jobs.front();
     std::string text = who(leader) + ": ";
     if (group.attempts > 1) return text + "attempt " + std::to_string(group.attempts);

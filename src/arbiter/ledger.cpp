@@ -35,7 +35,6 @@ std::string_view word(const Group& group) {
     if (group.learns_for != 0) return "learn echo";
     if (group.station == kBroadcast) return "broadcast";
     if (group.probe) return "probe";
-    if (group.settles) return "settle";
     return group.attempts > 1 ? "retry" : "request";
 }
 

@@ -97,8 +97,7 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
     return [&, this, now](const Job& job) {
         if (now < quiet.quarantined_until()) return false;
         const Station* station = stations.find(job.station);
-        const bool rested =
-            station == nullptr || now >= station->rested() || !station->settling_pdu().empty();
+        const bool rested = station == nullptr || now >= station->rested();
         return rested && !backlog_.has_retry(job.station);
     };
 }
@@ -114,13 +113,6 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     const Job* next = backlog_.queue().peek(test);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
-    const Station* asked = stations.find(next->station);
-    if (asked != nullptr && now < asked->rested()) {
-        // It rests only because of what it may still say.
-        Group group = read_for_nobody(next->station, asked->settling_pdu());
-        group.settles = true;
-        return {std::move(group), false};
-    }
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
         return {std::nullopt, true};
     other_first_ = false;
@@ -149,8 +141,7 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     backlog_.queue().each_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return;
         const Station* station = stations.find(job.station);
-        const bool waits = station != nullptr && station->settling_pdu().empty();
-        const TimePoint rested = waits ? station->rested() : free;
+        const TimePoint rested = station != nullptr ? station->rested() : free;
         earlier(std::max(quiet.quarantined_until(), rested));
     });
     if (const auto probe = stations.next_probe())

@@ -22,6 +22,7 @@ Station::Station(const StationSettings& settings, const OfflineSettings& offline
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
     owed_pdu_ = pdu;
+    damaged_pdu_.clear();
     proved_ = false;
     owed_.push_back(sent);
     if (owed_.size() > kMost) owed_.pop_front();
@@ -44,6 +45,13 @@ void Station::rest_for_owed(TimePoint now) {
     not_before_ = std::max(now, owed_.back() + settings_.response_timeout) + late_.value();
 }
 
+/// A reply came that each of the attempts may have been answered with, the one at `sent` too.
+void Station::take_one(TimePoint now, TimePoint sent) {
+    owed_.pop_front();
+    owed_.push_back(sent);
+    rest_for_owed(now);
+}
+
 void Station::on_proved(TimePoint now, TimePoint sent) {
     if (!owes() || proved_ || owed_.back() >= sent) return;
     proved_ = true;
@@ -52,7 +60,6 @@ void Station::on_proved(TimePoint now, TimePoint sent) {
 
 void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
     if (now >= not_before_ && !held_back) owed_.clear();
-    if (!owes()) damaged_ = false;
     asked_ = now;
     if (group.span) last_read_ = group.pdu;
 }
@@ -68,7 +75,8 @@ Stray Station::judge(TimePoint now, ByteView pdu) const {
 Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     Heard heard;
     heard.stray = judge(now, pdu);
-    const bool may_be_copy = copies_.is_copy(now, pdu);
+    const bool said_again = now < std::exchange(again_until_, TimePoint{});
+    const bool may_be_copy = said_again || copies_.is_copy(now, pdu);
     if (heard.stray != Stray::late) {
         copies_.on_unasked(now, pdu);
         not_before_ = std::max(not_before_, copies_.rest_until());
@@ -85,7 +93,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
     // What repeats the reply before it may be that once more, and what is owed still comes.
     if (may_be_copy) {
-        copies_.on_doubt(now, pdu);
+        copies_.on_doubt(copies_.delay_of(now, pdu) * 3 / 2);
     } else {
         owed_.pop_front();
     }
@@ -101,7 +109,7 @@ void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
     const Bytes* copy = copies_.copy_in(now, id, bytes);
     if (copy == nullptr) return;
     const Bytes reply = *copy;
-    if (owes()) return copies_.on_doubt(now, reply);
+    if (owes()) return copies_.on_doubt(copies_.delay_of(now, reply) * 3 / 2);
     copies_.on_unasked(now, reply);
 }
 
@@ -127,66 +135,30 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
-    audible_ = !group.settles;          // once is enough where it does not tell
-    if (group.settles && !exception) {  // an exception may be that to what was owed
-        owed_.clear();
-        not_before_ = now;
-    }
+    damaged_pdu_.clear();
     if (owes()) {
-        // Each attempt may be answered, and nobody knows which one this reply was for.
-        owed_.pop_front();
-        owed_.push_back(attempt.timing().sent);
-        rest_for_owed(now);
+        take_one(now, attempt.timing().sent);
     } else {
         not_before_ = std::max(not_before_, now + copies_.take_doubt());
     }
     if (!group.span || exception) return result;
     std::uint32_t& longest = longest_read_.at(group.span->function);
     longest = std::max(longest, group.span->count);
-    remember_read(*group.span, group.pdu);
+    const auto cheapest = read_span(0, cheapest_read_);
+    if (!cheapest || group.span->count < cheapest->count) cheapest_read_ = group.pdu;
     return result;
 }
 
-namespace {
-
-/// The reply to one of these reads cannot answer the other.
-bool tells_apart(ByteView a, ByteView b) {
-    return a[0] != b[0] ||
-           modbus::reply_length_from_request(a) != modbus::reply_length_from_request(b);
-}
-
-}  // namespace
-
-/// The cheapest read to probe with, and the cheapest one of another shape.
-void Station::remember_read(const ReadSpan& span, const Bytes& pdu) {
-    const auto known = read_span(0, cheapest_read_);
-    if (known && span.count >= known->count) {
-        const auto other = read_span(0, other_read_);
-        const bool cheaper = !other || span.count < other->count;
-        if (cheaper && tells_apart(pdu, cheapest_read_)) other_read_ = pdu;
-        return;
-    }
-    if (known && tells_apart(pdu, cheapest_read_)) other_read_ = cheapest_read_;
-    cheapest_read_ = pdu;
-}
-
-Bytes Station::settling_pdu() const {
-    // A second copy of what is owed would come behind it all the same.
-    if (!owes() || !audible_ || damaged_ || copies_.known() || cheapest_read_.empty()) return {};
-    if (tells_apart(cheapest_read_, owed_pdu_)) return cheapest_read_;
-    if (!other_read_.empty() && tells_apart(other_read_, owed_pdu_)) return other_read_;
-    auto part = read_span(0, cheapest_read_);
-    if (part->count < 2) return {};
-    --part->count;
-    Bytes pdu = encode_span(*part);
-    return tells_apart(pdu, owed_pdu_) ? pdu : Bytes{};
+void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) {
+    damaged_pdu_ = pdu;
+    if (owes()) take_one(now, sent);
+    copies_.on_doubt(CopyGuard::kSaidAgain);
+    again_until_ = now + CopyGuard::kSaidAgain;
+    not_before_ = std::max(not_before_, again_until_);
 }
 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
-    audible_ = false;
-    // Some say a damaged reply once more, behind what else they have been asked since.
-    damaged_ = damaged_ || verdict != Verdict::silent;
     if (health_.offline()) ++probes_;
     if (failing()) budget_.spend(now, cost);
 }

@@ -206,11 +206,21 @@ void ReplyFramer::discard(std::size_t count) {
     collect_starts();
 }
 
+/// Not a part of our own frame, which may begin like it.
+bool ReplyFramer::is_own_reply(ByteView damaged) const {
+    constexpr std::size_t kReadRequest = 8;
+    if (!is_read(request_[0]) || !expected_) return false;
+    const auto count = static_cast<std::uint8_t>(*expected_ - 3 - kCrc);
+    return damaged.size() >= std::min(*expected_, kReadRequest + 1) && damaged[0] == station_ &&
+           damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
+}
+
 void ReplyFramer::classify(ByteView bytes) {
     for (Unused& part : classify_heard(bytes, station_)) {
         if (part.kind == Unused::Kind::damaged && holds_start(part.bytes)) {
             damaged_ = true;
             damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
+            own_header_ = own_header_ || is_own_reply(part.bytes);
         }
         constexpr std::size_t kKept = 64;  // parts; beyond, only their bytes matter
         if (unused_.size() < kKept) {

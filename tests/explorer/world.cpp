@@ -287,7 +287,7 @@ void World::act(const arbiter::Finish& finish) {
 
 void World::act(const arbiter::Note& note) {
     if (note.direction == arbiter::Note::Direction::sent)
-        probing_ = note.what == "probe" || note.what == "learn echo" || note.what == "settle";
+        probing_ = note.what == "probe" || note.what == "learn echo";
 }
 
 }  // namespace panelgate::explorer

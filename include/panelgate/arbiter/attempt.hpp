@@ -77,7 +77,8 @@ class Attempt {
     TimePoint give_up() const { return timing_.sent + timing_.patience; }
     /// The whole answer PDU; its first byte came before the request had left by our arithmetic.
     const Bytes& reply() const { return *reply_; }
-    bool replied_early() const { return first_byte_ < timing_.sent; }
+    /// Noise in front of it tells nothing about it.
+    bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
     /// From the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
     /// From the end of the request to the first sign of a reply, as it reached us: adapters hold
@@ -103,6 +104,8 @@ class Attempt {
     bool echoed() const { return echo_.complete() && !borrowed_; }
     /// What its reply tells about the line's echo.
     void teach(EchoMemory& memory) const;
+    /// Its own reply has come, but damaged: what tells it from anything else is whole.
+    bool came_damaged() const { return framer_.had_own_header(); }
     /// Something of the station was heard, good or not.
     bool heard() const { return heard_; }
     /// Bytes were heard that came before a reply could.

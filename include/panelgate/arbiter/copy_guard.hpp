@@ -7,6 +7,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 
@@ -20,7 +21,8 @@ class CopyGuard {
     static constexpr std::size_t kReplies = 8;
     static constexpr Duration kLongest = 500ms;  ///< later, it is something else
     static constexpr Duration kForget = 2min;
-    static constexpr int kConfirmations = 3;  ///< that make equal answers credible
+    static constexpr Duration kSaidAgain = 150ms;  ///< behind a damaged reply, by some panels
+    static constexpr int kConfirmations = 3;       ///< that make equal answers credible
 
     void on_reply(TimePoint now, Bytes request, Bytes reply) {
         if (now - learned_at_ > kForget) learned_ = {};
@@ -56,23 +58,24 @@ class CopyGuard {
         last.second = true;
         if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last.at);
     }
-    /// A reply of the last moments that stands, as address and PDU, amid bytes that are no frame;
-    /// nothing: none does.
+    /// A reply of the last moments that stands, as a good frame, amid bytes that are none; nothing:
+    /// none does.
     const Bytes* copy_in(TimePoint now, std::uint8_t station, ByteView bytes) const {
         for (const Slot& slot : slots_) {
             if (!slot.is_recent(now)) continue;
-            Bytes said{station};
-            said.insert(said.end(), slot.reply.begin(), slot.reply.end());
+            const Bytes said = modbus::encode_adu(station, slot.reply);
             if (!std::ranges::search(bytes, said).empty()) return &slot.reply;
         }
         return nullptr;
     }
-    /// A copy, or a reply that was owed and has the same values: nobody knows. The next reply is
-    /// waited out for as long as its copy would take; if there is none, that was all.
-    void on_doubt(TimePoint now, ByteView reply) {
+    /// How long ago it said this last; 0: not lately.
+    Duration delay_of(TimePoint now, ByteView reply) const {
         const TimePoint said = said_at(now, reply);
-        if (said != TimePoint{}) doubt_ = (now - said) * 3 / 2;
+        return said == TimePoint{} ? Duration::zero() : now - said;
     }
+    /// A second reply may follow the next one, as it may have followed the last: so long that is
+    /// waited for. If none comes, that was all.
+    void on_doubt(Duration wait) { doubt_ = std::max(doubt_, wait); }
     /// It has spoken twice lately.
     bool known() const { return hold() > Duration::zero(); }
     /// This answer repeats that to another request, and the station has not shown yet that it gives

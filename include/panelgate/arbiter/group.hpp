@@ -22,7 +22,6 @@ struct Group {
     TimePoint started{};      ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
     bool probe = false;
-    bool settles = false;        ///< nobody asked: it shows that nothing is owed any more
     bool first_silence = false;  ///< its station was well when it was first sent
     /// It only finds out about the echo, for this job, which waits in the queue.
     Ticket learns_for = 0;

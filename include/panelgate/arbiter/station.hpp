@@ -38,6 +38,9 @@ class Station {
     /// An attempt that left at `sent` ended without its own reply: one more is owed, until it has
     /// come or cannot come any more.
     void owe(TimePoint now, const Bytes& pdu, TimePoint sent);
+    /// ... but its reply has come, damaged. Some say such a one once more: until that would be over
+    /// only the very same request may go there, and behind its answer the same holds.
+    void on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent);
     bool owes() const { return !owed_.empty(); }
     /// From then on another request may go there; until then only the very same.
     TimePoint rested() const { return not_before_; }
@@ -47,7 +50,8 @@ class Station {
         return owes() && probe_pdu() == owed_pdu_ ? next : std::max(next, not_before_);
     }
     bool may_ask(TimePoint now, const Bytes& pdu) const {
-        return now >= not_before_ || (owes() && pdu == owed_pdu_);
+        const bool again = (owes() && pdu == owed_pdu_) || pdu == damaged_pdu_;
+        return again || now >= not_before_;
     }
     /// A request goes there, and what was owed before has lapsed if it could not come any more.
     /// `held_back`: it may still be on its way, whatever the time.
@@ -58,12 +62,6 @@ class Station {
     /// The way to the wire was proved free now, by a request that left at `sent`: what was owed
     /// from before may only now have reached the station.
     void on_proved(TimePoint now, TimePoint sent);
-
-    /// A read whose reply cannot be taken for what is owed, of something that it has answered
-    /// before. Panels serve in turn: when this is answered, nothing that was asked before can come
-    /// any more, and nobody has to wait for that to be over. Empty: it may be silent, or nothing is
-    /// known that could tell.
-    Bytes settling_pdu() const;
 
     // What comes of it
 
@@ -157,7 +155,7 @@ class Station {
     }
     TimePoint answered_request(TimePoint now) const;
     void rest_for_owed(TimePoint now);
-    void remember_read(const ReadSpan& span, const Bytes& pdu);
+    void take_one(TimePoint now, TimePoint sent);
     Duration short_wait(std::optional<Duration> line) const;
 
     StationSettings settings_;
@@ -172,14 +170,13 @@ class Station {
     ProbeBudget budget_{ProbeBudget::kFailing};
     std::deque<TimePoint> owed_;  ///< when the requests left whose replies may still come
     Bytes owed_pdu_;              ///< they are one and the same
+    TimePoint again_until_{};     ///< it may say the reply that came damaged once more
+    Bytes damaged_pdu_;           ///< the request whose reply has just come damaged
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};
-    bool damaged_ = false;  ///< one of those that are owed has come, but was damaged
-    bool audible_ = false;  ///< what came last of it, in answer to a request, was a sound
-    Bytes cheapest_read_;   ///< that it has answered
-    Bytes other_read_;      ///< ... and one whose reply has another shape
-    Bytes last_read_;       ///< what to probe with before it has answered any
+    Bytes cheapest_read_;  ///< that it has answered
+    Bytes last_read_;      ///< what to probe with before it has answered any
     std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
     Slowest slowest_;                              ///< from request to first sign of the reply
     int failed_in_a_row_ = 0;

@@ -67,6 +67,9 @@ class ReplyFramer {
     /// ... and as many of them as the reply has, or nothing tells how many that are: the reply
     /// itself came damaged.
     bool was_damaged_whole() const { return damaged_whole_; }
+    /// ... and it was a read's reply by its header, and longer than our own frame that may begin
+    /// like it: it can be nothing else.
+    bool had_own_header() const { return own_header_; }
     /// All that is pending is one good frame of the station, and it does not answer.
     bool ends_with_other_frame() const;
     /// What was stepped over so far, in the order in which it was heard.
@@ -84,6 +87,7 @@ class ReplyFramer {
     bool ends_with_address() const { return !heard_.empty() && heard_.back() == station_; }
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
+    bool is_own_reply(ByteView damaged) const;
     void collect_starts();
     std::optional<Bytes> accept(std::size_t start, Bytes pdu);
     void discard(std::size_t count);
@@ -98,6 +102,7 @@ class ReplyFramer {
     bool open_length_ = false;
     bool damaged_ = false;
     bool damaged_whole_ = false;
+    bool own_header_ = false;
     std::size_t behind_ = 0;
     std::vector<Unused> unused_;
 };

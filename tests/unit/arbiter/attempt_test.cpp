@@ -134,9 +134,7 @@ TEST_F(AttemptTest, P1WhereCopiesAreKnownTheReplyThatIsHeldIsNoAnswer) {
     attempt_.hold_reply(60ms, true);
     EXPECT_EQ(run_to_verdict(), Verdict::wrong) << "and it is asked once more";
     EXPECT_EQ(ended_, Duration(60ms));
-    const auto strays = attempt_.take_strays();
-    ASSERT_EQ(strays.size(), 1u);
-    EXPECT_EQ(strays[0].bytes, encode_adu(kStation, kReply));
+    EXPECT_TRUE(attempt_.take_strays().empty()) << "it proves no copy either";
 }
 
 TEST_F(AttemptTest, P6ARepeatedReadTakesNobodyAlong) {

@@ -102,7 +102,7 @@ TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSp
 
 TEST_F(CopyGuardTest, P1WhatIsInDoubtIsWaitedForBehindOneMoreReply) {
     reply();
-    guard_.on_doubt(now_ + 20ms, kReply);
+    guard_.on_doubt(20ms);
     EXPECT_FALSE(guard_.known());
     EXPECT_GE(guard_.take_doubt(), Duration(20ms));
     EXPECT_EQ(guard_.take_doubt(), Duration(0));
@@ -119,10 +119,15 @@ TEST_F(CopyGuardTest, P1AStationRepeatsItselfAsSoonAsItsCopiesComeAndNotMuchLate
 
 TEST_F(CopyGuardTest, P1FindsACopyAmidOtherBytes) {
     reply();
-    const Bytes amid = "00 FF 11 03 02 00 01 12 34 00"_hex;
+    Bytes amid = "00 FF"_hex;
+    const Bytes adu = modbus::encode_adu(0x11, kReply);
+    amid.insert(amid.end(), adu.begin(), adu.end());
     EXPECT_NE(guard_.copy_in(now_ + 20ms, 0x11, amid), nullptr);
     EXPECT_EQ(guard_.copy_in(now_ + 20ms, 0x12, amid), nullptr);
     EXPECT_EQ(guard_.copy_in(now_ + CopyGuard::kLongest + 1ns, 0x11, amid), nullptr);
+    amid.back() ^= 1;
+    EXPECT_EQ(guard_.copy_in(now_ + 20ms, 0x11, amid), nullptr)
+        << "a damaged reply of equal values";
 }
 
 TEST_F(CopyGuardTest, ACopyIsThatOfTheLatestReplyThatItRepeats) {

@@ -126,22 +126,14 @@ TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProves
     EXPECT_GE(station_.rested(), now_ + kTimeout) << "it may have reached the station only now";
 }
 
-TEST_F(StationTest, P1AReadOfAnotherShapeThatIsAnsweredShowsThatNothingIsOwed) {
-    miss(kLong, Verdict::silent);
-    EXPECT_TRUE(station_.settling_pdu().empty()) << "nothing is known that it answers";
-    answer(kRead, kReply);
-    answer(kLong, kLongReply);
-    miss(kRead, Verdict::silent);
-    EXPECT_TRUE(station_.settling_pdu().empty()) << "it may be dead";
-    answer(kRead, kReply);  // the retry: to which of both?
-    EXPECT_EQ(station_.settling_pdu(), kLong);
-    Group settling = group_of(kId, kLong);
-    settling.settles = true;
-    answer(settling, "83 02"_hex);
-    EXPECT_TRUE(station_.owes()) << "the exception may be that to what is owed";
-    answer(settling, kLongReply);
+TEST_F(StationTest, P5AReplyThatHasComeDamagedIsNotOwedButSomeSayItOnceMore) {
+    station_.on_damaged_reply(now_, kRead, now_);
     EXPECT_FALSE(station_.owes());
-    EXPECT_TRUE(station_.may_ask(now_, kOther));
+    EXPECT_TRUE(station_.may_ask(now_, kRead));
+    EXPECT_FALSE(station_.may_ask(now_, kOther));
+    answer(group_of(kId, kRead, 2), kReply);
+    EXPECT_FALSE(station_.may_ask(now_ + 100ms, kOther)) << "the retry's own reply may come second";
+    EXPECT_TRUE(station_.may_ask(now_ + CopyGuard::kSaidAgain, kOther));
 }
 
 TEST_F(StationTest, TellsWhatAFrameIsThatNobodyWaitsForAndChangesNothingByThat) {
