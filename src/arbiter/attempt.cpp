@@ -59,10 +59,18 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
         stale_.insert(stale_.end(), rest.begin(), rest.end());
         return Verdict::open;
     }
+    drop_what_ended(now, rest.size());
     if (!heard_) first_byte_ = now;
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
+}
+
+/// The silence behind bytes that are no part of the reply was longer than any inside a frame.
+void Attempt::drop_what_ended(TimePoint now, std::size_t size) {
+    const TimePoint first = now - wire_time(timing_.serial, size);
+    const bool over = first >= last_byte_ + 3 * character_time(timing_.serial) / 2;
+    if (heard_ && over && framer_.has_pending() && !framer_.has_candidate()) framer_.drop_pending();
 }
 
 Verdict Attempt::feed(ByteView bytes, const Ends& ends) {
@@ -141,8 +149,9 @@ TimePoint Attempt::deadline() const {
     if (!is_hearing()) return in_doubt() ? std::min(over, timing_.sent + timing_.usual) : over;
     // What the echo filter holds back begins like the reply, too.
     const bool hole = echo_.pending() || (framer_.has_candidate() && framer_.knows_length());
-    const TimePoint silent =
-        std::max(timing_.sent, last_byte_) + (hole ? timing_.hole : timing_.end_of_frame);
+    Duration silence = hole ? timing_.hole : timing_.end_of_frame;
+    if (framer_.is_inside()) silence = silent_interval(timing_.serial);
+    const TimePoint silent = std::max(timing_.sent, last_byte_) + silence;
     // What may be the reply is heard to its end, also after its time, but not for ever.
     const bool may_be_reply = framer_.has_candidate() || echo_.pending();
     return std::min(silent, may_be_reply ? over + timing_.longest_reply : over);

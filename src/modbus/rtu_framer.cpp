@@ -74,6 +74,16 @@ ReplyLength reply_length(ByteView b) {
     }
 }
 
+namespace {
+
+/// 0: that cannot be told yet, or only by silence.
+std::size_t known_reply_length(ByteView heard) {
+    const ReplyLength length = reply_length(heard);
+    return length.kind == ReplyLength::Kind::known ? length.length : 0;
+}
+
+}  // namespace
+
 ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu)
     : station_(station),
       request_(std::move(request_pdu)),
@@ -102,10 +112,17 @@ std::vector<Unused> ReplyFramer::take_unused() {
 std::optional<Bytes> ReplyFramer::scan(bool silence) {
     collect_starts();
     open_length_ = false;
+    inside_ = false;
     while (!starts_.empty()) {
         bool open = false;
         const std::size_t start = starts_.front();
-        if (auto pdu = judge(start, silence, open)) return accept(start, std::move(*pdu));
+        auto pdu = judge(start, silence, open);
+        if (pdu) {
+            const Inside inside = inside_other(start, start + pdu->size() + 1 + kCrc);
+            inside_ = inside == Inside::perhaps && !silence;
+            if (inside_) return std::nullopt;
+            if (inside != Inside::yes) return accept(start, std::move(*pdu));
+        }
         if (open) {
             const ReplyLength length = reply_length(ByteView(heard_).subspan(start));
             open_length_ = expected_ || length.kind != ReplyLength::Kind::by_silence;
@@ -114,6 +131,27 @@ std::optional<Bytes> ReplyFramer::scan(bool silence) {
         starts_.pop_front();
     }
     return std::nullopt;
+}
+
+/// Data of another frame may look like the reply: as long as the other one may still become whole
+/// nobody knows.
+ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end) const {
+    Inside result = Inside::no;
+    for (std::size_t i = 0; i < start; ++i) {
+        const ByteView other = ByteView(heard_).subspan(i);
+        if (other[0] == 0 || other[0] > kMaxStation) continue;
+        for (const std::size_t size : {known_reply_length(other), request_adu_length(other)}) {
+            if (size < kMinAdu || size > kMaxRtuAdu) continue;
+            const bool whole = size <= other.size() && crc_ok(other.first(size));
+            if (i + size > end && whole) return Inside::yes;
+            if (i + size > end && size > other.size()) result = Inside::perhaps;
+            if (i + size <= start && whole) {
+                i += size - 1;
+                break;
+            }
+        }
+    }
+    return result;
 }
 
 bool ReplyFramer::ends_with_other_frame() const {
@@ -190,6 +228,7 @@ std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     classify(ByteView(heard_).subspan(start + pdu.size() + 1 + kCrc));
     behind_ = unused_.size() - before;
     open_length_ = false;
+    inside_ = false;
     heard_.clear();
     starts_.clear();
     looked_ = 0;

@@ -123,6 +123,7 @@ class Attempt {
     Bytes release_echo() { return echo_.release(); }
 
   private:
+    void drop_what_ended(TimePoint now, std::size_t size);
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
     bool may_be_echo(ByteView reply) const;

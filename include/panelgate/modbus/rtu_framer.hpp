@@ -62,6 +62,9 @@ class ReplyFramer {
     /// ... and its length is known, or will be by its own first bytes: a silence inside is only a
     /// hole.
     bool knows_length() const { return starts_.empty() ? ends_with_address() : open_length_; }
+    /// The reply is there, but it may be a part of another frame that is not whole yet: a silence
+    /// of its length tells.
+    bool is_inside() const { return inside_; }
     /// Bytes were given up that held the address and function of the reply but no good frame.
     bool was_damaged() const { return damaged_; }
     /// ... and as many of them as the reply has, or nothing tells how many that are: the reply
@@ -85,6 +88,8 @@ class ReplyFramer {
     std::optional<Bytes> judge(std::size_t start, bool silence, bool& open) const;
     std::optional<Bytes> answering(ByteView frame) const;
     bool ends_with_address() const { return !heard_.empty() && heard_.back() == station_; }
+    enum class Inside : std::uint8_t { no, perhaps, yes };
+    Inside inside_other(std::size_t start, std::size_t end) const;
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
     bool is_own_reply(ByteView damaged) const;
@@ -100,6 +105,7 @@ class ReplyFramer {
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
     std::deque<std::size_t> starts_;  ///< offsets with the right address and function, unjudged
     bool open_length_ = false;
+    bool inside_ = false;
     bool damaged_ = false;
     bool damaged_whole_ = false;
     bool own_header_ = false;

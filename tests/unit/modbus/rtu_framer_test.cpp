@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <random>
 
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -13,6 +14,11 @@ namespace {
 const Bytes kRequest = "03 00 6B 00 03"_hex;
 const Bytes kReplyPdu = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
+
+Bytes joined(Bytes front, const Bytes& back) {
+    front.insert(front.end(), back.begin(), back.end());
+    return front;
+}
 
 TEST(RtuFramer, GivesTheReplyAtItsLastByteHoweverItIsCut) {
     for (std::size_t piece = 1; piece <= kReply.size(); ++piece) {
@@ -93,7 +99,8 @@ TEST(RtuFramer, StepsOverNoiseOfAnyKindInFrontAndBehind) {
         heard.insert(heard.end(), kReply.begin(), kReply.end());
         const std::size_t tail = random() % 4;
         for (std::size_t i = 0; i < tail; ++i) heard.push_back(random() % 2 == 0 ? 0x00 : 0xFF);
-        const auto reply = framer.feed(heard);
+        auto reply = framer.feed(heard);
+        if (!reply && framer.is_inside()) reply = framer.on_silence();
         ASSERT_TRUE(reply) << to_hex(heard);
         EXPECT_EQ(*reply, kReplyPdu);
     }
@@ -107,6 +114,28 @@ TEST(RtuFramer, NoiseThatLooksLikeAStartDelaysTheReplyOnlyToTheSilence) {
     if (!reply) reply = framer.on_silence();
     ASSERT_TRUE(reply);
     EXPECT_EQ(*reply, kReplyPdu);
+}
+
+TEST(RtuFramer, P1WhatStandsInTheDataOfAnotherFrameIsNoReply) {
+    const Bytes reply = joined("03 0B"_hex, kReply);
+    const std::array others{encode_adu(0x12, reply),  // another station's
+                            encode_adu(0x11, reply),  // its own, of another length
+                            encode_adu(0x12, joined("10 00 00 00 08 10 00 00 00 00 00"_hex,
+                                                    kReply))};  // another master's write
+    for (const Bytes& other : others) {
+        ReplyFramer framer(0x11, kRequest);
+        for (std::size_t i = 0; i < other.size(); ++i)
+            EXPECT_FALSE(framer.feed(ByteView(other).subspan(i, 1))) << i;
+        EXPECT_FALSE(framer.on_silence());
+        EXPECT_EQ(framer.feed(kReply).value(), kReplyPdu);
+    }
+}
+
+TEST(RtuFramer, TheReplyBehindTheBeginningOfAnotherFrameWaitsForASilence) {
+    ReplyFramer framer(0x11, kRequest);
+    EXPECT_FALSE(framer.feed(joined("12 03 20"_hex, kReply)));
+    EXPECT_TRUE(framer.is_inside());
+    EXPECT_EQ(framer.on_silence().value(), kReplyPdu);
 }
 
 TEST(RtuFramer, KeepsItsMemoryBoundedUnderEndlessNoise) {
