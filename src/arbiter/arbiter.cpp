@@ -181,6 +181,8 @@ void Arbiter::settle(TimePoint now) {
     if (replied.back) stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
     proved_ = std::max(proved_, attempt.timing().started);
+    if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
+        quiet_.on_answered_early(now);
     strays_.on_replied(group.station);
     quiet_.rest_until(station.trail_until());
     ledger_.on_answered(now, attempt, think, replied);

@@ -89,8 +89,12 @@ class BusScript {
         heard_until_ = now_;
         drain();
     }
-    /// A whole reply of a station arrives now, its CRC added.
-    void hear_reply(std::uint8_t station, ByteView pdu) { hear(modbus::encode_adu(station, pdu)); }
+    /// A whole reply of a station arrives now, its CRC added. Where the line is no real UART, the
+    /// request has left then.
+    void hear_reply(std::uint8_t station, ByteView pdu) {
+        if (!settings_.paced) sent_until_ = std::min(sent_until_, now_);
+        hear(modbus::encode_adu(station, pdu));
+    }
     /// Bytes arrive one by one from now on, at the line's pace.
     void hear_paced(ByteView bytes) {
         for (const std::uint8_t& b : bytes) {

@@ -34,6 +34,8 @@ class Quiet {
         since_ = std::max(since_, now);
         noise_ = {};
     }
+    /// On a line that is not bound to its rate the reply came before our frame can have left.
+    void on_answered_early(TimePoint now) { since_ = now; }
     /// Something is heard that nobody asked for.
     void on_noise(TimePoint now) {
         if (now >= since_ + pause_ || noise_ == TimePoint{}) noise_ = now;

@@ -181,6 +181,22 @@ TEST_F(ArbiterTest, ALineWithoutARealPaceIsLearned) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
 }
 
+TEST_F(ArbiterTest, P5OnALineThatIsQuickerThanItsRateTheGapFollowsTheReply) {
+    for (unsigned i = 0; i < 6; ++i) bus.submit(17, read_at(i));
+    std::vector<TimePoint> replied;
+    for (std::size_t i = 0; i < 6; ++i) {
+        ASSERT_EQ(bus.sent.size(), i + 1);
+        bus.run_for(100us);
+        bus.hear_reply(17, reply_number(i));
+        replied.push_back(bus.now());
+        bus.next_sent();
+    }
+    const Duration leaving = wire_time(settings.serial, 8);
+    EXPECT_EQ(bus.sent[1].at, bus.sent[0].at + leaving + gap) << "one may have been a late one";
+    EXPECT_EQ(bus.sent[4].at, replied[3] + gap);
+    EXPECT_EQ(bus.sent[5].at, replied[4] + gap);
+}
+
 TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
     for (int i = 0; i < 3; ++i) {
         const Ticket ticket = bus.submit(17, kRead);

@@ -28,5 +28,16 @@ TEST(Pace, P1OneReplyThatCameTooEarlySettlesIt) {
     }
 }
 
+TEST(Pace, IsNoPaceAtAllAfterSomeEarlyRepliesInARow) {
+    Pace pace;
+    pace.on_reply(kEarly);
+    pace.on_reply(kEarly);
+    EXPECT_FALSE(pace.unbound());
+    pace.on_reply(kEarly);
+    EXPECT_TRUE(pace.unbound());
+    pace.on_reply(!kEarly);
+    EXPECT_FALSE(pace.unbound());
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter

@@ -31,6 +31,13 @@ TEST_F(QuietTest, TheGapFollowsTheLastBitSentOrHeard) {
     EXPECT_EQ(quiet_.free_at(2 * kGap), kStart + 90ms);
 }
 
+TEST_F(QuietTest, TheGapFollowsAReplyThatCameBeforeTheRequestCanHaveLeft) {
+    quiet_.on_sent(kStart + 50ms, 17);
+    quiet_.on_heard(kStart + 50ms);
+    quiet_.on_answered_early(kStart + 46ms);
+    EXPECT_EQ(quiet_.free_at(kGap), kStart + 56ms);
+}
+
 TEST_F(QuietTest, BytesThatNobodyAskedForPostponeTheNextRequest) {
     quiet_.on_noise(kStart + 50ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 60ms);
