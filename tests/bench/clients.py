@@ -42,8 +42,10 @@ class Client(asyncio.Protocol):
         self._transport = None
 
     @classmethod
-    async def connect(cls, port):
-        _, client = await asyncio.get_running_loop().create_connection(cls, "127.0.0.1", port)
+    async def connect(cls, port, own_address=None):
+        local = (own_address, 0) if own_address else None
+        _, client = await asyncio.get_running_loop().create_connection(
+            cls, "127.0.0.1", port, local_addr=local)
         return client
 
     def connection_made(self, transport):

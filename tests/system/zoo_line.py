@@ -15,7 +15,7 @@ from collections import namedtuple
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
 import harness  # noqa: E402
-from clients import Client, percentile  # noqa: E402,F401
+from clients import Client, percentile, with_clients  # noqa: E402,F401
 from harness import read_registers, write_register  # noqa: E402
 
 ZOO_BUS = os.environ.get("ZOO_BUS", str(harness.ROOT / "build/release/zoo_bus"))
