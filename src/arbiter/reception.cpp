@@ -1,21 +1,25 @@
 #include "panelgate/arbiter/reception.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <utility>
 
+#include "panelgate/modbus/request.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
 
 void Reception::stamp(TimePoint now, Job& job) {
     const std::size_t request = job.pdu.size() + kAduOverhead;
-    const Duration shortest =
-        job.station == kBroadcast
-            ? wire_time(serial_, request)
-            : wire_time(serial_, request + kShortestReplyAdu) + silent_interval(serial_);
+    const std::size_t reply =
+        std::max(modbus::reply_length_from_request(job.pdu).value_or(0), kShortestReplyAdu);
+    const Duration needed = job.station == kBroadcast
+                                  ? wire_time(serial_, request)
+                                  : wire_time(serial_, request + reply) + silent_interval(serial_);
     job.ticket = ++last_ticket_;
     job.arrived = now;
     job.deadline = now + deadline_;
-    job.start_by = job.deadline - shortest;
+    job.start_by = job.deadline - needed;
 }
 
 std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const Job& job,

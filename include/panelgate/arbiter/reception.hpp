@@ -16,7 +16,9 @@ class Reception {
         : serial_(settings.serial), deadline_(settings.queue.deadline) {}
 
     /// Its ticket, its deadline, and the last moment at which starting it makes sense: when the
-    /// request, a gap and the shortest thing that a station can say still fit.
+    /// request, a gap and its normal reply still fit. Counting only the shortest reply, an
+    /// exception, would fill an overloaded line with transactions whose answers come too late for
+    /// everybody.
     void stamp(TimePoint now, Job& job);
 
     struct FromMemory {

@@ -63,20 +63,29 @@ TEST_F(ReceptionTest, P3TheDeadlineCountsFromTheArrival) {
     EXPECT_EQ(job.deadline, kNow + 700ms);
 }
 
-TEST_F(ReceptionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByTheShortestReply) {
+TEST_F(ReceptionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByItsNormalReply) {
     for (const int baud : {1200, 9600, 115200}) {
         const Settings settings = at(baud);
         const Job job = stamped(settings, kRead);
         const Duration request = wire_time(settings.serial, kRead.size() + 3);
-        const Duration exception = wire_time(settings.serial, 5);
-        EXPECT_GE(room(job), request + silent_interval(settings.serial) + exception) << baud;
-        EXPECT_LE(room(job), 2 * (request + silent_interval(settings.serial) + exception)) << baud;
+        const Duration reply = wire_time(settings.serial, kReply.size() + 3);
+        const Duration needed = request + silent_interval(settings.serial) + reply;
+        EXPECT_GE(room(job), needed) << baud;
+        EXPECT_LE(room(job), needed + 1us) << baud;
     }
 }
 
-TEST_F(ReceptionTest, ALongerRequestHasToStartEarlier) {
+TEST_F(ReceptionTest, P3WhatHasNoKnownReplyHasToLeaveRoomForTheShortest) {
+    const Settings settings = at(9600);
+    const Bytes identify = "11"_hex;
+    const Duration frames = wire_time(settings.serial, identify.size() + 3 + 5);
+    EXPECT_EQ(room(stamped(settings, identify)), frames + silent_interval(settings.serial));
+}
+
+TEST_F(ReceptionTest, WhatTakesLongerHasToStartEarlier) {
     const Bytes write = Writer().u8(0x10).u16(0).u16(100).u8(200).raw(Bytes(200)).take();
     EXPECT_GT(room(stamped(at(9600), write)), room(stamped(at(9600), kRead)));
+    EXPECT_GT(room(stamped(at(9600), "03 00 00 00 64"_hex)), room(stamped(at(9600), kRead)));
     EXPECT_GT(room(stamped(at(1200), kRead)), room(stamped(at(9600), kRead)));
 }
 
