@@ -104,7 +104,8 @@ def by_ser2net(folder, ttys):
     config.write_text("%YAML 1.1\n---\n" + "".join(
         f"connection: &line{port}\n  accepter: tcp,127.0.0.1,{port}\n"
         f"  connector: serialdev,{tty},{BAUD}n81,local\n" for port, tty in zip(ports, ttys)))
-    with Helper(["ser2net", "-n", "-u", "-c", config]):
+    # It says on stderr that it finds no mDNS.
+    with Helper(["ser2net", "-n", "-u", "-c", config], stderr=subprocess.DEVNULL):
         for port in ports:
             wait_for_listener(port)
         yield [f"127.0.0.1:{port}" for port in ports]
