@@ -188,7 +188,7 @@ void Arbiter::settle(TimePoint now) {
     const bool exception = modbus::exception_of(reply).has_value();
     if (group.span && !exception && station.settings().max_age > Duration::zero())
         reception_.memory().store(*group.span, reply, group.started);
-    if (exception) schedule_.give_back(group);
+    if (exception) give_back(group);
     for (const Job& job : group.jobs)
         ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
@@ -214,10 +214,15 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     if (in_time && station.may_retry(group)) {
         schedule_.retry(std::move(group));
     } else if (group.joined()) {
-        schedule_.give_back(group);  // nobody's health: the panel may only not take the length
+        give_back(group);  // nobody's health: the panel may only not take the length
     } else {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
     }
+}
+
+/// The parts of a joined read go again, but those of clients who have left.
+void Arbiter::give_back(Group& group) {
+    for (const Job& job : schedule_.give_back(group)) ledger_.finish(job, Fault::cancelled);
 }
 
 /// No further attempt: everybody is answered, and the station judged.

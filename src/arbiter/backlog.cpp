@@ -39,6 +39,8 @@ std::vector<Job> Backlog::remove_retries(const JobQueue::Test& match) {
     for (Group& group : retries_) {
         std::ranges::copy_if(group.jobs, std::back_inserter(removed), match);
         std::erase_if(group.jobs, match);
+        if (!group.abandoned()) continue;
+        append(removed, std::exchange(group.jobs, {}));  // of those who left while it was sent
     }
     std::erase_if(retries_, [](const Group& group) { return group.jobs.empty(); });
     return removed;
