@@ -137,6 +137,7 @@ void Arbiter::step(TimePoint now) {
 void Arbiter::check_active(TimePoint now) {
     if (!active_ || now < active_->deadline()) return;
     if (active_->is_broadcast()) return end_broadcast(now);
+    expire_active(now);  // a reply that was held back may be too late for some
     conclude(now, active_->on_deadline(now, ends_attempt(now)));
 }
 

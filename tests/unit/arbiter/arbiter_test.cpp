@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <variant>
+
 #include "panelgate/modbus/exception.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
@@ -450,6 +453,29 @@ TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
     bus.hear_reply(17, kReply);
     EXPECT_TRUE(bus.answered(broadcast));
     EXPECT_FALSE(bus.answered(read));
+}
+
+/// It repeats another one, so it waits for what else may come; meanwhile the process stands still.
+TEST_F(ArbiterTest, P3AReplyThatWasHeldBackIsNotGivenToWhomItIsTooLateFor) {
+    bus.submit(17, read_at(1));
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    const Ticket second = bus.submit(17, read_at(2));
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    ASSERT_FALSE(bus.answered(second));
+    bus.arbiter().on_deadline(bus.now() + settings.queue.deadline);
+    std::optional<Finish> answer;
+    while (auto action = bus.arbiter().poll_action()) {
+        if (const auto* finish = std::get_if<Finish>(&*action)) answer = *finish;
+    }
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->ticket, second);
+    ASSERT_FALSE(answer->pdu);
+    EXPECT_EQ(answer->pdu.error(), Fault::timeout);
 }
 
 TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingTheWire) {
