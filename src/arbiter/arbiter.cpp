@@ -265,6 +265,10 @@ void Arbiter::expire(TimePoint now) {
         ledger_.decide(now, [&] { return explain::expired(now, job, sent); });
         ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
+    for (const Group& group : schedule_.backlog().take_dropped()) {
+        const bool silent = group.silent_after > Duration::zero();
+        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
+    }
 }
 
 /// Those of the transaction whose own deadline has come; the others go on waiting for its reply. A

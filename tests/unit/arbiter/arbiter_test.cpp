@@ -455,6 +455,17 @@ TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
     EXPECT_FALSE(bus.answered(read));
 }
 
+TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
+    bus.submit(17, read_at(1), 1);
+    ASSERT_EQ(bus.sent.size(), 1u);
+    bus.submit(18, read_at(2), 2);
+    ASSERT_TRUE(bus.next_sent());
+    ASSERT_EQ(bus.sent.back().adu[0], 18) << "another one goes first";
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
+    bus.cancel(1);
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 1);
+}
+
 /// It repeats another one, so it waits for what else may come; meanwhile the process stands still.
 TEST_F(ArbiterTest, P3AReplyThatWasHeldBackIsNotGivenToWhomItIsTooLateFor) {
     bus.submit(17, read_at(1));

@@ -97,6 +97,8 @@ TEST_F(BacklogTest, P2ARetryEndsWithTheLastWhoWaitsForIt) {
     EXPECT_TRUE(backlog_.has_retry(17));
     EXPECT_EQ(backlog_.cancel(3).size(), 2u) << "each is answered";
     EXPECT_FALSE(backlog_.has_retry(17));
+    EXPECT_EQ(backlog_.take_dropped().size(), 1u);
+    EXPECT_TRUE(backlog_.take_dropped().empty());
     left = read(1, 18);
     left.gone = true;
     left.deadline = kStart + 9s;
