@@ -162,6 +162,8 @@ void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish
 void Checker::check_write(TimePoint now, const Open& open) {
     if (open.job.station == kBroadcast) return;
     const auto done = truth_.executed(open.job.station, open.job.pdu);
+    // The start of our own frame comes back, and its last byte is what somebody makes of a reply.
+    if ((!done || *done > now) && is_luck()) return;
     if (!done || *done > now) return fail("P8: a write was confirmed that no station executed");
     clients_[open.job.client].own_write[open.job.station] = *done;
 }
