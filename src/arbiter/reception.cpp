@@ -28,4 +28,8 @@ std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const
     return FromMemory{++last_ticket_, std::move(*hit)};
 }
 
+void Reception::on_read(const Group& group, const Bytes& reply, Duration max_age) {
+    if (group.span && max_age > Duration::zero()) memory_.store(*group.span, reply, group.started);
+}
+
 }  // namespace panelgate::arbiter
