@@ -41,6 +41,7 @@ inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     {"receiver", "P5: the line was silent"},
     {"company", "P5: the line was silent"},
     {"doubled", "P5: the line was silent"},
+    {"babbles", "P5: the line was silent"},
     {"answers_broadcasts", "P5: the line was silent"},
     {"dead", "P5: nothing was sent"},
     {"reboots", "P1: transmitted while"},
