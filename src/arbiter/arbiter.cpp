@@ -4,15 +4,11 @@
 #include <utility>
 
 #include "explain.hpp"
-#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
-#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
-
-using Kind = StationEvent::Kind;
 
 Arbiter::Arbiter(Settings settings)
     : settings_(std::move(settings)),
@@ -137,125 +133,8 @@ void Arbiter::step(TimePoint now) {
 void Arbiter::check_active(TimePoint now) {
     if (!active_ || now < active_->deadline()) return;
     if (active_->is_broadcast()) return end_broadcast(now);
+    expire_active(now);  // a reply that was held back may be too late for some
     conclude(now, active_->on_deadline(now, ends_attempt(now)));
-}
-
-void Arbiter::conclude(TimePoint now, Verdict verdict) {
-    const std::vector<modbus::Unused> strays = active_->take_strays();
-    ledger_.inside_attempt(true);
-    if (verdict == Verdict::replied) settle(now);
-    note(now, strays);
-    if (verdict != Verdict::open && verdict != Verdict::replied) fail(now, verdict);
-    ledger_.inside_attempt(false);
-}
-
-/// The last bit of a broadcast has left: nobody answers, the line rests for the turnaround.
-void Arbiter::end_broadcast(TimePoint now) {
-    const Attempt attempt = take_active(now);
-    quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
-    for (const Job& job : attempt.group().jobs)
-        ledger_.finish(job, modbus::normal_write_reply(job.pdu));
-}
-
-/// The reply is there.
-void Arbiter::settle(TimePoint now) {
-    Station& station = stations_.of(active_->group().station);
-    const bool early = active_->replied_early();
-    const bool too_early = early && !settings_.paced && pace_.believed();
-    if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
-    if (station.may_be_copy(now, *active_)) {
-        const bool again = station.repeats_itself(now, *active_) &&
-                           active_->group().attempts == 1 && station.may_retry(active_->group());
-        return active_->hold_reply(station.needed(), again);
-    }
-    pace_.on_reply(early);
-    Attempt attempt = take_active(now);
-    Group& group = attempt.group();
-    const Bytes& reply = attempt.reply();
-    const Duration waited = attempt.waited(now);
-    const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
-    const Duration needed = attempt.first_sign(now);
-    const Station::Replied replied = station.on_reply(now, attempt, needed, think);
-    const bool tells = group.silent_after == Duration::zero();
-    stations_.on_reply(now, tells ? std::optional(needed) : std::nullopt);
-    if (replied.back) stations_.on_back();
-    if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
-    proved_ = std::max(proved_, attempt.timing().started);
-    if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
-        quiet_.on_answered_early(now);
-    strays_.on_replied(group.station);
-    quiet_.rest_until(station.trail_until());
-    ledger_.on_answered(now, attempt, think, replied);
-    attempt.teach(echo_memory_);
-    const bool exception = modbus::exception_of(reply).has_value();
-    if (group.span && !exception && station.settings().max_age > Duration::zero())
-        reception_.memory().store(*group.span, reply, group.started);
-    if (exception) schedule_.give_back(group);
-    for (const Job& job : group.jobs)
-        ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
-}
-
-void Arbiter::fail(TimePoint now, Verdict verdict) {
-    Attempt attempt = take_active(now);
-    ledger_.on_failed(attempt, verdict);
-    Group& group = attempt.group();
-    Station& station = stations_.of(group.station);
-    const TimePoint sent = attempt.timing().sent;
-    const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
-    if (attempt.came_damaged()) {
-        station.on_damaged_reply(now, group.pdu, sent);
-    } else {
-        station.owe(now, group.pdu, sent);
-    }
-    stations_.on_failed(now, group.station, verdict, cost);
-    if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
-        quiet_.quarantine(group.station, *until);
-        ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
-    }
-    group.silent_after = verdict == Verdict::silent
-                             ? std::min(now - sent, attempt.timing().patience) - latency_
-                             : Duration::zero();
-    const bool in_time =
-        std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-    if (in_time && station.may_retry(group)) {
-        schedule_.retry(std::move(group));
-    } else if (group.joined()) {
-        schedule_.give_back(group);  // nobody's health: the panel may only not take the length
-    } else {
-        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
-    }
-}
-
-/// No further attempt: everybody is answered, and the station judged.
-void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
-    for (const Job& job : group.jobs) ledger_.finish(job, fault);
-    Backlog& backlog = schedule_.backlog();
-    if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
-    if (group.learns_for != 0 && fault != Fault::damaged) {
-        // P8: the write never left, and its station is silent.
-        const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
-        for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
-    }
-    Station& station = stations_.of(group.station);
-    if (!station.on_given_up(now, fault)) return;
-    if (!station.stranger()) ledger_.event(Kind::offline, group.station);
-    const auto theirs = [&](const Job& job) { return job.station == group.station; };
-    for (const Job& job : backlog.remove_if(theirs)) ledger_.finish(job, Fault::offline);
-}
-
-/// The attempt is over: its time is accounted for, and what the echo filter held back is heard.
-Attempt Arbiter::take_active(TimePoint now) {
-    Attempt attempt = std::move(*active_);
-    active_.reset();
-    ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
-    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
-        ledger_.event(Kind::echo, attempt.group().station);
-    // Where a reply may come before the request has left, early bytes tell nothing.
-    const bool keeps_pace = settings_.paced || pace_.believed();
-    if (const auto noise = attempt.early_noise(); noise && keeps_pace)
-        stations_.on_trail(*noise, strays_.replied_before());
-    strays_.hear(attempt.release_echo());
-    return attempt;
 }
 
 void Arbiter::expire(TimePoint now) {
@@ -264,6 +143,10 @@ void Arbiter::expire(TimePoint now) {
         const bool sent = job.attempts > 0;
         ledger_.decide(now, [&] { return explain::expired(now, job, sent); });
         ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
+    }
+    for (const Group& group : schedule_.backlog().take_dropped()) {
+        const bool silent = group.silent_after > Duration::zero();
+        give_up(now, group, silent ? Fault::timeout : Fault::damaged);
     }
 }
 

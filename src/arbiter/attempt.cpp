@@ -39,7 +39,8 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
       end_confirmed_(!timing.confirm_end) {}
 
 bool Attempt::takes_along(TimePoint now, const Job& job) const {
-    return now < timing_.sent && group_.attempts == 1 && contained_in(group_.span, job) &&
+    const bool leaving = timing_.tolerance && now < timing_.sent;
+    return leaving && group_.attempts == 1 && contained_in(group_.span, job) &&
            group_.jobs.size() < JobQueue::kMost;
 }
 

@@ -36,11 +36,17 @@ void Backlog::each_retry(const std::function<void(const Group&)>& show) const {
 
 std::vector<Job> Backlog::remove_retries(const JobQueue::Test& match) {
     std::vector<Job> removed;
-    for (Group& group : retries_) {
-        std::ranges::copy_if(group.jobs, std::back_inserter(removed), match);
-        std::erase_if(group.jobs, match);
+    for (auto group = retries_.begin(); group != retries_.end();) {
+        std::ranges::copy_if(group->jobs, std::back_inserter(removed), match);
+        std::erase_if(group->jobs, match);
+        if (!group->abandoned()) {
+            ++group;
+            continue;
+        }
+        append(removed, std::exchange(group->jobs, {}));  // of those who left while it was sent
+        dropped_.push_back(std::move(*group));
+        group = retries_.erase(group);
     }
-    std::erase_if(retries_, [](const Group& group) { return group.jobs.empty(); });
     return removed;
 }
 
@@ -73,6 +79,7 @@ std::vector<Job> Backlog::clear() {
     const auto all = [](const Job&) { return true; };
     std::vector<Job> removed = remove_retries(all);
     append(removed, queue_.remove_if(all));
+    dropped_.clear();
     return removed;
 }
 

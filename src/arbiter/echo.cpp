@@ -96,6 +96,10 @@ void EchoMemory::on_unclear() {
     if (state_ == State::unknown) state_ = State::unclear;
 }
 
+void EchoMemory::on_unanswered(ByteView request) {
+    if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = State::unclear;
+}
+
 void EchoMemory::on_mismatch() {
     if (mode_ != EchoMode::on) forget();
 }

@@ -24,7 +24,7 @@ void Arbiter::check_invariants() const {
     must(up_ || backlog.empty(), "a line that is down has nothing waiting");
     must(up_ || !resetting_, "a line that is down is not to be reset");
     backlog.each_retry([&](const Group& group) {
-        must(!group.jobs.empty(), "somebody waits for each retry");
+        must(!group.abandoned(), "somebody waits for each retry");
         must(group.attempts > 0, "what is repeated was sent before");
         must(stations_.find(group.station) != nullptr, "its station is known");
     });

@@ -70,7 +70,8 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
         [](const Holder&) { return false; });
 }
 
-/// Of the greediest of those that have something to give.
+/// Of the greediest of those that have something to give; of several the newest, or it would be the
+/// same one's turn to lose every time, and nothing of it would ever be served.
 std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
                                                     const Ask& writes_too) const {
     std::optional<Victim> best;
@@ -79,9 +80,9 @@ std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
         for (const auto& [client, source] : origin.sources) {
             const std::pair load(origin.counting, source.counting);
             const Holder holder{host, origin, client, source};
-            if ((best && load <= most) || !may_lose(holder)) continue;
+            if ((best && load < most) || !may_lose(holder)) continue;
             const auto victim = victim_of(holder, writes_too(holder));
-            if (!victim) continue;
+            if (!victim || (best && load == most && victim->merit < best->merit)) continue;
             best = victim;
             most = load;
         }

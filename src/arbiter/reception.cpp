@@ -14,8 +14,8 @@ void Reception::stamp(TimePoint now, Job& job) {
     const std::size_t reply =
         std::max(modbus::reply_length_from_request(job.pdu).value_or(0), kShortestReplyAdu);
     const Duration needed = job.station == kBroadcast
-                                  ? wire_time(serial_, request)
-                                  : wire_time(serial_, request + reply) + silent_interval(serial_);
+                                ? wire_time(serial_, request)
+                                : wire_time(serial_, request + reply) + silent_interval(serial_);
     job.ticket = ++last_ticket_;
     job.arrived = now;
     job.deadline = now + deadline_;
@@ -30,6 +30,10 @@ std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const
     auto hit = memory_.find(*span, now, max_age);
     if (!hit) return std::nullopt;
     return FromMemory{++last_ticket_, std::move(*hit)};
+}
+
+void Reception::on_read(const Group& group, const Bytes& reply, Duration max_age) {
+    if (group.span && max_age > Duration::zero()) memory_.store(*group.span, reply, group.started);
 }
 
 }  // namespace panelgate::arbiter

@@ -1,6 +1,7 @@
 #include "panelgate/arbiter/schedule.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "panelgate/modbus/request.hpp"
@@ -169,8 +170,12 @@ void Schedule::retry(Group group) {
     backlog_.retry(std::move(group));
 }
 
-void Schedule::give_back(Group& group) {
+std::vector<Job> Schedule::give_back(Group& group) {
     for (Job& job : sharing_.split(group)) backlog_.queue().put_back(std::move(job));
+    std::vector<Job> gone;
+    std::ranges::copy_if(group.jobs, std::back_inserter(gone), &Job::gone);
+    std::erase_if(group.jobs, [](const Job& job) { return job.gone; });
+    return gone;
 }
 
 }  // namespace panelgate::arbiter

@@ -52,18 +52,18 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
 }
 
 std::vector<Job> Sharing::split(Group& group) {
-    const auto asked_all = [&](const Job& job) { return job.pdu == group.pdu; };
+    const auto stays = [&](const Job& job) { return job.pdu == group.pdu || job.gone; };
     if (group.joined()) {
         if (refused_.size() >= kRemembered) refused_.pop_front();
         refused_.push_back(*group.span);
     }
     std::vector<Job> parts;
     for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
-        if (asked_all(*job)) continue;
+        if (stays(*job)) continue;
         job->alone = true;
         parts.push_back(*job);
     }
-    std::erase_if(group.jobs, [&](const Job& job) { return !asked_all(job); });
+    std::erase_if(group.jobs, [&](const Job& job) { return !stays(job); });
     return parts;
 }
 

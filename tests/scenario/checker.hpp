@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -86,7 +87,7 @@ class Checker {
         std::uint64_t served = 0;  ///< by its station, when it was submitted
         std::uint64_t turn = 0;    ///< frames sent until then
         bool write = false;
-        bool sent = false;
+        bool sent = false;  ///< in a frame, and not known to wait again
         bool gone = false;  ///< its client
     };
     struct Client {
@@ -104,18 +105,21 @@ class Checker {
     // What may be sent when (checker_wire.cpp)
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
-    void check_turn(bool write);
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
-    void mark_sent(std::uint8_t station, ByteView pdu);
-    bool good_work_waited(TimePoint since) const;
+    std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
+    TimePoint owed_until() const;
+    // Who waits, and whose turn it is (checker_queue.cpp)
+    void mark_sent(std::uint8_t station, ByteView pdu, std::string_view what);
+    bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
+    std::size_t waiting() const;
+    void check_turn(bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
     bool is_luck();
-    std::size_t waiting() const;
     void check_write(TimePoint now, const Open& open);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
@@ -135,6 +139,7 @@ class Checker {
     static constexpr std::size_t kNobodyCame = SIZE_MAX;
     std::uint64_t frames_settled_ = 0;          ///< frames_ when everything had settled last
     std::size_t waiting_before_ = kNobodyCame;  ///< the newcomer that was taken last
+    bool displaced_ = false;                    ///< somebody had to go for it
     std::map<arbiter::Client, Client> clients_;
     std::map<std::string, int> written_;             ///< times that each write was on the wire
     std::unordered_set<std::string> closed_writes_;  ///< answered, or of nobody any more
@@ -152,9 +157,11 @@ class Checker {
     TimePoint heard_until_{};
     TimePoint noisy_since_{};  ///< no silence since then
     TimePoint last_transmit_{};
+    TimePoint told_{};  ///< a reply was handed on
     TimePoint paused_from_{};
     TimePoint resumed_{};
     std::uint64_t last_read_turn_ = 0;
+    std::deque<TimePoint> last_turns_;  ///< when the last frames were sent
     TimePoint started_{};
     std::uint64_t good_ = 0;
     std::uint64_t frames_ = 0;

@@ -49,6 +49,9 @@ void Checker::on_answered(TimePoint now) {
     if (attempt_.answered) return;
     attempt_.answered = true;
     watch_.on_answered(now, attempt_.station, now - attempt_.sent);
+    // Of two attempts nobody knows which one the reply was for.
+    if (attempt_.settles) watch_.on_nothing_owed(attempt_.station);
+    if (attempt_.owed && !attempt_.settles) watch_.on_owed(attempt_.station, owed_until());
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
 }
 
@@ -98,11 +101,18 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
+    attempt_.span = arbiter::read_span(station, pdu);
+    attempt_.again = what == "retry";
+    attempt_.settles = what == "settle";
+    attempt_.owed = now < watch_.rests_until(station);
+    constexpr std::size_t kRemembered = 8;
+    last_turns_.push_back(now);
+    if (last_turns_.size() > kRemembered) last_turns_.pop_front();
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
     check_turn(write);
     if (write) check_write_sent(station, pdu);
-    mark_sent(station, pdu);
+    mark_sent(station, pdu, what);
     if (write) truth_.on_write_sent(now, station, pdu);
 }
 
@@ -127,12 +137,26 @@ void Checker::close_attempt(TimePoint now) {
     if (attempt_.answered) return;
     const Duration cost = now - attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
-    if (plain && attempt_.dead && cost > costs_.limit(attempt_) &&
-        good_work_waited(attempt_.started))
+    const auto waited = good_work_since(attempt_.started);
+    if (plain && attempt_.dead && cost > costs_.limit(attempt_) && waited == attempt_.started)
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
     const std::string broken = costs_.on_unanswered(now, attempt_);
     if (!broken.empty()) fail(broken);
     watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
+    watch_.on_owed(attempt_.station, owed_until());
+}
+
+/// P1: until when a reply to the request that was sent last may come, at most.
+TimePoint Checker::owed_until() const {
+    const auto station =
+        std::ranges::find(settings_.stations, attempt_.station, &arbiter::StationSettings::id);
+    const arbiter::StationSettings& s =
+        station == settings_.stations.end() ? settings_.unlisted : *station;
+    constexpr int kMostTimeouts = 8;  // that an automatic window grows to
+    const Duration window = s.late_window.value_or(kMostTimeouts * s.response_timeout);
+    // An attempt that hears something goes on until that has ended.
+    return std::max(attempt_.sent + s.response_timeout, heard_until_ + settings_.reply_hole) +
+           window;
 }
 
 /// P5: what the line may be silent for while a request waits that nothing keeps from going.
@@ -140,9 +164,13 @@ void Checker::check_idling(TimePoint now) {
     // Gaps that were lengthened for what follows replies: at slow rates that takes its own time.
     constexpr std::size_t kReply = 45;
     const Duration slack = 100ms + wire_time(settings_.serial, kReply);
-    const TimePoint since = std::max(sent_until_, heard_until_);
-    if (now <= since + slack || !good_work_waited(since)) return;
-    const Duration idle = now - since;
+    // An answer that repeats another one may be held back for as long as its station needs: it
+    // could be a copy of that, with its own still to come (P1).
+    const TimePoint held = heard_until_ + watch_.own_slowest(attempt_.station) + 20ms;
+    const TimePoint over = std::max({sent_until_, heard_until_, std::min(told_, held)});
+    const auto waited = good_work_since(over);
+    if (!waited || now <= *waited + slack) return;
+    const Duration idle = now - *waited;
     longest_idle_ = std::max(longest_idle_, idle);
     Duration most = slack;
     if (!attempt_.answered) most += settings_.unlisted.response_timeout;
@@ -152,32 +180,20 @@ void Checker::check_idling(TimePoint now) {
              " ms while a request waited");
 }
 
-/// A request to a station that answers everything, that nobody has asked for it yet.
-bool Checker::good_work_waited(TimePoint since) const {
-    return std::ranges::any_of(open_, [&](const auto& entry) {
-        const Open& o = entry.second;
-        return !o.sent && !o.gone && o.submitted <= since && o.job.station != kBroadcast &&
-               !watch_.is_silent(o.job.station) && watch_.is_good(o.job.station, since) &&
-               !(o.write && echoes_);
-    });
-}
-
-/// P9: a waiting reader gets every fifth turn at least.
-void Checker::check_turn(bool write) {
-    constexpr std::uint64_t kWritesInARow = 4;
-    if (!write) {
-        last_read_turn_ = frames_;
-        return;
+/// Since when, but not before `since`, a request has waited that nothing keeps from going: it has
+/// not been sent, its station answers everything, and owes nothing (P1).
+std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
+    std::optional<TimePoint> first;
+    for (const auto& [ticket, o] : open_) {
+        const std::uint8_t station = o.job.station;
+        const bool good = !o.sent && !o.gone && station != kBroadcast &&
+                          !watch_.is_silent(station) && watch_.is_good(station, since) &&
+                          !(o.write && echoes_);
+        if (!good) continue;
+        const TimePoint from = std::max({since, o.submitted, watch_.rests_until(station)});
+        if (!first || from < *first) first = from;
     }
-    if (frames_ - last_read_turn_ <= kWritesInARow) return;
-    const bool starves = std::ranges::any_of(open_, [&](const auto& entry) {
-        const Open& o = entry.second;
-        const auto client = clients_.find(o.job.client);
-        return !o.sent && !o.gone && o.job.priority == arbiter::PriorityClass::read &&
-               o.turn + kWritesInARow < frames_ && client != clients_.end() &&
-               client->second.single && watch_.is_good(o.job.station, o.submitted);
-    });
-    if (starves) fail("P9: five writes in a row while a reader waits");
+    return first;
 }
 
 void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
@@ -204,15 +220,6 @@ void Checker::check_again(std::uint8_t station, ByteView pdu, std::string_view w
         return span && own ? span->contains(*own) : std::ranges::equal(o.job.pdu, pdu);
     });
     if (!wanted) fail("P4: a request went out again for nobody");
-}
-
-void Checker::mark_sent(std::uint8_t station, ByteView pdu) {
-    const auto span = arbiter::read_span(station, pdu);
-    for (auto& [ticket, open] : open_) {
-        if (open.sent || open.job.station != station) continue;
-        const auto own = arbiter::read_span(station, open.job.pdu);
-        open.sent = span && own ? span->contains(*own) : std::ranges::equal(open.job.pdu, pdu);
-    }
 }
 
 }  // namespace panelgate::scenario

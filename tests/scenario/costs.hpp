@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
+#include "panelgate/arbiter/shared_read.hpp"
 #include "plan.hpp"
 #include "watch.hpp"
 
@@ -17,7 +19,11 @@ struct Attempt {
     bool was_silent = false;  ///< the station was silent before
     bool trusted = false;     ///< it answered the last time
     bool answered = true;
-    bool heard = false;  ///< anything
+    bool heard = false;    ///< anything
+    bool again = false;    ///< it was on the wire before
+    bool settles = false;  ///< its answer shows that nothing is owed
+    bool owed = false;     ///< an earlier one may still be answered
+    std::optional<arbiter::ReadSpan> span;
 };
 
 /// P4: what those who do not answer cost the others.

@@ -78,7 +78,7 @@ TEST(Field, P4AClientThatScansAllIdsDoesNotKeepADeadPanelFromComingBack) {
     EXPECT_LT(to_seconds(outcome.longest_unasked.at(4)), 30);
 }
 
-TEST(Field, DISABLED_P2WhatAClientThatLeftHadAskedIsNotAskedAgain) {
+TEST(Field, P2WhatAClientThatLeftHadAskedIsNotAskedAgain) {
     Plan plan = quiet_line(38400, 2);
     plan.settings.unlisted.retries = 2;
     for (arbiter::StationSettings& station : plan.settings.stations) {

@@ -1,7 +1,8 @@
 // The arbiter's promises in virtual time, with faults that no lab would reach.
 //
 // PANELGATE_SCENARIO_FRAMES  transactions in all (default 1 000 000; a tenth with sanitizers)
-// PANELGATE_SCENARIO_SEED    this seed alone, to replay a failure with --gtest_filter
+// PANELGATE_SCENARIO_SEED    this seed alone, to replay a failure with --gtest_filter; one that
+//                            open.hpp lists fails here, too
 // PANELGATE_SCENARIO_SEEDS   of the survey: --gtest_also_run_disabled_tests
 // --gtest_filter='Survey*'
 

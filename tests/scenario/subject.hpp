@@ -28,6 +28,7 @@ class Subject {
     virtual std::size_t queue_depth() const { return arbiter_->queue_depth(); }
     virtual void on_line_up(TimePoint now) { arbiter_->on_line_up(now); }
     virtual void on_line_down(TimePoint now) { arbiter_->on_line_down(now); }
+    void check_invariants() const { arbiter_->check_invariants(); }
 
   protected:
     std::unique_ptr<arbiter::Arbiter> arbiter_;

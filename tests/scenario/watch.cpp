@@ -42,6 +42,21 @@ void Watch::on_unanswered(TimePoint now, std::uint8_t station, bool silent) {
     s.silent = s.silent || silent;
 }
 
+void Watch::on_owed(std::uint8_t station, TimePoint until) {
+    Station& s = stations_[station];
+    s.rests = std::max(s.rests, until);
+}
+
+TimePoint Watch::rests_until(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s == nullptr ? TimePoint{} : s->rests;
+}
+
+bool Watch::is_failing(std::uint8_t station) const {
+    const Station* s = find(station);
+    return s != nullptr && s->failing;
+}
+
 bool Watch::is_good(std::uint8_t station, TimePoint since) const {
     const Station* s = find(station);
     return s != nullptr && s->sound && !s->disturbed && s->settled < since;

@@ -21,11 +21,19 @@ class Watch {
     /// It answered `after` the computed end of the request.
     void on_answered(TimePoint now, std::uint8_t station, Duration after);
     void on_unanswered(TimePoint now, std::uint8_t station, bool silent);
+    /// A reply of it may come until then that answers an earlier request.
+    void on_owed(std::uint8_t station, TimePoint until);
+    /// A read of another shape was answered: nothing more can come.
+    void on_nothing_owed(std::uint8_t station) { stations_[station].rests = {}; }
 
     /// A gateway can get each of its answers, and nothing has hit it since then.
     bool is_good(std::uint8_t station, TimePoint since) const;
     /// It does nothing wrong but dying, so that its silence has no other reason.
     bool only_dies(std::uint8_t station) const;
+    /// Until then it is to be left alone (P1), but for the very same request.
+    TimePoint rests_until(std::uint8_t station) const;
+    /// Its last attempt was not answered.
+    bool is_failing(std::uint8_t station) const;
     /// It has not answered since it was last silent.
     bool is_silent(std::uint8_t station) const;
     bool is_known(std::uint8_t station) const;
@@ -45,6 +53,7 @@ class Watch {
         bool disturbed = false;
         bool silent = false;
         bool failing = false;
+        TimePoint rests{};
         TimePoint settled{};  ///< the last disturbance was over
         std::optional<Duration> slowest;
     };

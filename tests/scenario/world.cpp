@@ -57,7 +57,9 @@ bool World::step() {
     return true;
 }
 
+/// Behind every verb.
 void World::drain() {
+    subject_.check_invariants();
     while (auto action = subject_.poll_action(now())) {
         std::visit([this](const auto& a) { act(a); }, *action);
     }

@@ -114,6 +114,7 @@ class Arbiter {
     void end_broadcast(TimePoint now);
     void settle(TimePoint now);
     void fail(TimePoint now, Verdict verdict);
+    void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);
     Attempt take_active(TimePoint now);
     void expire(TimePoint now);

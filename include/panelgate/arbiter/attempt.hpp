@@ -67,7 +67,8 @@ class Attempt {
     /// most.
     void on_end(TimePoint now, Duration left);
 
-    /// A read that comes while the request is still leaving shares it. Not a repeated one: an
+    /// A read that comes while the request is still leaving shares it: only a real UART holds it
+    /// back for so long. Not a repeated one: an
     /// answer to the first attempt may still come, and would be too old.
     bool takes_along(TimePoint now, const Job& job) const;
 

@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "panelgate/arbiter/group.hpp"
@@ -34,6 +35,9 @@ class Backlog {
     std::optional<Group> take_retry(const std::function<bool(const Group&)>& may_go);
     void each_retry(const std::function<void(const Group&)>& show) const;
 
+    /// Retries that nobody waits for any more, without their jobs: what failed has failed.
+    std::vector<Group> take_dropped() { return std::exchange(dropped_, {}); }
+
     /// What this client has waiting; it is gone then.
     std::vector<Job> cancel(Client client);
     /// Those that can no longer be started, or, transmitted before, answered in time.
@@ -49,6 +53,7 @@ class Backlog {
 
     JobQueue queue_;
     std::deque<Group> retries_;
+    std::vector<Group> dropped_;
 };
 
 }  // namespace panelgate::arbiter

@@ -80,6 +80,9 @@ class EchoMemory {
     void on_reply_without_echo(ByteView request, bool fragment);
     /// The read that was to tell did not.
     void on_unclear();
+    /// Its own echo was heard and no answer: where it could be its own answer, that may be what it
+    /// was, because the line has no echo any more.
+    void on_unanswered(ByteView request);
     /// The echo differed: learn again, unless the configuration knows.
     void on_mismatch();
 

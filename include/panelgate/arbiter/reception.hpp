@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
@@ -28,6 +29,8 @@ class Reception {
     /// A value that was read lately, where the station's max_age allows it. Not for polls, which
     /// are to bring new ones.
     std::optional<FromMemory> from_memory(TimePoint now, const Job& job, Duration max_age);
+    /// A read was answered by its station; `max_age`: of that.
+    void on_read(const Group& group, const Bytes& reply, Duration max_age);
     ReadCache& memory() { return memory_; }
 
   private:

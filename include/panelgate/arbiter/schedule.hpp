@@ -38,8 +38,9 @@ class Schedule {
     const Backlog& backlog() const { return backlog_; }
     /// The same request goes again; others may go in between where only its station rests.
     void retry(Group group);
-    /// What was asked for together goes again, each for itself.
-    void give_back(Group& group);
+    /// What was asked for together goes again, each for itself. Gives those whose client has left:
+    /// for them nothing goes.
+    std::vector<Job> give_back(Group& group);
 
   private:
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);

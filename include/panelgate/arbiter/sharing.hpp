@@ -21,8 +21,8 @@ class Sharing {
     /// and two gaps, so joining reads without a hole is always cheaper on the wire.
     Group gather(Job leader, const Station& station, JobQueue& queue) const;
     /// The joined read did not come about: its parts go alone from now on. Gives them in the order
-    /// in which they are to be put back in front of the queue; what asked for the whole stays in
-    /// the group.
+    /// in which they are to be put back in front of the queue; what asked for the whole, and what
+    /// nobody waits for any more, stays in the group.
     std::vector<Job> split(Group& group);
     /// What of `reply` answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <variant>
+
 #include "panelgate/modbus/exception.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
@@ -309,16 +312,25 @@ TEST_F(ArbiterTest, P6IdenticalReadsShareOneTransaction) {
 }
 
 TEST_F(ArbiterTest, P6OneMayJoinWhileTheRequestLeavesButNotLater) {
+    settings.paced = true;
+    BusScript uart{settings};
+    uart.submit(17, kRead, 1);
+    uart.run_for(1ms);
+    const Ticket joined = uart.submit(17, kRead, 2);
+    uart.run_to_end_of_request();
+    const Ticket late = uart.submit(17, kRead, 3);
+    uart.run_for(3ms);
+    uart.hear_reply(17, kReply);
+    EXPECT_TRUE(uart.answered(joined));
+    EXPECT_FALSE(uart.answered(late)) << "its value would have been sampled before it asked";
+    EXPECT_TRUE(uart.next_sent());
+}
+
+TEST_F(ArbiterTest, P6NobodyJoinsWhatAFarEndMayHaveAlready) {
     bus.submit(17, kRead, 1);
-    bus.run_for(1ms);
-    const Ticket joined = bus.submit(17, kRead, 2);
-    bus.run_to_end_of_request();
-    const Ticket late = bus.submit(17, kRead, 3);
-    bus.run_for(3ms);
+    const Ticket late = bus.submit(17, kRead, 2);
     bus.hear_reply(17, kReply);
-    EXPECT_TRUE(bus.answered(joined));
-    EXPECT_FALSE(bus.answered(late)) << "its value would have been sampled before it asked";
-    EXPECT_TRUE(bus.next_sent());
+    EXPECT_FALSE(bus.answered(late)) << "the far end of a tcp line has the request at once";
 }
 
 TEST_F(ArbiterTest, P6TouchingReadsAreJoinedAndContainedOnesSliced) {
@@ -466,6 +478,40 @@ TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
     bus.hear_reply(17, kReply);
     EXPECT_TRUE(bus.answered(broadcast));
     EXPECT_FALSE(bus.answered(read));
+}
+
+TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
+    bus.submit(17, read_at(1), 1);
+    ASSERT_EQ(bus.sent.size(), 1u);
+    bus.submit(18, read_at(2), 2);
+    ASSERT_TRUE(bus.next_sent());
+    ASSERT_EQ(bus.sent.back().adu[0], 18) << "another one goes first";
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
+    bus.cancel(1);
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 1);
+}
+
+/// It repeats another one, so it waits for what else may come; meanwhile the process stands still.
+TEST_F(ArbiterTest, P3AReplyThatWasHeldBackIsNotGivenToWhomItIsTooLateFor) {
+    bus.submit(17, read_at(1));
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    const Ticket second = bus.submit(17, read_at(2));
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    ASSERT_FALSE(bus.answered(second));
+    bus.arbiter().on_deadline(bus.now() + settings.queue.deadline);
+    std::optional<Finish> answer;
+    while (auto action = bus.arbiter().poll_action()) {
+        if (const auto* finish = std::get_if<Finish>(&*action)) answer = *finish;
+    }
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->ticket, second);
+    ASSERT_FALSE(answer->pdu);
+    EXPECT_EQ(answer->pdu.error(), Fault::timeout);
 }
 
 TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingTheWire) {

@@ -88,6 +88,25 @@ TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHa
     EXPECT_TRUE(backlog_.cancel(1).empty());
 }
 
+/// Those who left while it was on the wire are still among its jobs.
+TEST_F(BacklogTest, P2ARetryEndsWithTheLastWhoWaitsForIt) {
+    Job left = read(1, 17);
+    left.gone = true;
+    retry({read(2, 17), left, read(3, 17)});
+    EXPECT_EQ(backlog_.cancel(2).size(), 1u);
+    EXPECT_TRUE(backlog_.has_retry(17));
+    EXPECT_EQ(backlog_.cancel(3).size(), 2u) << "each is answered";
+    EXPECT_FALSE(backlog_.has_retry(17));
+    EXPECT_EQ(backlog_.take_dropped().size(), 1u);
+    EXPECT_TRUE(backlog_.take_dropped().empty());
+    left = read(1, 18);
+    left.gone = true;
+    left.deadline = kStart + 9s;
+    retry({until(read(2, 18), kStart, kStart + 1s), left});
+    EXPECT_EQ(backlog_.expire(kStart + 1s).size(), 2u);
+    EXPECT_TRUE(backlog_.empty());
+}
+
 TEST_F(BacklogTest, P3WhatWasNotSentExpiresWhenItCanNoLongerBeStarted) {
     const Ticket first = wait(until(read(1, 17), kStart + 1s, kStart + 5s));
     wait(until(read(2, 17), kStart + 2s, kStart + 3s));

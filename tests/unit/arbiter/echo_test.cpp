@@ -161,6 +161,20 @@ TEST_F(Echo, P8AnExceptionTeachesAsWellAsAValue) {
     EXPECT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
 }
 
+TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
+    EchoMemory memory(EchoMode::automatic);
+    const Bytes read = "03 00 00 00 03"_hex;
+    const Bytes write = "06 00 00 00 03"_hex;
+    ASSERT_TRUE(memory.on_echo(read));
+    memory.on_unanswered(read);
+    EXPECT_EQ(memory.state(), EchoMemory::State::present) << "no read is answered by itself";
+    memory.on_unanswered(write);
+    EXPECT_EQ(memory.state(), EchoMemory::State::unclear);
+    EXPECT_TRUE(memory.must_be_learned_before(write, false));
+    memory.on_reply_without_echo(read, false);
+    EXPECT_EQ(memory.state(), EchoMemory::State::absent);
+}
+
 TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     BusScript bus(settings(EchoMode::automatic));
     const Ticket ticket = bus.submit(17, kWriteCoil);

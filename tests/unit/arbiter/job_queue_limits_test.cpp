@@ -47,6 +47,17 @@ TEST_F(JobQueueLimits, P9RefusesMoreThanTheLimitWhenAllHaveTheSame) {
     EXPECT_TRUE(refuses(read(1, 1)));
 }
 
+/// Else one of them would lose every time, and nothing of it would ever be served.
+TEST_F(JobQueueLimits, P9OfThoseWhoAreEquallyGreedyTheNewestRequestGoes) {
+    limits(3, 4);
+    const Ticket first = add(read(1, 1, 100));
+    const Ticket second = add(read(3, 1, 100));
+    const Ticket third = add(read(2, 1, 100));
+    EXPECT_EQ(shed_for(read(8, 1, 200)), third);
+    EXPECT_EQ(shed_for(read(9, 1, 300)), second);
+    EXPECT_EQ(next(), first);
+}
+
 TEST_F(JobQueueLimits, P6EqualReadsCountOnce) {
     for (Client client = 1; client <= 1024; ++client)
         ASSERT_TRUE(queue_.push(read_of(client, "03 00 10 00 08"_hex)).taken);

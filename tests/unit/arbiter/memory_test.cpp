@@ -171,7 +171,9 @@ TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
 }
 
 TEST(Shares, P9TheTimeOfASharedTransactionIsSharedOut) {
-    BusScript bus(settings_with(0s));
+    Settings settings = settings_with(0s);
+    settings.paced = true;
+    BusScript bus(settings);
     bus.submit(17, kRead, 1);
     bus.submit(17, kRead, 2);  // joins
     answer(bus, kReply);

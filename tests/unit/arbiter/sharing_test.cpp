@@ -114,6 +114,18 @@ TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
     EXPECT_TRUE(gather(registers(10, 4)).joined()) << "no join was refused";
 }
 
+TEST_F(SharingTest, P2WhoHasLeftIsNotAskedForAgainWhenAJoinIsSplit) {
+    wait(registers(12, 2));
+    wait(registers(14, 2));
+    Group group = gather(registers(10, 2));
+    ASSERT_TRUE(group.joined());
+    group.on_gone(group.jobs[1].client);
+    const Ticket gone = group.jobs[1].ticket;
+    EXPECT_EQ(sharing_.split(group).size(), 2u);
+    ASSERT_EQ(group.jobs.size(), 1u);
+    EXPECT_EQ(group.jobs.front().ticket, gone);
+}
+
 TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
     sharing_ = Sharing(false);
     wait(registers(10, 2));

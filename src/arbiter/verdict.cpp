@@ -1,0 +1,140 @@
+// What comes of an attempt: its jobs are answered, or it goes again, and its station is judged.
+
+#include <algorithm>
+#include <utility>
+
+#include "explain.hpp"
+#include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::arbiter {
+
+using Kind = StationEvent::Kind;
+
+void Arbiter::conclude(TimePoint now, Verdict verdict) {
+    const std::vector<modbus::Unused> strays = active_->take_strays();
+    ledger_.inside_attempt(true);
+    if (verdict == Verdict::replied) settle(now);
+    note(now, strays);
+    if (verdict != Verdict::open && verdict != Verdict::replied) fail(now, verdict);
+    ledger_.inside_attempt(false);
+}
+
+/// The last bit of a broadcast has left: nobody answers, the line rests for the turnaround.
+void Arbiter::end_broadcast(TimePoint now) {
+    const Attempt attempt = take_active(now);
+    quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
+    for (const Job& job : attempt.group().jobs)
+        ledger_.finish(job, modbus::normal_write_reply(job.pdu));
+}
+
+/// The reply is there.
+void Arbiter::settle(TimePoint now) {
+    Station& station = stations_.of(active_->group().station);
+    const bool early = active_->replied_early();
+    const bool too_early = early && !settings_.paced && pace_.believed();
+    if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
+    if (station.may_be_copy(now, *active_)) {
+        const bool again = station.repeats_itself(now, *active_) &&
+                           active_->group().attempts == 1 && station.may_retry(active_->group());
+        return active_->hold_reply(station.needed(), again);
+    }
+    pace_.on_reply(early);
+    Attempt attempt = take_active(now);
+    Group& group = attempt.group();
+    const Bytes& reply = attempt.reply();
+    const Duration waited = attempt.waited(now);
+    const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
+    const Duration needed = attempt.first_sign(now);
+    const Station::Replied replied = station.on_reply(now, attempt, needed, think);
+    const bool tells = group.silent_after == Duration::zero();
+    stations_.on_reply(now, tells ? std::optional(needed) : std::nullopt);
+    if (replied.back) stations_.on_back();
+    if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
+    proved_ = std::max(proved_, attempt.timing().started);
+    if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
+        quiet_.on_answered_early(now);
+    strays_.on_replied(group.station);
+    quiet_.rest_until(station.trail_until());
+    ledger_.on_answered(now, attempt, think, replied);
+    attempt.teach(echo_memory_);
+    if (modbus::exception_of(reply)) {
+        give_back(group);
+    } else {
+        reception_.on_read(group, reply, station.settings().max_age);
+    }
+    for (const Job& job : group.jobs)
+        ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
+}
+
+void Arbiter::fail(TimePoint now, Verdict verdict) {
+    Attempt attempt = take_active(now);
+    ledger_.on_failed(attempt, verdict);
+    Group& group = attempt.group();
+    Station& station = stations_.of(group.station);
+    const TimePoint sent = attempt.timing().sent;
+    const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
+    if (attempt.came_damaged()) {
+        station.on_damaged_reply(now, group.pdu, sent);
+    } else {
+        station.owe(now, group.pdu, sent);
+    }
+    if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.pdu);
+    stations_.on_failed(now, group.station, verdict, cost);
+    if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
+        quiet_.quarantine(group.station, *until);
+        ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
+    }
+    group.silent_after = verdict == Verdict::silent
+                             ? std::min(now - sent, attempt.timing().patience) - latency_
+                             : Duration::zero();
+    const bool in_time =
+        std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
+    if (in_time && station.may_retry(group)) {
+        schedule_.retry(std::move(group));
+    } else if (group.joined()) {
+        give_back(group);  // nobody's health: the panel may only not take the length
+    } else {
+        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+    }
+}
+
+/// The parts of a joined read go again, but those of clients who have left.
+void Arbiter::give_back(Group& group) {
+    for (const Job& job : schedule_.give_back(group)) ledger_.finish(job, Fault::cancelled);
+}
+
+/// No further attempt: everybody is answered, and the station judged.
+void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
+    for (const Job& job : group.jobs) ledger_.finish(job, fault);
+    Backlog& backlog = schedule_.backlog();
+    if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
+    if (group.learns_for != 0 && fault != Fault::damaged) {
+        // P8: the write never left, and its station is silent.
+        const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
+        for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
+    }
+    Station& station = stations_.of(group.station);
+    if (!station.on_given_up(now, fault)) return;
+    if (!station.stranger()) ledger_.event(Kind::offline, group.station);
+    const auto theirs = [&](const Job& job) { return job.station == group.station; };
+    for (const Job& job : backlog.remove_if(theirs)) ledger_.finish(job, Fault::offline);
+}
+
+/// The attempt is over: its time is accounted for, and what the echo filter held back is heard.
+Attempt Arbiter::take_active(TimePoint now) {
+    Attempt attempt = std::move(*active_);
+    active_.reset();
+    ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
+    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
+        ledger_.event(Kind::echo, attempt.group().station);
+    // Where a reply may come before the request has left, early bytes tell nothing.
+    const bool keeps_pace = settings_.paced || pace_.believed();
+    if (const auto noise = attempt.early_noise(); noise && keeps_pace)
+        stations_.on_trail(*noise, strays_.replied_before());
+    strays_.hear(attempt.release_echo());
+    return attempt;
+}
+
+}  // namespace panelgate::arbiter

@@ -1,0 +1,120 @@
+// Who waits, and whose turn it is.
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "checker.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
+
+namespace panelgate::scenario {
+namespace {
+
+constexpr std::uint8_t kBroadcast = 0;
+
+}  // namespace
+
+/// What goes with this frame: what it contains and may run, nothing older of its client waiting for
+/// that station, nor a broadcast. What was sent before and is not this frame waits again.
+void Checker::mark_sent(std::uint8_t station, ByteView pdu, std::string_view what) {
+    if (what != "request" && what != "broadcast") return;  // it answers nobody, or the same again
+    const auto span = arbiter::read_span(station, pdu);
+    std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
+    for (auto& [ticket, open] : open_) {
+        const bool concerned = open.job.station == station || open.job.station == kBroadcast;
+        if (open.gone || !concerned) continue;
+        const auto own = arbiter::read_span(open.job.station, open.job.pdu);
+        const bool goes =
+            span && own ? span->contains(*own)
+                        : open.job.station == station && std::ranges::equal(open.job.pdu, pdu);
+        if (goes && (open.sent || !behind.contains(open.job.client))) {
+            open.sent = true;
+        } else {
+            behind.insert(open.job.client);
+        }
+    }
+}
+
+/// A read that comes while one which contains it is still leaving goes along with it, unless
+/// something older of its client waits for that station.
+bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
+    const auto own = arbiter::read_span(job.station, job.pdu);
+    const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
+    if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
+    return std::ranges::none_of(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        return !o.sent && !o.gone && o.job.client == job.client &&
+               (o.job.station == job.station || o.job.station == kBroadcast);
+    });
+}
+
+/// Of reads that one transaction answers in any case only one counts: one that another contains
+/// rides. Those that only touch are joined as far as a panel is known to take the length, which is
+/// not known here: they count.
+std::size_t Checker::waiting() const {
+    std::size_t waiting = 0;
+    std::map<std::pair<unsigned, unsigned>, std::vector<arbiter::ReadSpan>> reads;
+    for (const auto& [ticket, open] : open_) {
+        if (open.sent || open.gone) continue;
+        const auto span = arbiter::read_span(open.job.station, open.job.pdu);
+        if (!span || !settings_.share_reads) {
+            ++waiting;
+        } else {
+            reads[{span->station, span->function}].push_back(*span);
+        }
+    }
+    for (auto& [table, spans] : reads) {
+        std::ranges::sort(spans, [](const arbiter::ReadSpan& a, const arbiter::ReadSpan& b) {
+            return std::tuple(a.address, b.count) < std::tuple(b.address, a.count);
+        });
+        std::uint32_t end = 0;
+        for (const arbiter::ReadSpan& span : spans) {
+            if (span.end() > end) ++waiting;
+            end = std::max(end, span.end());
+        }
+    }
+    return waiting;
+}
+
+/// A newcomer may not raise what waits beyond the limit. More than it may wait all the same: what
+/// was taken for a joined read and refused by the panel waits again, and what rode along with a
+/// read that has gone counts again, when it was behind something older of its own client. A
+/// newcomer takes somebody's place then. Where a frame has left in the same moment nobody can tell
+/// which it was.
+void Checker::on_settled() {
+    const std::size_t before = std::exchange(waiting_before_, kNobodyCame);
+    const bool gone = std::exchange(frames_settled_, frames_) != frames_;
+    if (before == kNobodyCame || gone || displaced_ || open_.size() <= settings_.queue.limit)
+        return;
+    const std::size_t after = waiting();
+    if (after > settings_.queue.limit && after > before)
+        fail("P9: more requests wait than the limit allows: " + std::to_string(after) + " of " +
+             std::to_string(settings_.queue.limit));
+}
+
+/// P9: a waiting reader gets every fifth turn at least, unless its station rests for what it owes
+/// (P1), or has not answered when it was asked last: then it has a share of its own (P4); or it
+/// says its replies twice, and is let finish.
+void Checker::check_turn(bool write) {
+    constexpr std::uint64_t kWritesInARow = 4;
+    if (!write) {
+        last_read_turn_ = frames_;
+        return;
+    }
+    if (frames_ - last_read_turn_ <= kWritesInARow) return;
+    const TimePoint first = last_turns_[last_turns_.size() - 1 - kWritesInARow];
+    const auto starves = std::ranges::find_if(open_, [&](const auto& entry) {
+        const Open& o = entry.second;
+        const auto client = clients_.find(o.job.client);
+        return !o.sent && !o.gone && o.job.priority == arbiter::PriorityClass::read &&
+               o.turn + kWritesInARow < frames_ && client != clients_.end() &&
+               client->second.single && watch_.is_good(o.job.station, o.submitted) &&
+               !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&
+               watch_.rests_until(o.job.station) <= first;
+    });
+    if (starves != open_.end())
+        fail("P9: five writes in a row while a reader waits: " + std::to_string(starves->first));
+}
+
+}  // namespace panelgate::scenario
