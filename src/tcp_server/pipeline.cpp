@@ -157,11 +157,6 @@ void Pipeline::turn_away() {
     admit();
 }
 
-void Pipeline::withdraw() {
-    turn_away();
-    caller_.withdraw();
-}
-
 void Pipeline::close() {
     if (std::exchange(closed_, true)) return;
     waiting_.clear();

@@ -42,9 +42,7 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
 
     /// From now on no request starts: those that wait here are answered Fault::cancelled.
     void turn_away();
-    /// And those that wait on the buses are taken back.
-    void withdraw();
-    /// And nobody is told. May be called twice.
+    /// And those that wait on the buses are taken back, and nobody is told. May be called twice.
     void close();
 
   private:

@@ -27,7 +27,6 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
       partial_timer_(socket_.get_executor()),
-      grace_timer_(socket_.get_executor()),
       output_timer_(socket_.get_executor()) {}
 
 void Session::start(Caller caller) {
@@ -53,7 +52,6 @@ void Session::close() {
     error_code ignored;
     socket_.close(ignored);
     partial_timer_.cancel();
-    grace_timer_.cancel();
     output_timer_.cancel();
     pipeline_->close();
     if (const ClosedHandler handler = std::exchange(on_closed_, nullptr)) handler(self);
@@ -144,24 +142,17 @@ void Session::forget_partial_adu() {
     if (std::exchange(partial_watch_, 0) != 0) partial_timer_.cancel();
 }
 
+/// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
+/// has left looks the same until it answers the first reply with a reset (P2).
 void Session::on_end_of_input() {
     const bool cut_off = input_state_ == Input::served && framer_.partial();
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;
     forget_partial_adu();
     write();
-    if (closed_) return;
-    grace_timer_.expires_after(
-        std::chrono::duration_cast<steady_clock::duration>(shared_->settings.half_close_grace));
-    grace_timer_.async_wait([self = shared_from_this()](error_code error) {
-        if (error || self->closed_) return;
-        self->pipeline_->withdraw();
-        self->go_on();
-    });
 }
 
-/// Also while nobody reads, and after the client's FIN: one that closed both directions answers the
-/// first reply with a reset. Then nobody waits for the others.
+/// Also while nobody reads, and after the client's FIN. Then nobody waits for the others.
 void Session::watch_for_reset() {
     socket_.async_wait(asio::ip::tcp::socket::wait_error,
                        [self = shared_from_this()](const error_code&) { self->close(); });

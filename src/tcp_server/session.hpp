@@ -67,7 +67,6 @@ class Session : public std::enable_shared_from_this<Session> {
     boost::asio::steady_timer partial_timer_;
     std::uint64_t partial_watch_ = 0;  ///< which ADU the timer is for; 0: none
     std::uint64_t partial_watches_ = 0;
-    boost::asio::steady_timer grace_timer_;
 
     bool writing_ = false;       ///< the pipeline's front()
     std::uint64_t written_ = 0;  ///< replies

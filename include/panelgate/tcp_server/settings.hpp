@@ -42,9 +42,6 @@ struct Settings {
     Duration partial_adu_timeout = 5s;  ///< a half-sent ADU closes its connection
     int bad_protocol_ids = 3;           ///< in a row close the connection
     Duration output_timeout = 5min;     ///< a client that takes nothing for so long is closed
-    /// After a client's FIN its waiting requests may still start for so long: nobody can tell a
-    /// half-close from a client that left, and that one takes its requests with it (P2).
-    Duration half_close_grace = 100ms;
 
     std::string name() const { return address + ":" + std::to_string(port); }
 };
