@@ -31,20 +31,24 @@ constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 constexpr int kKeepaliveIdle = 60;
 constexpr int kKeepaliveInterval = 10;
 constexpr int kKeepaliveProbes = 3;
+// What the kernel takes for a client that does not read: without a limit megabytes, and each reply
+// in there is older when it arrives than one that is asked for later.
+constexpr int kSendBuffer = 64 * 1024;
+constexpr int kUnsentBytes = 4 * 1024;  // 16 of the longest replies
 
 void set_option(tcp::socket& socket, int level, int name, int value) {
     ::setsockopt(socket.native_handle(), level, name, &value, sizeof value);
 }
 
 /// What cannot be set is no reason to refuse a client.
-void set_up(tcp::socket& socket, std::size_t output_limit) {
+void set_up(tcp::socket& socket) {
     set_option(socket, IPPROTO_TCP, TCP_NODELAY, 1);
     set_option(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
     set_option(socket, IPPROTO_TCP, TCP_KEEPIDLE, kKeepaliveIdle);
     set_option(socket, IPPROTO_TCP, TCP_KEEPINTVL, kKeepaliveInterval);
     set_option(socket, IPPROTO_TCP, TCP_KEEPCNT, kKeepaliveProbes);
-    // Without a limit the kernel takes megabytes for a client that does not read.
-    set_option(socket, SOL_SOCKET, SO_SNDBUF, static_cast<int>(output_limit));
+    set_option(socket, SOL_SOCKET, SO_SNDBUF, kSendBuffer);
+    set_option(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, kUnsentBytes);
 }
 
 std::string text(const tcp::endpoint& peer) {
@@ -163,7 +167,7 @@ bool Listener::Core::has_room() {
 }
 
 void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
-    set_up(socket, shared_->settings.output_limit);
+    set_up(socket);
     const auto session = std::make_shared<Session>(
         std::move(socket), shared_,
         [weak = weak_from_this()](const std::shared_ptr<Session>& closed) {

@@ -71,10 +71,10 @@ Pipeline::Pipeline(std::shared_ptr<const Shared> shared, Caller caller,
                    std::function<void()> on_answer)
     : shared_(std::move(shared)), caller_(std::move(caller)), on_answer_(std::move(on_answer)) {}
 
-/// Replies that may leave take no room: they are output, which has a limit of its own.
+/// A reply takes room until the client has taken it: who reads slowly is asked for slowly.
 bool Pipeline::has_room() const {
     const Settings& settings = shared_->settings;
-    return replies_.held() + waiting_.size() < settings.in_flight + settings.waiting;
+    return replies_.size() + waiting_.size() < settings.in_flight + settings.waiting;
 }
 
 void Pipeline::take(modbus::Adu adu) {
@@ -82,11 +82,16 @@ void Pipeline::take(modbus::Adu adu) {
     admit();
 }
 
+void Pipeline::pop() {
+    replies_.pop();
+    admit();
+}
+
 /// Everything waits for a place on the buses, also what needs none: a refusal or the gateway's own
 /// registers are answered as things are when the requests before have started.
 void Pipeline::admit() {
     const std::size_t places = shared_->settings.in_flight;
-    while (!waiting_.empty() && (turning_away_ || replies_.unanswered() < places)) {
+    while (!waiting_.empty() && (turning_away_ || replies_.in_flight() < places)) {
         const modbus::Adu adu = std::move(waiting_.front());
         waiting_.pop_front();
         serve(adu);
@@ -150,11 +155,6 @@ void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
 void Pipeline::turn_away() {
     turning_away_ = true;
     admit();
-}
-
-void Pipeline::withdraw() {
-    turn_away();
-    caller_.withdraw();
 }
 
 void Pipeline::close() {

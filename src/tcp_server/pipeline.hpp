@@ -19,31 +19,30 @@
 
 namespace panelgate::tcp_server {
 
-/// The requests of one connection, from their arrival until their replies may leave: at most
-/// settings.in_flight are on the buses, the others wait in order and are judged when their turn
-/// comes, so nothing overtakes. Answers that come after its end are dropped.
+/// The requests of one connection, from their arrival until the client has taken their replies: at
+/// most settings.in_flight are on the buses or on their way back, the others wait in order and are
+/// judged when their turn comes, so nothing overtakes. Answers that come after its end are dropped.
 class Pipeline : public std::enable_shared_from_this<Pipeline> {
   public:
-    /// `on_answer`: a bus has answered, so there may be a reply to pop, and room. Never called from
-    /// inside take(), and not after close().
+    /// `on_answer`: a bus has answered, so there may be a reply to send. Never called from inside
+    /// take() or pop(), and not after close().
     Pipeline(std::shared_ptr<const Shared> shared, Caller caller, std::function<void()> on_answer);
 
     /// One more request can be kept. Who takes none without room bounds the memory.
     bool has_room() const;
     void take(modbus::Adu adu);
-    /// The next reply ADU whose turn has come.
-    std::optional<Bytes> pop() { return replies_.pop(); }
+    /// The next reply ADU whose turn has come, null when there is none; valid until pop().
+    const Bytes* front() const { return replies_.front(); }
+    /// front() has been taken: there is room for another request.
+    void pop();
 
     /// Everything that was taken has been answered, and all replies were popped.
     bool empty() const { return waiting_.empty() && replies_.empty(); }
-    std::size_t ready_bytes() const { return replies_.ready_bytes(); }
     const std::string& client() const { return caller_.name(); }
 
     /// From now on no request starts: those that wait here are answered Fault::cancelled.
     void turn_away();
-    /// And those that wait on the buses are taken back.
-    void withdraw();
-    /// And nobody is told. May be called twice.
+    /// And those that wait on the buses are taken back, and nobody is told. May be called twice.
     void close();
 
   private:

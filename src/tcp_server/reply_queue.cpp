@@ -27,22 +27,20 @@ void ReplyQueue::drop(Ticket ticket) { close(at(ticket)); }
 void ReplyQueue::close(Slot& slot) {
     slot.settled = true;
     --unanswered_;
-    for (; ready_ < slots_.size() && slots_[ready_].settled; ++ready_) {
-        ready_bytes_ += slots_[ready_].adu.size();
-    }
+    while (ready_ < slots_.size() && slots_[ready_].settled) ++ready_;
+    step_over_silent();
 }
 
-std::optional<Bytes> ReplyQueue::pop() {
-    while (ready_ > 0) {
-        Bytes adu = std::move(slots_.front().adu);
+void ReplyQueue::pop() {
+    slots_.front().adu.clear();
+    step_over_silent();
+}
+
+void ReplyQueue::step_over_silent() {
+    for (; ready_ > 0 && slots_.front().adu.empty(); --ready_) {
         slots_.pop_front();
         ++first_;
-        --ready_;
-        if (adu.empty()) continue;
-        ready_bytes_ -= adu.size();
-        return adu;
     }
-    return std::nullopt;
 }
 
 }  // namespace panelgate::tcp_server

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <optional>
 
 #include "panelgate/base/bytes.hpp"
 
@@ -25,16 +24,18 @@ class ReplyQueue {
     /// An open request that gets no reply (a silent broadcast).
     void drop(Ticket ticket);
 
-    /// The next reply ADU whose turn has come.
-    std::optional<Bytes> pop();
+    /// The next reply ADU whose turn has come, null when there is none. It stays where it is until
+    /// pop(), whatever else happens.
+    const Bytes* front() const { return ready_ == 0 ? nullptr : &slots_.front().adu; }
+    /// front() has left.
+    void pop();
 
     bool empty() const { return slots_.empty(); }
-    /// Requests that are neither settled nor dropped.
-    std::size_t unanswered() const { return unanswered_; }
-    /// Requests whose replies may not leave yet: the first unanswered one and all behind it.
-    std::size_t held() const { return slots_.size() - ready_; }
-    /// Bytes of the replies that may leave: these wait for nobody but the client.
-    std::size_t ready_bytes() const { return ready_bytes_; }
+    /// Requests whose replies have not left.
+    std::size_t size() const { return slots_.size(); }
+    /// Those of them that wait for an answer of their own or for the client to read, not those that
+    /// only wait behind an unanswered one.
+    std::size_t in_flight() const { return unanswered_ + ready_; }
 
   private:
     struct Slot {
@@ -45,11 +46,11 @@ class ReplyQueue {
     };
     Slot& at(Ticket ticket) { return slots_[static_cast<std::size_t>(ticket - first_)]; }
     void close(Slot& slot);
+    void step_over_silent();
 
     std::deque<Slot> slots_;
     Ticket first_ = 0;       ///< of slots_.front()
-    std::size_t ready_ = 0;  ///< slots at the front that are settled
-    std::size_t ready_bytes_ = 0;
+    std::size_t ready_ = 0;  ///< slots at the front that are settled; the first has an ADU
     std::size_t unanswered_ = 0;
 };
 

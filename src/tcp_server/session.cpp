@@ -1,12 +1,16 @@
 #include "session.hpp"
 
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/write.hpp>
 #include <chrono>
-#include <optional>
 #include <utility>
 #include <variant>
+
+#include "panelgate/base/bytes.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -23,7 +27,7 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
       partial_timer_(socket_.get_executor()),
-      grace_timer_(socket_.get_executor()) {}
+      output_timer_(socket_.get_executor()) {}
 
 void Session::start(Caller caller) {
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
@@ -48,7 +52,7 @@ void Session::close() {
     error_code ignored;
     socket_.close(ignored);
     partial_timer_.cancel();
-    grace_timer_.cancel();
+    output_timer_.cancel();
     pipeline_->close();
     if (const ClosedHandler handler = std::exchange(on_closed_, nullptr)) handler(self);
 }
@@ -138,24 +142,17 @@ void Session::forget_partial_adu() {
     if (std::exchange(partial_watch_, 0) != 0) partial_timer_.cancel();
 }
 
+/// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
+/// has left looks the same until it answers the first reply with a reset (P2).
 void Session::on_end_of_input() {
     const bool cut_off = input_state_ == Input::served && framer_.partial();
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;
     forget_partial_adu();
     write();
-    if (closed_) return;
-    grace_timer_.expires_after(
-        std::chrono::duration_cast<steady_clock::duration>(shared_->settings.half_close_grace));
-    grace_timer_.async_wait([self = shared_from_this()](error_code error) {
-        if (error || self->closed_) return;
-        self->pipeline_->withdraw();
-        self->go_on();
-    });
 }
 
-/// Also while nobody reads, and after the client's FIN: one that closed both directions answers the
-/// first reply with a reset. Then nobody waits for the others.
+/// Also while nobody reads, and after the client's FIN. Then nobody waits for the others.
 void Session::watch_for_reset() {
     socket_.async_wait(asio::ip::tcp::socket::wait_error,
                        [self = shared_from_this()](const error_code&) { self->close(); });
@@ -164,19 +161,15 @@ void Session::watch_for_reset() {
 // Output.
 
 void Session::write() {
-    if (closed_) return;
-    if (pipeline_->ready_bytes() + output_.size() > shared_->settings.output_limit) {
-        return fail("reason=\"client does not read\"", false);
-    }
-    if (writing_) return;
-    std::optional<Bytes> adu = pipeline_->pop();
-    if (!adu) {
+    if (closed_ || writing_) return;
+    const Bytes* adu = pipeline_->front();
+    if (adu == nullptr) {
         if (input_state_ != Input::served && pipeline_->empty()) close();
         return;
     }
-    output_ = std::move(*adu);
     writing_ = true;
-    asio::async_write(socket_, asio::buffer(output_),
+    watch_output();
+    asio::async_write(socket_, asio::buffer(*adu),
                       [self = shared_from_this()](const error_code& error, std::size_t) {
                           self->on_written(error);
                       });
@@ -184,10 +177,36 @@ void Session::write() {
 
 void Session::on_written(const error_code& error) {
     writing_ = false;
-    output_.clear();
     if (closed_) return;
     if (error) return close();
-    write();
+    ++written_;
+    pipeline_->pop();
+    go_on();
+}
+
+/// Closes a client that takes nothing for output_timeout, or up to twice that: one timer a period,
+/// not one a reply. Slow is allowed: bytes that its system has acknowledged count as taken.
+void Session::watch_output() {
+    if (std::exchange(watching_output_, true)) return;
+    output_timer_.expires_after(
+        std::chrono::duration_cast<steady_clock::duration>(shared_->settings.output_timeout));
+    output_timer_.async_wait(
+        [self = shared_from_this(), written = written_, held = not_taken()](error_code error) {
+            if (error || self->closed_) return;
+            self->watching_output_ = false;
+            if (!self->writing_) return;
+            if (self->written_ == written && self->not_taken() == held) {
+                return self->fail("reason=\"client does not read\"", false);
+            }
+            self->watch_output();
+        });
+}
+
+/// Bytes of replies that the client's system has not acknowledged.
+int Session::not_taken() {
+    int bytes = 0;
+    if (::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) != 0) return 0;
+    return bytes;
 }
 
 }  // namespace panelgate::tcp_server

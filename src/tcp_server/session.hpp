@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include "caller.hpp"
-#include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/mbap.hpp"
 #include "pipeline.hpp"
 #include "shared.hpp"
@@ -18,7 +17,7 @@ namespace panelgate::tcp_server {
 
 /// One client connection. Its listener keeps it alive until `on_closed`; the operations under way
 /// keep it a little longer. One read and one write at a time. What it holds of a client is bounded:
-/// the requests of its pipeline, one read behind them, and Settings::output_limit of replies.
+/// the requests of its pipeline with their replies, and one read behind them.
 class Session : public std::enable_shared_from_this<Session> {
   public:
     using ClosedHandler = std::function<void(const std::shared_ptr<Session>&)>;
@@ -51,6 +50,8 @@ class Session : public std::enable_shared_from_this<Session> {
     void forget_partial_adu();
     void write();
     void on_written(const boost::system::error_code& error);
+    void watch_output();
+    int not_taken();
     void fail(std::string_view reason, bool protocol_error);
 
     boost::asio::ip::tcp::socket socket_;
@@ -66,10 +67,11 @@ class Session : public std::enable_shared_from_this<Session> {
     boost::asio::steady_timer partial_timer_;
     std::uint64_t partial_watch_ = 0;  ///< which ADU the timer is for; 0: none
     std::uint64_t partial_watches_ = 0;
-    boost::asio::steady_timer grace_timer_;
 
-    Bytes output_;  ///< the ADU that is being written
-    bool writing_ = false;
+    bool writing_ = false;       ///< the pipeline's front()
+    std::uint64_t written_ = 0;  ///< replies
+    boost::asio::steady_timer output_timer_;
+    bool watching_output_ = false;
     bool closed_ = false;
 };
 

@@ -174,8 +174,12 @@ class Closed(Exception):
 class Client:
     """Raw Modbus/TCP: what was sent is what the test says, nothing is repaired."""
 
-    def __init__(self, port, patience=PATIENCE):
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=patience)
+    def __init__(self, port, patience=PATIENCE, receive_buffer=None):
+        self.socket = socket.socket()
+        self.socket.settimeout(patience)
+        if receive_buffer:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.connect(("127.0.0.1", port))
         self._transaction = 0
 
     def __enter__(self):

@@ -36,14 +36,12 @@ struct Settings {
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
-    std::size_t in_flight = 16;            ///< requests of one connection on the buses
-    std::size_t waiting = 64;              ///< requests that wait behind them; then nobody reads
-    Duration partial_adu_timeout = 5s;     ///< a half-sent ADU closes its connection
-    int bad_protocol_ids = 3;              ///< in a row close the connection
-    std::size_t output_limit = 64 * 1024;  ///< bytes that a client has not read; above it is closed
-    /// After a client's FIN its waiting requests may still start for so long: nobody can tell a
-    /// half-close from a client that left, and that one takes its requests with it (P2).
-    Duration half_close_grace = 100ms;
+    /// Requests of one connection on the buses, or answered and not yet taken by the client.
+    std::size_t in_flight = 16;
+    std::size_t waiting = 64;           ///< requests that wait behind them; then nobody reads
+    Duration partial_adu_timeout = 5s;  ///< a half-sent ADU closes its connection
+    int bad_protocol_ids = 3;           ///< in a row close the connection
+    Duration output_timeout = 5min;     ///< a client that takes nothing for so long is closed
 
     std::string name() const { return address + ":" + std::to_string(port); }
 };

@@ -18,8 +18,8 @@ class SessionEnd : public Loopback {
         }
         client.send(stream);
     }
-    void answer_and_receive(Client& client, std::uint16_t end) {
-        for (std::uint16_t i = 0; i < end; ++i) {
+    void answer_and_receive(Client& client, std::uint16_t first, std::uint16_t end) {
+        for (std::uint16_t i = first; i < end; ++i) {
             ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
             bus1.answer(0, reply_to_read(i));
             ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
@@ -41,20 +41,7 @@ TEST_F(SessionEnd, TakesItsRequestsBackWhenTheClientIsReset) {
     EXPECT_EQ(listener->counters().connections, 0U);
 }
 
-TEST_F(SessionEnd, P2TakesWaitingRequestsBackWhenTheClientHasClosed) {
-    settings.half_close_grace = 20ms;
-    start();
-    Client client = connect();
-    client.request(1, 1, "06 0000 0001"_hex);
-    ASSERT_TRUE(run_until_held(1));
-    client.socket().close();
-    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
-    EXPECT_TRUE(bus1.held.empty());
-    EXPECT_EQ(bus1.cancelled.front(), bus1.seen[0].client);
-}
-
 TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatTheClientHasClosed) {
-    settings.half_close_grace = 60s;
     start();
     Client client = connect();
     for (std::uint16_t i = 0; i < 3; ++i) client.request(i, 1, read_pdu(i));
@@ -78,7 +65,6 @@ TEST_F(SessionEnd, P2NoticesAResetAlsoWhileItDoesNotRead) {
 }
 
 TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatAClientHasClosedWhileItDidNotRead) {
-    settings.half_close_grace = 60s;
     start();
     Client client = connect();
     send_hundred_reads(client);
@@ -91,32 +77,46 @@ TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatAClientHasClosedWhileItDidNotR
 }
 
 TEST_F(SessionEnd, AnswersEverythingAlsoWhenTheSendingSideWasClosedWhileItDidNotRead) {
-    settings.half_close_grace = 60s;
     start();
     Client client = connect();
     send_hundred_reads(client);
     client.socket().shutdown(tcp::socket::shutdown_send);
-    answer_and_receive(client, 100);
+    answer_and_receive(client, 0, 100);
     EXPECT_TRUE(client.sees_close());
     EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
-TEST_F(SessionEnd, P2WhatStillWaitsAfterTheGraceIsAnsweredAndNeverStarts) {
-    settings.half_close_grace = 20ms;
+TEST_F(SessionEnd, P3WhatWaitsIsAskedAlsoLongAfterTheSendingSideWasClosed) {
+    settings.partial_adu_timeout = 150ms;
     start();
     Client client = connect();
     send_hundred_reads(client);
-    answer_and_receive(client, 60);  // forty are left
+    answer_and_receive(client, 0, 60);  // forty are left
     client.socket().shutdown(tcp::socket::shutdown_send);
-    for (std::uint16_t i = 60; i < 100; ++i) {
-        ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, "83 0a"_hex}));
-    }
+    Client clock = connect();
+    clock.send("00"_hex);
+    EXPECT_TRUE(clock.sees_close()) << "its time is over";
+    EXPECT_EQ(bus1.held.size(), 16U);
+    answer_and_receive(client, 60, 100);
     EXPECT_TRUE(client.sees_close());
+    EXPECT_FALSE(client.was_reset());
+}
+
+TEST_F(SessionEnd, P2AResetAfterTheFinTakesWhatWaitsAway) {
+    start();
+    Client client = connect();
+    send_hundred_reads(client);
+    answer_and_receive(client, 0, 60);
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    ASSERT_TRUE(run_until_held(16));
+    client.socket().set_option(asio::socket_base::linger(true, 0));
+    client.socket().close();
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    EXPECT_TRUE(bus1.held.empty());
     EXPECT_EQ(bus1.seen.size(), 76U);
 }
 
 TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {
-    settings.half_close_grace = 60s;
     start();
     Client client = connect();
     client.request(1, 1, read_pdu(1));
@@ -131,23 +131,20 @@ TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {
     EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
-TEST_F(SessionEnd, ClosesAClientThatDoesNotReadAndNobodyElseNotices) {
-    settings.output_limit = 4096;
-    bus1.instant = reply_to_read(7);
+TEST_F(SessionEnd, ClosesAClientThatTakesNothingForLongAndNobodyElseNotices) {
+    settings.output_timeout = 50ms;
+    bus1.instant = "41"_hex + Bytes(252, 0);
     start();
     Client bystander = connect();
     Client slow(context, listener->port(), 4096);
-    const Bytes request = modbus::encode_mbap(1, 255, "2b 0e 01 00"_hex);
+    const Bytes request = modbus::encode_mbap(1, 1, "41"_hex);
     std::size_t offset = 0;
     EXPECT_TRUE(run_until([&] {
-        for (int i = 0; i < 100; ++i) {
-            const auto n = slow.try_send(ByteView(request).subspan(offset));
-            if (!n || *n == 0) break;
-            offset = (offset + *n) % request.size();
-        }
+        const auto n = slow.try_send(ByteView(request).subspan(offset));
+        offset = (offset + n.value_or(0)) % request.size();
         return logged("does not read") == 1;
     }));
-    EXPECT_EQ(bystander.ask(1, read_pdu(0)), reply_to_read(7));
+    EXPECT_EQ(bystander.ask(1, "41"_hex), *bus1.instant);
     EXPECT_EQ(listener->counters().connections, 1U);
 }
 

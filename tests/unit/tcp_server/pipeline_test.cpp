@@ -1,0 +1,82 @@
+#include "pipeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <memory>
+
+#include "caller.hpp"
+#include "held_bus.hpp"
+#include "shared.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+// A pipeline of two places and three that wait, with a client that takes replies when it likes.
+class SmallPipeline : public ::testing::Test {
+  protected:
+    static Settings small() {
+        Settings settings;
+        settings.lines = {"floor1"};
+        settings.in_flight = 2;
+        settings.waiting = 3;
+        return settings;
+    }
+    void take_all_there_is_room_for() {
+        while (pipeline->has_room()) pipeline->take({++taken, 1, "03 0000 0001"_hex});
+    }
+    void answer_all() {
+        while (!bus.held.empty()) bus.answer(0, "03 02 0007"_hex);
+    }
+
+    boost::asio::io_context context;
+    HeldBus bus{context};
+    std::uint16_t taken = 0;
+    int told = 0;
+    std::shared_ptr<Shared> shared = std::make_shared<Shared>(
+        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, {}, true}}), {}, {}, {}});
+    std::shared_ptr<Pipeline> pipeline = std::make_shared<Pipeline>(
+        shared, Caller("10.0.0.7:5000", bus::host_of("10.0.0.7")), [this] { ++told; });
+};
+
+TEST_F(SmallPipeline, P9WhatTheClientHasNotTakenIsStillInFlight) {
+    take_all_there_is_room_for();
+    EXPECT_EQ(taken, 5);
+    EXPECT_EQ(bus.held.size(), 2U);
+    answer_all();
+    EXPECT_EQ(told, 2);
+    EXPECT_EQ(bus.seen.size(), 2U) << "both replies wait for the client";
+    EXPECT_FALSE(pipeline->has_room());
+    pipeline->pop();
+    EXPECT_EQ(bus.held.size(), 1U);
+    EXPECT_TRUE(pipeline->has_room());
+    take_all_there_is_room_for();
+    EXPECT_EQ(taken, 6);
+}
+
+TEST_F(SmallPipeline, P3EverythingIsAnsweredInOrderHoweverSlowlyItIsTaken) {
+    take_all_there_is_room_for();
+    for (std::uint16_t next = 1; next <= 5; ++next) {
+        answer_all();
+        ASSERT_NE(pipeline->front(), nullptr);
+        EXPECT_EQ((*pipeline->front())[1], next) << "the transaction";
+        pipeline->pop();
+    }
+    EXPECT_TRUE(pipeline->empty());
+    EXPECT_EQ(bus.seen.size(), 5U);
+}
+
+TEST_F(SmallPipeline, ARequestWithoutAReplyGivesItsPlaceBackAtOnce) {
+    shared->settings.broadcast = BroadcastMode::silent;
+    for (std::uint16_t i = 0; i < 5; ++i) pipeline->take({i, 0, "06 0000 0001"_hex});
+    for (int i = 0; i < 5; ++i) {
+        ASSERT_FALSE(bus.held.empty());
+        bus.answer(0, "06 0000 0001"_hex);
+    }
+    EXPECT_TRUE(pipeline->empty());
+}
+
+}  // namespace
+}  // namespace panelgate::tcp_server
