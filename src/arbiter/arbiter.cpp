@@ -204,6 +204,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     stations_.on_failed(now, group.station, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(group.station, *until);
+        station.on_line_rests(now, *until - now);
         ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
     }
     group.silent_after = verdict == Verdict::silent
@@ -211,8 +212,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                              : Duration::zero();
     const bool in_time =
         std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-    if (in_time && station.may_retry(group)) {
-        schedule_.retry(std::move(group));
+    if (in_time && station.may_retry(group) && stations_.affords_retry(now, station)) {
+        station.on_retry(verdict == Verdict::silent);
+        schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {
         schedule_.give_back(group);  // nobody's health: the panel may only not take the length
     } else {
@@ -311,7 +313,8 @@ void Arbiter::start(TimePoint now, Group group) {
         Station& station = stations_.of(group.station);
         station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));
         if (group.attempts == 1)
-            group.first_silence = !station.suspect() && !station.health().offline();
+            group.first_silence =
+                !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }
