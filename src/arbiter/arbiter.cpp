@@ -216,6 +216,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         station.on_retry(verdict == Verdict::silent);
         schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {
+        station.on_retry(verdict == Verdict::silent);
         schedule_.give_back(group);  // nobody's health: the panel may only not take the length
     } else {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);

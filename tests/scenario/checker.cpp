@@ -135,8 +135,10 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     if (found == open_.end()) return fail("P3: answered twice, or what nobody asked");
     const Open open = std::move(found->second);
     open_.erase(found);
-    if (const auto client = clients_.find(open.job.client); client != clients_.end())
+    if (const auto client = clients_.find(open.job.client); client != clients_.end()) {
         --client->second.open;
+        if (!finish.pdu && watch_.is_silent(open.job.station)) client->second.held_until = now;
+    }
     check_in_time(now, open, finish);
     if (open.write) {
         const std::string key = key_of(open.job.station, open.job.pdu);

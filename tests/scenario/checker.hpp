@@ -96,7 +96,8 @@ class Checker {
         unsigned open = 0;
         bool healthy = false;  ///< none of its stations is ever dead
         bool polite = false;
-        bool single = false;  ///< one request at a time
+        bool single = false;     ///< one request at a time
+        TimePoint held_until{};  ///< the last fault that a silent station has brought it
     };
 
     void fail(std::string what);
@@ -109,6 +110,7 @@ class Checker {
     void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
     void mark_sent(std::uint8_t station, ByteView pdu);
     bool good_work_waited(TimePoint since) const;
+    bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     // What may be answered (checker.cpp)

@@ -126,11 +126,11 @@ Duration Checker::least_wait() const {
 void Checker::close_attempt(TimePoint now) {
     if (attempt_.answered) return;
     const Duration cost = now - attempt_.started;
+    const bool wanted = good_work_waited(attempt_.started);
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
-    if (plain && attempt_.dead && cost > costs_.limit(attempt_) &&
-        good_work_waited(attempt_.started))
+    if (plain && attempt_.dead && cost > costs_.limit(attempt_) && wanted)
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
-    const std::string broken = costs_.on_unanswered(now, attempt_);
+    const std::string broken = costs_.on_unanswered(now, attempt_, wanted);
     if (!broken.empty()) fail(broken);
     watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
 }
@@ -158,8 +158,21 @@ bool Checker::good_work_waited(TimePoint since) const {
         const Open& o = entry.second;
         return !o.sent && !o.gone && o.submitted <= since && o.job.station != kBroadcast &&
                !watch_.is_silent(o.job.station) && watch_.is_good(o.job.station, since) &&
-               !(o.write && echoes_);
+               !(o.write && echoes_) && !waits_in_order(since, entry.first, o);
     });
+}
+
+/// Its client's broadcast goes before it, and behind a request to a station that is silent.
+bool Checker::waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const {
+    const auto client = clients_.find(open.job.client);
+    bool behind = client != clients_.end() && client->second.held_until > since;
+    for (const auto& [older, o] : open_) {
+        if (older >= ticket) return false;
+        if (o.gone || o.job.client != open.job.client) continue;
+        if (behind && !o.sent && o.job.station == kBroadcast) return true;
+        behind = behind || watch_.is_silent(o.job.station);
+    }
+    return false;
 }
 
 /// P9: a waiting reader gets every fifth turn at least.
