@@ -200,7 +200,8 @@ void Arbiter::start(TimePoint now, Group group) {
         Station& station = stations_.of(group.station);
         station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));
         if (group.attempts == 1)
-            group.first_silence = !station.suspect() && !station.health().offline();
+            group.first_silence =
+                !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }

@@ -58,7 +58,7 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = backlog_.has_retries() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
-    if (alone || !other_first_) {
+    if (alone || !others_go_first(now, stations, quiet)) {
         if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
         if (alone) return {};
     }
@@ -77,10 +77,31 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
 }
 
 std::optional<Group> Schedule::next_retry(TimePoint now, const Stations& stations, Quiet& quiet) {
-    return backlog_.take_retry([&](const Group& group) {
-        return repeat_from(group, stations) <= now &&
-               gap_is_over(now, group.station, stations, quiet);
+    auto group = backlog_.take_retry([&](const Group& waiting) {
+        return repeat_from(waiting, stations) <= now &&
+               gap_is_over(now, waiting.station, stations, quiet);
     });
+    if (group) let_others_go_first();
+    return group;
+}
+
+/// Before the next retry.
+void Schedule::let_others_go_first() {
+    others_.clear();
+    turns_ = 0;
+    dear_ = dear_ && backlog_.has_retries();
+    if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
+    backlog_.queue().each_first([&](const Job& job) { others_.insert(job.station); });
+    // Who has many clients does not have all of these turns.
+    turns_ = dear_ ? 2 * others_.size() : 1;
+}
+
+bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
+    if (turns_ == 0) return false;
+    const JobQueue::Test may = runnable(now, stations, quiet);
+    return backlog_.queue().peek([&](const Job& job) {
+        return others_.contains(job.station) && may(job) && stations.may_spend(now, job.station);
+    }) != nullptr;
 }
 
 std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Quiet& quiet) const {
@@ -116,7 +137,8 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     const bool broadcast = next->station == kBroadcast;
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
         return {std::nullopt, true};
-    other_first_ = false;
+    others_.erase(next->station);
+    if (turns_ > 0) --turns_;
     if (!broadcast && echo.must_be_learned_before(next->pdu, next->ticket == learned_for_)) {
         learned_for_ = next->ticket;
         return {learning_for(*next, stations.of(next->station)), false};
@@ -165,9 +187,13 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
 }
 
-void Schedule::retry(Group group) {
-    other_first_ = quarantine_ != Quarantine::line;
+void Schedule::retry(Group group, Duration patience) {
+    constexpr Duration kDear = 100ms;
+    const bool first = !backlog_.has_retries();
+    // A write that goes again has had its turn among the writes.
+    dear_ = dear_ || (patience > kDear && modbus::is_pure_read(group.pdu));
     backlog_.retry(std::move(group));
+    if (first) let_others_go_first();
 }
 
 std::vector<Job> Schedule::give_back(Group& group) {

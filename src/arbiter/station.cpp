@@ -101,6 +101,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     copies_.on_reply(now, owed_pdu_, Bytes(pdu.begin(), pdu.end()));
     if (heard.settled) not_before_ = now + copies_.hold();
     heard.back = health_.on_reply(now);
+    missed_ = false;
     probes_ = 0;
     return heard;
 }
@@ -120,7 +121,9 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     result.back = health_.on_reply(now);
     probes_ = 0;
     failed_in_a_row_ = 0;
-    budget_.clear();
+    failing_.clear();
+    missed_ = false;
+    lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
     // What answers a retry may be the reply to the attempt before: it tells nothing.
     if (group.silent_after == Duration::zero()) slowest_.add(waited);
     turnaround_.add(think);
@@ -159,12 +162,16 @@ void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) 
 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
-    if (health_.offline()) ++probes_;
-    if (failing()) budget_.spend(now, cost);
+    if (health_.offline() || flaky()) ++probes_;
+    const int silent = verdict == Verdict::silent ? 1 : 0;
+    lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);
+    if (failing()) failing_.spend(now, cost);
+    if (!health_.offline()) spend(now, cost);
 }
 
 bool Station::on_given_up(TimePoint now, Fault fault) {
     ++failed_in_a_row_;
+    missed_ = false;
     if (fault == Fault::damaged && !health_.offline()) {
         health_.on_damaged();
         return false;
@@ -186,7 +193,8 @@ Duration Station::short_wait(std::optional<Duration> line) const {
     return std::min(whole, std::max<Duration>(20ms, (own ? *own : *line) * 3 / 2 + 8ms));
 }
 
-Duration Station::patience(const Group& group, std::optional<Duration> line, bool hurry) const {
+Duration Station::patience(const Group& group, std::optional<Duration> line, bool hurry,
+                           bool spent) const {
     const Duration whole = settings_.response_timeout;
     if (group.silent_after > Duration::zero()) {
         // A retry behind a whole timeout waits as long as the panel has ever needed; one behind a
@@ -194,14 +202,14 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         if (group.silent_after >= whole) return short_wait(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
-    if (health_.offline() && !slowest()) {
+    if ((health_.offline() || spent) && !slowest()) {
         // Nobody knows how long it needs: now and then one waits longer, and longer each time.
         constexpr int kOneIn = 4;
         constexpr int kDoublings = 6;
         const int longer = probes_ % kOneIn == kOneIn - 1 ? 1 + probes_ / kOneIn % kDoublings : 0;
         return std::min(whole, short_wait(line) * (1 << longer));
     }
-    if (health_.offline() || suspect() || stranger()) return short_wait(line);
+    if (health_.offline() || suspect() || stranger() || spent) return short_wait(line);
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.
     if (hurry && slowest() && modbus::is_pure_read(group.pdu))
         return std::min(timeout(), short_wait(line));

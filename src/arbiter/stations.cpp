@@ -41,10 +41,28 @@ Duration Stations::gap(std::uint8_t id) const {
 }
 
 Duration Stations::patience(TimePoint now, const Group& group) {
-    return of(group.station).patience(group, slowest(), now < hurry_until_);
+    const Station& station = of(group.station);
+    const bool poor = station.in_debt(now) && has_company(now, station);
+    const bool hurry = now < hurry_until_ || poor;
+    return station.patience(group, slowest(), hurry, spent(now, station));
+}
+
+bool Stations::has_company(TimePoint now, const Station& station) const {
+    return std::ranges::any_of(stations_, [&](const auto& entry) {
+        const Station& other = entry.second;
+        return &other != &station && other.health().last_success() && !other.health().offline() &&
+               now < other.asked() + kCompany;
+    });
+}
+
+bool Stations::is_stranger(std::uint8_t id) const {
+    const Station* station = find(id);
+    return id != kBroadcast &&
+           (station == nullptr ? !configured_.contains(id) : station->stranger());
 }
 
 bool Stations::may_spend(TimePoint now, std::uint8_t id) const {
+    if (is_stranger(id)) return strangers_.allows(now, surprise());
     const Station* station = find(id);
     if (station == nullptr) return true;
     if (station->suspect() && !suspects_.allows(now)) return false;
@@ -56,9 +74,11 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     if (job.station == kBroadcast) return false;
     forget_strangers(now);
     Station& station = of(job.station);
+    if (station.stranger()) station.on_wanted(now);
     if (!station.health().offline()) return false;
     const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
-    return !may_wake || !probes().allows(now) || !station.take_half_open(now);
+    const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
+    return !may_wake || !budget.allows(now) || !station.take_half_open(now);
 }
 
 StationHealth Stations::health(std::uint8_t id) const {
@@ -74,7 +94,10 @@ Duration Stations::response_timeout(std::uint8_t id) const {
 void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost) {
     Station& station = of(id);
     station.on_failed(now, verdict, cost);
-    if (station.health().offline()) {
+    if (station.stranger()) {
+        strangers_.spend(now, cost, 2 * surprise());
+        if (station.health().offline()) known_strangers_.spend(now, cost, kCompany);
+    } else if (station.health().offline()) {
         probes_.spend(now, cost);
         alone_.spend(now, cost);
     } else if (station.suspect()) {

@@ -84,6 +84,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     stations_.on_failed(now, group.station, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(group.station, *until);
+        station.on_line_rests(now, *until - now);
         ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
     }
     group.silent_after = verdict == Verdict::silent
@@ -91,9 +92,11 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                              : Duration::zero();
     const bool in_time =
         std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-    if (in_time && station.may_retry(group)) {
-        schedule_.retry(std::move(group));
+    if (in_time && station.may_retry(group) && stations_.affords_retry(now, station)) {
+        station.on_retry(verdict == Verdict::silent);
+        schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {
+        station.on_retry(verdict == Verdict::silent);
         give_back(group);  // nobody's health: the panel may only not take the length
     } else {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);

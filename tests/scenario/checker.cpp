@@ -100,8 +100,10 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     if (found == open_.end()) return fail("P3: answered twice, or what nobody asked");
     const Open open = std::move(found->second);
     open_.erase(found);
-    if (const auto client = clients_.find(open.job.client); client != clients_.end())
+    if (const auto client = clients_.find(open.job.client); client != clients_.end()) {
         --client->second.open;
+        if (!finish.pdu && watch_.is_silent(open.job.station)) client->second.held_until = now;
+    }
     check_in_time(now, open, finish);
     // Who was sent before, in a joined read, is told so when it has to go.
     const Fault of_displaced = open.sent ? Fault::timeout : Fault::busy;

@@ -97,7 +97,8 @@ class Checker {
         unsigned open = 0;
         bool healthy = false;  ///< none of its stations is ever dead
         bool polite = false;
-        bool single = false;  ///< one request at a time
+        bool single = false;     ///< one request at a time
+        TimePoint held_until{};  ///< the last fault that a silent station has brought it
     };
 
     void fail(std::string what);
@@ -108,6 +109,7 @@ class Checker {
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
     std::optional<TimePoint> good_work_since(TimePoint since) const;
+    bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     TimePoint owed_until() const;

@@ -136,11 +136,11 @@ Duration Checker::least_wait() const {
 void Checker::close_attempt(TimePoint now) {
     if (attempt_.answered) return;
     const Duration cost = now - attempt_.started;
+    const bool wanted = good_work_since(attempt_.started) == attempt_.started;
     const bool plain = calm_ && watch_.only_dies(attempt_.station) && !attempt_.heard;
-    const auto waited = good_work_since(attempt_.started);
-    if (plain && attempt_.dead && cost > costs_.limit(attempt_) && waited == attempt_.started)
+    if (plain && attempt_.dead && cost > costs_.limit(attempt_) && wanted)
         fail("P4: an attempt at a silent station cost " + std::to_string(cost / 1ms) + " ms");
-    const std::string broken = costs_.on_unanswered(now, attempt_);
+    const std::string broken = costs_.on_unanswered(now, attempt_, wanted);
     if (!broken.empty()) fail(broken);
     watch_.on_unanswered(now, attempt_.station, !attempt_.heard);
     watch_.on_owed(attempt_.station, owed_until());
@@ -188,12 +188,25 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
         const std::uint8_t station = o.job.station;
         const bool good = !o.sent && !o.gone && station != kBroadcast &&
                           !watch_.is_silent(station) && watch_.is_good(station, since) &&
-                          !(o.write && echoes_);
+                          !(o.write && echoes_) && !waits_in_order(since, ticket, o);
         if (!good) continue;
         const TimePoint from = std::max({since, o.submitted, watch_.rests_until(station)});
         if (!first || from < *first) first = from;
     }
     return first;
+}
+
+/// Its client's broadcast goes before it, and behind a request to a station that is silent.
+bool Checker::waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const {
+    const auto client = clients_.find(open.job.client);
+    bool behind = client != clients_.end() && client->second.held_until > since;
+    for (const auto& [older, o] : open_) {
+        if (older >= ticket) return false;
+        if (o.gone || o.job.client != open.job.client) continue;
+        if (behind && !o.sent && o.job.station == kBroadcast) return true;
+        behind = behind || watch_.is_silent(o.job.station);
+    }
+    return false;
 }
 
 void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {

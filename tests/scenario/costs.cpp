@@ -38,11 +38,12 @@ Duration Costs::limit(const Attempt& attempt) const {
     return std::min(timeout, 3 * (*slowest + 10ms)) + frames(attempt);
 }
 
-std::string Costs::on_unanswered(TimePoint now, const Attempt& attempt) {
+std::string Costs::on_unanswered(TimePoint now, const Attempt& attempt, bool wanted) {
     if (!attempt.dead) return {};
     const Duration most = settings_.unlisted.response_timeout + frames(attempt);
     const Duration cost = std::min(now - attempt.started, most);
     dead_ += cost;
+    if (!wanted) return {};
     constexpr int kShare = 5;  // a fifth
     level_ = std::max(level_ - (now - level_at_) / kShare, Duration{}) + cost;
     level_at_ = now;

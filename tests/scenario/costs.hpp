@@ -33,8 +33,9 @@ class Costs {
 
     /// What an unanswered attempt may cost while others wait.
     Duration limit(const Attempt& attempt) const;
-    /// It has cost this much when the next one goes. Nothing, or what was broken.
-    std::string on_unanswered(TimePoint now, const Attempt& attempt);
+    /// It has cost this much when the next one goes; `wanted`: others wanted the line. Nothing, or
+    /// what was broken.
+    std::string on_unanswered(TimePoint now, const Attempt& attempt, bool wanted);
     void on_answered(TimePoint now, const Attempt& attempt);
     std::string at_end(Duration elapsed) const;
     /// Of the line, by those who never do anything wrong.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <algorithm>
+
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {
 
 /// Keeps all that is spent from it below a share of the line's time: after something that cost d
-/// nothing more is allowed for d * (1 / share - 1). Pure.
+/// nothing more is allowed for d * (1 / share - 1). What is spent all the same, because it could
+/// not be foreseen, is a debt. Pure.
 class ProbeBudget {
   public:
     /// Of stations that are offline, together (P4: at most 5 %, aiming at 3 %).
@@ -15,14 +18,21 @@ class ProbeBudget {
     /// Of stations that have just fallen silent, together; and of each one that keeps failing.
     static constexpr double kFailing = 0.2;
 
+    /// ... of ids that nobody listed and nobody has heard, together: once they have been asked.
+    static constexpr double kStrangers = 0.02;
+
     explicit ProbeBudget(double share) : share_(share) {}
 
-    bool allows(TimePoint now) const { return now >= next_; }
+    /// `credit`: a debt that takes so long to be paid is no reason to wait.
+    bool allows(TimePoint now, Duration credit = {}) const { return now + credit >= next_; }
     TimePoint next() const { return next_; }
-    /// Something without a reply ended at `now` after having kept the line for `cost`.
-    void spend(TimePoint now, Duration cost) {
-        const double rest = to_seconds(cost) * (1.0 / share_ - 1.0);
-        next_ = now + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(rest));
+    /// Something without a reply ended at `now` after having kept the line for `cost`. Of the debt
+    /// before so much is remembered as takes `most` to be paid.
+    void spend(TimePoint now, Duration cost, Duration most = {}) {
+        const std::chrono::duration<double> time(to_seconds(cost) / share_);
+        const auto whole = std::chrono::duration_cast<Duration>(time);
+        const TimePoint began = now - cost;
+        next_ = std::max(began + whole, std::min(std::max(next_, began) + whole, now + most));
     }
     void clear() { next_ = {}; }
 

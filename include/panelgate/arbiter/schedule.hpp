@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "panelgate/arbiter/backlog.hpp"
@@ -36,14 +39,18 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// The same request goes again; others may go in between where only its station rests.
-    void retry(Group group);
+    /// The same request goes again, and may be waited for so long; others go in between where only
+    /// its station rests: one, or, when it may cost them much, one request to each station that
+    /// something waits for.
+    void retry(Group group, Duration patience);
     /// What was asked for together goes again, each for itself. Gives those whose client has left:
     /// for them nothing goes.
     std::vector<Job> give_back(Group& group);
 
   private:
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
+    bool others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const;
+    void let_others_go_first();
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
                   TimePoint proved);
@@ -53,8 +60,10 @@ class Schedule {
     bool may_stall_;
     Backlog backlog_;
     Sharing sharing_;
-    Ticket learned_for_ = 0;    ///< a read was sent for it, to find out about the echo (P8)
-    bool other_first_ = false;  ///< a retry lets one other go first
+    Ticket learned_for_ = 0;         ///< a read was sent for it, to find out about the echo (P8)
+    std::set<std::uint8_t> others_;  ///< stations that waited when a retry was due
+    std::size_t turns_ = 0;          ///< that it leaves to them, at most
+    bool dear_ = false;              ///< a retry may cost them much
 };
 
 }  // namespace panelgate::arbiter

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cstdint>
 #include <deque>
 #include <optional>
 
@@ -123,15 +125,31 @@ class Station {
         return stranger() && !owes() && now >= asked_ + kForgetStranger;
     }
     /// It has just fallen silent, and is not offline yet.
-    bool suspect() const { return health_.silent_in_a_row() > 0 && !health_.offline(); }
+    bool suspect() const {
+        return (missed_ || health_.silent_in_a_row() > 0) && !health_.offline();
+    }
     /// It fails again and again, and is not silent.
     bool failing() const { return failed_in_a_row_ >= kFailing && !health_.offline(); }
-    /// As far as its own share of the bus goes.
-    bool may_spend(TimePoint now) const { return !failing() || budget_.allows(now); }
+    /// So many of its last attempts were in vain that another one would surprise nobody.
+    bool flaky() const { return std::popcount(lately_) >= kFlaky; }
+    /// What its failures took of the bus lately is within its share, but for the odd one that
+    /// nobody could foresee.
+    bool may_spend(TimePoint now) const {
+        return budget_.allows(now, kCredit * timeout_cost()) &&
+               (!failing() || failing_.allows(now));
+    }
+    /// ... and all of it is paid.
+    bool in_debt(TimePoint now) const { return !budget_.allows(now); }
+    /// The whole line rests for so long because of it.
+    void on_line_rests(TimePoint now, Duration rest) { spend(now, rest); }
     bool may_retry(const Group& group) const;
+    /// Its request goes again, behind silence or not: until that is over nobody is surprised.
+    void on_retry(bool silent) { missed_ = silent; }
     /// How long the next attempt waits for its reply to begin. `line`: the longest think time of
     /// all stations of the line so far; `hurry`: others have just fallen silent, and waited for.
-    Duration patience(const Group& group, std::optional<Duration> line, bool hurry) const;
+    /// `spent`: it has failed so often that others are not to pay for more than it has needed.
+    Duration patience(const Group& group, std::optional<Duration> line, bool hurry,
+                      bool spent = false) const;
     /// What it has needed, and some more; at most its response timeout.
     Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
     /// ... and not more than that, but for what a receiver holds back.
@@ -145,7 +163,14 @@ class Station {
     TimePoint trail_until() const { return trail_.until(); }
     std::optional<Duration> slowest() const { return slowest_.value(); }
 
+    /// The last time that something for it went on the wire, or that a stranger was wanted.
+    TimePoint asked() const { return asked_; }
+    void on_wanted(TimePoint now) { asked_ = now; }
+
     static constexpr int kFailing = 2;  ///< transactions in a row
+    static constexpr int kFlaky = 4;    ///< silent ones of the last 8 attempts
+    static constexpr int kCredit = 2;   ///< whole timeouts that need not be paid at once
+    static constexpr int kDebt = 3;     ///< ... and that are remembered
     static constexpr Duration kForgetStranger = 60s;
 
   private:
@@ -153,6 +178,11 @@ class Station {
         return settings_.adaptive_timeout ? adaptive_.value(turnaround_)
                                           : settings_.response_timeout;
     }
+    /// How long its share of the bus has to save for a whole timeout.
+    Duration timeout_cost() const {
+        return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
+    }
+    void spend(TimePoint now, Duration cost) { budget_.spend(now, cost, kDebt * timeout_cost()); }
     TimePoint answered_request(TimePoint now) const;
     void rest_for_owed(TimePoint now);
     void take_one(TimePoint now, TimePoint sent);
@@ -167,7 +197,9 @@ class Station {
     DriftAlarm drift_;
     CopyGuard copies_;
     Trail trail_;
-    ProbeBudget budget_{ProbeBudget::kFailing};
+    ProbeBudget budget_{ProbeBudget::kFailing};   ///< of its failures; no reply pays for them
+    ProbeBudget failing_{ProbeBudget::kFailing};  ///< of those while it is failing()
+    std::uint8_t lately_ = 0;     ///< the last 8 attempts, the latest lowest: 1 was silent
     std::deque<TimePoint> owed_;  ///< when the requests left whose replies may still come
     Bytes owed_pdu_;              ///< they are one and the same
     TimePoint again_until_{};     ///< it may say the reply that came damaged once more
@@ -180,6 +212,7 @@ class Station {
     std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
     Slowest slowest_;                              ///< from request to first sign of the reply
     int failed_in_a_row_ = 0;
+    bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
     bool trail_told_ = false;
     int probes_ = 0;  ///< in vain, since it was heard last
 };

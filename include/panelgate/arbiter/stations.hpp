@@ -52,8 +52,18 @@ class Stations {
     bool refuses(TimePoint now, const Job& job);
     /// How long the next attempt waits for its reply to begin.
     Duration patience(TimePoint now, const Group& group);
+    /// It fails so often that others, who want the line too, are not to pay for it: no silence of
+    /// it is a surprise.
+    bool spent(TimePoint now, const Station& station) const {
+        return station.flaky() && has_company(now, station);
+    }
+    /// A retry is within what this station may cost the others.
+    bool affords_retry(TimePoint now, const Station& station) const {
+        return !spent(now, station) && (station.may_spend(now) || !has_company(now, station));
+    }
     /// The budgets of those that do not answer let this one be asked. A station that has only just
-    /// fallen silent, or that keeps failing, is to wait for them only while others want the line.
+    /// fallen silent, that keeps failing, or that nobody knows, is to wait for them only while
+    /// others want the line.
     bool may_spend(TimePoint now, std::uint8_t id) const;
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost);
@@ -67,6 +77,13 @@ class Stations {
 
   private:
     bool anyone_online() const;
+    bool is_stranger(std::uint8_t id) const;
+    /// Another one, that is there, was asked just now.
+    bool has_company(TimePoint now, const Station& station) const;
+    /// What the silence of one that nobody could foresee costs, with its share to save for it.
+    Duration surprise() const {
+        return static_cast<int>(1 / ProbeBudget::kFailing) * unlisted_.response_timeout;
+    }
     /// What those that are offline may take: more while an outage of all has only just begun.
     const ProbeBudget& probes() const {
         const bool all_just_died = !anyone_online() && alone_.next() < heard_ + kOutage;
@@ -74,7 +91,8 @@ class Stations {
     }
 
     static constexpr Duration kOutage = 30s;
-    static constexpr Duration kHurry = 5s;  ///< at most
+    static constexpr Duration kHurry = 5s;    ///< at most
+    static constexpr Duration kCompany = 5s;  ///< who was asked since then wants the line
 
     OfflineSettings offline_;
     StationSettings unlisted_;
@@ -85,6 +103,8 @@ class Stations {
     ProbeBudget probes_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
     ProbeBudget suspects_{ProbeBudget::kFailing};
+    ProbeBudget strangers_{ProbeBudget::kFailing};          ///< all attempts at strangers
+    ProbeBudget known_strangers_{ProbeBudget::kStrangers};  ///< ... but the first at each
     Slowest slowest_;
     TimePoint heard_{};        ///< any of them
     TimePoint hurry_until_{};  ///< one has just been waited for in vain: the next ones are not
