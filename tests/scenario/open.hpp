@@ -15,25 +15,19 @@ struct OpenViolation {
 
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     // A copy that takes the place of the reply before anything tells that its station speaks twice,
-    // beside echoes, noise and pauses that hide the copies before it.
+    // beside echoes, noise and pauses that hide the copies before it: three of 600 runs.
     {"receiver", "P1: a value"},
-    {"company", "P1: a value"},
-    {"voices", "P1: a value"},
     {"wild", "P1: "},
     {"wild", "P6: a value"},
-    {"receiver", "P6: a value"},
     // A reader's station rests in some of the turns, and its own writers have those that are left.
-    {"dead", "P9: five writes in a row"},
     {"company", "P9: five writes in a row"},
     // A panel that is sound by itself fails beside noise that hits its frames without a collision
     // that the checker sees, where the station has no retries.
     {"voices", "P4: a sound"},
     {"receiver", "P4: a sound"},
     {"company", "P4: a sound"},
-    {"stall", "P4: a sound"},
     {"*", "P4: a good station was refused"},
     // Budgets and rests under several faults at once.
-    {"dead", "P4: silent stations take"},
     {"wild", "P4: "},
     {"mass", "P4: "},
     // What is held back because it repeats another answer, and the silence behind copies.
@@ -43,12 +37,8 @@ inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     {"doubled", "P5: the line was silent"},
     {"babbles", "P5: the line was silent"},
     {"answers_broadcasts", "P5: the line was silent"},
-    {"dead", "P5: nothing was sent"},
-    {"reboots", "P1: transmitted while"},
-    {"stall", "P1: transmitted while"},
     {"babbles", "P9: of one odd panel"},
     {"doubled", "P9: of one odd panel"},
-    {"damaged_first", "P9: of one odd panel"},
 });
 
 inline bool is_open(std::string_view kind, std::string_view violation) {

@@ -35,17 +35,18 @@ namespace panelgate::arbiter {
 /// A line starts down: on_line_up comes first. Acting may call in again: finish the loop, it
 /// drains. The promises (P1…P9) are those of the README.
 ///
-/// | state    | is when                     | leaves on                | then |
-/// |----------|-----------------------------|--------------------------|----------------------------|
-/// | down     | no on_line_up yet, or down  | on_line_up               | quiet; what is owed stays
-/// | | quiet    | Quiet says so: gap, rest    | its end                  | retry, probe or next job
-/// | | sending  | an attempt, before its end  | its last bit             | broadcast: quiet;
-/// waiting  | | waiting  | an attempt, after its end   | reply, damage, its time  | settle, or
-/// fail: owed,     | |          |                             |                          | then
-/// retry, split or answer| | resting  | the station owes (Station)  | it has come, or lapsed   |
-/// its jobs may run again     | | doubtful | it lapsed on a line that    | Reset, down, up | as
-/// after down              | |          | may stall, and nothing      |                          |
-/// | |          | proves that it passed       |                          | |
+// clang-format off
+/// | state    | is when                    | leaves on              | then                         |
+/// |----------|----------------------------|------------------------|------------------------------|
+/// | down     | no on_line_up yet, or down | on_line_up             | quiet; what is owed stays    |
+/// | quiet    | Quiet says so: gap, rest   | its end                | retry, probe or next job     |
+/// | sending  | an attempt, before its end | its last bit           | broadcast: quiet; waiting    |
+/// | waiting  | an attempt, after its end  | reply, damage, timeout | settle, or fail: owed, then  |
+/// |          |                            |                        | retry, split or answer       |
+/// | resting  | the station owes (Station) | it has come or lapsed  | its jobs may run again       |
+/// | doubtful | it lapsed where the line   | Reset, down, up        | as after down                |
+/// |          | may stall, unproved        |                        |                              |
+// clang-format on
 class Arbiter {
   public:
     explicit Arbiter(Settings settings);
