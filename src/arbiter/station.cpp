@@ -162,6 +162,7 @@ void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) 
 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
+    failed_ = now;
     if (health_.offline() || flaky()) ++probes_;
     const int silent = verdict == Verdict::silent ? 1 : 0;
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);

@@ -48,10 +48,10 @@ Duration Stations::patience(TimePoint now, const Group& group) {
 }
 
 bool Stations::has_company(TimePoint now, const Station& station) const {
+    const TimePoint since = std::max(station.failed(), now - kCompany);
     return std::ranges::any_of(stations_, [&](const auto& entry) {
-        const Station& other = entry.second;
-        return &other != &station && other.health().last_success() && !other.health().offline() &&
-               now < other.asked() + kCompany;
+        const auto answered = entry.second.health().last_success();
+        return &entry.second != &station && answered && *answered > since;
     });
 }
 

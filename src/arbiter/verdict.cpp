@@ -81,6 +81,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         station.owe(now, group.pdu, sent);
     }
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.pdu);
+    const bool affordable = stations_.affords_retry(now, station);
     stations_.on_failed(now, group.station, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(group.station, *until);
@@ -92,7 +93,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                              : Duration::zero();
     const bool in_time =
         std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-    if (in_time && station.may_retry(group) && stations_.affords_retry(now, station)) {
+    if (in_time && affordable && station.may_retry(group)) {
         station.on_retry(verdict == Verdict::silent);
         schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {

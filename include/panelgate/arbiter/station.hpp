@@ -163,8 +163,9 @@ class Station {
     TimePoint trail_until() const { return trail_.until(); }
     std::optional<Duration> slowest() const { return slowest_.value(); }
 
-    /// The last time that something for it went on the wire, or that a stranger was wanted.
-    TimePoint asked() const { return asked_; }
+    /// The end of its last attempt that was in vain.
+    TimePoint failed() const { return failed_; }
+    /// Somebody wants a stranger that is not to be asked now.
     void on_wanted(TimePoint now) { asked_ = now; }
 
     static constexpr int kFailing = 2;  ///< transactions in a row
@@ -211,6 +212,7 @@ class Station {
     Bytes last_read_;      ///< what to probe with before it has answered any
     std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
     Slowest slowest_;                              ///< from request to first sign of the reply
+    TimePoint failed_{};
     int failed_in_a_row_ = 0;
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
     bool trail_told_ = false;

@@ -57,7 +57,7 @@ class Stations {
     bool spent(TimePoint now, const Station& station) const {
         return station.flaky() && has_company(now, station);
     }
-    /// A retry is within what this station may cost the others.
+    /// Before on_failed(): a retry is within what this station may cost the others.
     bool affords_retry(TimePoint now, const Station& station) const {
         return !spent(now, station) && (station.may_spend(now) || !has_company(now, station));
     }
@@ -78,7 +78,7 @@ class Stations {
   private:
     bool anyone_online() const;
     bool is_stranger(std::uint8_t id) const;
-    /// Another one, that is there, was asked just now.
+    /// Another one has answered just now, and since this one was in vain: it is not the line.
     bool has_company(TimePoint now, const Station& station) const;
     /// What the silence of one that nobody could foresee costs, with its share to save for it.
     Duration surprise() const {
@@ -92,7 +92,7 @@ class Stations {
 
     static constexpr Duration kOutage = 30s;
     static constexpr Duration kHurry = 5s;    ///< at most
-    static constexpr Duration kCompany = 5s;  ///< who was asked since then wants the line
+    static constexpr Duration kCompany = 5s;  ///< who has answered since then wants the line
 
     OfflineSettings offline_;
     StationSettings unlisted_;
