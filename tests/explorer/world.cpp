@@ -128,6 +128,8 @@ void World::deliver(Verb verb, std::uint8_t station) {
         waiting.pop_front();
     }
     say(adu);
+    // What may stand in the data of another frame is taken when a silence has ended that.
+    if (verb == Verb::behind_header) advance(now_ + silent_interval(small_settings().serial));
     const bool waits = std::ranges::any_of(
         judge_.open(), [&](const Judge::Open& open) { return is_asked(open, was); });
     begun_ = verb == Verb::hole && must_do && waits;

@@ -160,7 +160,10 @@ class Station {
     std::uint32_t longest_read(std::uint8_t function) const;
     Duration worst_lateness() const { return late_.worst(); }
     /// Until when nobody should send, because of what follows its replies.
-    TimePoint trail_until() const { return trail_.until(); }
+    TimePoint trail_until() const {
+        const bool copies = copies_.known() && copies_.hold() <= trail_.longest();
+        return std::max(trail_.until(), copies ? copies_.rest_until() : TimePoint{});
+    }
     std::optional<Duration> slowest() const { return slowest_.value(); }
 
     /// The end of its last attempt that was in vain.
