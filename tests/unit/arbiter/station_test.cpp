@@ -180,6 +180,63 @@ TEST_F(StationTest, P4OneThatKeepsFailingWithoutBeingSilentHasAFifthOfTheBus) {
     EXPECT_FALSE(station_.failing());
 }
 
+TEST_F(StationTest, P4AReplyDoesNotPayForTheSilencesBeforeIt) {
+    EXPECT_FALSE(station_.in_debt(now_));
+    miss(kRead);
+    const TimePoint missed = now_;
+    answer(kRead, kReply);
+    EXPECT_TRUE(station_.in_debt(now_));
+    EXPECT_TRUE(station_.may_spend(now_)) << "one silence can happen to anybody";
+    EXPECT_FALSE(station_.in_debt(missed + 4 * kTimeout));
+}
+
+TEST_F(StationTest, P4WhatItsFailuresTakeBeyondAFifthHoldsItsRequests) {
+    while (station_.may_spend(now_)) {
+        miss(kRead);
+        answer(kRead, kReply);
+    }
+    const TimePoint full = now_;
+    while (!station_.may_spend(now_)) now_ += 1ms;
+    EXPECT_LE(now_ - full, 5 * kTimeout) << "what one of them cost";
+}
+
+TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotMend) {
+    answer(kRead, kReply);
+    for (int i = 0; i < Station::kFlaky; ++i) {
+        EXPECT_FALSE(station_.flaky());
+        miss(kRead);
+        station_.on_stray_frame(now_ + 100ms, kReply);
+    }
+    EXPECT_TRUE(station_.flaky());
+    EXPECT_LT(station_.patience(group_of(kId, kRead), std::nullopt, false, true), kTimeout / 2);
+    for (int i = 0; i < 5; ++i) answer(kRead, kReply);
+    EXPECT_FALSE(station_.flaky());
+}
+
+TEST_F(StationTest, P4DamagedRepliesDoNotMakeItFlaky) {
+    for (int i = 0; i < 8; ++i) miss(kRead, Verdict::damaged);
+    EXPECT_FALSE(station_.flaky());
+}
+
+TEST_F(StationTest, P4WhileARetryIsDueItsSilenceIsKnown) {
+    answer(kRead, kReply);
+    station_.on_retry(false);
+    EXPECT_FALSE(station_.suspect());
+    station_.on_retry(true);
+    EXPECT_TRUE(station_.suspect());
+    EXPECT_LT(patience(kRead), kTimeout / 2);
+    answer(kRead, kReply);
+    EXPECT_FALSE(station_.suspect());
+}
+
+TEST_F(StationTest, AStrangerThatIsWantedIsNotForgotten) {
+    Station stranger = station(false);
+    stranger.on_asked(now_, group_of(kId, kRead));
+    stranger.on_wanted(now_ + 30s);
+    EXPECT_FALSE(stranger.forgettable(now_ + Station::kForgetStranger));
+    EXPECT_TRUE(stranger.forgettable(now_ + 30s + Station::kForgetStranger));
+}
+
 TEST_F(StationTest, OnlyAStrangerIsForgottenWhenNobodyHasAskedForItForAMinute) {
     Station stranger = station(false);
     stranger.on_asked(now_, group_of(kId, kRead));

@@ -75,5 +75,36 @@ TEST_F(StationsTest, P4WhenOneIsBackTheOthersAreAskedAtOnce) {
     EXPECT_LE(wait_for_probe(), 0s);
 }
 
+TEST_F(StationsTest, P4OnlyWhereAnotherHasAnsweredSinceIsAFlakyStationHeldShort) {
+    answer(1);
+    answer(2);
+    for (int i = 0; i < Station::kFlaky; ++i) {
+        now_ += 500ms;
+        stations_.on_failed(now_, 1, Verdict::silent, 500ms);
+    }
+    const Station& flaky = stations_.of(1);
+    ASSERT_TRUE(flaky.flaky());
+    EXPECT_FALSE(stations_.spent(now_, flaky)) << "it may be the line";
+    EXPECT_TRUE(stations_.affords_retry(now_, flaky));
+    answer(2);
+    EXPECT_TRUE(stations_.spent(now_, flaky));
+    EXPECT_FALSE(stations_.affords_retry(now_, flaky));
+    EXPECT_FALSE(stations_.spent(now_ + 1min, flaky)) << "nobody else is there";
+}
+
+TEST_F(StationsTest, P4StrangersDoNotUseUpWhatTheProbesOfOthersMayCost) {
+    constexpr std::uint8_t kStranger = 200;
+    answer(1);
+    kill(2, 20ms);
+    now_ += 1min;
+    ASSERT_LE(wait_for_probe(), 0s);
+    for (int i = 0; i < 10; ++i) stations_.on_failed(now_, kStranger, Verdict::silent, 100ms);
+    stations_.of(kStranger).on_given_up(now_, Fault::timeout);
+    for (int i = 0; i < 10; ++i) stations_.on_failed(now_, kStranger, Verdict::silent, 100ms);
+    EXPECT_LE(wait_for_probe(), 0s);
+    EXPECT_FALSE(stations_.may_spend(now_, kStranger + 1)) << "all strangers have one budget";
+    EXPECT_TRUE(stations_.may_spend(now_, 3)) << "which is not that of who is listed";
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter

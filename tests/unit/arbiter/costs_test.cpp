@@ -1,0 +1,247 @@
+// What panels that do not answer, or not always, cost those beside them (P4), in virtual time.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panelgate/arbiter/arbiter.hpp"
+#include "support/bus_script.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::BusScript;
+
+constexpr std::uint8_t kOdd = 3;
+constexpr std::array<std::uint8_t, 4> kHealthy{1, 2, 4, 5};
+constexpr Duration kQuick = 3ms;
+const Bytes kRead = "03 00 00 00 01"_hex;
+
+Settings five_stations() {
+    Settings settings;
+    settings.serial = {38400, 8, Parity::none, 1};
+    for (std::uint8_t id = 1; id <= 5; ++id) {
+        StationSettings station;
+        station.id = id;
+        settings.stations.push_back(station);
+    }
+    return settings;
+}
+
+/// Five panels on a line, and clients each of which asks again as soon as it is answered.
+class Plant {
+  public:
+    /// After how long station 3 answers the request of this number to it; nothing: never.
+    using Odd = std::function<std::optional<Duration>(int)>;
+
+    explicit Plant(Odd odd) : odd_(std::move(odd)) {}
+
+    /// A client that asks these stations in turn.
+    void add_client(std::vector<std::uint8_t> stations) {
+        clients_.push_back({std::move(stations)});
+    }
+    void run_for(Duration span) {
+        const TimePoint end = bus.now() + span;
+        while (bus.now() < end) {
+            ask();
+            TimePoint next = std::min(end, bus.now() + 1ms);
+            if (const auto due = bus.arbiter().next_deadline())
+                next = std::min(next, std::max(*due, bus.now()));
+            for (const Reply& reply : replies_)
+                next = std::min(next, std::max(reply.at, bus.now()));
+            bus.run_until(next);
+            speak();
+        }
+    }
+    void forget() { vain_.clear(), started_ = bus.now(), answers.clear(), faults.clear(); }
+    /// Of the time since then, taken by requests to these stations that were not answered in time.
+    double share_in_vain(std::uint8_t from, std::uint8_t to) const {
+        Duration all{};
+        for (const auto& [station, cost] : vain_) {
+            if (station >= from && station <= to) all += cost;
+        }
+        return to_seconds(all) / to_seconds(bus.now() - started_);
+    }
+
+    BusScript bus{five_stations()};
+    std::map<std::uint8_t, int> answers;
+    std::map<std::uint8_t, int> faults;
+    std::map<std::uint8_t, int> asked;  ///< on the wire
+
+  private:
+    struct ClientOf {
+        std::vector<std::uint8_t> stations;
+        std::size_t next = 0;
+        Ticket open = 0;
+        std::uint8_t station = 0;
+    };
+    struct Reply {
+        TimePoint at;
+        std::uint8_t station;
+    };
+
+    void ask() {
+        for (std::size_t i = 0; i < clients_.size(); ++i) {
+            ClientOf& client = clients_[i];
+            if (client.open != 0 && !bus.answered(client.open)) continue;
+            if (client.open != 0)
+                ++(bus.answer(client.open).pdu ? answers : faults)[client.station];
+            client.open = 0;
+            client.station = client.stations[client.next++ % client.stations.size()];
+            const auto ticket = bus.try_submit(client.station, kRead, i + 1);
+            if (ticket) client.open = *ticket;
+        }
+    }
+    /// What has left since the last time, and what is to be heard now.
+    void speak() {
+        for (; seen_ < bus.sent.size(); ++seen_) {
+            const auto& [at, adu, what] = bus.sent[seen_];
+            if (open_ != 0) vain_[open_] += at - open_since_;
+            open_ = adu[0];
+            open_since_ = at;
+            const int number = asked[open_]++;
+            const auto after = open_ == kOdd ? odd_(number) : std::optional<Duration>(kQuick);
+            const TimePoint end = at + wire_time(bus.settings().serial, adu.size());
+            if (open_ <= 5 && after) replies_.push_back({end + *after, open_});
+        }
+        const auto due = std::ranges::find_if(
+            replies_, [&](const Reply& reply) { return reply.at <= bus.now(); });
+        if (due == replies_.end()) return;
+        const std::uint8_t station = due->station;
+        replies_.erase(due);
+        if (open_ == station) open_ = 0;
+        bus.hear_reply(station, Writer().u8(3).u8(2).u16(++value_).take());
+    }
+
+    Odd odd_;
+    std::vector<ClientOf> clients_;
+    std::vector<Reply> replies_;
+    std::size_t seen_ = 0;
+    std::uint8_t open_ = 0;  ///< asked last, and not answered yet
+    TimePoint open_since_;
+    TimePoint started_;
+    std::map<std::uint8_t, Duration> vain_;
+    std::uint16_t value_ = 0;
+};
+
+void add_one_client_each(Plant& plant) {
+    for (std::uint8_t id = 1; id <= 5; ++id) plant.add_client({id});
+}
+
+std::optional<Duration> when(bool answers, Duration after = kQuick) {
+    return answers ? std::optional(after) : std::nullopt;
+}
+
+class Intermittent : public testing::TestWithParam<Plant::Odd> {};
+
+TEST_P(Intermittent, P4PanelsFailuresTakeAFifthOfALineThatOthersWant) {
+    Plant plant(GetParam());
+    add_one_client_each(plant);
+    plant.run_for(10s);
+    plant.forget();
+    plant.run_for(100s);
+    EXPECT_LE(plant.share_in_vain(kOdd, kOdd), 0.21);
+    EXPECT_GT(plant.asked[kOdd], 20) << "and it is asked all the same";
+    EXPECT_EQ(plant.faults[1], 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Every, Intermittent,
+    testing::Values([](int n) { return when(n % 2 == 0); },         // every second
+                    [](int n) { return when(n % 3 == 0); },         // every third
+                    [](int n) { return when(n % 4 != 0); },         // three of four
+                    [](int n) { return when(n % 3 == 0, 400ms); },  // slowly
+                    [](int n) { return when(n % 4 != 0, 400ms); },
+                    [](int n) { return when(n % 100 < 50); },             // now and then dead
+                    [](int) { return std::optional<Duration>(600ms); },   // always late
+                    [](int) { return std::optional<Duration>(1000ms); },  // very late
+                    [](int n) { return when(true, n % 2 == 0 ? 3ms : 700ms); }));
+
+TEST(Costs, P4APanelThatLosesOneFrameInTwentyHardlyNotices) {
+    std::uint32_t random = 1;
+    Plant plant([&](int) {
+        random = random * 1664525 + 1013904223;
+        return when((random >> 16) % 20 != 0);
+    });
+    add_one_client_each(plant);
+    plant.run_for(300s);
+    // Both of two attempts fail in one of 400.
+    EXPECT_GT(plant.answers[kOdd], 2000);
+    EXPECT_LT(plant.faults[kOdd] * 200, plant.answers[kOdd]);
+}
+
+TEST(Costs, P4APanelThatNeedsAlmostItsTimeoutIsNeverCutShort) {
+    Plant plant([](int n) { return when(n % 20 != 7, 480ms); });
+    add_one_client_each(plant);
+    plant.run_for(120s);
+    EXPECT_EQ(plant.faults[kOdd], 0);
+    EXPECT_GT(plant.answers[kOdd], 100);
+}
+
+TEST(Costs, P4AnIntermittentPanelThatIsAloneIsRetriedAndWaitedFor) {
+    Plant plant([](int n) { return when(n % 2 == 0); });
+    plant.add_client({kOdd});
+    plant.run_for(30s);
+    EXPECT_EQ(plant.faults[kOdd], 0);
+    EXPECT_GT(plant.answers[kOdd], 20);
+}
+
+TEST(Costs, P4IdsThatNobodyHasHeardTakeAFifthAtFirstAndALittleInTheLongRun) {
+    Plant plant([](int) { return std::nullopt; });
+    for (const std::uint8_t id : kHealthy) plant.add_client({id});
+    plant.add_client({kOdd});
+    plant.run_for(8s);
+    std::vector<std::uint8_t> strangers;
+    for (std::uint8_t id = 6; id < 247; ++id) strangers.push_back(id);
+    for (int i = 0; i < 3; ++i) plant.add_client(strangers);
+    plant.forget();
+    plant.run_for(20s);
+    EXPECT_LE(plant.share_in_vain(6, 247), 0.25);
+    plant.run_for(40s);
+    plant.forget();
+    const int before = plant.asked[kOdd];
+    plant.run_for(100s);
+    EXPECT_LE(plant.share_in_vain(6, 247), 0.025);
+    EXPECT_LE(plant.share_in_vain(kOdd, 247), 0.05);
+    EXPECT_GT(plant.asked[kOdd] - before, 10) << "the configured one is probed all the same";
+}
+
+TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
+    BusScript bus{five_stations()};
+    const auto answer = [&](std::uint8_t station, Duration after, std::uint16_t value) {
+        ASSERT_EQ(bus.sent.back().adu[0], station);
+        bus.run_to_end_of_request();
+        bus.run_for(after);
+        bus.hear_reply(station, Writer().u8(3).u8(2).u16(value).take());
+    };
+    for (const Duration needs : {kQuick, Duration(300ms)}) {
+        bus.submit(kOdd, kRead, 7);
+        answer(kOdd, needs, static_cast<std::uint16_t>(needs / 1ms));
+        bus.run_for(60s);
+        bus.submit(kOdd, kRead, 7);
+        for (const std::uint8_t id : kHealthy) bus.submit(id, kRead, id);
+        const std::size_t first = bus.sent.size();
+        std::vector<std::uint8_t> order;
+        while (bus.sent.back().what != "retry") {
+            ASSERT_TRUE(bus.next_sent(2s));
+            order.push_back(bus.sent.back().adu[0]);
+            if (order.back() != kOdd)
+                answer(order.back(), kQuick, static_cast<std::uint16_t>(bus.sent.size()));
+        }
+        const std::size_t others = bus.sent.size() - first - 1;
+        EXPECT_EQ(others, needs == kQuick ? 1u : 4u);
+        answer(kOdd, kQuick, 9);
+        bus.run_for(60s);
+    }
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
