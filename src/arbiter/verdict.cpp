@@ -25,8 +25,13 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
 void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
-    for (const Job& job : attempt.group().jobs)
-        ledger_.finish(job, modbus::normal_write_reply(job.pdu));
+    for (const Job& job : attempt.group().jobs) {
+        if (job.deadline <= now) {  // nobody looked at the clock in between
+            ledger_.finish(job, Fault::timeout);
+        } else {
+            ledger_.finish(job, modbus::normal_write_reply(job.pdu));
+        }
+    }
 }
 
 /// The reply is there.

@@ -463,6 +463,28 @@ TEST_F(ArbiterTest, BroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnaro
     EXPECT_EQ(bus.arbiter().counters().broadcasts, 1u);
 }
 
+TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessStoodStill) {
+    Arbiter arbiter(settings);
+    const TimePoint start{1h};
+    arbiter.on_line_up(start);
+    Job job;
+    job.pdu = kWrite;
+    job.client = 1;
+    job.priority = PriorityClass::write;
+    const TimePoint free = start + 1s;
+    arbiter.on_deadline(free);
+    ASSERT_TRUE(arbiter.submit(free, job));
+    arbiter.on_deadline(free + settings.queue.deadline + 1s);
+    int answers = 0;
+    while (auto action = arbiter.poll_action()) {
+        const auto* finish = std::get_if<Finish>(&*action);
+        if (finish == nullptr) continue;
+        ++answers;
+        EXPECT_EQ(finish->pdu.error(), Fault::timeout);
+    }
+    EXPECT_EQ(answers, 1);
+}
+
 TEST_F(ArbiterTest, BroadcastOfSeveralIsAnsweredWithAddressAndQuantity) {
     const Ticket ticket = bus.submit(0, "10 00 64 00 02 04 00 0A 01 02"_hex);
     bus.run_for(1s);
