@@ -136,6 +136,24 @@ TEST_F(StationTest, P5AReplyThatHasComeDamagedIsNotOwedButSomeSayItOnceMore) {
     EXPECT_TRUE(station_.may_ask(now_ + CopyGuard::kSaidAgain, kOther));
 }
 
+TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAnyTook) {
+    for (int i = 0; i < 20; ++i) answer(kRead, kReply);
+    now_ += 1s;
+    const auto slow = test::answered(now_ - 450ms, now_, group_of(kId, kRead), kReply);
+    station_.on_reply(now_, slow, 450ms, 445ms);  // once, when a network hung
+    while (!station_.health().offline()) {
+        miss(kRead);
+        station_.on_given_up(now_, Fault::timeout);
+    }
+    int dear = 0;
+    for (int i = 0; i < 40; ++i) {
+        dear += patience(kRead) > kTimeout / 2 ? 1 : 0;
+        miss(kRead);
+        station_.on_given_up(now_, Fault::timeout);
+    }
+    EXPECT_EQ(dear, 10);
+}
+
 TEST_F(StationTest, TellsWhatAFrameIsThatNobodyWaitsForAndChangesNothingByThat) {
     EXPECT_EQ(station_.judge(now_, kReply), Stray::unasked);
     answer(kRead, kReply);
