@@ -203,16 +203,17 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         if (group.silent_after >= whole) return short_wait(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
-    constexpr int kOneIn = 4;
-    if (health_.offline() && slowest() && turnaround_.known() && probes_ % kOneIn != kOneIn - 1) {
-        // What a network did to a few replies must not make each probe dear: now and then one waits
-        // as long as it has ever needed, the others as long as most replies take.
+    constexpr int kDear = 16;
+    if (health_.offline() && slowest() && turnaround_.known() && probes_ % kDear != kDear - 1) {
+        // What a network did to a few replies must not make probes dear: now and then one waits as
+        // long as it has ever needed, the others as long as most replies take.
         constexpr double kMost = 0.75;
         const Duration most = std::max<Duration>(20ms, 2 * turnaround_.quantile(kMost) + 8ms);
         return std::min(short_wait(line), most);
     }
     if ((health_.offline() || spent) && !slowest()) {
         // Nobody knows how long it needs: now and then one waits longer, and longer each time.
+        constexpr int kOneIn = 4;
         constexpr int kDoublings = 6;
         const int longer = probes_ % kOneIn == kOneIn - 1 ? 1 + probes_ / kOneIn % kDoublings : 0;
         return std::min(whole, short_wait(line) * (1 << longer));

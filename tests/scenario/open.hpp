@@ -29,6 +29,7 @@ inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     {"*", "P4: a good station was refused"},
     // Budgets and rests under several faults at once.
     {"wild", "P4: "},
+    {"dead", "P5: nothing was sent"},
     // What is held back because it repeats another answer, and the silence behind copies.
     {"voices", "P5: the line was silent"},
     {"receiver", "P5: the line was silent"},

@@ -151,7 +151,8 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
         miss(kRead);
         station_.on_given_up(now_, Fault::timeout);
     }
-    EXPECT_EQ(dear, 10);
+    EXPECT_GE(dear, 2);
+    EXPECT_LE(dear, 3);
 }
 
 TEST_F(StationTest, TellsWhatAFrameIsThatNobodyWaitsForAndChangesNothingByThat) {
