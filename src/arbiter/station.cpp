@@ -93,7 +93,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     if (heard.lateness > Duration::zero()) late_.on_late(heard.lateness);
     // What repeats the reply before it may be that once more, and what is owed still comes.
     if (may_be_copy) {
-        copies_.on_doubt(copies_.delay_of(now, pdu) * 3 / 2);
+        copies_.on_either(now, pdu);
     } else {
         owed_.pop_front();
     }
@@ -110,7 +110,7 @@ void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
     const Bytes* copy = copies_.copy_in(now, id, bytes);
     if (copy == nullptr) return;
     const Bytes reply = *copy;
-    if (owes()) return copies_.on_doubt(copies_.delay_of(now, reply) * 3 / 2);
+    if (owes()) return copies_.on_either(now, reply);
     copies_.on_unasked(now, reply);
 }
 

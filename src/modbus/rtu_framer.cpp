@@ -156,9 +156,7 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
 
 bool ReplyFramer::ends_with_other_frame() const {
     if (!starts_.empty() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
-    const ReplyLength length = reply_length(heard_);
-    return length.kind == ReplyLength::Kind::known && length.length == heard_.size() &&
-           crc_ok(heard_);
+    return known_reply_length(heard_) == heard_.size() && crc_ok(heard_);
 }
 
 bool ReplyFramer::is_start(std::uint8_t address, std::uint8_t function) const {
@@ -274,13 +272,12 @@ void ReplyFramer::classify(ByteView bytes) {
 std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station) {
     std::vector<Unused> parts;
     while (!bytes.empty()) {
-        const ReplyLength length = reply_length(bytes);
-        const bool whole = length.kind == ReplyLength::Kind::known &&
-                           length.length <= bytes.size() && length.length >= kMinAdu &&
-                           crc_ok(bytes.first(length.length));
+        const std::size_t length = known_reply_length(bytes);
+        const bool whole =
+            length >= kMinAdu && length <= bytes.size() && crc_ok(bytes.first(length));
         const bool rest_is_frame =
             !whole && bytes.size() >= kMinAdu && bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes);
-        const std::size_t size = whole ? length.length : bytes.size();
+        const std::size_t size = whole ? length : bytes.size();
         Unused part;
         part.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
         if (whole || rest_is_frame) {

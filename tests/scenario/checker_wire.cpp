@@ -50,8 +50,7 @@ void Checker::on_answered(TimePoint now) {
     attempt_.answered = true;
     watch_.on_answered(now, attempt_.station, now - attempt_.sent);
     // Of two attempts nobody knows which one the reply was for.
-    if (attempt_.settles) watch_.on_nothing_owed(attempt_.station);
-    if (attempt_.owed && !attempt_.settles) watch_.on_owed(attempt_.station, owed_until());
+    if (attempt_.owed) watch_.on_owed(attempt_.station, owed_until());
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
 }
 
@@ -103,7 +102,6 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     attempt_.heard = false;
     attempt_.span = arbiter::read_span(station, pdu);
     attempt_.again = what == "retry";
-    attempt_.settles = what == "settle";
     attempt_.owed = now < watch_.rests_until(station);
     constexpr std::size_t kRemembered = 8;
     last_turns_.push_back(now);

@@ -19,10 +19,9 @@ struct Attempt {
     bool was_silent = false;  ///< the station was silent before
     bool trusted = false;     ///< it answered the last time
     bool answered = true;
-    bool heard = false;    ///< anything
-    bool again = false;    ///< it was on the wire before
-    bool settles = false;  ///< its answer shows that nothing is owed
-    bool owed = false;     ///< an earlier one may still be answered
+    bool heard = false;  ///< anything
+    bool again = false;  ///< it was on the wire before
+    bool owed = false;   ///< an earlier one may still be answered
     std::optional<arbiter::ReadSpan> span;
 };
 

@@ -23,8 +23,6 @@ class Watch {
     void on_unanswered(TimePoint now, std::uint8_t station, bool silent);
     /// A reply of it may come until then that answers an earlier request.
     void on_owed(std::uint8_t station, TimePoint until);
-    /// A read of another shape was answered: nothing more can come.
-    void on_nothing_owed(std::uint8_t station) { stations_[station].rests = {}; }
 
     /// A gateway can get each of its answers, and nothing has hit it since then.
     bool is_good(std::uint8_t station, TimePoint since) const;

@@ -68,17 +68,18 @@ class Attempt {
     void on_end(TimePoint now, Duration left);
 
     /// A read that comes while the request is still leaving shares it: only a real UART holds it
-    /// back for so long. Not a repeated one: an
-    /// answer to the first attempt may still come, and would be too old.
+    /// back for so long. Not a repeated one: an answer to the first attempt may still come, and
+    /// would be too old.
     bool takes_along(TimePoint now, const Job& job) const;
 
     Group& group() { return group_; }
     const Group& group() const { return group_; }
     const Timing& timing() const { return timing_; }
     TimePoint give_up() const { return timing_.sent + timing_.patience; }
-    /// The whole answer PDU; its first byte came before the request had left by our arithmetic.
+    /// The whole answer PDU.
     const Bytes& reply() const { return *reply_; }
-    /// Noise in front of it tells nothing about it.
+    /// Its first byte came before the request had left by our arithmetic. Noise in front of it
+    /// tells nothing about it.
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
     /// From the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;

@@ -33,11 +33,7 @@ class CopyGuard {
         slot.reply = std::move(reply);
     }
     /// It repeats a reply of the last moments to the letter.
-    bool is_copy(TimePoint now, ByteView reply) const {
-        return std::ranges::any_of(slots_, [&](const Slot& slot) {
-            return slot.is_recent(now) && std::ranges::equal(reply, slot.reply);
-        });
-    }
+    bool is_copy(TimePoint now, ByteView reply) const { return said_at(now, reply) != TimePoint{}; }
     /// ... so soon as copies come from this station.
     bool repeats_itself(TimePoint now, ByteView reply) const {
         const TimePoint said = said_at(now, reply);
@@ -45,18 +41,17 @@ class CopyGuard {
     }
     /// Of the shape of the reply taken last, and soon: perhaps another panel with the same address.
     bool is_second(TimePoint now, ByteView reply) const {
-        const Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
-        return last.is_recent(now) && reply.size() == last.reply.size() &&
-               reply[0] == last.reply[0];
+        const Slot& slot = last();
+        return slot.is_recent(now) && reply.size() == slot.reply.size() &&
+               reply[0] == slot.reply[0];
     }
     /// A good frame that nobody asked for and nothing was owed for.
     void on_unasked(TimePoint now, ByteView reply) {
         const TimePoint said = said_at(now, reply);
         if (said != TimePoint{}) return learn(now, now - said);
         if (!is_second(now, reply)) return;
-        Slot& last = slots_[(next_ + kReplies - 1) % kReplies];
-        last.second = true;
-        if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last.at);
+        slots_[last_index()].second = true;
+        if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last().at);
     }
     /// A reply of the last moments that stands, as a good frame, amid bytes that are none; nothing:
     /// none does.
@@ -68,10 +63,10 @@ class CopyGuard {
         }
         return nullptr;
     }
-    /// How long ago it said this last; 0: not lately.
-    Duration delay_of(TimePoint now, ByteView reply) const {
+    /// This repeats one, or is a reply that was owed and has the same values: nobody knows.
+    void on_either(TimePoint now, ByteView reply) {
         const TimePoint said = said_at(now, reply);
-        return said == TimePoint{} ? Duration::zero() : now - said;
+        if (said != TimePoint{}) on_doubt((now - said) * 3 / 2);
     }
     /// A second reply may follow the next one, as it may have followed the last: so long that is
     /// waited for. If none comes, that was all.
@@ -94,9 +89,7 @@ class CopyGuard {
     /// ... after this one, for what is in doubt too.
     Duration take_doubt() { return std::max(hold(), std::exchange(doubt_, Duration::zero())); }
     /// Behind the reply taken last: until then.
-    TimePoint rest_until() const {
-        return slots_[(next_ + kReplies - 1) % kReplies].at + learned_ * 5 / 4;
-    }
+    TimePoint rest_until() const { return last().at + learned_ * 5 / 4; }
 
   private:
     struct Slot {
@@ -106,6 +99,8 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
+    std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
+    const Slot& last() const { return slots_[last_index()]; }
     /// When it said this last; the beginning of time: not lately.
     TimePoint said_at(TimePoint now, ByteView reply) const {
         TimePoint said{};

@@ -17,8 +17,7 @@ class ProbeBudget {
     static constexpr double kAlone = 0.5;
     /// Of stations that have just fallen silent, together; and of each one that keeps failing.
     static constexpr double kFailing = 0.2;
-
-    /// ... of ids that nobody listed and nobody has heard, together: once they have been asked.
+    /// Of ids that nobody listed and nobody has heard, together: once they have been asked.
     static constexpr double kStrangers = 0.02;
 
     explicit ProbeBudget(double share) : share_(share) {}
