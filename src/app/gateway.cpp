@@ -10,7 +10,6 @@
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/profile/judge.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/event_text.hpp"
 
@@ -97,7 +96,7 @@ Duration frame_gap(const config::Line& line, std::uint8_t station) {
 }  // namespace
 
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
-    : executor_(std::move(executor)), config_(std::move(config)) {
+    : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
@@ -171,7 +170,7 @@ void Gateway::add_points(const config::Line& line, bus::Bus& bus) {
         configured.push_back(&station);
     }
     if (polled.empty()) return;
-    pollers_.push_back(std::make_unique<points::Poller>(executor_, bus, std::move(polled)));
+    pollers_.push_back(std::make_unique<points::Poller>(clock_, bus, std::move(polled)));
     pollers_.back()->on_update(
         [this, first = points_.size()](std::size_t station, const auto& wants) {
             publish_points(first, wants, station);
@@ -191,7 +190,7 @@ void Gateway::publish_points(std::size_t first, const std::vector<std::size_t>& 
     if (events_.is_idle()) return;
     const points::StationPoints& points = points_[first + station];
     const auto entry = std::ranges::find(directory_.stations, &points, &web::StationEntry::points);
-    const TimePoint now = rt::now();
+    const TimePoint now = clock_.now();
     for (const std::size_t want : wants) {
         if (want >= points.points().size()) continue;  // a poll block
         const points::Point& point = points.points()[want];
@@ -219,7 +218,7 @@ void Gateway::add_relays() {
         route.to_has_multiple = to.profile->has_function(multiple);
         routes.push_back(std::move(route));
     }
-    relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
+    relays_ = std::make_unique<points::Relays>(clock_, std::move(routes));
     relays_->on_state([](const points::RelayStatus& relay) {
         const auto level = relay.state == "ok" ? rt::LogLevel::info : rt::LogLevel::warn;
         rt::log(level, "relay", {{"relay", relay.name}, {"state", relay.state}});
@@ -239,8 +238,8 @@ void Gateway::add_listener(const tcp_server::Settings& settings) {
     tcp_server::Hooks hooks;
     hooks.log = [](std::string_view text) { rt::log(rt::LogLevel::info, text); };
     hooks.version = PANELGATE_VERSION;
-    listeners_.push_back(
-        std::make_unique<tcp_server::Listener>(executor_, settings, std::move(units), hooks));
+    listeners_.push_back(std::make_unique<tcp_server::Listener>(executor_, clock_, settings,
+                                                                std::move(units), hooks));
 }
 
 void Gateway::add_http(const web::Settings& settings) {
@@ -248,7 +247,7 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.metrics_text = [this] { return metrics_text(); };
     providers.ready = [this] { return ready_; };
     providers.version = PANELGATE_VERSION;
-    providers.now = rt::now;
+    providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
@@ -300,7 +299,7 @@ void Gateway::stop() {
 
 std::vector<points::PointSample> Gateway::point_samples() const {
     std::vector<points::PointSample> samples;
-    const TimePoint now = rt::now();
+    const TimePoint now = clock_.now();
     for (const web::StationEntry& station : directory_.stations) {
         if (station.points == nullptr) continue;
         for (const points::Point& point : station.points->points()) {

@@ -13,6 +13,7 @@
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/directory.hpp"
@@ -55,6 +56,7 @@ class Gateway {
     std::string metrics_text() const;
 
     boost::asio::any_io_executor executor_;
+    rt::AsioClock clock_;
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;

@@ -1,16 +1,12 @@
 #include "panelgate/points/relays.hpp"
 
-#include <boost/asio/steady_timer.hpp>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::points {
-
-namespace asio = boost::asio;
 
 namespace {
 
@@ -39,17 +35,17 @@ Bytes write_of(const RelayRoute& route, ByteView reply) {
 
 struct Relays::State : std::enable_shared_from_this<Relays::State> {
     struct Entry {
-        Entry(const asio::any_io_executor& executor, RelayRoute r)
-            : route(std::move(r)), timer(executor) {
+        Entry(rt::Clock& clock, RelayRoute r) : route(std::move(r)), alarm(clock.make_alarm()) {
             status.name = route.relay.name();
         }
         RelayRoute route;
-        asio::steady_timer timer;
+        std::unique_ptr<rt::Alarm> alarm;
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
         Bytes written;  ///< the last write that was confirmed
     };
+    explicit State(rt::Clock& c) : clock(c) {}
     using Then = void (State::*)(Entry&, const bus::Answer&);
 
     void arm(Entry& entry);
@@ -60,6 +56,7 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
     void set(Entry& entry, std::string state);
 
+    rt::Clock& clock;
     std::vector<std::unique_ptr<Entry>> entries;
     Changed changed;
     bool running = false;
@@ -67,14 +64,10 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
 
 /// The next turn that is still to come: what a slow panel has missed is missed.
 void Relays::State::arm(Entry& entry) {
-    const TimePoint now = rt::now();
+    const TimePoint now = clock.now();
     const Duration every = entry.route.relay.every;
     while (entry.due <= now) entry.due += every * ((now - entry.due) / every + 1);
-    entry.timer.expires_at(entry.due);
-    entry.timer.async_wait([weak = weak_from_this(), &entry](boost::system::error_code error) {
-        const auto self = weak.lock();
-        if (!error && self && self->running) self->read(entry);
-    });
+    entry.alarm->arm(entry.due, [this, &entry] { read(entry); });
 }
 
 void Relays::State::ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then) {
@@ -134,7 +127,7 @@ void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
         set(entry, "target failing: " + why);
     } else {
         ++entry.status.writes;
-        entry.status.last_write = rt::now();
+        entry.status.last_write = clock.now();
         set(entry, "ok");
     }
     arm(entry);
@@ -146,10 +139,10 @@ void Relays::State::set(Entry& entry, std::string state) {
     if (changed) changed(entry.status);
 }
 
-Relays::Relays(asio::any_io_executor executor, std::vector<RelayRoute> routes)
-    : state_(std::make_shared<State>()) {
+Relays::Relays(rt::Clock& clock, std::vector<RelayRoute> routes)
+    : state_(std::make_shared<State>(clock)) {
     for (RelayRoute& route : routes)
-        state_->entries.push_back(std::make_unique<State::Entry>(executor, std::move(route)));
+        state_->entries.push_back(std::make_unique<State::Entry>(clock, std::move(route)));
 }
 
 Relays::~Relays() { stop(); }
@@ -158,7 +151,7 @@ void Relays::on_state(Changed changed) { state_->changed = std::move(changed); }
 
 void Relays::start() {
     state_->running = true;
-    const TimePoint now = rt::now();
+    const TimePoint now = state_->clock.now();
     const auto count = static_cast<Duration::rep>(state_->entries.size());
     Duration::rep index = 0;
     for (const auto& entry : state_->entries) {
@@ -172,7 +165,7 @@ void Relays::start() {
 void Relays::stop() {
     if (!std::exchange(state_->running, false)) return;
     for (const auto& entry : state_->entries) {
-        entry->timer.cancel();
+        entry->alarm->cancel();
         entry->route.from->cancel(entry->client);
         entry->route.to->cancel(entry->client);
     }

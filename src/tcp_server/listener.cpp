@@ -7,7 +7,6 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -15,7 +14,6 @@
 #include "access_list.hpp"
 #include "caller.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 
@@ -61,12 +59,13 @@ std::string text(const tcp::endpoint& peer) {
 
 class Listener::Core : public std::enable_shared_from_this<Core> {
   public:
-    Core(const asio::any_io_executor& executor, Settings settings, UnitMap units, Hooks hooks)
-        : shared_(std::make_shared<Shared>(
-              Shared{std::move(settings), std::move(units), std::move(hooks), {}, rt::now()})),
+    Core(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings, UnitMap units,
+         Hooks hooks)
+        : shared_(std::make_shared<Shared>(Shared{
+              std::move(settings), std::move(units), std::move(hooks), clock, {}, clock.now()})),
           allowed_(shared_->settings.allow),
           acceptor_(executor),
-          pause_(executor) {
+          pause_(clock.make_alarm()) {
         shared_->counters.listener = shared_->settings.name();
     }
 
@@ -88,7 +87,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     std::shared_ptr<Shared> shared_;
     AccessList allowed_;
     tcp::acceptor acceptor_;
-    asio::steady_timer pause_;
+    std::unique_ptr<rt::Alarm> pause_;
     std::set<std::shared_ptr<Session>> sessions_;
     std::function<void()> done_;
     bool full_ = false;     ///< told in the log
@@ -137,10 +136,7 @@ void Listener::Core::on_accept(const error_code& error, tcp::socket socket) {
     if (error && error != asio::error::connection_aborted) {
         // Without descriptors the next try would fail at once, and the loop would do nothing else.
         if (!std::exchange(failing_, true)) shared_->log("cannot accept", "", error.message());
-        pause_.expires_after(kAcceptPause);
-        pause_.async_wait([self = shared_from_this()](const error_code& stopped) {
-            if (!stopped && self->acceptor_.is_open()) self->accept();
-        });
+        pause_->arm(shared_->clock.now() + kAcceptPause, [this] { accept(); });
         return;
     }
     if (!error) {
@@ -186,7 +182,7 @@ void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
 void Listener::Core::close_acceptor() {
     error_code ignored;
     acceptor_.close(ignored);
-    pause_.cancel();
+    pause_->cancel();
 }
 
 void Listener::Core::tell_when_empty() {
@@ -208,9 +204,9 @@ void Listener::Core::close_now() {
     for (const auto& session : sessions) session->close();
 }
 
-Listener::Listener(const asio::any_io_executor& executor, Settings settings, UnitMap units,
-                   Hooks hooks)
-    : core_(std::make_shared<Core>(executor, std::move(settings), std::move(units),
+Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
+                   UnitMap units, Hooks hooks)
+    : core_(std::make_shared<Core>(executor, clock, std::move(settings), std::move(units),
                                    std::move(hooks))) {}
 
 Listener::~Listener() { core_->close_now(); }

@@ -8,7 +8,6 @@
 #include "dispatch.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -34,7 +33,7 @@ Bytes reply_pdu(std::uint8_t function, const Result<Bytes>& pdu) {
 
 Bytes diagnose(ByteView request, const Shared& shared) {
     Diagnostics state;
-    state.uptime = rt::now() - shared.started;
+    state.uptime = shared.clock.now() - shared.started;
     state.version = shared.hooks.version;
     for (const bus::BusClient* line : shared.units.lines()) {
         const bus::LineStatus status = line->status();

@@ -3,6 +3,7 @@
 #include <string_view>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/tcp_server/settings.hpp"
@@ -15,6 +16,7 @@ struct Shared {
     Settings settings;
     UnitMap units;
     Hooks hooks;
+    rt::Clock& clock;
     Counters counters;
     TimePoint started;
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -24,12 +25,13 @@ struct Hooks {
 };
 
 /// One Modbus/TCP port and its connections (contract 4). One thread: everything runs on the
-/// executor given. The buses in the map outlive it; answers that come after its end are dropped.
+/// executor given. The clock and the buses in the map outlive it; answers that come after its end
+/// are dropped.
 class Listener {
   public:
     /// Throws std::invalid_argument for an allow list that cannot be read.
-    Listener(const boost::asio::any_io_executor& executor, Settings settings, UnitMap units,
-             Hooks hooks);
+    Listener(const boost::asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
+             UnitMap units, Hooks hooks);
     ~Listener();  ///< as close_now()
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;

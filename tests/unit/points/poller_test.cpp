@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 
 #include "support/fake_bus.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::points {
 namespace {
@@ -22,7 +23,7 @@ class PollerTest : public testing::Test {
         std::vector<PolledStation> stations(2);
         stations[0] = {5, {{Table::holding_registers, 100, 1, 1ms}}, limits()};
         stations[1] = {9, {{Table::holding_registers, 7, 1, 1ms}}, limits()};
-        poller = std::make_unique<Poller>(io.get_executor(), bus, std::move(stations));
+        poller = std::make_unique<Poller>(clock, bus, std::move(stations));
         poller->on_update([this](std::size_t station, const std::vector<std::size_t>& wants) {
             updates[station] += wants.size();
         });
@@ -31,7 +32,10 @@ class PollerTest : public testing::Test {
         return make_plan_limits(profile::PanelProfile(), SerialFormat{}, 2ms);
     }
 
+    bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
+
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     test::FakeBus bus{io.get_executor()};
     std::unique_ptr<Poller> poller;
     std::map<std::size_t, std::size_t> updates;
@@ -39,7 +43,7 @@ class PollerTest : public testing::Test {
 
 TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     poller->start();
-    while (updates[0] < 3 || updates[1] < 3) io.run_one();
+    ASSERT_TRUE(run_until([&] { return updates[0] >= 3 && updates[1] >= 3; }));
     EXPECT_EQ(poller->station(0).reading(0).values, std::vector<std::uint16_t>{42});
     EXPECT_TRUE(poller->station(1).reading(0).failing);
     for (const bus::Request& request : bus.requests)
@@ -50,10 +54,10 @@ TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
 TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {
     bus.script = [](const bus::Request&) { return std::nullopt; };
     poller->start();
-    while (bus.open() < 2) io.run_one();
+    ASSERT_TRUE(run_until([&] { return bus.open() == 2; }));
     poller->stop();
     EXPECT_EQ(bus.cancelled.size(), 2u);
-    io.run();
+    EXPECT_FALSE(run_until([] { return false; })) << "something goes on";
     EXPECT_EQ(updates[0] + updates[1], 0u);
 }
 

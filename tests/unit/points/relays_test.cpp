@@ -6,6 +6,7 @@
 
 #include "support/fake_bus.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::points {
 namespace {
@@ -25,16 +26,17 @@ class RelaysTest : public testing::Test {
         route.to_station = 20;
         from.script = [this](const bus::Request&) { return source; };
         to.script = [this](const bus::Request&) { return target; };
-        relays = std::make_unique<Relays>(io.get_executor(), std::vector{route});
+        relays = std::make_unique<Relays>(clock, std::vector{route});
         relays->on_state([this](const RelayStatus& status) { states.push_back(status.state); });
         relays->start();
     }
     void run_until(const std::function<bool()>& done) {
-        while (!done()) io.run_one();
+        ASSERT_TRUE(test::run_until(io, clock, done)) << "nothing is left to happen";
     }
     RelayStatus status() { return relays->status().at(0); }
 
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     test::FakeBus from{io.get_executor()};
     test::FakeBus to{io.get_executor()};
     std::optional<bus::Answer> source = test::FakeBus::reply("03 04 00 01 00 02"_hex);
@@ -103,7 +105,7 @@ TEST_F(RelaysTest, StopsWithWhatItHasOpen) {
     run_until([&] { return from.open() == 1; });
     relays->stop();
     EXPECT_EQ(from.cancelled.size(), 1u);
-    io.run();
+    EXPECT_FALSE(test::run_until(io, clock, [] { return false; })) << "something goes on";
     EXPECT_TRUE(to.requests.empty());
 }
 

@@ -20,7 +20,7 @@ class ListenerTest : public Loopback {};
 TEST_F(ListenerTest, SaysWhichAddressItCannotHave) {
     start();
     settings.port = listener->port();
-    Listener second(context.get_executor(), settings, UnitMap(settings, lines), {});
+    Listener second(context.get_executor(), clock, settings, UnitMap(settings, lines), {});
     try {
         second.start();
         FAIL() << "two listeners on one port";
@@ -30,7 +30,7 @@ TEST_F(ListenerTest, SaysWhichAddressItCannotHave) {
     }
     EXPECT_EQ(second.port(), 0);
     settings.address = "floor1";
-    Listener third(context.get_executor(), settings, UnitMap(settings, lines), {});
+    Listener third(context.get_executor(), clock, settings, UnitMap(settings, lines), {});
     EXPECT_THROW(third.start(), std::system_error);
 }
 
@@ -203,6 +203,7 @@ TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
     setrlimit(RLIMIT_NOFILE, &before);
     EXPECT_TRUE(told);
     EXPECT_LE(turns, 2U) << "it spins";
+    clock.jump();
     EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
     EXPECT_EQ(logged("cannot accept"), 1U);
 }

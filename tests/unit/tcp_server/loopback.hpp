@@ -17,6 +17,7 @@
 #include "panelgate/modbus/mbap.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -155,13 +156,17 @@ class Loopback : public ::testing::Test {
         Hooks hooks;
         hooks.log = [this](std::string_view line) { log.emplace_back(line); };
         hooks.version = "1.2.3";
-        listener = std::make_unique<Listener>(context.get_executor(), settings,
+        listener = std::make_unique<Listener>(context.get_executor(), clock, settings,
                                               UnitMap(settings, lines), std::move(hooks));
         listener->start();
     }
     Client connect() { return Client(context, listener->port()); }
     bool run_until(const std::function<bool()>& reached) {
         return tcp_server::run_until(context, reached);
+    }
+    /// An alarm is armed: what has come so far starts the time that the rest may take.
+    bool run_until_armed(std::size_t count = 1) {
+        return run_until([&] { return clock.armed() == count; });
     }
     bool run_until_held(std::size_t count) {
         return run_until([&] { return bus1.held.size() == count; });
@@ -182,6 +187,7 @@ class Loopback : public ::testing::Test {
     }
 
     asio::io_context context;
+    test::ManualClock clock;  ///< stands still but for a test that moves it
     HeldBus bus1{context};
     HeldBus bus2{context};
     Settings settings;

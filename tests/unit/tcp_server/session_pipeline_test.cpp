@@ -179,7 +179,6 @@ TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
 }
 
 TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
-    settings.partial_adu_timeout = 30ms;
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
@@ -189,6 +188,8 @@ TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
     ASSERT_TRUE(run_until_held(2));
     Client bystander = connect();
     bystander.send(half);
+    ASSERT_TRUE(run_until_armed());
+    clock.advance(settings.partial_adu_timeout);
     EXPECT_TRUE(bystander.sees_close()) << "it has begun later, and its time is over";
     client.send(read_pdu(5));
     expect_values(client, 0, 6);
@@ -196,13 +197,16 @@ TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
 }
 
 TEST_F(SessionPipeline, LimitsTheTimeOfAHalfSentAduOnceItReadsAgain) {
-    settings.partial_adu_timeout = 30ms;
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Client client = connect();
     client.send(reads(5) + "0005 0000 0006 01"_hex);
+    ASSERT_TRUE(run_until_held(2));
+    EXPECT_EQ(clock.next(), std::nullopt) << "nobody reads it";
     expect_values(client, 0, 5);
+    ASSERT_TRUE(run_until_armed(2)) << "the half-sent ADU, and replies that may not be taken";
+    clock.advance(settings.partial_adu_timeout);
     EXPECT_TRUE(client.sees_close());
     EXPECT_EQ(listener->counters().protocol_errors, 1U);
 }
