@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "pty_link.hpp"
 #include "run_loop.hpp"
@@ -57,12 +58,13 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
     SignalLoop loop(io);
+    rt::AsioClock clock(io.get_executor());
     std::vector<std::unique_ptr<sim::SimulatedBus>> buses;
     std::vector<std::unique_ptr<PtyLink>> made;
     std::vector<std::unique_ptr<TcpBridge>> bridges;
     try {
         for (const config::Line& line : loaded.config->lines) {
-            buses.push_back(simulate_line(io.get_executor(), line));
+            buses.push_back(simulate_line(io.get_executor(), clock, line));
             buses.back()->start();
             const auto link = links.find(line.name);
             if (link == links.end()) continue;

@@ -16,7 +16,7 @@
 namespace panelgate::app {
 
 std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
-                                                 const config::Line& line) {
+                                                 rt::Clock& clock, const config::Line& line) {
     std::vector<sim::Station> stations;
     for (const config::Station& station : line.stations)
         stations.emplace_back(*station.profile, station.id);
@@ -25,8 +25,8 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
     settings.echo = line.simulated_echo;
     for (const config::Station& station : line.stations)
         settings.faults[station.id] = station.faults;
-    auto bus =
-        std::make_unique<sim::SimulatedBus>(std::move(executor), settings, std::move(stations));
+    auto bus = std::make_unique<sim::SimulatedBus>(std::move(executor), clock, settings,
+                                                   std::move(stations));
     rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});
     return bus;
 }
@@ -119,16 +119,17 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     line::Settings device = line.device;
     const bool simulates = simulate || line.kind == config::Line::Kind::simulated;
     if (simulates) {
-        simulated_.push_back(simulate_line(executor_, line));
+        simulated_.push_back(simulate_line(executor_, clock_, line));
         device.device = simulated_.back()->device();
         device.rs485 = {};
         settings.device = "sim";
     }
     const bool remote = line.kind == config::Line::Kind::tcp && !simulates;
     settings.arbiter.may_stall = remote;
-    auto wire = remote ? line::make_tcp_line(executor_, std::move(device))
-                       : line::make_tty_line(executor_, std::move(device));
-    buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(wire)));
+    auto wire = remote ? line::make_tcp_line(executor_, clock_, std::move(device))
+                       : line::make_tty_line(executor_, clock_, std::move(device));
+    buses_.push_back(
+        std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
     add_stations(line, *buses_.back(), simulates ? simulated_.back().get() : nullptr);
     add_points(line, *buses_.back());
 }

@@ -72,8 +72,8 @@ class Gateway {
     bool ready_ = false;
 };
 
-/// A simulated bus with the configured stations of a line.
+/// A simulated bus with the configured stations of a line; the clock outlives it.
 std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
-                                                 const config::Line& line);
+                                                 rt::Clock& clock, const config::Line& line);
 
 }  // namespace panelgate::app

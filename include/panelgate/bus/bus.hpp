@@ -13,6 +13,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::bus {
 
@@ -45,7 +46,9 @@ struct Settings {
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.
 class Bus final : public BusClient {
   public:
-    Bus(boost::asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line);
+    /// Answers are posted to the executor; it and the clock outlive the bus.
+    Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
+        std::unique_ptr<line::Line> line);
     /// Answers what is still open with Fault::cancelled.
     ~Bus() override;
 
@@ -68,7 +71,7 @@ class Bus final : public BusClient {
 
   private:
     struct State;
-    std::shared_ptr<State> state_;  ///< shared with completions that are still under way
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace panelgate::bus

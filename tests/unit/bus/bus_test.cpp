@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/post.hpp>
+#include <functional>
+#include <optional>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
+#include "support/memory_line.hpp"
 
 namespace panelgate::bus {
 namespace {
@@ -15,49 +18,6 @@ namespace {
 const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kWrite = "06 00 01 00 03"_hex;
-
-/// A line in memory: every frame written is answered as the test says, from the loop.
-class MemoryLine final : public line::Line {
-  public:
-    explicit MemoryLine(boost::asio::io_context& io) : io_(io) {}
-
-    void start(Events& events) override {
-        events_ = &events;
-        if (up_at_start) events.on_up();
-    }
-    void stop() override { events_ = nullptr; }
-    void poll_input() override {}
-    void write(ByteView bytes) override {
-        written.emplace_back(bytes.begin(), bytes.end());
-        if (fail_writes) {
-            events_->on_down("unplugged");
-            return;
-        }
-        if (reply.empty() || bytes[0] == 0) return;
-        boost::asio::post(io_, [this, adu = modbus::encode_adu(bytes[0], reply)] {
-            if (events_ != nullptr) events_->on_bytes(adu);
-        });
-    }
-    const line::Counters& counters() override { return counters_; }
-    std::optional<Duration> unsent() override {
-        if (!tells_unsent) return std::nullopt;
-        ++asked_for_unsent;
-        return Duration::zero();
-    }
-    Events* events() { return events_; }
-
-    std::vector<Bytes> written;
-    Bytes reply = kReply;
-    bool up_at_start = true;
-    bool fail_writes = false;
-    bool tells_unsent = false;
-    int asked_for_unsent = 0;
-
-  private:
-    boost::asio::io_context& io_;
-    Events* events_ = nullptr;
-    line::Counters counters_;
-};
 
 class BusTest : public testing::Test {
   protected:
@@ -79,10 +39,12 @@ class BusTest : public testing::Test {
         settings.observe = [this](const BusEvent& event) {
             if (event.kind == BusEvent::Kind::line && !event.why.empty()) seen.push_back(event.why);
         };
-        auto memory = std::make_unique<MemoryLine>(io);
+        auto memory = std::make_unique<test::MemoryLine>(clock);
         line = memory.get();
-        bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
+        line->reply = kReply;
+        bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
     }
+    bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
     /// Asks and runs the loop until answered.
     Answer ask(std::uint8_t station, Bytes pdu, ClientId client = 1) {
         std::optional<Answer> got;
@@ -92,14 +54,13 @@ class BusTest : public testing::Test {
         request.client = client;
         bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
         EXPECT_FALSE(got) << "answered from inside transact()";
-        io.restart();
-        while (!got && io.run_one() > 0) {
-        }
+        EXPECT_TRUE(run_until([&] { return got.has_value(); })) << "it is never answered";
         return got.value_or(Answer{});
     }
 
     boost::asio::io_context io{1};
-    MemoryLine* line = nullptr;
+    test::ManualClock clock;
+    test::MemoryLine* line = nullptr;
     std::vector<std::string> seen;  ///< why the line's state is not just that
     std::unique_ptr<Bus> bus;
 };
@@ -243,9 +204,67 @@ TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
         });
     };
     again();
-    while (answers < 20 && io.run_one() > 0) {
-    }
-    EXPECT_EQ(answers, 20);
+    EXPECT_TRUE(run_until([&] { return answers == 20; }));
+}
+
+/// The loop was busy while the reply came, and its time is over when the alarm rings.
+TEST_F(BusTest, P1AReplyThatLiesInTheDeviceWhenItsTimeIsOverIsNoTimeout) {
+    line->reply.clear();
+    bus->start();
+    std::optional<Answer> got;
+    Request request;
+    request.station = 17;
+    request.pdu = kWrite;
+    bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
+    clock.advance(1ms);
+    line->come(modbus::encode_adu(17, kWrite));
+    clock.pass(50ms);
+    ASSERT_TRUE(run_until([&] { return got.has_value(); }));
+    EXPECT_EQ(got->pdu.value(), kWrite);
+    EXPECT_EQ(bus->station_status(17).state, "online");
+}
+
+/// They came before the request: they hold it up for the gap, and are nobody's reply.
+TEST_F(BusTest, P1StaleBytesAreReadBeforeARequestIsSent) {
+    bus->start();
+    clock.advance(1s);
+    line->come(modbus::encode_adu(17, "03 06 0B AD 0B AD 0B AD"_hex));
+    std::optional<Answer> got;
+    Request request;
+    request.station = 17;
+    request.pdu = kRead;
+    const TimePoint asked = clock.now();
+    bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+    EXPECT_TRUE(line->written.empty()) << "the wire is not quiet yet";
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
+    EXPECT_GE(clock.now() - asked, silent_interval({1000000, 8, Parity::none, 1}));
+    ASSERT_TRUE(run_until([&] { return got.has_value(); }));
+    EXPECT_EQ(got->pdu.value(), kReply);
+    EXPECT_EQ(bus->trace(1).front().bytes, modbus::encode_adu(17, kReply));
+    EXPECT_EQ(bus->trace(10).front().direction, TraceFrame::Direction::discarded);
+}
+
+TEST_F(BusTest, RefusalsAreHandedOutAMillisecondApart) {
+    bus->start();
+    int refused = 0;
+    const auto ask_wrongly = [&] {
+        Request request;
+        request.station = 17;
+        request.pdu = "03 00"_hex;
+        bus->transact(std::move(request), [&](const Answer&) { ++refused; });
+    };
+    ask_wrongly();
+    ask_wrongly();
+    io.poll();
+    EXPECT_EQ(refused, 0);
+    clock.advance(1ms);
+    EXPECT_EQ(refused, 2);
+    ask_wrongly();
+    clock.advance(1ms - 1ns);
+    EXPECT_EQ(refused, 2);
+    clock.advance(1ns);
+    EXPECT_EQ(refused, 3);
 }
 
 TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
@@ -259,7 +278,7 @@ TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
         bus->transact(std::move(request),
                       [&](const Answer& a) { faults.push_back(a.pdu.error()); });
     }
-    while (line->written.empty()) io.run_one();
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
     bus.reset();
     io.restart();
     io.run();
