@@ -16,12 +16,13 @@
 #include "plan.hpp"
 #include "truth.hpp"
 #include "watch.hpp"
+#include "witness.hpp"
 
 namespace panelgate::scenario {
 
 /// Holds what an arbiter does against what it promises. Knows the truth (what the panels did and
 /// when) from the world and the claims (answers, frames) from the arbiter; shares no code with it.
-class Checker {
+class Checker : public Witness {
   public:
     explicit Checker(const Plan& plan);
     Checker(const Checker&) = delete;
@@ -41,18 +42,16 @@ class Checker {
     void on_heard(TimePoint now, std::size_t bytes);
     /// A good answer to the request on the wire was delivered to its last byte.
     void on_answered(TimePoint now);
-    void on_served(TimePoint now, std::uint8_t station) { truth_.on_served(now, station); }
-    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) {
+    void on_served(TimePoint now, std::uint8_t station) override { truth_.on_served(now, station); }
+    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_executed(now, station, pdu);
     }
-    void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) {
+    void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_exception(now, station, pdu);
     }
-    /// A second copy of an answer was delivered to its last byte.
-    void on_copy(TimePoint now, std::uint8_t station);
-    /// Bytes were delivered that nobody said.
-    void on_garbled(TimePoint now) { garbled_ = now; }
-    void on_collision(TimePoint now, std::uint8_t station);
+    void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_garbled(TimePoint now) override { garbled_ = now; }
+    void on_collision(TimePoint now, std::uint8_t station) override;
     void on_line_down(TimePoint now);
     void on_line_up(TimePoint now);
     void on_stall(TimePoint now) { watch_.on_upset(now); }
