@@ -15,7 +15,7 @@ COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "po
             "tcp_server/counters.hpp"}
 SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "points/settings.hpp", "rt/settings.hpp",
             "points/point.hpp",
-            "sim/settings.hpp", "tcp_server/settings.hpp", "web/settings.hpp"}
+            "sim/settings.hpp", "tcp_server/settings.hpp", "web/http/settings.hpp"}
 EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim", "doctor",
               "scan", "metrics", "points", "web", "config", "app"}
 TABLE = {
@@ -124,7 +124,7 @@ PLANTED = {
 }
 HARMLESS = {
     "src/bus/fine.cpp": '#include "panelgate/rt/asio_clock.hpp"\nauto t = rt::now();  // not ::now()',
-    "src/config/fine.cpp": '#include "panelgate/web/settings.hpp"\n#include <vector>',
+    "src/config/fine.cpp": '#include "panelgate/web/http/settings.hpp"\n#include <vector>',
     "src/rt/fine.cpp": "auto t = std::chrono::steady_clock::now();",
     "src/yaml/document.cpp": "#include <yaml-cpp/yaml.h>",
 }

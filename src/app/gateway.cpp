@@ -12,7 +12,7 @@
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/web/event_text.hpp"
+#include "panelgate/web/api/event_text.hpp"
 
 namespace panelgate::app {
 

@@ -15,8 +15,8 @@
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
-#include "panelgate/web/directory.hpp"
-#include "panelgate/web/server.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/api/server.hpp"
 
 namespace panelgate::app {
 

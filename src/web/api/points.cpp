@@ -1,0 +1,169 @@
+#include <boost/json/array.hpp>
+
+#include "api/handlers.hpp"
+#include "api/items.hpp"
+#include "api/json_util.hpp"
+#include "api/point_json.hpp"
+#include "api/write_answer.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/points/station_points.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+using points::Point;
+using points::Value;
+
+json::object describe(const Api& api, const points::StationPoints& station, const Point& point) {
+    json::object object = point_json(point, station.read(point, api.providers.now()));
+    object["at"] = point.at;
+    object["type"] = label(point.type);
+    object["writable"] = point.writable;
+    return object;
+}
+
+struct Found {
+    StationEntry station;
+    const Point* point = nullptr;
+};
+
+Parsed<Found> find_point(const HttpRequest& request, const Api& api) {
+    auto station = find_station(api, request.arguments[0]);
+    if (!station) return station.error();
+    const Point* point =
+        station->points != nullptr ? station->points->find(request.arguments[1]) : nullptr;
+    if (point == nullptr) {
+        return problem(
+            404, "station '" + station->name + "' has no point '" + request.arguments[1] + '\'');
+    }
+    return Found{std::move(*station), point};
+}
+
+Parsed<Value> value_member(const std::string& text) {
+    const auto body = parse_object(text);
+    if (!body) return body.error();
+    const json::value* value = body->if_contains("value");
+    if (value == nullptr) return problem(400, "the body needs \"value\"");
+    if (value->is_bool()) return Value(value->get_bool());
+    if (value->is_int64()) return Value(value->get_int64());
+    if (value->is_uint64()) return Value(value->get_uint64());
+    if (value->is_double()) return Value(value->get_double());
+    if (value->is_string()) return Value(std::string(value->get_string()));
+    return problem(400, "value must be a number, true, false or a text");
+}
+
+Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
+    if (found.station.read_only)
+        return problem(403, "station '" + found.station.name + "' is read-only");
+    auto value = value_member(body);
+    if (!value) return value.error();
+    static const profile::PanelProfile kStandard;
+    const auto& profile = found.station.profile != nullptr ? *found.station.profile : kStandard;
+    auto pdu = points::write_request(profile, *found.point, *value);
+    if (!pdu) return problem(422, pdu.error().message);
+    bus::Request made;
+    made.station = found.station.id;
+    made.pdu = std::move(*pdu);
+    made.priority = arbiter::PriorityClass::write;
+    made.quantity = modbus::QuantityCheck::wide;
+    return made;
+}
+
+json::array describe(const std::vector<points::Interpretation>& all) {
+    json::array list;
+    for (const points::Interpretation& one : all) {
+        json::object object;
+        object["type"] = label(one.type);
+        object["word_order"] = label(one.order);
+        json::array values;
+        for (const std::string& value : one.values)
+            values.push_back(value.empty() ? json::value(nullptr) : json::value(value));
+        object["values"] = std::move(values);
+        list.push_back(std::move(object));
+    }
+    return list;
+}
+
+}  // namespace
+
+Handling get_points(HttpRequest request, const Api* api) {
+    const auto station = find_station(*api, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    json::array list;
+    if (station->points != nullptr) {
+        for (const Point& point : station->points->points())
+            list.push_back(describe(*api, *station->points, point));
+    }
+    json::object body;
+    body["points"] = std::move(list);
+    co_return json_response(200, body);
+}
+
+Handling get_point(HttpRequest request, const Api* api) {
+    const auto found = find_point(request, *api);
+    if (!found) co_return to_response(found.error());
+    co_return json_response(200, describe(*api, *found->station.points, *found->point));
+}
+
+Handling put_point(HttpRequest request, const Api* api) {
+    const auto found = find_point(request, *api);
+    if (!found) co_return to_response(found.error());
+    auto planned = write_of(*found, request.body);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    bus::Answer answer = co_await transact(request.caller, found->station.bus, std::move(made));
+    co_return write_answer(answer, found->station.profile);
+}
+
+Handling get_interpretations(HttpRequest request, const Api* api) {
+    auto items = items_of_table_path(request, *api);
+    if (!items) co_return to_response(items.error());
+    constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
+    if (modbus::is_bit_table(items->table) || items->count > kMost)
+        co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
+    bus::Request made;
+    made.station = items->station.id;
+    made.pdu =
+        modbus::encode_read(items->table, items->address, static_cast<std::uint16_t>(items->count));
+    bus::Answer answer = co_await transact(request.caller, items->station.bus, std::move(made));
+    if (!answer.pdu) co_return to_response(problem_of(answer.pdu.error(), answer.transmitted));
+    if (const auto code = modbus::exception_of(*answer.pdu)) {
+        const Problem refused =
+            problem_of_exception(*code, meaning_of(items->station.profile, *code));
+        co_return to_response(refused);
+    }
+    const auto registers = modbus::registers_of(*answer.pdu);
+    json::object body;
+    body["station"] = items->station.name;
+    body["address"] = items->address;
+    body["raw"] = json::array(registers.begin(), registers.end());
+    body["interpretations"] = describe(points::interpretations(registers));
+    co_return json_response(200, body);
+}
+
+Handling get_relays(HttpRequest, const Api* api) {
+    json::array list;
+    const TimePoint now = api->providers.now();
+    for (const points::RelayStatus& relay : api->providers.relays()) {
+        json::object object;
+        object["name"] = relay.name;
+        object["state"] = relay.state;
+        object["reads"] = relay.reads;
+        object["writes"] = relay.writes;
+        object["read_failures"] = relay.read_failures;
+        object["write_failures"] = relay.write_failures;
+        object["last_write_ms"] = nullptr;
+        if (relay.last_write) {
+            object["last_write_ms"] = whole_ms(now - *relay.last_write);
+        }
+        list.push_back(std::move(object));
+    }
+    json::object body;
+    body["relays"] = std::move(list);
+    co_return json_response(200, body);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,158 @@
+#include <algorithm>
+#include <boost/json/array.hpp>
+
+#include "api/handlers.hpp"
+#include "api/items.hpp"
+#include "api/json_util.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/profile/notation.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+/// One GET must not occupy a line for minutes: at 19200 baud this many full reads take about 10 s.
+constexpr unsigned kMaxTransactions = 64;
+
+enum class ValueType : std::uint8_t { u16, i16, boolean };
+
+Parsed<ValueType> parse_type(const HttpRequest& request, modbus::Table table) {
+    const bool bits = modbus::is_bit_table(table);
+    const auto given = request.query.find("type");
+    if (given == request.query.end()) return bits ? ValueType::boolean : ValueType::u16;
+    if (bits && given->second == "bool") return ValueType::boolean;
+    if (!bits && given->second == "u16") return ValueType::u16;
+    if (!bits && given->second == "i16") return ValueType::i16;
+    return problem(400,
+                   bits ? "the type of a bit is bool" : "the type of a register is u16 or i16");
+}
+
+/// Values read so far, and what the answer says of them.
+struct Reading {
+    json::array values;
+    unsigned transactions = 0;
+    Duration age{};
+    bool cached = false;
+};
+
+void append_values(Reading& reading, ByteView reply, const Items& part, ValueType type) {
+    if (type == ValueType::boolean) {
+        for (const bool bit : modbus::bits_of(reply, part.count)) reading.values.push_back(bit);
+        return;
+    }
+    for (const std::uint16_t value : modbus::registers_of(reply)) {
+        if (type == ValueType::i16) {
+            reading.values.push_back(static_cast<std::int16_t>(value));
+        } else {
+            reading.values.push_back(value);
+        }
+    }
+}
+
+/// The first table, the area's own or another that reaches it, whose read function the panel has.
+/// A table path is taken at its word: what the panel makes of it, its exception tells.
+Parsed<modbus::Table> table_to_read(const Items& items) {
+    if (items.area == nullptr || has_function(items.station, read_function(items.table))) {
+        return items.table;
+    }
+    for (const modbus::Table table : items.area->also) {
+        if (has_function(items.station, read_function(table))) return table;
+    }
+    return problem(422, "the panel has no function that reads " + items.area->name);
+}
+
+json::object describe(const Items& items, Reading reading) {
+    std::string notation;
+    if (items.area != nullptr) {
+        notation = profile::format_notation(*items.area, items.address);
+    } else if (items.station.profile != nullptr) {
+        notation = profile::format_notation(*items.station.profile, items.table, items.address);
+    }
+    json::object body;
+    body["station"] = items.station.name;
+    body["table"] = label(items.table);
+    body["address"] = items.address;
+    body["notation"] = nullptr;
+    if (!notation.empty()) body["notation"] = notation;
+    body["values"] = std::move(reading.values);
+    body["age_ms"] = whole_ms(reading.age);
+    body["source"] = reading.cached ? "cache" : "bus";
+    if (reading.transactions > 1) body["transactions"] = reading.transactions;
+    return body;
+}
+
+bus::Request read_request(const Items& part) {
+    bus::Request request;
+    request.station = part.station.id;
+    request.pdu =
+        modbus::encode_read(part.table, part.address, static_cast<std::uint16_t>(part.count));
+    request.priority = arbiter::PriorityClass::read;
+    request.quantity = modbus::QuantityCheck::wide;
+    return request;
+}
+
+std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
+                                   ValueType type) {
+    if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
+    if (const auto code = modbus::exception_of(*answer.pdu)) {
+        return problem_of_exception(*code, meaning_of(part.station.profile, *code));
+    }
+    append_values(reading, *answer.pdu, part, type);
+    ++reading.transactions;
+    if (answer.source == bus::Source::cache) {
+        reading.cached = true;
+        reading.age = std::max(reading.age, answer.age);
+    }
+    return std::nullopt;
+}
+
+Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType type) {
+    const unsigned limit = max_count(items.station, read_function(items.table));
+    if (items.count > limit * kMaxTransactions) {
+        co_return to_response(
+            problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));
+    }
+    Reading reading;
+    for (unsigned done = 0; done < items.count;) {
+        Items part = items;
+        part.address = static_cast<std::uint16_t>(items.address + done);
+        part.count = std::min(limit, items.count - done);
+        bus::Request request = read_request(part);
+        bus::Answer answer = co_await transact(caller, items.station.bus, std::move(request));
+        const auto failed = take_answer(reading, answer, part, type);
+        if (failed) co_return to_response(*failed);
+        done += part.count;
+    }
+    co_return json_response(200, describe(items, std::move(reading)));
+}
+
+}  // namespace
+
+Handling get_table(HttpRequest request, const Api* api) {
+    auto items = items_of_table_path(request, *api);
+    if (!items) co_return to_response(items.error());
+    const auto type = parse_type(request, items->table);
+    if (!type) co_return to_response(type.error());
+    Handling reading = read_items(request.caller, std::move(*items), *type);
+    HttpResponse response = co_await std::move(reading);
+    co_return response;
+}
+
+Handling get_device(HttpRequest request, const Api* api) {
+    auto items = items_of_device_path(request, *api);
+    if (!items) co_return to_response(items.error());
+    const auto range = check_range(*items, items->area->readable, "readable");
+    if (!range) co_return to_response(range.error());
+    const auto table = table_to_read(*items);
+    if (!table) co_return to_response(table.error());
+    items->table = *table;
+    const auto type = parse_type(request, items->table);
+    if (!type) co_return to_response(type.error());
+    Handling reading = read_items(request.caller, std::move(*items), *type);
+    HttpResponse response = co_await std::move(reading);
+    co_return response;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,74 @@
+#include "http/access.hpp"
+
+#include <cctype>
+#include <string_view>
+
+namespace panelgate::web {
+namespace {
+
+/// In a time that does not depend on where the texts differ.
+bool same_secret(std::string_view given, std::string_view secret) {
+    unsigned difference = given.size() == secret.size() ? 0 : 1;
+    for (std::size_t i = 0; i < given.size(); ++i) {
+        const char expected = secret.empty() ? '\0' : secret[i % secret.size()];
+        difference |= static_cast<unsigned char>(given[i] ^ expected);
+    }
+    return difference == 0;
+}
+
+std::string_view header(const HttpRequest& request, const char* name) {
+    const auto found = request.headers.find(name);
+    return found == request.headers.end() ? std::string_view() : found->second;
+}
+
+/// The token after "Bearer " (RFC 6750 2.1; schemes are compared without case, RFC 9110 11.1).
+std::optional<std::string_view> bearer_token(std::string_view authorization) {
+    constexpr std::string_view kScheme = "bearer ";
+    if (authorization.size() < kScheme.size()) return std::nullopt;
+    for (std::size_t i = 0; i < kScheme.size(); ++i) {
+        const auto lower = std::tolower(static_cast<unsigned char>(authorization[i]));
+        if (lower != kScheme[i]) return std::nullopt;
+    }
+    return authorization.substr(kScheme.size());
+}
+
+/// The role of a token; nothing for a token that nobody has. All are compared, whichever matches.
+std::optional<Role> role_of(std::string_view token, const Settings& settings) {
+    std::optional<Role> role;
+    for (const Token& known : settings.tokens) {
+        if (same_secret(token, known.secret) && !known.secret.empty()) role = known.role;
+    }
+    return role;
+}
+
+Problem unauthorized(std::string detail) {
+    Problem made = problem(401, std::move(detail));
+    made.headers.emplace_back("WWW-Authenticate", "Bearer realm=\"panelgate\"");
+    return made;
+}
+
+bool is_foreign_form(const HttpRequest& request) {
+    if (request.method == "GET" || request.method == "HEAD") return false;
+    return !header(request, "origin").empty() &&
+           !header(request, "content-type").starts_with("application/json");
+}
+
+}  // namespace
+
+std::optional<Problem> check_access(const HttpRequest& request, Role needed,
+                                    const Settings& settings) {
+    if (needed == Role::none) return std::nullopt;
+    if (is_foreign_form(request)) return problem(415, "send the body as application/json");
+    const std::string_view authorization = header(request, "authorization");
+    if (authorization.empty()) {
+        if (settings.anonymous >= needed) return std::nullopt;
+        return unauthorized("this needs a token");
+    }
+    const auto token = bearer_token(authorization);
+    const auto role = token ? role_of(*token, settings) : std::nullopt;
+    if (!role) return unauthorized("this token is not known");
+    if (*role < needed) return problem(403, "this needs the role operator");
+    return std::nullopt;
+}
+
+}  // namespace panelgate::web
