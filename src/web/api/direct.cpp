@@ -1,11 +1,14 @@
 #include <algorithm>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
-#include "api/write_plan.hpp"
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "handlers.hpp"
+#include "panel_limits.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "station_path.hpp"
+#include "write_plan.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -59,7 +62,7 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
 
     const auto functions = write_functions(*table, cells->size());
     const std::uint8_t function = broadcast_function(directory, line, functions);
-    const unsigned limit = max_count(StationEntry{}, function);
+    const unsigned limit = panel_of({}).max_count(function);
     if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
         return problem(422, "at most " + std::to_string(limit) +
                                 " values in one broadcast, up to address 65535");
@@ -123,26 +126,26 @@ HttpResponse raw_answer(const bus::Answer& answer) {
 }  // namespace
 
 Handling post_broadcast(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api, request.arguments[0]);
+    const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const auto body = parse_object(request.body);
     if (!body) co_return to_response(body.error());
     auto planned = broadcast_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await transact(request.caller, (*line)->bus, std::move(made));
+    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return broadcast_answer(answer);
 }
 
 Handling post_raw(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api, request.arguments[0]);
+    const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const auto body = parse_object(request.body);
     if (!body) co_return to_response(body.error());
     auto planned = raw_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await transact(request.caller, (*line)->bus, std::move(made));
+    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return raw_answer(answer);
 }
 

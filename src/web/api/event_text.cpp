@@ -2,27 +2,10 @@
 
 #include <boost/json/serialize.hpp>
 
-#include "api/json_util.hpp"
-#include "api/point_json.hpp"
+#include "point_json.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
-
-json::object point_json(const points::Point& point, const points::PointReading& reading) {
-    json::object object;
-    object["name"] = point.name;
-    object["value"] = nullptr;
-    if (reading.value)
-        object["value"] = std::visit([](const auto& v) { return json::value(v); }, *reading.value);
-    if (reading.label) object["label"] = *reading.label;
-    object["unit"] = point.unit;
-    object["quality"] = label(reading.quality);
-    object["age_ms"] = nullptr;
-    if (reading.age) {
-        object["age_ms"] = whole_ms(*reading.age);
-    }
-    return object;
-}
 
 std::string point_event(const StationEntry& station, const points::Point& point,
                         const points::PointReading& reading) {

@@ -2,8 +2,12 @@
 #include <iterator>
 #include <set>
 #include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
 
-#include "api/handlers.hpp"
+#include "handlers.hpp"
+#include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
 namespace {

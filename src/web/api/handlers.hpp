@@ -1,24 +1,16 @@
 #pragma once
 
-#include <boost/asio/awaitable.hpp>
-
-#include "http/message.hpp"
-#include "http/problem.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
-#include "panelgate/web/http/settings.hpp"
+#include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
 
-/// What handlers work on. Sessions share it; the directory outlives every session that is not
-/// abandoned.
+/// What handlers work on. The directory outlives every caller that has not left.
 struct Api {
-    Settings settings;
     const Directory* directory = nullptr;
     Providers providers;
 };
-
-using Handling = boost::asio::awaitable<HttpResponse>;
 
 Handling get_index(HttpRequest request, const Api* api);
 Handling get_healthz(HttpRequest request, const Api* api);

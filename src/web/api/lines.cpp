@@ -2,9 +2,10 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
+#include "answer.hpp"
+#include "handlers.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -102,7 +103,7 @@ Handling get_lines(HttpRequest, const Api* api) {
 }
 
 Handling get_line(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api, request.arguments[0]);
+    const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const bus::LineStatus status = (*line)->bus->status();
     json::object body = describe(**line, status);
@@ -112,7 +113,7 @@ Handling get_line(HttpRequest request, const Api* api) {
 }
 
 Handling get_trace(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api, request.arguments[0]);
+    const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const auto last = query_number(request, "last", 1, kMaxTrace, kDefaultTrace);
     if (!last) co_return to_response(last.error());

@@ -1,14 +1,15 @@
 #include <boost/json/array.hpp>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
-#include "api/point_json.hpp"
-#include "api/write_answer.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "handlers.hpp"
+#include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "point_json.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -30,8 +31,8 @@ struct Found {
     const Point* point = nullptr;
 };
 
-Parsed<Found> find_point(const HttpRequest& request, const Api& api) {
-    auto station = find_station(api, request.arguments[0]);
+Parsed<Found> find_point(const HttpRequest& request, const Directory& directory) {
+    auto station = find_station(directory, request.arguments[0]);
     if (!station) return station.error();
     const Point* point =
         station->points != nullptr ? station->points->find(request.arguments[1]) : nullptr;
@@ -60,9 +61,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
         return problem(403, "station '" + found.station.name + "' is read-only");
     auto value = value_member(body);
     if (!value) return value.error();
-    static const profile::PanelProfile kStandard;
-    const auto& profile = found.station.profile != nullptr ? *found.station.profile : kStandard;
-    auto pdu = points::write_request(profile, *found.point, *value);
+    auto pdu = points::write_request(panel_of(found.station), *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
     bus::Request made;
     made.station = found.station.id;
@@ -90,7 +89,7 @@ json::array describe(const std::vector<points::Interpretation>& all) {
 }  // namespace
 
 Handling get_points(HttpRequest request, const Api* api) {
-    const auto station = find_station(*api, request.arguments[0]);
+    const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
     json::array list;
     if (station->points != nullptr) {
@@ -103,23 +102,23 @@ Handling get_points(HttpRequest request, const Api* api) {
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(request, *api);
+    const auto found = find_point(request, *api->directory);
     if (!found) co_return to_response(found.error());
     co_return json_response(200, describe(*api, *found->station.points, *found->point));
 }
 
 Handling put_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(request, *api);
+    const auto found = find_point(request, *api->directory);
     if (!found) co_return to_response(found.error());
     auto planned = write_of(*found, request.body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await transact(request.caller, found->station.bus, std::move(made));
+    bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
     co_return write_answer(answer, found->station.profile);
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
-    auto items = items_of_table_path(request, *api);
+    auto items = items_of_table_path(request, *api->directory);
     if (!items) co_return to_response(items.error());
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
     if (modbus::is_bit_table(items->table) || items->count > kMost)
@@ -128,13 +127,9 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     made.station = items->station.id;
     made.pdu =
         modbus::encode_read(items->table, items->address, static_cast<std::uint16_t>(items->count));
-    bus::Answer answer = co_await transact(request.caller, items->station.bus, std::move(made));
-    if (!answer.pdu) co_return to_response(problem_of(answer.pdu.error(), answer.transmitted));
-    if (const auto code = modbus::exception_of(*answer.pdu)) {
-        const Problem refused =
-            problem_of_exception(*code, meaning_of(items->station.profile, *code));
-        co_return to_response(refused);
-    }
+    bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
+    const auto failed = problem_of(answer, items->station.profile);
+    if (failed) co_return to_response(*failed);
     const auto registers = modbus::registers_of(*answer.pdu);
     json::object body;
     body["station"] = items->station.name;

@@ -1,13 +1,14 @@
 #include <algorithm>
 #include <boost/json/array.hpp>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "answer.hpp"
+#include "ask.hpp"
+#include "handlers.hpp"
+#include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -51,18 +52,6 @@ void append_values(Reading& reading, ByteView reply, const Items& part, ValueTyp
     }
 }
 
-/// The first table, the area's own or another that reaches it, whose read function the panel has.
-/// A table path is taken at its word: what the panel makes of it, its exception tells.
-Parsed<modbus::Table> table_to_read(const Items& items) {
-    if (items.area == nullptr || has_function(items.station, read_function(items.table))) {
-        return items.table;
-    }
-    for (const modbus::Table table : items.area->also) {
-        if (has_function(items.station, read_function(table))) return table;
-    }
-    return problem(422, "the panel has no function that reads " + items.area->name);
-}
-
 json::object describe(const Items& items, Reading reading) {
     std::string notation;
     if (items.area != nullptr) {
@@ -95,10 +84,7 @@ bus::Request read_request(const Items& part) {
 
 std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
                                    ValueType type) {
-    if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
-    if (const auto code = modbus::exception_of(*answer.pdu)) {
-        return problem_of_exception(*code, meaning_of(part.station.profile, *code));
-    }
+    if (auto failed = problem_of(answer, part.station.profile)) return failed;
     append_values(reading, *answer.pdu, part, type);
     ++reading.transactions;
     if (answer.source == bus::Source::cache) {
@@ -108,8 +94,8 @@ std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, 
     return std::nullopt;
 }
 
-Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType type) {
-    const unsigned limit = max_count(items.station, read_function(items.table));
+Handling read_items(std::shared_ptr<Caller> caller, Items items, ValueType type) {
+    const unsigned limit = panel_of(items.station).max_count(read_function(items.table));
     if (items.count > limit * kMaxTransactions) {
         co_return to_response(
             problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));
@@ -120,7 +106,7 @@ Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType ty
         part.address = static_cast<std::uint16_t>(items.address + done);
         part.count = std::min(limit, items.count - done);
         bus::Request request = read_request(part);
-        bus::Answer answer = co_await transact(caller, items.station.bus, std::move(request));
+        bus::Answer answer = co_await ask(caller, items.station.bus, std::move(request));
         const auto failed = take_answer(reading, answer, part, type);
         if (failed) co_return to_response(*failed);
         done += part.count;
@@ -131,7 +117,7 @@ Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType ty
 }  // namespace
 
 Handling get_table(HttpRequest request, const Api* api) {
-    auto items = items_of_table_path(request, *api);
+    auto items = items_of_table_path(request, *api->directory);
     if (!items) co_return to_response(items.error());
     const auto type = parse_type(request, items->table);
     if (!type) co_return to_response(type.error());
@@ -141,7 +127,7 @@ Handling get_table(HttpRequest request, const Api* api) {
 }
 
 Handling get_device(HttpRequest request, const Api* api) {
-    auto items = items_of_device_path(request, *api);
+    auto items = items_of_device_path(request, *api->directory);
     if (!items) co_return to_response(items.error());
     const auto range = check_range(*items, items->area->readable, "readable");
     if (!range) co_return to_response(range.error());

@@ -2,17 +2,24 @@
 
 #include <utility>
 
-#include "http/listener.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/web/http/listener.hpp"
+#include "panelgate/web/http/site.hpp"
+#include "routes.hpp"
 
 namespace panelgate::web {
 
 Server::Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
                Providers providers) {
     auto api = std::make_shared<Api>();
-    api->settings = std::move(settings);
     api->directory = &directory;
     api->providers = std::move(providers);
-    listener_ = std::make_shared<Listener>(std::move(executor), std::move(api));
+    auto site = std::make_shared<Site>();
+    site->settings = std::move(settings);
+    site->product = "panelgate/" + api->providers.version;
+    site->routes = routes(std::move(api));
+    site->next_caller = bus::next_client_id;
+    listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
 }
 
 Server::~Server() { listener_->abandon(); }

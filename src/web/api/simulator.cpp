@@ -1,16 +1,17 @@
 #include <boost/json/object.hpp>
 #include <map>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
+#include "answer.hpp"
+#include "body.hpp"
+#include "handlers.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
-Parsed<StationEntry> find_simulated(const Api& api, const std::string& name) {
-    auto station = find_station(api, name);
+Parsed<StationEntry> find_simulated(const Directory& directory, const std::string& name) {
+    auto station = find_station(directory, name);
     if (station && !station->simulated)
         return problem(404, "station '" + name + "' is not simulated");
     return station;
@@ -39,13 +40,13 @@ HttpResponse faults_of(const StationEntry& station) {
 }  // namespace
 
 Handling get_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api, request.arguments[0]);
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
     co_return faults_of(*station);
 }
 
 Handling put_simulated(HttpRequest request, const Api* api) {
-    const auto station = find_simulated(*api, request.arguments[0]);
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
     const auto body = parse_object(request.body);
     if (!body) co_return to_response(body.error());

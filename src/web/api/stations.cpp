@@ -1,9 +1,9 @@
 #include <boost/json/array.hpp>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
+#include "answer.hpp"
+#include "handlers.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -64,7 +64,7 @@ Handling get_stations(HttpRequest, const Api* api) {
 }
 
 Handling get_station(HttpRequest request, const Api* api) {
-    const auto station = find_station(*api, request.arguments[0]);
+    const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
     json::object body = describe(*station);
     body["polls"] = describe_polls(station->points, api->providers.now());

@@ -1,8 +1,7 @@
 #include <string_view>
 #include <utility>
 
-#include "api/handlers.hpp"
-#include "panelgate/metrics/exposition.hpp"
+#include "handlers.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -43,7 +42,7 @@ Handling get_readyz(HttpRequest, const Api* api) {
 }
 
 Handling get_metrics(HttpRequest, const Api* api) {
-    co_return text_response(200, api->providers.metrics_text(), metrics::kContentType);
+    co_return text_response(200, api->providers.metrics_text(), api->providers.metrics_type);
 }
 
 }  // namespace panelgate::web

@@ -1,55 +1,32 @@
 #include <algorithm>
+#include <string>
+#include <string_view>
+#include <utility>
 
-#include "api/handlers.hpp"
-#include "api/items.hpp"
-#include "api/json_util.hpp"
-#include "api/write_answer.hpp"
-#include "api/write_plan.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "handlers.hpp"
+#include "station_path.hpp"
+#include "write_plan.hpp"
 
 namespace panelgate::web {
 namespace {
 
-Problem not_writable(const Items& items) {
-    Problem made = problem(405, std::string(label(items.table)) + " cannot be written");
+Problem not_writable(modbus::Table table) {
+    Problem made = problem(405, std::string(label(table)) + " cannot be written");
     made.headers.emplace_back("Allow", "GET, HEAD");
     return made;
 }
 
-/// The PDU for these values, or why the panel cannot take them.
-Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& cells) {
-    for (const std::uint8_t function : write_functions(items.table, cells.size())) {
-        if (!has_function(items.station, function)) continue;
-        const unsigned limit = max_count(items.station, function);
-        if (cells.size() > limit) {
-            return problem(422, "at most " + std::to_string(limit) +
-                                    " values in one write; writes are not split");
-        }
-        return encode_write(function, items.address, cells);
-    }
-    const auto functions = write_functions(items.table, cells.size());
-    return problem(422, "the panel has no function " + upper_hex({&functions.back(), 1}) + " for " +
-                            std::to_string(cells.size()) + " of its " +
-                            std::string(label(items.table)));
-}
-
-Parsed<bus::Request> write_request(const HttpRequest& request, Items items) {
+/// The request that writes the body's values, or why there is none.
+Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
     if (items.station.read_only) {
         return problem(403, "station '" + items.station.name + "' is read-only");
     }
-    if (!is_writable(items.table)) return not_writable(items);
-    const auto body = parse_object(request.body);
-    if (!body) return body.error();
-    const auto cells = values_member(*body, items.table);
+    if (!is_writable(items.table)) return not_writable(items.table);
+    const auto cells = cells_of(body, items.table);
     if (!cells) return cells.error();
-    if (cells->size() > 0x10000u - items.address) {
-        return problem(422, "these values go beyond address 65535");
-    }
-    items.count = static_cast<unsigned>(cells->size());
-    if (items.area != nullptr) {
-        const auto range = check_range(items, *items.area->writable, "writable");
-        if (!range) return range.error();
-    }
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();
     bus::Request made;
@@ -60,47 +37,38 @@ Parsed<bus::Request> write_request(const HttpRequest& request, Items items) {
     return made;
 }
 
-Handling write_items(HttpRequest request, Items items) {
-    auto planned = write_request(request, items);
+Handling write_items(HttpRequest request, Parsed<Items> items) {
+    if (!items) co_return to_response(items.error());
+    auto planned = write_request(*items, request.body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await transact(request.caller, items.station.bus, std::move(made));
-    co_return write_answer(answer, items.station.profile);
+    bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
+    co_return write_answer(answer, items->station.profile);
 }
 
-}  // namespace
-
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile* profile) {
-    if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
-    if (const auto code = modbus::exception_of(*answer.pdu)) {
-        return to_response(problem_of_exception(*code, meaning_of(profile, *code)));
-    }
-    boost::json::object body;
-    body["transmitted"] = true;
-    body["confirmed"] = true;
-    return json_response(200, body);
-}
-
-Handling put_table(HttpRequest request, const Api* api) {
-    auto items = items_of_table_path(request, *api);
-    if (!items) co_return to_response(items.error());
-    Handling writing = write_items(std::move(request), std::move(*items));
-    HttpResponse response = co_await std::move(writing);
-    co_return response;
-}
-
-Handling put_device(HttpRequest request, const Api* api) {
-    auto items = items_of_device_path(request, *api);
-    if (!items) co_return to_response(items.error());
+/// A notation names memory: any table that reaches it and can be written will do.
+Parsed<Items> device_to_write(const HttpRequest& request, const Directory& directory) {
+    auto items = items_of_device_path(request, directory);
+    if (!items) return items;
     const auto& also = items->area->also;
     const auto writable = std::ranges::find_if(also, is_writable);
     if (!is_writable(items->table) && writable != also.end()) items->table = *writable;
     if (is_writable(items->table) && !items->area->writable) {
-        co_return to_response(problem(422, items->area->name + " is read-only in this panel"));
+        return problem(422, items->area->name + " is read-only in this panel");
     }
-    Handling writing = write_items(std::move(request), std::move(*items));
-    HttpResponse response = co_await std::move(writing);
-    co_return response;
+    return items;
+}
+
+}  // namespace
+
+Handling put_table(HttpRequest request, const Api* api) {
+    auto items = items_of_table_path(request, *api->directory);
+    return write_items(std::move(request), std::move(items));
+}
+
+Handling put_device(HttpRequest request, const Api* api) {
+    auto items = device_to_write(request, *api->directory);
+    return write_items(std::move(request), std::move(items));
 }
 
 }  // namespace panelgate::web

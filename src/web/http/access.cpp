@@ -1,4 +1,4 @@
-#include "http/access.hpp"
+#include "access.hpp"
 
 #include <cctype>
 #include <string_view>

@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "http/message.hpp"
-#include "http/problem.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {

@@ -1,4 +1,4 @@
-#include "http/listener.hpp"
+#include "panelgate/web/http/listener.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "panelgate/rt/log.hpp"
+#include "session.hpp"
 
 namespace panelgate::web {
 namespace asio = boost::asio;
@@ -31,14 +32,14 @@ void refuse(tcp::socket socket) {
 
 }  // namespace
 
-Server::Listener::Listener(asio::any_io_executor executor, std::shared_ptr<const Api> api)
-    : api_(std::move(api)), acceptor_(executor), pause_(executor) {}
+HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const Site> site)
+    : site_(std::move(site)), acceptor_(executor), pause_(executor) {}
 
-error_code Server::Listener::open() {
+error_code HttpListener::open() {
     error_code error;
-    const auto address = asio::ip::make_address(api_->settings.address, error);
+    const auto address = asio::ip::make_address(site_->settings.address, error);
     if (error) return error;
-    const tcp::endpoint endpoint(address, api_->settings.port);
+    const tcp::endpoint endpoint(address, site_->settings.port);
     acceptor_.open(endpoint.protocol(), error);
     if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
     if (!error) acceptor_.bind(endpoint, error);
@@ -55,13 +56,13 @@ error_code Server::Listener::open() {
     return {};
 }
 
-std::uint16_t Server::Listener::port() const {
+std::uint16_t HttpListener::port() const {
     error_code error;
     const tcp::endpoint endpoint = acceptor_.local_endpoint(error);
     return error ? std::uint16_t{0} : endpoint.port();
 }
 
-asio::awaitable<void> Server::Listener::accept_loop(std::shared_ptr<Listener> self) {
+asio::awaitable<void> HttpListener::accept_loop(std::shared_ptr<HttpListener> self) {
     while (self->acceptor_.is_open()) {
         error_code error;
         tcp::socket socket =
@@ -76,12 +77,12 @@ asio::awaitable<void> Server::Listener::accept_loop(std::shared_ptr<Listener> se
     }
 }
 
-void Server::Listener::take(tcp::socket socket) {
-    if (sessions_.size() >= api_->settings.max_connections) {
+void HttpListener::take(tcp::socket socket) {
+    if (sessions_.size() >= site_->settings.max_connections) {
         refuse(std::move(socket));
         return;
     }
-    auto session = std::make_shared<HttpSession>(std::move(socket), api_);
+    auto session = std::make_shared<HttpSession>(std::move(socket), site_);
     sessions_.insert(session);
     asio::co_spawn(acceptor_.get_executor(), HttpSession::run(session),
                    [self = weak_from_this(), session](std::exception_ptr failed) {
@@ -91,7 +92,7 @@ void Server::Listener::take(tcp::socket socket) {
                    });
 }
 
-void Server::Listener::stop() {
+void HttpListener::stop() {
     error_code ignored;
     acceptor_.close(ignored);
     pause_.cancel();
@@ -99,7 +100,7 @@ void Server::Listener::stop() {
     for (const auto& session : sessions) session->stop();
 }
 
-void Server::Listener::abandon() {
+void HttpListener::abandon() {
     stop();
     const auto sessions = sessions_;
     for (const auto& session : sessions) session->abandon();

@@ -1,4 +1,4 @@
-#include "http/session.hpp"
+#include "session.hpp"
 
 #include <sys/socket.h>
 
@@ -16,9 +16,10 @@
 #include <exception>
 #include <utility>
 
-#include "http/router.hpp"
-#include "http/target.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "router.hpp"
+#include "target.hpp"
 
 namespace panelgate::web {
 namespace asio = boost::asio;
@@ -49,10 +50,10 @@ HttpRequest to_request(BeastRequest&& message, Target target) {
 
 template <class Message>
 void set_head(Message& message, const HttpResponse& response, bool keep_alive,
-              const std::string& version) {
+              const std::string& product) {
     message.version(11);
     message.result(response.status);
-    message.set(http::field::server, "panelgate/" + version);
+    message.set(http::field::server, product);
     message.set(http::field::content_type, response.content_type);
     message.set(http::field::cache_control, "no-store");
     message.set("X-Content-Type-Options", "nosniff");
@@ -78,15 +79,16 @@ bool is_parse_error(boost::system::error_code why) {
 
 }  // namespace
 
-HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<const Api> api)
+HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<const Site> site)
     : stream_(std::move(socket)),
-      api_(std::move(api)),
-      buffer_(kHeaderLimit + kReadSize + api_->settings.max_body) {
+      site_(std::move(site)),
+      buffer_(kHeaderLimit + kReadSize + site_->settings.max_body) {
     boost::system::error_code ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
     boost::system::error_code gone;
     const auto peer = stream_.socket().remote_endpoint(gone);
-    if (!gone) caller_->host = bus::host_of(peer.address().to_string());
+    caller_ = std::make_shared<Caller>(site_->next_caller(),
+                                       gone ? std::string() : peer.address().to_string());
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
@@ -118,10 +120,10 @@ asio::awaitable<bool> HttpSession::serve_one() {
         response = to_response(problem(400, "the request target cannot be understood"));
     }
     bool more = false;
-    if (!caller_->abandoned && response.events && !head) {
+    if (!caller_->has_left() && response.events && !head) {
         asio::awaitable<void> sending = send_events(std::move(response.events));
         co_await std::move(sending);
-    } else if (!caller_->abandoned) {
+    } else if (!caller_->has_left()) {
         asio::awaitable<bool> sending = send(std::move(response), head, keep_alive && !stopping_);
         more = co_await std::move(sending);
     }
@@ -133,17 +135,17 @@ asio::awaitable<bool> HttpSession::serve_one() {
 asio::awaitable<boost::system::error_code> HttpSession::receive() {
     parser_.emplace();
     parser_->header_limit(kHeaderLimit);
-    parser_->body_limit(api_->settings.max_body);
+    parser_->body_limit(site_->settings.max_body);
     ErrorCode error;
     if (buffer_.size() == 0) {
-        stream_.expires_after(api_->settings.idle_timeout);
+        stream_.expires_after(site_->settings.idle_timeout);
         const auto space = buffer_.prepare(kReadSize);
         const std::size_t n = co_await stream_.async_read_some(
             space, asio::redirect_error(asio::use_awaitable, error));
         if (error) co_return error;
         buffer_.commit(n);
     }
-    stream_.expires_after(api_->settings.request_timeout);
+    stream_.expires_after(site_->settings.request_timeout);
     co_await http::async_read_header(stream_, buffer_, *parser_,
                                      asio::redirect_error(asio::use_awaitable, error));
     if (error || parser_->is_done()) co_return error;
@@ -170,13 +172,13 @@ asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
     std::string what;
     watch_for_departure();
     try {
-        asio::awaitable<HttpResponse> handling = dispatch(std::move(request), api_.get());
+        asio::awaitable<HttpResponse> handling = dispatch(std::move(request), site_.get());
         HttpResponse response = co_await std::move(handling);
         co_return response;
     } catch (const std::exception& error) {
         what = error.what();
     }
-    if (!caller_->abandoned) {
+    if (!caller_->has_left()) {
         rt::log(rt::LogLevel::error, "http handler failed", {{"path", path}, {"error", what}});
     }
     co_return to_response(problem(500, "the gateway failed to handle this request"));
@@ -184,7 +186,7 @@ asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
 
 asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
     busy_ = true;
-    HttpResponse response = to_response(problem_of_parse(why, api_->settings.max_body));
+    HttpResponse response = to_response(problem_of_parse(why, site_->settings.max_body));
     asio::awaitable<bool> sending = send(std::move(response), false, false);
     co_await std::move(sending);
     co_await drain();
@@ -194,15 +196,15 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
 /// Did it go out, and may another request follow?
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
     ErrorCode error;
-    stream_.expires_after(api_->settings.request_timeout);
+    stream_.expires_after(site_->settings.request_timeout);
     if (head) {
         http::response<http::empty_body> message;
-        set_head(message, response, keep_alive, api_->providers.version);
+        set_head(message, response, keep_alive, site_->product);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
     } else {
         http::response<http::string_body> message;
-        set_head(message, response, keep_alive, api_->providers.version);
+        set_head(message, response, keep_alive, site_->product);
         message.body() = std::move(response.body);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
@@ -218,12 +220,12 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     listener->wake = [&bell] { bell.cancel(); };
     listener_ = listener;
     std::string text =
-        "HTTP/1.1 200 OK\r\nServer: panelgate/" + api_->providers.version +
+        "HTTP/1.1 200 OK\r\nServer: " + site_->product +
         "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
         "X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n: panelgate\n\n";
     ErrorCode error;
     while (!error) {
-        stream_.expires_after(api_->settings.request_timeout);
+        stream_.expires_after(site_->settings.request_timeout);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
         if (error || listener->ended() || stopping_) break;
@@ -282,7 +284,7 @@ void HttpSession::stop() {
 void HttpSession::abandon() {
     stopping_ = true;
     if (listener_ && listener_->wake) listener_->wake();
-    caller_->abandon();
+    caller_->leave();
     close();
 }
 

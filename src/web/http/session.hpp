@@ -9,7 +9,7 @@
 #include <memory>
 #include <optional>
 
-#include "api/handlers.hpp"
+#include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
 
@@ -17,13 +17,13 @@ namespace panelgate::web {
 /// has ended; everything in the one thread.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
-    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<const Api> api);
+    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<const Site> site);
 
     /// Serves until the client goes away, breaks the protocol, is idle for too long, or stop().
     static boost::asio::awaitable<void> run(std::shared_ptr<HttpSession> self);
     /// Answers the request that runs, then closes; closes at once when none does.
     void stop();
-    /// Closes at once; requests that still wait for a line are forgotten.
+    /// Closes at once; whoever works for the client is told.
     void abandon();
 
   private:
@@ -43,8 +43,8 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     void close();
 
     boost::beast::tcp_stream stream_;
-    std::shared_ptr<const Api> api_;
-    std::shared_ptr<BusCaller> caller_ = std::make_shared<BusCaller>();
+    std::shared_ptr<const Site> site_;
+    std::shared_ptr<Caller> caller_;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent

@@ -1,4 +1,4 @@
-#include "http/target.hpp"
+#include "target.hpp"
 
 #include "panelgate/base/bytes.hpp"
 

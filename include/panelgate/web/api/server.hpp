@@ -17,10 +17,13 @@
 
 namespace panelgate::web {
 
+class HttpListener;
+
 /// What the server shows besides the directory. The functions are called in the one thread.
 struct Providers {
-    std::function<std::string()> metrics_text;  ///< of metrics::kContentType
-    std::function<bool()> ready;                ///< do configuration and listeners stand?
+    std::function<std::string()> metrics_text;
+    std::string metrics_type;     ///< the content type of that text
+    std::function<bool()> ready;  ///< do configuration and listeners stand?
     std::string version;
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<std::vector<points::RelayStatus>()> relays;
@@ -48,8 +51,7 @@ class Server {
     std::size_t connections() const;
 
   private:
-    class Listener;
-    std::shared_ptr<Listener> listener_;
+    std::shared_ptr<HttpListener> listener_;
 };
 
 }  // namespace panelgate::web

@@ -1,4 +1,4 @@
-#include "http/target.hpp"
+#include "target.hpp"
 
 #include <gmock/gmock.h>
 

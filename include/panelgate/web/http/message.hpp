@@ -6,9 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "api/bus_caller.hpp"
+#include "panelgate/web/http/caller.hpp"
 #include "panelgate/web/http/event_hub.hpp"
-#include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {
 
@@ -20,7 +19,7 @@ struct HttpRequest {
     std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for
-    std::shared_ptr<BusCaller> caller;   ///< the session's face on the buses
+    std::shared_ptr<Caller> caller;
 };
 /// The request headers that anything here looks at.
 inline constexpr const char* kHeadersRead[] = {"authorization", "origin", "content-type"};

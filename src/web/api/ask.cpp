@@ -1,4 +1,4 @@
-#include "api/bus_caller.hpp"
+#include "ask.hpp"
 
 #include <boost/asio/associated_executor.hpp>
 #include <boost/asio/async_result.hpp>
@@ -35,20 +35,17 @@ asio::awaitable<bus::Answer> start_transact(bus::BusClient* bus, bus::Request re
 
 }  // namespace
 
-void BusCaller::abandon() {
-    if (std::exchange(abandoned, true)) return;
-    for (bus::BusClient* bus : std::exchange(used, {})) bus->cancel(client);
-}
-
-asio::awaitable<bus::Answer> transact(std::shared_ptr<BusCaller> caller, bus::BusClient* bus,
-                                      bus::Request request) {
-    if (!caller->abandoned) {
-        if (caller->used.insert(bus).second) bus->name_client(caller->client, caller->name);
-        request.client = caller->client;
-        request.host = caller->host;
+asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
+                                 bus::Request request) {
+    if (!caller->has_left()) {
+        const bus::ClientId client = caller->id();
+        const auto cancel = [bus, client] { bus->cancel(client); };
+        if (caller->at_leaving(bus, cancel)) bus->name_client(client, "http");
+        request.client = client;
+        if (!caller->address().empty()) request.host = bus::host_of(caller->address());
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);
-        if (!caller->abandoned) co_return answer;
+        if (!caller->has_left()) co_return answer;
     }
     throw boost::system::system_error(asio::error::operation_aborted);
 }

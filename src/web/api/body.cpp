@@ -1,4 +1,4 @@
-#include "api/json_util.hpp"
+#include "body.hpp"
 
 #include <algorithm>
 #include <boost/json/array.hpp>
@@ -45,17 +45,6 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
 }
 
 }  // namespace
-
-std::int64_t whole_ms(Duration duration) {
-    return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
-}
-
-HttpResponse json_response(unsigned status, const json::value& body) {
-    HttpResponse response;
-    response.status = status;
-    response.body = json::serialize(body) + "\n";
-    return response;
-}
 
 Parsed<json::object> parse_object(std::string_view body) {
     json::stream_parser parser;
@@ -104,6 +93,12 @@ Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, mod
         cells.push_back(*parsed);
     }
     return cells;
+}
+
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
+    const auto object = parse_object(body);
+    if (!object) return object.error();
+    return values_member(*object, table);
 }
 
 }  // namespace panelgate::web

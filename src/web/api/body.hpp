@@ -7,16 +7,10 @@
 #include <string_view>
 #include <vector>
 
-#include "http/problem.hpp"
-#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
-
-/// For members that end in _ms: rounded towards zero.
-std::int64_t whole_ms(Duration duration);
-
-HttpResponse json_response(unsigned status, const boost::json::value& body);
 
 /// The body as an object; 400 with line and column of what is wrong.
 Parsed<boost::json::object> parse_object(std::string_view body);
@@ -33,5 +27,7 @@ Parsed<std::string> string_member(const boost::json::object& object, std::string
 /// or -32768..-1 for their two's complement. At least one.
 Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
                                                  modbus::Table table);
+/// The same of a body that is nothing else: {"values": [...]}.
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table);
 
 }  // namespace panelgate::web

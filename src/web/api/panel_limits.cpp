@@ -1,0 +1,35 @@
+#include "panel_limits.hpp"
+
+#include <string>
+
+#include "panelgate/profile/notation.hpp"
+
+namespace panelgate::web {
+
+const profile::PanelProfile& panel_of(const StationEntry& station) {
+    static const profile::PanelProfile kStandard;
+    return station.profile != nullptr ? *station.profile : kStandard;
+}
+
+Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
+                         std::string_view what) {
+    if (range.contains(items.address, items.count)) return {};
+    const auto first =
+        profile::format_notation(*items.area, static_cast<std::uint16_t>(range.first));
+    const auto last = profile::format_notation(*items.area, static_cast<std::uint16_t>(range.last));
+    return problem(422, std::to_string(items.count) + " from " + items.area->name + " address " +
+                            std::to_string(items.address) + " is outside what is " +
+                            std::string(what) + ": " + first + " to " + last);
+}
+
+Parsed<modbus::Table> table_to_read(const Items& items) {
+    if (items.area == nullptr || panel_of(items.station).has_function(read_function(items.table))) {
+        return items.table;
+    }
+    for (const modbus::Table table : items.area->also) {
+        if (panel_of(items.station).has_function(read_function(table))) return table;
+    }
+    return problem(422, "the panel has no function that reads " + items.area->name);
+}
+
+}  // namespace panelgate::web
