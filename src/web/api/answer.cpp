@@ -63,9 +63,8 @@ const char* detail_of(Fault fault) {
 }
 
 /// The panel manual's word for an exception code, or "".
-std::string meaning_of(std::uint8_t code, const profile::PanelProfile* profile) {
-    if (profile == nullptr) return {};
-    for (const profile::ExceptionMeaning& exception : profile->exceptions) {
+std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) {
+    for (const profile::ExceptionMeaning& exception : profile.exceptions) {
         if (exception.code == code) return exception.meaning;
     }
     return {};
@@ -89,7 +88,7 @@ Problem problem_of(Fault fault, bool transmitted) {
     return made;
 }
 
-Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile* profile) {
+Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile) {
     std::string detail = "the panel answered exception " + std::to_string(code) + ": ";
     detail += modbus::describe_exception(code);
     const std::string meaning = meaning_of(code, profile);
@@ -101,14 +100,14 @@ Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile* pro
     return made;
 }
 
-std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile* profile) {
+std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile) {
     if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
     const auto code = modbus::exception_of(*answer.pdu);
     if (code) return problem_of_exception(*code, profile);
     return std::nullopt;
 }
 
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile* profile) {
+HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile) {
     const auto failed = problem_of(answer, profile);
     if (failed) return to_response(*failed);
     json::object body;

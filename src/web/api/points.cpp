@@ -114,7 +114,7 @@ Handling put_point(HttpRequest request, const Api* api) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
-    co_return write_answer(answer, found->station.profile);
+    co_return write_answer(answer, panel_of(found->station));
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
@@ -128,7 +128,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     made.pdu =
         modbus::encode_read(items->table, items->address, static_cast<std::uint16_t>(items->count));
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
-    const auto failed = problem_of(answer, items->station.profile);
+    const auto failed = problem_of(answer, panel_of(items->station));
     if (failed) co_return to_response(*failed);
     const auto registers = modbus::registers_of(*answer.pdu);
     json::object body;

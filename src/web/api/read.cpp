@@ -84,7 +84,7 @@ bus::Request read_request(const Items& part) {
 
 std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
                                    ValueType type) {
-    if (auto failed = problem_of(answer, part.station.profile)) return failed;
+    if (auto failed = problem_of(answer, panel_of(part.station))) return failed;
     append_values(reading, *answer.pdu, part, type);
     ++reading.transactions;
     if (answer.source == bus::Source::cache) {
@@ -94,51 +94,51 @@ std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, 
     return std::nullopt;
 }
 
-Handling read_items(std::shared_ptr<Caller> caller, Items items, ValueType type) {
-    const unsigned limit = panel_of(items.station).max_count(read_function(items.table));
-    if (items.count > limit * kMaxTransactions) {
+Handling read_items(HttpRequest request, Parsed<Items> items) {
+    if (!items) co_return to_response(items.error());
+    const auto type = parse_type(request, items->table);
+    if (!type) co_return to_response(type.error());
+    const unsigned limit = panel_of(items->station).max_count(read_function(items->table));
+    if (items->count > limit * kMaxTransactions) {
         co_return to_response(
             problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));
     }
     Reading reading;
-    for (unsigned done = 0; done < items.count;) {
-        Items part = items;
-        part.address = static_cast<std::uint16_t>(items.address + done);
-        part.count = std::min(limit, items.count - done);
-        bus::Request request = read_request(part);
-        bus::Answer answer = co_await ask(caller, items.station.bus, std::move(request));
-        const auto failed = take_answer(reading, answer, part, type);
+    for (unsigned done = 0; done < items->count;) {
+        Items part = *items;
+        part.address = static_cast<std::uint16_t>(items->address + done);
+        part.count = std::min(limit, items->count - done);
+        bus::Request made = read_request(part);
+        bus::Answer answer = co_await ask(request.caller, part.station.bus, std::move(made));
+        const auto failed = take_answer(reading, answer, part, *type);
         if (failed) co_return to_response(*failed);
         done += part.count;
     }
-    co_return json_response(200, describe(items, std::move(reading)));
+    co_return json_response(200, describe(*items, std::move(reading)));
+}
+
+/// A notation names memory: it is read through the first table that the panel can read it by.
+Parsed<Items> device_to_read(const HttpRequest& request, const Directory& directory) {
+    auto items = items_of_device_path(request, directory);
+    if (!items) return items;
+    const auto range = check_range(*items, items->area->readable, "readable");
+    if (!range) return range.error();
+    const auto table = table_to_read(*items);
+    if (!table) return table.error();
+    items->table = *table;
+    return items;
 }
 
 }  // namespace
 
 Handling get_table(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api->directory);
-    if (!items) co_return to_response(items.error());
-    const auto type = parse_type(request, items->table);
-    if (!type) co_return to_response(type.error());
-    Handling reading = read_items(request.caller, std::move(*items), *type);
-    HttpResponse response = co_await std::move(reading);
-    co_return response;
+    return read_items(std::move(request), std::move(items));
 }
 
 Handling get_device(HttpRequest request, const Api* api) {
-    auto items = items_of_device_path(request, *api->directory);
-    if (!items) co_return to_response(items.error());
-    const auto range = check_range(*items, items->area->readable, "readable");
-    if (!range) co_return to_response(range.error());
-    const auto table = table_to_read(*items);
-    if (!table) co_return to_response(table.error());
-    items->table = *table;
-    const auto type = parse_type(request, items->table);
-    if (!type) co_return to_response(type.error());
-    Handling reading = read_items(request.caller, std::move(*items), *type);
-    HttpResponse response = co_await std::move(reading);
-    co_return response;
+    auto items = device_to_read(request, *api->directory);
+    return read_items(std::move(request), std::move(items));
 }
 
 }  // namespace panelgate::web

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace panelgate::web {
 
@@ -11,7 +12,7 @@ namespace panelgate::web {
 class Caller {
   public:
     /// `id` is of this connection alone; `address` has no port, "" when it is not known.
-    Caller(std::uint64_t id, std::string address);
+    Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {}
 
     std::uint64_t id() const { return id_; }
     const std::string& address() const { return address_; }
@@ -20,8 +21,13 @@ class Caller {
     bool has_left() const { return left_; }
     /// What is called once when the connection is over. Of several for one `whom` the first counts;
     /// was this the first? Nothing may be asked of a caller that has left.
-    bool at_leaving(const void* whom, std::function<void()> farewell);
-    void leave();
+    bool at_leaving(const void* whom, std::function<void()> farewell) {
+        return farewells_.emplace(whom, std::move(farewell)).second;
+    }
+    void leave() {
+        if (std::exchange(left_, true)) return;
+        for (const auto& [whom, farewell] : std::exchange(farewells_, {})) farewell();
+    }
 
   private:
     std::uint64_t id_;

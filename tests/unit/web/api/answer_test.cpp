@@ -31,27 +31,27 @@ TEST(Answer, AsksToTryAgainOnlyWhereThatMayHelp) {
 TEST(Answer, AddsTheManualsWordToAnException) {
     profile::PanelProfile panel;
     panel.exceptions.push_back({2, "Address is outside the range"});
-    const Problem known = problem_of_exception(2, &panel);
+    const Problem known = problem_of_exception(2, panel);
     EXPECT_EQ(known.status, 422u);
     EXPECT_TRUE(known.detail.starts_with("the panel answered exception 2: ")) << known.detail;
     EXPECT_TRUE(known.detail.ends_with(" (Address is outside the range)")) << known.detail;
-    EXPECT_FALSE(problem_of_exception(3, &panel).detail.ends_with(")"));
+    EXPECT_FALSE(problem_of_exception(3, panel).detail.ends_with(")"));
     EXPECT_EQ(told(known).at("modbus_exception"), 2);
 }
 
 TEST(Answer, BlamesTheRequestForExceptionsOneToFourOnly) {
-    EXPECT_EQ(problem_of_exception(1, nullptr).status, 422u);
-    EXPECT_EQ(problem_of_exception(4, nullptr).status, 422u);
-    EXPECT_EQ(problem_of_exception(0, nullptr).status, 502u);
-    EXPECT_EQ(problem_of_exception(5, nullptr).status, 502u);
+    EXPECT_EQ(problem_of_exception(1, {}).status, 422u);
+    EXPECT_EQ(problem_of_exception(4, {}).status, 422u);
+    EXPECT_EQ(problem_of_exception(0, {}).status, 502u);
+    EXPECT_EQ(problem_of_exception(5, {}).status, 502u);
 }
 
 TEST(Answer, OfAWriteSaysWhatIsSure) {
-    const auto confirmed = write_answer(test::FakeBus::reply({6, 0, 1, 0, 2}), nullptr);
+    const auto confirmed = write_answer(test::FakeBus::reply({6, 0, 1, 0, 2}), {});
     EXPECT_EQ(confirmed.status, 200u);
     EXPECT_EQ(confirmed.body, "{\"transmitted\":true,\"confirmed\":true}\n");
-    EXPECT_EQ(write_answer(test::FakeBus::reply({0x86, 2}), nullptr).status, 422u);
-    EXPECT_EQ(write_answer(test::FakeBus::fault(Fault::timeout, true), nullptr).status, 504u);
+    EXPECT_EQ(write_answer(test::FakeBus::reply({0x86, 2}), {}).status, 422u);
+    EXPECT_EQ(write_answer(test::FakeBus::fault(Fault::timeout, true), {}).status, 504u);
 }
 
 TEST(Answer, RoundsMillisecondsTowardsZero) {
