@@ -101,4 +101,17 @@ Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table
     return values_member(*object, table);
 }
 
+Parsed<points::Value> value_of(std::string_view text) {
+    const auto body = parse_object(text);
+    if (!body) return body.error();
+    const json::value* value = body->if_contains("value");
+    if (value == nullptr) return problem(400, "the body needs \"value\"");
+    if (value->is_bool()) return points::Value(value->get_bool());
+    if (value->is_int64()) return points::Value(value->get_int64());
+    if (value->is_uint64()) return points::Value(value->get_uint64());
+    if (value->is_double()) return points::Value(value->get_double());
+    if (value->is_string()) return points::Value(std::string(value->get_string()));
+    return problem(400, "value must be a number, true, false or a text");
+}
+
 }  // namespace panelgate::web

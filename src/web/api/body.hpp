@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/points/value.hpp"
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
@@ -29,5 +30,8 @@ Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& obje
                                                  modbus::Table table);
 /// The same of a body that is nothing else: {"values": [...]}.
 Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table);
+
+/// A point's new value: {"value": ...}.
+Parsed<points::Value> value_of(std::string_view body);
 
 }  // namespace panelgate::web

@@ -16,7 +16,6 @@ namespace json = boost::json;
 namespace {
 
 using points::Point;
-using points::Value;
 
 json::object describe(const Api& api, const points::StationPoints& station, const Point& point) {
     json::object object = point_json(point, station.read(point, api.providers.now()));
@@ -43,23 +42,10 @@ Parsed<Found> find_point(const HttpRequest& request, const Directory& directory)
     return Found{std::move(*station), point};
 }
 
-Parsed<Value> value_member(const std::string& text) {
-    const auto body = parse_object(text);
-    if (!body) return body.error();
-    const json::value* value = body->if_contains("value");
-    if (value == nullptr) return problem(400, "the body needs \"value\"");
-    if (value->is_bool()) return Value(value->get_bool());
-    if (value->is_int64()) return Value(value->get_int64());
-    if (value->is_uint64()) return Value(value->get_uint64());
-    if (value->is_double()) return Value(value->get_double());
-    if (value->is_string()) return Value(std::string(value->get_string()));
-    return problem(400, "value must be a number, true, false or a text");
-}
-
 Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
     if (found.station.read_only)
         return problem(403, "station '" + found.station.name + "' is read-only");
-    auto value = value_member(body);
+    const auto value = value_of(body);
     if (!value) return value.error();
     auto pdu = points::write_request(panel_of(found.station), *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);

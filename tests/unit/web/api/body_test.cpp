@@ -58,6 +58,19 @@ TEST(Body, PointsAtWhatIsNoJson) {
     EXPECT_EQ(registers_error("[1]"), "the body must be a JSON object");
 }
 
+TEST(Body, TakesAPointsValueAsItIs) {
+    using points::Value;
+    EXPECT_EQ(*value_of(R"({"value":true})"), Value(true));
+    EXPECT_EQ(*value_of(R"({"value":-5})"), Value(std::int64_t{-5}));
+    EXPECT_EQ(*value_of(R"({"value":18446744073709551615})"), Value(18446744073709551615u));
+    EXPECT_EQ(*value_of(R"({"value":1.5})"), Value(1.5));
+    EXPECT_EQ(*value_of(R"({"value":"Ok"})"), Value(std::string("Ok")));
+    EXPECT_EQ(value_of("{}").error().detail, "the body needs \"value\"");
+    for (const char* body : {R"({"value":null})", R"({"value":[1]})", R"({"value":{}})"}) {
+        EXPECT_EQ(value_of(body).error().detail, "value must be a number, true, false or a text");
+    }
+}
+
 TEST(Body, GivesMembersOfTheirKind) {
     const auto object = boost::json::parse(R"({"n":7.0,"t":"x"})").as_object();
     EXPECT_EQ(*number_member(object, "n", 0, 7), 7);
