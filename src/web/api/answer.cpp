@@ -4,6 +4,7 @@
 #include <boost/json/serialize.hpp>
 #include <chrono>
 #include <cstdlib>
+#include <utility>
 
 #include "panelgate/modbus/exception.hpp"
 

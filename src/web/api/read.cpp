@@ -1,5 +1,9 @@
 #include <algorithm>
 #include <boost/json/array.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "answer.hpp"
 #include "ask.hpp"

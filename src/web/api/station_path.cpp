@@ -1,5 +1,7 @@
 #include "station_path.hpp"
 
+#include <utility>
+
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/web/http/query.hpp"
 
