@@ -39,7 +39,8 @@ struct Reading {
 
 void append_values(Reading& reading, ByteView reply, const Items& part, ValueType type) {
     if (type == ValueType::boolean) {
-        for (const bool bit : modbus::bits_of(reply, part.count)) reading.values.push_back(bit);
+        for (const bool bit : modbus::bits_of(reply, part.span.count))
+            reading.values.push_back(bit);
         return;
     }
     for (const std::uint16_t value : modbus::registers_of(reply)) {
@@ -54,8 +55,8 @@ void append_values(Reading& reading, ByteView reply, const Items& part, ValueTyp
 /// The first table, the area's own or another that reaches it, whose read function the panel has.
 /// A table path is taken at its word: what the panel makes of it, its exception tells.
 Parsed<modbus::Table> table_to_read(const Items& items) {
-    if (items.area == nullptr || has_function(items.station, read_function(items.table))) {
-        return items.table;
+    if (items.area == nullptr || has_function(items.station, read_function(items.span.table))) {
+        return items.span.table;
     }
     for (const modbus::Table table : items.area->also) {
         if (has_function(items.station, read_function(table))) return table;
@@ -66,14 +67,15 @@ Parsed<modbus::Table> table_to_read(const Items& items) {
 json::object describe(const Items& items, Reading reading) {
     std::string notation;
     if (items.area != nullptr) {
-        notation = profile::format_notation(*items.area, items.address);
+        notation = profile::format_notation(*items.area, items.address());
     } else if (items.station.profile != nullptr) {
-        notation = profile::format_notation(*items.station.profile, items.table, items.address);
+        notation =
+            profile::format_notation(*items.station.profile, items.span.table, items.address());
     }
     json::object body;
     body["station"] = items.station.name;
-    body["table"] = label(items.table);
-    body["address"] = items.address;
+    body["table"] = label(items.span.table);
+    body["address"] = items.span.first;
     body["notation"] = nullptr;
     if (!notation.empty()) body["notation"] = notation;
     body["values"] = std::move(reading.values);
@@ -86,8 +88,7 @@ json::object describe(const Items& items, Reading reading) {
 bus::Request read_request(const Items& part) {
     bus::Request request;
     request.station = part.station.id;
-    request.pdu =
-        modbus::encode_read(part.table, part.address, static_cast<std::uint16_t>(part.count));
+    request.pdu = modbus::encode_read(part.span);
     request.priority = arbiter::PriorityClass::read;
     request.quantity = modbus::QuantityCheck::wide;
     return request;
@@ -109,21 +110,21 @@ std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, 
 }
 
 Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType type) {
-    const unsigned limit = max_count(items.station, read_function(items.table));
-    if (items.count > limit * kMaxTransactions) {
+    const unsigned limit = max_count(items.station, read_function(items.span.table));
+    if (items.span.count > limit * kMaxTransactions) {
         co_return to_response(
             problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));
     }
     Reading reading;
-    for (unsigned done = 0; done < items.count;) {
+    for (unsigned done = 0; done < items.span.count;) {
         Items part = items;
-        part.address = static_cast<std::uint16_t>(items.address + done);
-        part.count = std::min(limit, items.count - done);
+        part.span.first = items.span.first + done;
+        part.span.count = std::min(limit, items.span.count - done);
         bus::Request request = read_request(part);
         bus::Answer answer = co_await transact(caller, items.station.bus, std::move(request));
         const auto failed = take_answer(reading, answer, part, type);
         if (failed) co_return to_response(*failed);
-        done += part.count;
+        done += part.span.count;
     }
     co_return json_response(200, describe(items, std::move(reading)));
 }
@@ -133,7 +134,7 @@ Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType ty
 Handling get_table(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api);
     if (!items) co_return to_response(items.error());
-    const auto type = parse_type(request, items->table);
+    const auto type = parse_type(request, items->span.table);
     if (!type) co_return to_response(type.error());
     Handling reading = read_items(request.caller, std::move(*items), *type);
     HttpResponse response = co_await std::move(reading);
@@ -147,8 +148,8 @@ Handling get_device(HttpRequest request, const Api* api) {
     if (!range) co_return to_response(range.error());
     const auto table = table_to_read(*items);
     if (!table) co_return to_response(table.error());
-    items->table = *table;
-    const auto type = parse_type(request, items->table);
+    items->span.table = *table;
+    const auto type = parse_type(request, items->span.table);
     if (!type) co_return to_response(type.error());
     Handling reading = read_items(request.caller, std::move(*items), *type);
     HttpResponse response = co_await std::move(reading);

@@ -8,10 +8,6 @@
 namespace panelgate::web {
 namespace {
 
-constexpr modbus::Table kTables[] = {modbus::Table::coils, modbus::Table::discrete_inputs,
-                                     modbus::Table::input_registers,
-                                     modbus::Table::holding_registers};
-
 std::optional<unsigned> to_number(std::string_view text, int base) {
     unsigned number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
@@ -22,7 +18,7 @@ std::optional<unsigned> to_number(std::string_view text, int base) {
 }  // namespace
 
 Parsed<modbus::Table> parse_table(std::string_view word, unsigned status) {
-    for (const modbus::Table table : kTables) {
+    for (const modbus::Table table : modbus::kTables) {
         if (word == label(table)) return table;
     }
     return problem(status, "there is no table '" + std::string(word) +
@@ -67,13 +63,13 @@ Parsed<Items> items_of_table_path(const HttpRequest& request, const Api& api) {
     items.station = std::move(*station);
     const auto table = parse_table(request.arguments[1], 404);
     if (!table) return table.error();
-    items.table = *table;
+    items.span.table = *table;
     const auto address = parse_address(request.arguments[2]);
     if (!address) return address.error();
-    items.address = *address;
-    const auto count = query_number(request, "count", 1, 0x10000u - items.address, 1);
+    items.span.first = *address;
+    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
     if (!count) return count.error();
-    items.count = *count;
+    items.span.count = *count;
     return items;
 }
 
@@ -92,11 +88,11 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Api& api) {
         return problem(outside ? 422 : 404, item.error().message);
     }
     items.area = item->area;
-    items.table = item->area->table;
-    items.address = item->address;
-    const auto count = query_number(request, "count", 1, 0x10000u - items.address, 1);
+    items.span.table = item->area->table;
+    items.span.first = item->address;
+    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
     if (!count) return count.error();
-    items.count = *count;
+    items.span.count = *count;
     return items;
 }
 
@@ -112,13 +108,14 @@ bool has_function(const StationEntry& station, std::uint8_t function) {
 
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what) {
-    if (range.contains(items.address, items.count)) return {};
+    if (range.contains(items.span.first, items.span.count)) return {};
     const auto first =
         profile::format_notation(*items.area, static_cast<std::uint16_t>(range.first));
     const auto last = profile::format_notation(*items.area, static_cast<std::uint16_t>(range.last));
-    return problem(422, std::to_string(items.count) + " from " + items.area->name + " address " +
-                            std::to_string(items.address) + " is outside what is " +
-                            std::string(what) + ": " + first + " to " + last);
+    return problem(422, std::to_string(items.span.count) + " from " + items.area->name +
+                            " address " + std::to_string(items.span.first) +
+                            " is outside what is " + std::string(what) + ": " + first + " to " +
+                            last);
 }
 
 std::string meaning_of(const profile::PanelProfile* profile, std::uint8_t code) {

@@ -8,15 +8,15 @@
 #include "api.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::web {
 
 /// Items of one station that a request names.
 struct Items {
     StationEntry station;
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint16_t address = 0;  ///< 0-based, as on the wire
-    unsigned count = 1;         ///< address + count is at most 65536
+    modbus::Span span;  ///< none beyond the end of the table
+    std::uint16_t address() const { return static_cast<std::uint16_t>(span.first); }
     /// The piece of memory, when a notation named it; then the profile's ranges hold.
     const profile::Area* area = nullptr;
 };
@@ -38,7 +38,7 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Api& api);
 /// Items in one request with this function: the panel's limit, or the standard's.
 unsigned max_count(const StationEntry& station, std::uint8_t function);
 bool has_function(const StationEntry& station, std::uint8_t function);
-/// May [address, address + count) be used? 422 that names the range. `what` is "readable", …
+/// May the span be used? 422 that names the range. `what` is "readable", …
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what);
 /// The panel manual's word for an exception code, or "".
