@@ -13,18 +13,20 @@ const profile::PanelProfile& panel_of(const StationEntry& station) {
 
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what) {
-    if (range.contains(items.address, items.count)) return {};
+    if (range.contains(items.span.first, items.span.count)) return {};
     const auto first =
         profile::format_notation(*items.area, static_cast<std::uint16_t>(range.first));
     const auto last = profile::format_notation(*items.area, static_cast<std::uint16_t>(range.last));
-    return problem(422, std::to_string(items.count) + " from " + items.area->name + " address " +
-                            std::to_string(items.address) + " is outside what is " +
-                            std::string(what) + ": " + first + " to " + last);
+    return problem(422, std::to_string(items.span.count) + " from " + items.area->name +
+                            " address " + std::to_string(items.span.first) +
+                            " is outside what is " + std::string(what) + ": " + first + " to " +
+                            last);
 }
 
 Parsed<modbus::Table> table_to_read(const Items& items) {
-    if (items.area == nullptr || panel_of(items.station).has_function(read_function(items.table))) {
-        return items.table;
+    if (items.area == nullptr ||
+        panel_of(items.station).has_function(read_function(items.span.table))) {
+        return items.span.table;
     }
     for (const modbus::Table table : items.area->also) {
         if (panel_of(items.station).has_function(read_function(table))) return table;

@@ -107,19 +107,18 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api->directory);
     if (!items) co_return to_response(items.error());
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
-    if (modbus::is_bit_table(items->table) || items->count > kMost)
+    if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
     bus::Request made;
     made.station = items->station.id;
-    made.pdu =
-        modbus::encode_read(items->table, items->address, static_cast<std::uint16_t>(items->count));
+    made.pdu = modbus::encode_read(items->span);
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
     const auto failed = problem_of(answer, panel_of(items->station));
     if (failed) co_return to_response(*failed);
     const auto registers = modbus::registers_of(*answer.pdu);
     json::object body;
     body["station"] = items->station.name;
-    body["address"] = items->address;
+    body["address"] = items->span.first;
     body["raw"] = json::array(registers.begin(), registers.end());
     body["interpretations"] = describe(points::interpretations(registers));
     co_return json_response(200, body);

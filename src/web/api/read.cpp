@@ -44,7 +44,8 @@ struct Reading {
 
 void append_values(Reading& reading, ByteView reply, const Items& part, ValueType type) {
     if (type == ValueType::boolean) {
-        for (const bool bit : modbus::bits_of(reply, part.count)) reading.values.push_back(bit);
+        for (const bool bit : modbus::bits_of(reply, part.span.count))
+            reading.values.push_back(bit);
         return;
     }
     for (const std::uint16_t value : modbus::registers_of(reply)) {
@@ -59,14 +60,15 @@ void append_values(Reading& reading, ByteView reply, const Items& part, ValueTyp
 json::object describe(const Items& items, Reading reading) {
     std::string notation;
     if (items.area != nullptr) {
-        notation = profile::format_notation(*items.area, items.address);
+        notation = profile::format_notation(*items.area, items.address());
     } else if (items.station.profile != nullptr) {
-        notation = profile::format_notation(*items.station.profile, items.table, items.address);
+        notation =
+            profile::format_notation(*items.station.profile, items.span.table, items.address());
     }
     json::object body;
     body["station"] = items.station.name;
-    body["table"] = label(items.table);
-    body["address"] = items.address;
+    body["table"] = label(items.span.table);
+    body["address"] = items.span.first;
     body["notation"] = nullptr;
     if (!notation.empty()) body["notation"] = notation;
     body["values"] = std::move(reading.values);
@@ -79,8 +81,7 @@ json::object describe(const Items& items, Reading reading) {
 bus::Request read_request(const Items& part) {
     bus::Request request;
     request.station = part.station.id;
-    request.pdu =
-        modbus::encode_read(part.table, part.address, static_cast<std::uint16_t>(part.count));
+    request.pdu = modbus::encode_read(part.span);
     request.priority = arbiter::PriorityClass::read;
     request.quantity = modbus::QuantityCheck::wide;
     return request;
@@ -100,23 +101,23 @@ std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, 
 
 Handling read_items(HttpRequest request, Parsed<Items> items) {
     if (!items) co_return to_response(items.error());
-    const auto type = parse_type(request, items->table);
+    const auto type = parse_type(request, items->span.table);
     if (!type) co_return to_response(type.error());
-    const unsigned limit = panel_of(items->station).max_count(read_function(items->table));
-    if (items->count > limit * kMaxTransactions) {
+    const unsigned limit = panel_of(items->station).max_count(read_function(items->span.table));
+    if (items->span.count > limit * kMaxTransactions) {
         co_return to_response(
             problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));
     }
     Reading reading;
-    for (unsigned done = 0; done < items->count;) {
+    for (unsigned done = 0; done < items->span.count;) {
         Items part = *items;
-        part.address = static_cast<std::uint16_t>(items->address + done);
-        part.count = std::min(limit, items->count - done);
+        part.span.first = items->span.first + done;
+        part.span.count = std::min(limit, items->span.count - done);
         bus::Request made = read_request(part);
         bus::Answer answer = co_await ask(request.caller, part.station.bus, std::move(made));
         const auto failed = take_answer(reading, answer, part, *type);
         if (failed) co_return to_response(*failed);
-        done += part.count;
+        done += part.span.count;
     }
     co_return json_response(200, describe(*items, std::move(reading)));
 }
@@ -129,7 +130,7 @@ Parsed<Items> device_to_read(const HttpRequest& request, const Directory& direct
     if (!range) return range.error();
     const auto table = table_to_read(*items);
     if (!table) return table.error();
-    items->table = *table;
+    items->span.table = *table;
     return items;
 }
 

@@ -6,16 +6,9 @@
 #include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
-namespace {
-
-constexpr modbus::Table kTables[] = {modbus::Table::coils, modbus::Table::discrete_inputs,
-                                     modbus::Table::input_registers,
-                                     modbus::Table::holding_registers};
-
-}  // namespace
 
 Parsed<modbus::Table> parse_table(std::string_view word, unsigned status) {
-    for (const modbus::Table table : kTables) {
+    for (const modbus::Table table : modbus::kTables) {
         if (word == label(table)) return table;
     }
     return problem(status, "there is no table '" + std::string(word) +
@@ -50,13 +43,13 @@ Parsed<Items> items_of_table_path(const HttpRequest& request, const Directory& d
     items.station = std::move(*station);
     const auto table = parse_table(request.arguments[1], 404);
     if (!table) return table.error();
-    items.table = *table;
+    items.span.table = *table;
     const auto address = parse_address(request.arguments[2]);
     if (!address) return address.error();
-    items.address = *address;
-    const auto count = query_number(request, "count", 1, 0x10000u - items.address, 1);
+    items.span.first = *address;
+    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
     if (!count) return count.error();
-    items.count = *count;
+    items.span.count = *count;
     return items;
 }
 
@@ -75,11 +68,11 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Directory& 
         return problem(outside ? 422 : 404, item.error().message);
     }
     items.area = item->area;
-    items.table = item->area->table;
-    items.address = item->address;
-    const auto count = query_number(request, "count", 1, 0x10000u - items.address, 1);
+    items.span.table = item->area->table;
+    items.span.first = item->address;
+    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
     if (!count) return count.error();
-    items.count = *count;
+    items.span.count = *count;
     return items;
 }
 

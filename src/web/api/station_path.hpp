@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/span.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -15,9 +16,8 @@ namespace panelgate::web {
 /// Items of one station that a request names.
 struct Items {
     StationEntry station;
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint16_t address = 0;  ///< 0-based, as on the wire
-    unsigned count = 1;         ///< address + count is at most 65536
+    modbus::Span span;  ///< none beyond the end of the table
+    std::uint16_t address() const { return static_cast<std::uint16_t>(span.first); }
     /// The piece of memory, when a notation named it; then the profile's ranges hold.
     const profile::Area* area = nullptr;
 };

@@ -25,8 +25,8 @@ Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
     if (items.station.read_only) {
         return problem(403, "station '" + items.station.name + "' is read-only");
     }
-    if (!is_writable(items.table)) return not_writable(items.table);
-    const auto cells = cells_of(body, items.table);
+    if (!is_writable(items.span.table)) return not_writable(items.span.table);
+    const auto cells = cells_of(body, items.span.table);
     if (!cells) return cells.error();
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();
@@ -53,8 +53,8 @@ Parsed<Items> device_to_write(const HttpRequest& request, const Directory& direc
     if (!items) return items;
     const auto& also = items->area->also;
     const auto writable = std::ranges::find_if(also, is_writable);
-    if (!is_writable(items->table) && writable != also.end()) items->table = *writable;
-    if (is_writable(items->table) && !items->area->writable) {
+    if (!is_writable(items->span.table) && writable != also.end()) items->span.table = *writable;
+    if (is_writable(items->span.table) && !items->area->writable) {
         return problem(422, items->area->name + " is read-only in this panel");
     }
     return items;

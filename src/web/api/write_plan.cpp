@@ -12,20 +12,20 @@ namespace {
 /// With the items that are really written.
 Parsed<void> check_area(Items items, std::size_t count) {
     if (items.area == nullptr) return {};
-    items.count = static_cast<unsigned>(count);
+    items.span.count = static_cast<unsigned>(count);
     return check_range(items, *items.area->writable, "writable");
 }
 
 }  // namespace
 
 Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& cells) {
-    if (cells.size() > 0x10000u - items.address) {
+    if (cells.size() > modbus::kTableItems - items.span.first) {
         return problem(422, "these values go beyond address 65535");
     }
     const auto range = check_area(items, cells.size());
     if (!range) return range.error();
     const profile::PanelProfile& panel = panel_of(items.station);
-    const auto functions = write_functions(items.table, cells.size());
+    const auto functions = write_functions(items.span.table, cells.size());
     for (const std::uint8_t function : functions) {
         if (!panel.has_function(function)) continue;
         const unsigned limit = panel.max_count(function);
@@ -33,11 +33,11 @@ Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& c
             return problem(422, "at most " + std::to_string(limit) +
                                     " values in one write; writes are not split");
         }
-        return encode_write(function, items.address, cells);
+        return encode_write(function, items.address(), cells);
     }
     return problem(422, "the panel has no function " + upper_hex({&functions.back(), 1}) + " for " +
                             std::to_string(cells.size()) + " of its " +
-                            std::string(label(items.table)));
+                            std::string(label(items.span.table)));
 }
 
 std::vector<std::uint8_t> write_functions(modbus::Table table, std::size_t count) {

@@ -15,7 +15,7 @@ class PanelLimits : public ::testing::Test {
         area.table = Table::input_registers;
         area.also = {Table::coils, Table::holding_registers};
         items.station.profile = &panel;
-        items.table = area.table;
+        items.span.table = area.table;
         items.area = &area;
     }
     void give_functions(std::initializer_list<std::uint8_t> codes) {
@@ -27,10 +27,10 @@ class PanelLimits : public ::testing::Test {
 };
 
 TEST_F(PanelLimits, NameTheRangeThatIsLeft) {
-    items.address = 98;
-    items.count = 2;
+    items.span.first = 98;
+    items.span.count = 2;
     EXPECT_TRUE(check_range(items, {0, 99}, "readable"));
-    items.count = 3;
+    items.span.count = 3;
     const auto beyond = check_range(items, {0, 99}, "readable");
     ASSERT_FALSE(beyond);
     EXPECT_EQ(beyond.error().status, 422u);

@@ -77,9 +77,9 @@ TEST_F(Paths, NameItemsOfATable) {
     const auto items = items_of_table_path(path({"press", "coils", "0x10"}, "3"), directory);
     ASSERT_TRUE(items);
     EXPECT_EQ(items->station.name, "press");
-    EXPECT_EQ(items->table, Table::coils);
-    EXPECT_EQ(items->address, 16u);
-    EXPECT_EQ(items->count, 3u);
+    EXPECT_EQ(items->span.table, Table::coils);
+    EXPECT_EQ(items->span.first, 16u);
+    EXPECT_EQ(items->span.count, 3u);
     EXPECT_EQ(items->area, nullptr);
 }
 
@@ -98,7 +98,8 @@ TEST_F(Paths, AreWrongFromTheLeftToTheRight) {
 }
 
 TEST_F(Paths, EndWhereAddressesEnd) {
-    EXPECT_EQ(items_of_table_path(path({"press", "coils", "65535"}, "1"), directory)->count, 1u);
+    EXPECT_EQ(items_of_table_path(path({"press", "coils", "65535"}, "1"), directory)->span.count,
+              1u);
     const auto beyond = items_of_table_path(path({"press", "coils", "65535"}, "2"), directory);
     ASSERT_FALSE(beyond);
     EXPECT_EQ(beyond.error().detail, "count must be a whole number from 1 to 1");
@@ -108,8 +109,8 @@ TEST_F(Paths, NameItemsInTheVendorsNotation) {
     const auto items = items_of_device_path(path({"press", "uw100"}, "2"), directory);
     ASSERT_TRUE(items);
     EXPECT_EQ(items->area, &panel.areas[0]);
-    EXPECT_EQ(items->table, Table::holding_registers);
-    EXPECT_EQ(items->address, 100u);
+    EXPECT_EQ(items->span.table, Table::holding_registers);
+    EXPECT_EQ(items->span.first, 100u);
     EXPECT_EQ(refusal(items_of_device_path(path({"press", "XY1"}), directory)), 404u);
     EXPECT_EQ(refusal(items_of_device_path(path({"press", "UW70000"}), directory)), 422u);
 }

@@ -23,8 +23,8 @@ class WritePlan : public ::testing::Test {
         Items made;
         made.station.name = "press";
         made.station.profile = &panel;
-        made.table = table;
-        made.address = address;
+        made.span.table = table;
+        made.span.first = address;
         return made;
     }
     static std::string pdu(const Items& items, const Cells& cells) {
