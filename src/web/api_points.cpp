@@ -60,9 +60,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
         return problem(403, "station '" + found.station.name + "' is read-only");
     auto value = value_member(body);
     if (!value) return value.error();
-    static const profile::PanelProfile kStandard;
-    const auto& profile = found.station.profile != nullptr ? *found.station.profile : kStandard;
-    auto pdu = points::write_request(profile, *found.point, *value);
+    auto pdu = points::write_request(*found.station.profile, *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
     bus::Request made;
     made.station = found.station.id;
@@ -115,7 +113,7 @@ Handling put_point(HttpRequest request, const Api* api) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await transact(request.caller, found->station.bus, std::move(made));
-    co_return write_answer(answer, found->station.profile);
+    co_return write_answer(answer, *found->station.profile);
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
@@ -132,7 +130,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     if (!answer.pdu) co_return to_response(problem_of(answer.pdu.error(), answer.transmitted));
     if (const auto code = modbus::exception_of(*answer.pdu)) {
         const Problem refused =
-            problem_of_exception(*code, meaning_of(items->station.profile, *code));
+            problem_of_exception(*code, meaning_of(*items->station.profile, *code));
         co_return to_response(refused);
     }
     const auto registers = modbus::registers_of(*answer.pdu);

@@ -67,7 +67,7 @@ json::object describe(const Items& items, Reading reading) {
     std::string notation;
     if (items.area != nullptr) {
         notation = profile::format_notation(*items.area, items.address);
-    } else if (items.station.profile != nullptr) {
+    } else if (!items.station.unknown_panel) {
         notation = profile::format_notation(*items.station.profile, items.table, items.address);
     }
     json::object body;
@@ -97,7 +97,7 @@ std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, 
                                    ValueType type) {
     if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
     if (const auto code = modbus::exception_of(*answer.pdu)) {
-        return problem_of_exception(*code, meaning_of(part.station.profile, *code));
+        return problem_of_exception(*code, meaning_of(*part.station.profile, *code));
     }
     append_values(reading, *answer.pdu, part, type);
     ++reading.transactions;

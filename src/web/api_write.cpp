@@ -65,12 +65,12 @@ Handling write_items(HttpRequest request, Items items) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await transact(request.caller, items.station.bus, std::move(made));
-    co_return write_answer(answer, items.station.profile);
+    co_return write_answer(answer, *items.station.profile);
 }
 
 }  // namespace
 
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile* profile) {
+HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile) {
     if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
     if (const auto code = modbus::exception_of(*answer.pdu)) {
         return to_response(problem_of_exception(*code, meaning_of(profile, *code)));

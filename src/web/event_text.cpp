@@ -24,7 +24,7 @@ json::object point_json(const points::Point& point, const points::PointReading& 
     return object;
 }
 
-std::string point_event(const StationEntry& station, const points::Point& point,
+std::string point_event(const bus::StationRef& station, const points::Point& point,
                         const points::PointReading& reading) {
     json::object object = point_json(point, reading);
     object["line"] = station.line;

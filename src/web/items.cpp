@@ -82,7 +82,7 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Api& api) {
     auto station = find_station(api, request.arguments[0]);
     if (!station) return station.error();
     items.station = std::move(*station);
-    if (items.station.profile == nullptr) {
+    if (items.station.unknown_panel) {
         return problem(422, "station '" + items.station.name +
                                 "' has no profile that explains notations; read its tables");
     }
@@ -101,13 +101,11 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Api& api) {
 }
 
 unsigned max_count(const StationEntry& station, std::uint8_t function) {
-    static const profile::PanelProfile kStandard;
-    const auto& profile = station.profile != nullptr ? *station.profile : kStandard;
-    return std::max(1u, profile.max_count(function));
+    return std::max(1u, station.profile->max_count(function));
 }
 
 bool has_function(const StationEntry& station, std::uint8_t function) {
-    return station.profile == nullptr || station.profile->find_function(function) != nullptr;
+    return station.profile->find_function(function) != nullptr;
 }
 
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
@@ -121,9 +119,8 @@ Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                             std::string(what) + ": " + first + " to " + last);
 }
 
-std::string meaning_of(const profile::PanelProfile* profile, std::uint8_t code) {
-    if (profile == nullptr) return {};
-    for (const profile::ExceptionMeaning& exception : profile->exceptions) {
+std::string meaning_of(const profile::PanelProfile& profile, std::uint8_t code) {
+    for (const profile::ExceptionMeaning& exception : profile.exceptions) {
         if (exception.code == code) return exception.meaning;
     }
     return {};

@@ -42,7 +42,7 @@ bool has_function(const StationEntry& station, std::uint8_t function);
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what);
 /// The panel manual's word for an exception code, or "".
-std::string meaning_of(const profile::PanelProfile* profile, std::uint8_t code);
+std::string meaning_of(const profile::PanelProfile& profile, std::uint8_t code);
 /// "1F 01 FF"
 std::string upper_hex(ByteView bytes, std::string_view separator = " ");
 

@@ -7,6 +7,6 @@
 namespace panelgate::web {
 
 /// What a client is told of its write.
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile* profile);
+HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile);
 
 }  // namespace panelgate::web
