@@ -4,7 +4,6 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
-#include "panel_limits.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "station_path.hpp"
@@ -20,7 +19,7 @@ std::uint8_t broadcast_function(const Directory& directory, const LineEntry& lin
                                 const std::vector<std::uint8_t>& functions) {
     const auto takers = [&](std::uint8_t function) {
         return std::ranges::count_if(directory.stations, [&](const StationEntry& station) {
-            if (station.line != line.name || station.profile == nullptr) return false;
+            if (station.line != line.name) return false;
             const auto* rule = station.profile->find_function(function);
             return rule != nullptr && rule->broadcast;
         });
@@ -62,7 +61,7 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
 
     const auto functions = write_functions(*table, cells->size());
     const std::uint8_t function = broadcast_function(directory, line, functions);
-    const unsigned limit = panel_of({}).max_count(function);
+    const unsigned limit = directory.generic->max_count(function);
     if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
         return problem(422, "at most " + std::to_string(limit) +
                                 " values in one broadcast, up to address 65535");

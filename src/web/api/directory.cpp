@@ -41,6 +41,8 @@ std::optional<StationEntry> Directory::find_station(std::string_view name) const
     unlisted.line = line->name;
     unlisted.id = *id;
     unlisted.bus = line->bus;
+    unlisted.profile = generic;
+    unlisted.unknown_panel = true;
     return unlisted;
 }
 

@@ -7,7 +7,7 @@
 namespace panelgate::web {
 namespace json = boost::json;
 
-std::string point_event(const StationEntry& station, const points::Point& point,
+std::string point_event(const bus::StationRef& station, const points::Point& point,
                         const points::PointReading& reading) {
     json::object object = point_json(point, reading);
     object["line"] = station.line;

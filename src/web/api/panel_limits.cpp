@@ -6,11 +6,6 @@
 
 namespace panelgate::web {
 
-const profile::PanelProfile& panel_of(const StationEntry& station) {
-    static const profile::PanelProfile kStandard;
-    return station.profile != nullptr ? *station.profile : kStandard;
-}
-
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what) {
     if (range.contains(items.span.first, items.span.count)) return {};
@@ -25,11 +20,11 @@ Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
 
 Parsed<modbus::Table> table_to_read(const Items& items) {
     if (items.area == nullptr ||
-        panel_of(items.station).has_function(read_function(items.span.table))) {
+        items.station.profile->has_function(read_function(items.span.table))) {
         return items.span.table;
     }
     for (const modbus::Table table : items.area->also) {
-        if (panel_of(items.station).has_function(read_function(table))) return table;
+        if (items.station.profile->has_function(read_function(table))) return table;
     }
     return problem(422, "the panel has no function that reads " + items.area->name);
 }

@@ -9,9 +9,6 @@
 
 namespace panelgate::web {
 
-/// The station's profile; of a panel that nothing is known of, what the standard has.
-const profile::PanelProfile& panel_of(const StationEntry& station);
-
 /// May these items of an area be used? 422 that names the range. `what` is "readable", …
 Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
                          std::string_view what);

@@ -4,7 +4,6 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
-#include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -47,7 +46,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
         return problem(403, "station '" + found.station.name + "' is read-only");
     const auto value = value_of(body);
     if (!value) return value.error();
-    auto pdu = points::write_request(panel_of(found.station), *found.point, *value);
+    auto pdu = points::write_request(*found.station.profile, *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
     bus::Request made;
     made.station = found.station.id;
@@ -100,7 +99,7 @@ Handling put_point(HttpRequest request, const Api* api) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
-    co_return write_answer(answer, panel_of(found->station));
+    co_return write_answer(answer, *found->station.profile);
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
@@ -113,7 +112,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     made.station = items->station.id;
     made.pdu = modbus::encode_read(items->span);
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
-    const auto failed = problem_of(answer, panel_of(items->station));
+    const auto failed = problem_of(answer, *items->station.profile);
     if (failed) co_return to_response(*failed);
     const auto registers = modbus::registers_of(*answer.pdu);
     json::object body;

@@ -61,7 +61,7 @@ json::object describe(const Items& items, Reading reading) {
     std::string notation;
     if (items.area != nullptr) {
         notation = profile::format_notation(*items.area, items.address());
-    } else if (items.station.profile != nullptr) {
+    } else if (!items.station.unknown_panel) {
         notation =
             profile::format_notation(*items.station.profile, items.span.table, items.address());
     }
@@ -89,7 +89,7 @@ bus::Request read_request(const Items& part) {
 
 std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
                                    ValueType type) {
-    if (auto failed = problem_of(answer, panel_of(part.station))) return failed;
+    if (auto failed = problem_of(answer, *part.station.profile)) return failed;
     append_values(reading, *answer.pdu, part, type);
     ++reading.transactions;
     if (answer.source == bus::Source::cache) {
@@ -103,7 +103,7 @@ Handling read_items(HttpRequest request, Parsed<Items> items) {
     if (!items) co_return to_response(items.error());
     const auto type = parse_type(request, items->span.table);
     if (!type) co_return to_response(type.error());
-    const unsigned limit = panel_of(items->station).max_count(read_function(items->span.table));
+    const unsigned limit = items->station.profile->max_count(read_function(items->span.table));
     if (items->span.count > limit * kMaxTransactions) {
         co_return to_response(
             problem(422, "at most " + std::to_string(limit * kMaxTransactions) + " at once"));

@@ -58,7 +58,7 @@ Parsed<Items> items_of_device_path(const HttpRequest& request, const Directory& 
     auto station = find_station(directory, request.arguments[0]);
     if (!station) return station.error();
     items.station = std::move(*station);
-    if (items.station.profile == nullptr) {
+    if (items.station.unknown_panel) {
         return problem(422, "station '" + items.station.name +
                                 "' has no profile that explains notations; read its tables");
     }

@@ -16,7 +16,7 @@ json::object describe(const StationEntry& station) {
     object["line"] = station.line;
     object["id"] = station.id;
     object["profile"] = nullptr;
-    if (station.profile != nullptr) object["profile"] = station.profile->name;
+    if (!station.unknown_panel) object["profile"] = station.profile->name;
     object["unit"] = nullptr;
     if (station.unit) object["unit"] = *station.unit;
     object["state"] = status.state;

@@ -7,7 +7,6 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
-#include "panel_limits.hpp"
 #include "station_path.hpp"
 #include "write_plan.hpp"
 
@@ -44,7 +43,7 @@ Handling write_items(HttpRequest request, Parsed<Items> items) {
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
-    co_return write_answer(answer, panel_of(items->station));
+    co_return write_answer(answer, *items->station.profile);
 }
 
 /// A notation names memory: any table that reaches it and can be written will do.

@@ -24,7 +24,7 @@ Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& c
     }
     const auto range = check_area(items, cells.size());
     if (!range) return range.error();
-    const profile::PanelProfile& panel = panel_of(items.station);
+    const profile::PanelProfile& panel = *items.station.profile;
     const auto functions = write_functions(items.span.table, cells.size());
     for (const std::uint8_t function : functions) {
         if (!panel.has_function(function)) continue;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/bus/station_ref.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
@@ -29,20 +30,20 @@ struct SimulatedPanel {
     std::function<std::optional<std::string>(const std::map<std::string, double>&)> set_faults;
 };
 
-struct StationEntry {
-    std::string name;  ///< "LINE:ID" for a station that the configuration does not list
-    std::string line;
-    std::uint8_t id = 0;
-    const profile::PanelProfile* profile = nullptr;  ///< null: nothing is known of the panel
+struct StationEntry : bus::StationRef {
+    const profile::PanelProfile* profile = nullptr;  ///< never null; outlives the directory
+    /// Nobody has said what panel it is: `profile` is `generic`, and not shown as the panel's.
+    bool unknown_panel = false;
     bool read_only = false;
-    std::optional<int> unit;        ///< the unit id that Modbus/TCP clients use, when there is one
-    bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
+    std::optional<int> unit;  ///< the unit id that Modbus/TCP clients use, when there is one
     const points::StationPoints* points = nullptr;    ///< null without any; outlives the directory
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 
-/// What the API serves. Filled at load; may be changed between requests of the one thread.
+/// What the API serves: the view that it needs of the plant. Filled at load; may be changed between
+/// requests of the one thread.
 struct Directory {
+    const profile::PanelProfile* generic = nullptr;  ///< of stations that nobody has listed
     std::vector<LineEntry> lines;
     std::vector<StationEntry> stations;
 

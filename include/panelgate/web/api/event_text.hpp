@@ -5,14 +5,14 @@
 #include <string_view>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/bus/station_ref.hpp"
 #include "panelgate/points/station_points.hpp"
-#include "panelgate/web/api/directory.hpp"
 
 namespace panelgate::web {
 
 // The data of events, one line of JSON each.
 
-std::string point_event(const StationEntry& station, const points::Point& point,
+std::string point_event(const bus::StationRef& station, const points::Point& point,
                         const points::PointReading& reading);
 std::string line_event(std::string_view line, std::string_view state, std::string_view why);
 std::string station_event(std::string_view line, std::string_view station, std::string_view what);

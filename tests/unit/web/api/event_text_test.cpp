@@ -6,7 +6,7 @@ namespace panelgate::web {
 namespace {
 
 TEST(EventText, TellsAPointAsRestDoesAndWhoseItIs) {
-    StationEntry station;
+    bus::StationRef station;
     station.name = "press";
     station.line = "floor1";
     points::Point point;

@@ -9,6 +9,7 @@
 
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/profile/load_profile.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "support/fake_bus.hpp"
 #include "support/http_client.hpp"
@@ -52,8 +53,9 @@ inline profile::PanelProfile test_profile() {
     return profile;
 }
 
-/// A server on loopback with a line floor1: press (31, with test_profile), meter (5, read-only, no
-/// profile). Line floor2 has the same bus and refuses unlisted stations.
+/// A server on loopback with a line floor1: press (31, with test_profile), meter (5, read-only, of
+/// which nobody knows what panel it is). Line floor2 has the same bus and refuses unlisted
+/// stations.
 class HttpRig : public ::testing::Test {
   protected:
     HttpRig() : bus(io.get_executor()), panel(test_profile()) {
@@ -61,8 +63,12 @@ class HttpRig : public ::testing::Test {
         settings.anonymous = Role::operator_;
         directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
         directory.lines.push_back({"floor2", "/dev/ttyUSB1", &bus, false});
-        directory.stations.push_back(
-            {"press", "floor1", 31, &panel, false, 101, &bus, nullptr, {}});
+        directory.generic = shipped.find("generic");
+        StationEntry press;
+        static_cast<bus::StationRef&>(press) = {"press", "floor1", 31, &bus};
+        press.profile = &panel;
+        press.unit = 101;
+        directory.stations.push_back(std::move(press));
         bus.script = [](const bus::Request& request) { return answer_from_addresses(request); };
     }
     ~HttpRig() override {
@@ -71,8 +77,12 @@ class HttpRig : public ::testing::Test {
     }
 
     void add_meter() {
-        directory.stations.push_back(
-            {"meter", "floor1", 5, nullptr, true, std::nullopt, &bus, nullptr, {}});
+        StationEntry meter;
+        static_cast<bus::StationRef&>(meter) = {"meter", "floor1", 5, &bus};
+        meter.profile = directory.generic;
+        meter.unknown_panel = true;
+        meter.read_only = true;
+        directory.stations.push_back(std::move(meter));
     }
     Server& start() {
         Providers providers;
@@ -122,6 +132,7 @@ class HttpRig : public ::testing::Test {
 
     boost::asio::io_context io;
     test::FakeBus bus;
+    profile::Catalogue shipped = profile::Catalogue::shipped();
     profile::PanelProfile panel;
     Directory directory;
     Settings settings;

@@ -63,13 +63,5 @@ TEST_F(PanelLimits, TakeATablePathAtItsWord) {
     EXPECT_EQ(*table_to_read(items), Table::input_registers);
 }
 
-TEST_F(PanelLimits, AreTheStandardsOfAPanelThatNobodyKnows) {
-    const profile::PanelProfile& unknown = panel_of({});
-    EXPECT_TRUE(unknown.has_function(3));
-    EXPECT_EQ(unknown.max_count(3), 125u);
-    EXPECT_EQ(unknown.max_count(5), 1u);
-    EXPECT_EQ(&panel_of(items.station), &panel);
-}
-
 }  // namespace
 }  // namespace panelgate::web

@@ -50,6 +50,7 @@ class Paths : public ::testing::Test {
         area.name = "UW";
         area.notation.prefix = "UW";
         area.readable = {0, 999};
+        directory.generic = &generic;
         directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
         StationEntry press;
         press.name = "press";
@@ -70,6 +71,7 @@ class Paths : public ::testing::Test {
     boost::asio::io_context io;
     test::FakeBus bus;
     profile::PanelProfile panel;
+    profile::PanelProfile generic;
     Directory directory;
 };
 
@@ -86,6 +88,7 @@ TEST_F(Paths, NameItemsOfATable) {
 TEST_F(Paths, FindAStationByLineAndId) {
     EXPECT_EQ(find_station(directory, "floor1:31")->name, "press");
     EXPECT_EQ(find_station(directory, "floor1:7")->name, "floor1:7");
+    EXPECT_EQ(find_station(directory, "floor1:7")->profile, &generic);
     EXPECT_EQ(find_station(directory, "floor2:7").error().detail, "there is no station 'floor2:7'");
     EXPECT_EQ(find_line(directory, "floor2").error().detail, "there is no line 'floor2'");
 }

@@ -48,7 +48,7 @@ TEST_F(WritePlan, WritesOneByTheMultipleFunctionWhereThereIsNoOther) {
     EXPECT_EQ(pdu(items(Table::holding_registers, 0, {3, 16}), {5}), "10 00 00 00 01 02 00 05");
 }
 
-TEST_F(WritePlan, TakesAPanelThatNobodyKnowsForOneOfTheStandard) {
+TEST_F(WritePlan, KeepsToTheStandardWhereTheProfileSaysNothing) {
     Items unknown = items(Table::holding_registers, 0, {});
     EXPECT_EQ(pdu(unknown, {5}), "06 00 00 00 05");
     EXPECT_EQ(pdu(unknown, Cells(123)).substr(0, 14), "10 00 00 00 7b");
