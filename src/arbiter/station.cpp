@@ -145,9 +145,9 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         not_before_ = std::max(not_before_, now + copies_.take_doubt());
     }
     if (!group.span || exception) return result;
-    std::uint32_t& longest = longest_read_.at(group.span->function);
+    std::uint32_t& longest = longest_read_[static_cast<std::size_t>(group.span->table)];
     longest = std::max(longest, group.span->count);
-    const auto cheapest = read_span(0, cheapest_read_);
+    const auto cheapest = modbus::read_span(cheapest_read_);
     if (!cheapest || group.span->count < cheapest->count) cheapest_read_ = group.pdu;
     return result;
 }
@@ -232,10 +232,6 @@ Bytes Station::probe_pdu() const {
     if (!cheapest_read_.empty()) return cheapest_read_;
     if (!last_read_.empty()) return last_read_;
     return modbus::encode_read(modbus::Table::holding_registers, 0, 1);
-}
-
-std::uint32_t Station::longest_read(std::uint8_t function) const {
-    return function < longest_read_.size() ? longest_read_[function] : 0;
 }
 
 }  // namespace panelgate::arbiter
