@@ -72,25 +72,24 @@ std::unique_ptr<points::Poller> House::make_poller() {
         points::PolledStation station;
         station.id = plan_.line.panels[i].id;
         station.wants = {
-            {modbus::Table::holding_registers, kPolled, kPolledCount, plan_.polled[i]}};
+            {{modbus::Table::holding_registers, kPolled, kPolledCount}, plan_.polled[i]}};
         station.limits =
             points::make_plan_limits(profile::PanelProfile(), plan_.line.settings.serial,
                                      plan_.line.settings.unlisted.frame_gap.value_or(2ms));
-        polled_.push_back(station.id);
         stations.push_back(std::move(station));
     }
     auto poller = std::make_unique<points::Poller>(clock_, seam_, std::move(stations));
-    poller->on_update([this](std::size_t station, const std::vector<std::size_t>& wants) {
+    poller->on_update([this](std::uint8_t station, const std::vector<std::size_t>& wants) {
         judge_poll(station, wants);
     });
     return poller;
 }
 
-void House::judge_poll(std::size_t station, const std::vector<std::size_t>& wants) {
+void House::judge_poll(std::uint8_t station, const std::vector<std::size_t>& wants) {
     for (const std::size_t want : wants) {
-        const points::Reading& reading = poller_->station(station).reading(want);
+        const points::Reading& reading = poller_->find(station)->reading(want);
         if (reading.sampled)
-            judge_.judge_values(polled_[station], kPolled, reading.values, *reading.sampled);
+            judge_.judge_values(station, kPolled, reading.values, *reading.sampled);
     }
 }
 

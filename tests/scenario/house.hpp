@@ -47,7 +47,7 @@ class House {
     std::shared_ptr<tcp_server::Shared> make_shared_state();
     std::unique_ptr<points::Poller> make_poller();
     std::vector<points::RelayRoute> routes();
-    void judge_poll(std::size_t station, const std::vector<std::size_t>& wants);
+    void judge_poll(std::uint8_t station, const std::vector<std::size_t>& wants);
 
     void settle();
     bool step(TimePoint until);
@@ -69,7 +69,6 @@ class House {
     bus::Bus bus_;
     HouseSeam seam_;
     HouseClients clients_;
-    std::vector<std::uint8_t> polled_;  ///< ids, by the poller's order
     std::unique_ptr<points::Poller> poller_;
     points::Relays relays_;
     bool asleep_ = false;  ///< nobody runs the loop
