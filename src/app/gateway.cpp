@@ -51,8 +51,10 @@ bus::Settings bus_settings(const config::Line& line) {
     settings.device = line.device.device;
     settings.arbiter = line.arbiter;
     for (const config::Station& station : line.stations) {
-        settings.stations[station.id] = station.name;
-        if (station.guard) settings.guards[station.id] = guard_of(*station.profile);
+        bus::StationSettings& made = settings.stations[station.id];
+        made.name = station.name;
+        made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
+        if (station.guard) made.guard = guard_of(*station.profile);
     }
     return settings;
 }

@@ -50,6 +50,7 @@ struct Bus::State final : public line::Line::Events,
         : settings(std::move(s)),
           line(std::move(l)),
           arbiter(settings.arbiter),
+          rights(settings.stations),
           counters(settings.stations),
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
@@ -62,8 +63,7 @@ struct Bus::State final : public line::Line::Events,
     void on_bytes(ByteView bytes) override;
 
     void transact(Request request, AnswerHandler handler);
-    std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
-    void refuse(Pending pending, Fault fault);
+    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void pump();
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
@@ -89,6 +89,7 @@ struct Bus::State final : public line::Line::Events,
     Settings settings;
     std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
+    Rights rights;
     RequestCounters counters;
     FlightRecorder recorder;
     DecisionRecorder decisions;
@@ -142,10 +143,9 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (const auto code = guarded(request)) {
-        Answer refused;
-        refused.pdu = modbus::encode_exception(function, *code);
-        return answer(std::move(entry), std::move(refused));
+    if (auto refusal = rights.judge(request.station, request.pdu)) {
+        Result<Bytes> reply = answer_to(*refusal, function);
+        return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     line->poll_input();
     arbiter::Job job;
@@ -163,18 +163,10 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     pump();
 }
 
-/// Why the panel's profile rules this request out, when its station is guarded.
-std::optional<modbus::ExceptionCode> Bus::State::guarded(const Request& request) const {
-    const auto guard = settings.guards.find(request.station);
-    if (guard == settings.guards.end()) return std::nullopt;
-    const auto code = guard->second(request.pdu);
-    if (!code) return std::nullopt;
-    return static_cast<modbus::ExceptionCode>(*code);
-}
-
-void Bus::State::refuse(Pending entry, Fault fault) {
+void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
     Answer refused;
-    refused.pdu = fault;
+    refused.pdu = std::move(pdu);
+    refused.refusal = std::move(refusal);
     answer(std::move(entry), std::move(refused));
 }
 
@@ -376,6 +368,10 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     status.state = label(health.state());
     if (const auto last = health.last_success()) status.last_success = rt::now() - *last;
     return status;
+}
+
+std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
+    return state_->rights.judge_write(station);
 }
 
 std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }

@@ -68,12 +68,8 @@ void LineDoctor::judge(TimePoint now, const arbiter::Arbiter& arbiter, line::Lin
 
 void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
     const std::string cause(code(finding.cause));
-    std::string station = "all";
-    if (finding.station) {
-        const auto named = settings_.stations.find(*finding.station);
-        station =
-            named == settings_.stations.end() ? std::to_string(*finding.station) : named->second;
-    }
+    const std::string station =
+        finding.station ? name_of(settings_.stations, *finding.station) : "all";
     if (is_new) {
         rt::log(rt::LogLevel::warn, "line finding",
                 {{"line", settings_.name},

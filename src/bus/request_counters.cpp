@@ -19,10 +19,10 @@ std::string outcome_of(const Answer& answer) {
     return answer.shared ? "shared" : "ok";
 }
 
-RequestCounters::RequestCounters(const std::map<std::uint8_t, std::string>& stations) {
+RequestCounters::RequestCounters(const Stations& stations) {
     stations_[0].station = "other";
-    for (const auto& [id, name] : stations) {
-        stations_[id].station = name;
+    for (const auto& [id, station] : stations) {
+        stations_[id].station = station.name;
         stations_[id].configured = true;
     }
 }

@@ -7,6 +7,7 @@
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/bus/station_settings.hpp"
 
 namespace panelgate::bus {
 
@@ -17,7 +18,7 @@ std::string outcome_of(const Answer& answer);
 /// one entry, functions outside Table A one label: no client can add a series (P10).
 class RequestCounters {
   public:
-    explicit RequestCounters(const std::map<std::uint8_t, std::string>& stations);
+    explicit RequestCounters(const Stations& stations);
 
     void count(std::uint8_t station, std::uint8_t function, const std::string& outcome,
                Duration took);

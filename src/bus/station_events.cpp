@@ -28,9 +28,7 @@ std::string_view label(arbiter::StationEvent::Kind kind) {
     std::abort();
 }
 void log_event(const Settings& settings, const arbiter::StationEvent& event) {
-    const auto named = settings.stations.find(event.station);
-    const std::string id = std::to_string(event.station);
-    const std::string station = named == settings.stations.end() ? id : named->second;
+    const std::string station = name_of(settings.stations, event.station);
     const std::string ms = std::to_string(std::lround(to_milliseconds(event.by)));
     const auto say = [&](rt::LogLevel level, const char* what, const std::string& hint) {
         if (hint.empty()) {

@@ -12,6 +12,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/bus/rights.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
@@ -42,6 +43,8 @@ struct Answer {
     Source source = Source::bus;
     Duration age{};       ///< of the value, when source is cache
     bool shared = false;  ///< another request's transaction answered this one, too
+    /// The rights forbid it: `pdu` is Fault::denied, or of a guard the exception.
+    std::optional<Refusal> refusal{};
 };
 using AnswerHandler = std::function<void(Answer)>;
 
@@ -104,8 +107,14 @@ class BusClient {
 
     /// Hands in a request. The handler is called exactly once, never from inside transact(), at the
     /// latest at the deadline of the line's queue settings. Checks the PDU (Fault::malformed,
-    /// Fault::denied) and the queue (Fault::busy) itself.
+    /// Fault::denied), the rights (Answer::refusal) and the queue (Fault::busy) itself.
     virtual void transact(Request request, AnswerHandler handler) = 0;
+    /// Why transact() would refuse every write to this station (0: every broadcast), if it would.
+    /// For those who have to say so before they know the write, or before they ask other lines.
+    virtual std::optional<Refusal> refusal_of_write(std::uint8_t station) const {
+        static_cast<void>(station);
+        return std::nullopt;
+    }
     /// Forgets a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// one on the wire is completed and then answered normally.
     virtual void cancel(ClientId client) = 0;

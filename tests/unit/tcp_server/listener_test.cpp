@@ -66,7 +66,7 @@ TEST_F(ListenerTest, LetsAnAllowedPeerIn) {
 }
 
 TEST_F(ListenerTest, P9TellsTheBusesWhoAsksAndFromWhichAddress) {
-    lines[0].read_only.clear();
+    bus1.rights = {};
     start();
     Client first = connect();
     Client second = connect();

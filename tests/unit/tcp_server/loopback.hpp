@@ -143,7 +143,8 @@ class Loopback : public ::testing::Test {
     Loopback() {
         settings.port = 0;
         settings.lines = {"floor1"};
-        lines = {{"floor1", &bus1, {1, 2}, {2}, true}, {"floor2", &bus2, {11, 12}, {}, true}};
+        lines = {{"floor1", &bus1, {1, 2}, true}, {"floor2", &bus2, {11, 12}, true}};
+        bus1.protect(2);
     }
     ~Loopback() override {
         listener.reset();
