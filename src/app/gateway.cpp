@@ -160,6 +160,7 @@ void Gateway::add_listener(const tcp_server::Settings& settings) {
 void Gateway::add_http(const web::Settings& settings) {
     web::Providers providers;
     providers.metrics_text = [this] { return metrics_text(); };
+    providers.metrics_type = metrics::kContentType;
     providers.ready = [this] { return ready_; };
     providers.version = PANELGATE_VERSION;
     providers.now = rt::now;

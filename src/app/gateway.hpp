@@ -13,9 +13,9 @@
 #include "panelgate/points/relays.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
-#include "panelgate/web/directory.hpp"
-#include "panelgate/web/event_hub.hpp"
-#include "panelgate/web/server.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/api/server.hpp"
 #include "plant.hpp"
 
 namespace panelgate::app {

@@ -7,7 +7,7 @@
 
 #include "panelgate/points/value.hpp"
 #include "panelgate/sim/misbehaviour.hpp"
-#include "panelgate/web/event_text.hpp"
+#include "panelgate/web/api/event_text.hpp"
 
 namespace panelgate::app {
 namespace {

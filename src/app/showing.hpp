@@ -9,8 +9,8 @@
 #include "panelgate/points/counters.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/profile/panel_profile.hpp"
-#include "panelgate/web/directory.hpp"
-#include "panelgate/web/event_hub.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
 
 namespace panelgate::app {

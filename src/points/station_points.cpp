@@ -7,9 +7,9 @@ namespace panelgate::points {
 std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls) {
     std::vector<Want> wants;
     for (const Point& point : points)
-        wants.push_back({point.table, point.address, point.count(), point.every});
+        wants.push_back({{point.table, point.address, point.count()}, point.every});
     for (const Poll& poll : polls)
-        wants.push_back({poll.table, poll.address, poll.count, poll.every});
+        wants.push_back({{poll.table, poll.address, poll.count}, poll.every});
     return wants;
 }
 

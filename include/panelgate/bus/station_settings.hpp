@@ -19,7 +19,7 @@ enum class Access : std::uint8_t { read_write, read_only };
 struct StationSettings {
     std::string name;
     Access access = Access::read_write;
-    Guard guard;  ///< empty: whatever is asked goes out
+    Guard guard{};  ///< empty: whatever is asked goes out
 };
 
 /// Those that the configuration lists, by their ids.

@@ -20,8 +20,8 @@ class PollerTest : public testing::Test {
             return std::optional(test::FakeBus::reply({3, 2, 0, 42}));
         };
         std::vector<PolledStation> stations(2);
-        stations[0] = {5, {{Table::holding_registers, 100, 1, 1ms}}, limits()};
-        stations[1] = {9, {{Table::holding_registers, 7, 1, 1ms}}, limits()};
+        stations[0] = {5, {{{Table::holding_registers, 100, 1}, 1ms}}, limits()};
+        stations[1] = {9, {{{Table::holding_registers, 7, 1}, 1ms}}, limits()};
         poller = std::make_unique<Poller>(io.get_executor(), bus, std::move(stations));
         poller->on_update([this](std::uint8_t station, const std::vector<std::size_t>& wants) {
             updates[station] += wants.size();
