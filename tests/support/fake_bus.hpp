@@ -56,6 +56,9 @@ class FakeBus : public bus::BusClient {
         const auto found = stations.find(station);
         return found == stations.end() ? bus::StationStatus{"unknown", {}} : found->second;
     }
+    std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
+        return rights.judge_write(station);
+    }
     std::vector<bus::TraceFrame> trace(std::size_t last) const override {
         const auto skip = frames.size() - std::min(last, frames.size());
         return {frames.begin() + static_cast<std::ptrdiff_t>(skip), frames.end()};
@@ -79,6 +82,7 @@ class FakeBus : public bus::BusClient {
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
     bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, "absent"};
+    bus::Rights rights;  ///< to everything, at first
     std::vector<bus::ClientShare> shares;
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
