@@ -222,7 +222,10 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.
     if (hurry && slowest() && modbus::is_pure_read(group.pdu))
         return std::min(timeout(), short_wait(line));
-    return timeout();
+    // A write that is not repeated is waited for as long as the configuration says: the panel may
+    // just have become slower than it has taught, and nothing else tells whether it was executed.
+    const bool repeatable = modbus::is_pure_read(group.pdu) || settings_.retry_writes;
+    return repeatable ? timeout() : whole;
 }
 
 Bytes Station::probe_pdu() const {
