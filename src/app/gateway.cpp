@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
@@ -49,24 +50,29 @@ std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bu
     return std::make_shared<const web::SimulatedPanel>(std::move(panel));
 }
 
-void publish(web::EventHub& hub, const std::string& line,
-             const std::map<std::uint8_t, std::string>& names, const bus::BusEvent& event) {
-    if (hub.is_idle()) return;
-    const auto named = names.find(event.station);
-    const std::string station = event.station == 0     ? ""
-                                : named != names.end() ? named->second
-                                                       : std::to_string(event.station);
-    switch (event.kind) {
-        case bus::BusEvent::Kind::line:
-            return hub.publish("line", web::line_event(line, event.what, event.why));
-        case bus::BusEvent::Kind::station:
-            return hub.publish("station", web::station_event(line, station, event.what));
-        case bus::BusEvent::Kind::transaction:
-            return hub.publish("transaction", web::transaction_event(line, station, event.function,
-                                                                     event.what, event.took));
+/// Puts what a bus tells into the words of /api/v1/events.
+struct Publisher {
+    web::EventHub& hub;
+    const std::string& line;
+    const std::map<std::uint8_t, std::string>& names;
+
+    std::string name_of(std::uint8_t station) const {
+        if (station == 0) return {};
+        const auto named = names.find(station);
+        return named == names.end() ? std::to_string(station) : named->second;
     }
-    std::abort();
-}
+    void operator()(const bus::LineEvent& event) const {
+        hub.publish("line", web::line_event(line, event.up ? "up" : "down", event.why));
+    }
+    void operator()(const arbiter::StationEvent& event) const {
+        hub.publish("station", web::station_event(line, name_of(event.station), label(event.kind)));
+    }
+    void operator()(const bus::TransactionEvent& event) const {
+        hub.publish("transaction",
+                    web::transaction_event(line, name_of(event.station), event.function,
+                                           label(event.outcome), event.took));
+    }
+};
 
 /// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
 bus::Guard guard_of(const profile::PanelProfile& profile) {
@@ -114,8 +120,10 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         if (station.guard) settings.guards[station.id] = guard_of(*station.profile);
     }
 
-    settings.observe = [this, name = line.name, names = settings.stations](
-                           const bus::BusEvent& event) { publish(events_, name, names, event); };
+    settings.observe = [this, name = line.name,
+                        names = settings.stations](const bus::BusEvent& event) {
+        if (!events_.is_idle()) std::visit(Publisher{events_, name, names}, event);
+    };
 
     line::Settings device = line.device;
     const bool simulates = simulate || line.kind == config::Line::Kind::simulated;
@@ -185,7 +193,7 @@ void Gateway::add_points(const config::Line& line, bus::Bus& bus) {
     }
 }
 
-/// What the points that these wants are have become. `first`: of the poller's stations in points_.
+/// Publishes the points among these wants. `first`: where the poller's stations begin in points_.
 void Gateway::publish_points(std::size_t first, const std::vector<std::size_t>& wants,
                              std::size_t station) {
     if (events_.is_idle()) return;
@@ -221,8 +229,9 @@ void Gateway::add_relays() {
     }
     relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
     relays_->on_state([](const points::RelayStatus& relay) {
-        const auto level = relay.state == "ok" ? rt::LogLevel::info : rt::LogLevel::warn;
-        rt::log(level, "relay", {{"relay", relay.name}, {"state", relay.state}});
+        const bool ok = relay.state == points::RelayState::ok;
+        rt::log(ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
+                {{"relay", relay.name}, {"state", text_of(relay)}});
     });
 }
 
@@ -318,8 +327,8 @@ std::vector<points::PointSample> Gateway::point_samples() const {
 std::vector<points::RelaySample> Gateway::relay_samples() const {
     std::vector<points::RelaySample> samples;
     for (const points::RelayStatus& relay : relays_->status()) {
-        samples.push_back({relay.name, relay.state == "ok", relay.reads, relay.writes,
-                           relay.read_failures, relay.write_failures});
+        samples.push_back({relay.name, relay.state == points::RelayState::ok, relay.reads,
+                           relay.writes, relay.read_failures, relay.write_failures});
     }
     return samples;
 }

@@ -88,7 +88,7 @@ bus::Request read_request(const Items& part) {
     request.station = part.station.id;
     request.pdu =
         modbus::encode_read(part.table, part.address, static_cast<std::uint16_t>(part.count));
-    request.priority = arbiter::PriorityClass::read;
+    request.priority = PriorityClass::read;
     request.quantity = modbus::QuantityCheck::wide;
     return request;
 }

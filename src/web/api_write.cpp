@@ -55,7 +55,7 @@ Parsed<bus::Request> write_request(const HttpRequest& request, Items items) {
     bus::Request made;
     made.station = items.station.id;
     made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     made.quantity = modbus::QuantityCheck::wide;
     return made;
 }

@@ -12,7 +12,7 @@ namespace panelgate::web {
 /// One HTTP session as the buses see it.
 struct BusCaller {
     bus::ClientId client = bus::next_client_id();
-    arbiter::Host host = 0;  ///< of the client's address; 0: unknown
+    bus::Host host = 0;  ///< of the client's address; 0: unknown
     std::string name = "http";
     bool abandoned = false;
     std::set<bus::BusClient*> used;

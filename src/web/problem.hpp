@@ -29,7 +29,7 @@ template <class T>
 using Parsed = boost::system::result<T, Problem>;
 
 Problem problem(unsigned status, std::string detail);
-/// A bus that gave no reply (contract 5: 502 line down or damaged, 503 busy, 504 no reply in time).
+/// A bus that gave no reply (502 line down or damaged, 503 busy, 504 no reply in time).
 Problem problem_of(Fault fault, bool transmitted);
 /// A panel's exception reply: 422 for codes 1-4, 502 above. `meaning` is the manual's word, or "".
 Problem problem_of_exception(std::uint8_t code, const std::string& meaning);

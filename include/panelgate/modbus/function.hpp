@@ -42,7 +42,7 @@ inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 
 /// The four tables of the data model (AP 4.3).
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
-/// "holding-registers", the word of the REST path (contract 5).
+/// "holding-registers", the word of the REST path.
 std::string_view label(Table table);
 inline constexpr bool is_bit_table(Table table) {
     return table == Table::coils || table == Table::discrete_inputs;

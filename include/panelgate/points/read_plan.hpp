@@ -79,8 +79,8 @@ struct PlannedRead {
     Span span() const { return {table, address, count}; }
 };
 
-/// How long a read of `count` items keeps the line from everybody else (contract 9): request of 8
-/// bytes, gap, think time, reply of 5 bytes and the data, gap.
+/// How long a read of `count` items keeps the line from everybody else: request of 8 bytes, gap,
+/// think time, reply of 5 bytes and the data, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
 
 /// Few reads that serve every want, sorted by table and address. Where all intervals are the same

@@ -12,7 +12,7 @@
 
 namespace panelgate::web {
 
-/// Server-sent events for those who listen (contract 5): point, station, line, transaction. One
+/// Server-sent events for those who listen (README, REST): point, station, line, transaction. One
 /// thread. A listener that reads too slowly loses the oldest and is told how many.
 class EventHub {
   public:

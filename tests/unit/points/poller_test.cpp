@@ -43,7 +43,7 @@ TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     EXPECT_EQ(poller->station(0).reading(0).values, std::vector<std::uint16_t>{42});
     EXPECT_TRUE(poller->station(1).reading(0).failing);
     for (const bus::Request& request : bus.requests)
-        EXPECT_EQ(request.priority, arbiter::PriorityClass::poll);
+        EXPECT_EQ(request.priority, PriorityClass::poll);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
 }
 
