@@ -245,11 +245,8 @@ void Gateway::add_listener(const tcp_server::Settings& settings) {
                 station.unit = unit;
         }
     }
-    tcp_server::Hooks hooks;
-    hooks.log = [](std::string_view text) { rt::log(rt::LogLevel::info, text); };
-    hooks.version = PANELGATE_VERSION;
-    listeners_.push_back(
-        std::make_unique<tcp_server::Listener>(executor_, settings, std::move(units), hooks));
+    listeners_.push_back(std::make_unique<tcp_server::Listener>(
+        executor_, settings, std::move(units), PANELGATE_VERSION));
 }
 
 void Gateway::add_http(const web::Settings& settings) {
