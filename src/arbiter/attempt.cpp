@@ -40,8 +40,8 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
 
 bool Attempt::takes_along(TimePoint now, const Job& job) const {
     const bool leaving = timing_.tolerance && now < timing_.sent;
-    return leaving && group_.attempts == 1 && contained_in(group_.span, job) &&
-           group_.jobs.size() < JobQueue::kMost;
+    return leaving && group_.attempts == 1 && job.station == group_.station &&
+           contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
@@ -203,7 +203,7 @@ void Attempt::teach(EchoMemory& memory) const {
 }
 
 Duration Attempt::waited(TimePoint now) const {
-    const Duration reply = wire_time(timing_.serial, reply_->size() + kAduOverhead);
+    const Duration reply = wire_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }
 

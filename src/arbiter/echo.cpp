@@ -12,7 +12,7 @@ namespace panelgate::arbiter {
 bool teaches_echo(ByteView request) {
     if (!modbus::is_pure_read(request)) return false;
     const auto reply = modbus::reply_length_from_request(request);
-    return reply && *reply != request.size() + kAduOverhead;
+    return reply && *reply != request.size() + modbus::kAduOverhead;
 }
 
 bool holds_fragment(ByteView heard, ByteView frame) {

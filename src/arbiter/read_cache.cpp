@@ -2,24 +2,15 @@
 
 #include <utility>
 
-#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
 namespace {
 
-/// Could writing `range` change what `span` reads?
-bool may_change(const std::optional<modbus::Range>& range, const ReadSpan& span) {
-    if (!range) return true;
-    const bool holds_coils = span.function == modbus::kReadCoils;
-    const bool holds_registers = span.function == modbus::kReadHoldingRegisters;
-    const bool same_table = range->table == modbus::Table::coils               ? holds_coils
-                            : range->table == modbus::Table::holding_registers ? holds_registers
-                                                                               : false;
-    if (!same_table) return true;
-    const std::uint32_t end = range->address + std::uint32_t{range->count};
-    return range->address < span.end() && span.address < end;
+/// Could writing these items change what a read of `items` gives?
+bool may_change(const std::optional<modbus::Span>& written, const modbus::Span& items) {
+    return !written || written->table != items.table || written->overlaps(items);
 }
 
 }  // namespace
@@ -40,8 +31,9 @@ std::optional<ReadCache::Hit> ReadCache::find(const ReadSpan& span, TimePoint no
         const Duration age = now - entry.sampled;
         if (age > max_age) return std::nullopt;
         if (entry.span.contains(span)) {
-            return Hit{
-                entry.span == span ? entry.reply : slice_reply(entry.span, entry.reply, span), age};
+            return Hit{entry.span == span ? entry.reply
+                                          : slice_reply(entry.span.items, entry.reply, span.items),
+                       age};
         }
     }
     return std::nullopt;
@@ -49,10 +41,10 @@ std::optional<ReadCache::Hit> ReadCache::find(const ReadSpan& span, TimePoint no
 
 void ReadCache::on_write(TimePoint now, std::uint8_t station, ByteView request) {
     written_[station] = now;
-    const std::optional<modbus::Range> range = modbus::access_of(request).write;
+    const std::optional<modbus::Span> items = modbus::access_of(request).write;
     entries_.remove_if([&](const Entry& entry) {
         return (station == kBroadcast || entry.span.station == station) &&
-               may_change(range, entry.span);
+               may_change(items, entry.span.items);
     });
 }
 

@@ -10,9 +10,9 @@
 namespace panelgate::arbiter {
 
 void Reception::stamp(TimePoint now, Job& job) {
-    const std::size_t request = job.pdu.size() + kAduOverhead;
+    const std::size_t request = job.pdu.size() + modbus::kAduOverhead;
     const std::size_t reply =
-        std::max(modbus::reply_length_from_request(job.pdu).value_or(0), kShortestReplyAdu);
+        std::max(modbus::reply_length_from_request(job.pdu).value_or(0), modbus::kExceptionAdu);
     const Duration needed = job.station == kBroadcast
                                 ? wire_time(serial_, request)
                                 : wire_time(serial_, request + reply) + silent_interval(serial_);
@@ -25,15 +25,16 @@ void Reception::stamp(TimePoint now, Job& job) {
 std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const Job& job,
                                                             Duration max_age) {
     if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
-    const auto span = read_span(job.station, job.pdu);
+    const auto span = modbus::read_span(job.pdu);
     if (!span) return std::nullopt;
-    auto hit = memory_.find(*span, now, max_age);
+    auto hit = memory_.find({job.station, *span}, now, max_age);
     if (!hit) return std::nullopt;
     return FromMemory{++last_ticket_, std::move(*hit)};
 }
 
 void Reception::on_read(const Group& group, const Bytes& reply, Duration max_age) {
-    if (group.span && max_age > Duration::zero()) memory_.store(*group.span, reply, group.started);
+    if (group.span && max_age > Duration::zero())
+        memory_.store({group.station, *group.span}, reply, group.started);
 }
 
 }  // namespace panelgate::arbiter

@@ -6,17 +6,15 @@
 #include <optional>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
 
 inline constexpr std::uint8_t kBroadcast = 0;
-inline constexpr std::uint8_t kUnlisted = 0;         ///< in the counters
-inline constexpr std::size_t kAduOverhead = 3;       ///< address and CRC
-inline constexpr std::size_t kShortestReplyAdu = 5;  ///< an exception
+inline constexpr std::uint8_t kUnlisted = 0;  ///< in the counters
 
 /// These bytes begin with another master's request: not our own frame, which an adapter that is
 /// said to have no echo may give. What is heard is cut into replies elsewhere, and a request glued
@@ -27,10 +25,10 @@ inline bool begins_with_request(ByteView heard, ByteView own) {
            !std::ranges::equal(heard.first(size), own);
 }
 
-/// This job's items are among those of a transaction.
-inline bool contained_in(const std::optional<ReadSpan>& span, const Job& job) {
+/// This job's items are among those of a transaction with its station.
+inline bool contained_in(const std::optional<modbus::Span>& span, const Job& job) {
     if (!span || job.alone) return false;
-    const auto own = read_span(job.station, job.pdu);
+    const auto own = modbus::read_span(job.pdu);
     return own && span->contains(*own);
 }
 

@@ -24,7 +24,7 @@ bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, 
 Group read_for_nobody(std::uint8_t station, Bytes pdu) {
     Group group;
     group.station = station;
-    group.span = read_span(station, pdu);
+    group.span = modbus::read_span(pdu);
     group.pdu = std::move(pdu);
     return group;
 }

@@ -1,6 +1,5 @@
 #include "panelgate/arbiter/shared_read.hpp"
 
-#include <algorithm>
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
@@ -9,36 +8,12 @@
 
 namespace panelgate::arbiter {
 
-std::optional<ReadSpan> read_span(std::uint8_t station, ByteView pdu) {
-    Reader in(pdu);
-    ReadSpan span;
-    span.station = station;
-    span.function = in.u8();
-    span.address = in.u16();
-    span.count = in.u16();
-    constexpr std::uint32_t kItems = 65536;
-    const bool read =
-        span.function >= modbus::kReadCoils && span.function <= modbus::kReadInputRegisters;
-    if (!in.finished() || !read || span.count == 0 || span.end() > kItems) return std::nullopt;
-    return span;
-}
-
-ReadSpan join(const ReadSpan& a, const ReadSpan& b) {
-    ReadSpan both = a;
-    both.address = std::min(a.address, b.address);
-    both.count = std::max(a.end(), b.end()) - both.address;
-    return both;
-}
-
-Bytes encode_span(const ReadSpan& span) {
-    return Writer().u8(span.function).u16(span.address).u16(span.count).take();
-}
-
-Bytes slice_reply(const ReadSpan& whole, ByteView reply, const ReadSpan& part) {
-    const std::size_t first = part.address - whole.address;
-    if (!part.reads_bits()) {
+Bytes slice_reply(const modbus::Span& whole, ByteView reply, const modbus::Span& part) {
+    const std::size_t first = part.first - whole.first;
+    const modbus::Function function = modbus::read_function(part.table);
+    if (!modbus::is_bit_table(part.table)) {
         Writer out;
-        out.u8(part.function).u8(2 * part.count);
+        out.u8(function).u8(2 * part.count);
         return out.raw(reply.subspan(2 + 2 * first, std::size_t{2} * part.count)).take();
     }
     const std::vector<bool> bits = modbus::bits_of(reply, whole.count);
@@ -46,7 +21,7 @@ Bytes slice_reply(const ReadSpan& whole, ByteView reply, const ReadSpan& part) {
     const Bytes packed = modbus::pack_bits(
         std::vector<bool>(begin, begin + static_cast<std::ptrdiff_t>(part.count)));
     Writer out;
-    out.u8(part.function).u8(static_cast<unsigned>(packed.size()));
+    out.u8(function).u8(static_cast<unsigned>(packed.size()));
     return out.raw(packed).take();
 }
 

@@ -4,16 +4,18 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
 namespace {
 
 /// Items of one read that this station is known to answer.
-std::uint32_t known_length(const Station& station, const ReadSpan& span) {
+std::uint32_t known_length(const Station& station, const modbus::Span& span) {
     const StationSettings& settings = station.settings();
-    const std::uint32_t limit = span.reads_bits() ? settings.max_bits : settings.max_registers;
-    return settings.vouched ? limit : std::min(limit, station.longest_read(span.function));
+    const std::uint32_t limit =
+        modbus::is_bit_table(span.table) ? settings.max_bits : settings.max_registers;
+    return settings.vouched ? limit : std::min(limit, station.longest_read(span.table));
 }
 
 }  // namespace
@@ -22,40 +24,41 @@ Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const
     Group group;
     group.station = leader.station;
     group.pdu = leader.pdu;
-    if (share_ && !leader.alone) group.span = read_span(leader.station, leader.pdu);
+    if (share_ && !leader.alone) group.span = modbus::read_span(leader.pdu);
     group.jobs.push_back(std::move(leader));
     while (group.span) {
         const std::uint32_t before = group.span->count;
         for (Job& job : queue.take_all(group.station, [&](const Job& other) {
                  if (!joins(group, other, station)) return false;
-                 group.span = join(*group.span, *read_span(other.station, other.pdu));
+                 group.span = join(*group.span, *modbus::read_span(other.pdu));
                  return true;
              })) {
             group.jobs.push_back(std::move(job));
         }
         if (group.span->count == before) break;
     }
-    if (group.span) group.pdu = encode_span(*group.span);
+    if (group.span) group.pdu = modbus::encode_read(*group.span);
     return group;
 }
 
 bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
     if (job.alone || job.station != group.station) return false;
-    const auto span = read_span(job.station, job.pdu);
+    const auto span = modbus::read_span(job.pdu);
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
-    const ReadSpan both = join(*group.span, *span);
+    const modbus::Span both = join(*group.span, *span);
     // The whole of one that contains all the others has been asked for by a client.
     if (both != *span && both.count > known_length(station, both)) return false;
-    return std::none_of(refused_.begin(), refused_.end(),
-                        [&](const ReadSpan& refused) { return both.contains(refused); });
+    return std::none_of(refused_.begin(), refused_.end(), [&](const ReadSpan& refused) {
+        return ReadSpan{job.station, both}.contains(refused);
+    });
 }
 
 std::vector<Job> Sharing::split(Group& group) {
     const auto stays = [&](const Job& job) { return job.pdu == group.pdu || job.gone; };
     if (group.joined()) {
         if (refused_.size() >= kRemembered) refused_.pop_front();
-        refused_.push_back(*group.span);
+        refused_.push_back({group.station, *group.span});
     }
     std::vector<Job> parts;
     for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
@@ -69,7 +72,7 @@ std::vector<Job> Sharing::split(Group& group) {
 
 Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) {
     if (job.pdu == group.pdu || modbus::exception_of(reply)) return reply;
-    return slice_reply(*group.span, reply, *read_span(job.station, job.pdu));
+    return slice_reply(*group.span, reply, *modbus::read_span(job.pdu));
 }
 
 }  // namespace panelgate::arbiter

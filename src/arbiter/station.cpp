@@ -145,9 +145,9 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         not_before_ = std::max(not_before_, now + copies_.take_doubt());
     }
     if (!group.span || exception) return result;
-    std::uint32_t& longest = longest_read_.at(group.span->function);
+    std::uint32_t& longest = longest_read_[static_cast<std::size_t>(group.span->table)];
     longest = std::max(longest, group.span->count);
-    const auto cheapest = read_span(0, cheapest_read_);
+    const auto cheapest = modbus::read_span(cheapest_read_);
     if (!cheapest || group.span->count < cheapest->count) cheapest_read_ = group.pdu;
     return result;
 }
@@ -222,17 +222,16 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.
     if (hurry && slowest() && modbus::is_pure_read(group.pdu))
         return std::min(timeout(), short_wait(line));
-    return timeout();
+    // A write that is not repeated is waited for as long as the configuration says: the panel may
+    // just have become slower than it has taught, and nothing else tells whether it was executed.
+    const bool repeatable = modbus::is_pure_read(group.pdu) || settings_.retry_writes;
+    return repeatable ? timeout() : whole;
 }
 
 Bytes Station::probe_pdu() const {
     if (!cheapest_read_.empty()) return cheapest_read_;
     if (!last_read_.empty()) return last_read_;
     return modbus::encode_read(modbus::Table::holding_registers, 0, 1);
-}
-
-std::uint32_t Station::longest_read(std::uint8_t function) const {
-    return function < longest_read_.size() ? longest_read_[function] : 0;
 }
 
 }  // namespace panelgate::arbiter

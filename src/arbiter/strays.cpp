@@ -15,7 +15,7 @@ using Part = Ledger::Part;
 
 namespace {
 
-ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - kAduOverhead); }
+ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - modbus::kAduOverhead); }
 
 /// A good frame that can only be a request, another master's.
 bool is_request(ByteView adu) {
@@ -86,7 +86,7 @@ void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& sta
     const std::size_t size = modbus::request_adu_length(request);
     const ByteView pdu = pdu_of(request.first(size));
     if (request.size() > size || request[0] == kBroadcast) return;  // its reply is heard as well
-    constexpr std::size_t kShort = 8;
+    constexpr std::size_t kShort = modbus::kReadRequestAdu;
     const Duration reply =
         wire_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
     const Duration think = std::clamp<Duration>(3 * stations.slowest().value_or(10ms), 20ms, 100ms);

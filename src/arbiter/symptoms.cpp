@@ -44,7 +44,8 @@ void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     if (const auto code = modbus::exception_of(attempt.reply())) ++counters.exceptions[*code];
     ++(attempt.echo().mismatch() ? symptoms.collided : symptoms.answered);
     ++symptoms.answered_after[pause_class(attempt.timing().pause)];
-    if (attempt.reply().size() + kAduOverhead >= Symptoms::kLongReply) ++symptoms.long_answered;
+    if (attempt.reply().size() + modbus::kAduOverhead >= Symptoms::kLongReply)
+        ++symptoms.long_answered;
     if (attempt.echoed()) ++symptoms.echoes;
     if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (replied.trailed) ++symptoms.trailed;

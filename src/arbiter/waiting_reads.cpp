@@ -6,7 +6,7 @@
 namespace panelgate::arbiter {
 
 bool WaitingReads::WiderFirst::operator()(const ReadSpan& a, const ReadSpan& b) const {
-    return std::tuple(place(a), b.count) < std::tuple(place(b), a.count);
+    return std::tuple(place(a), b.items.count) < std::tuple(place(b), a.items.count);
 }
 
 bool WaitingReads::carries(const ReadSpan& span) const {
@@ -66,7 +66,7 @@ void WaitingReads::drop_span(Spans::iterator it, const Count& count) {
     if (!is_widest(gone)) return;
     widest_.erase(place(gone));
     for (; next != spans_.end(); ++next) {
-        if (!next->first.same_table(gone) || next->first.address >= gone.end()) return;
+        if (!next->first.same_table(gone) || next->first.items.first >= gone.items.end()) return;
         if (!carries(next->first)) make_widest(next, count);
     }
 }
@@ -80,7 +80,7 @@ bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
     auto it = spans_.find(span);
     if (it->second.size() > 1) return false;
     for (++it; it != spans_.end(); ++it) {
-        if (!it->first.same_table(span) || it->first.address >= span.end()) break;
+        if (!it->first.same_table(span) || it->first.items.first >= span.items.end()) break;
         if (span.contains(it->first)) return false;
     }
     return true;
@@ -89,8 +89,8 @@ bool WaitingReads::frees(Ticket ticket, const ReadSpan& span) const {
 bool WaitingReads::consistent() const {
     std::size_t widest = 0;
     for (const auto& [span, equals] : spans_) {
-        constexpr std::uint32_t kAll = 65536;
-        const auto table = spans_.lower_bound({span.station, span.function, 0, kAll});
+        const auto table =
+            spans_.lower_bound({span.station, {span.items.table, 0, modbus::kTableItems}});
         const bool contained = std::any_of(table, spans_.find(span), [&inner = span](auto& wider) {
             return wider.first.contains(inner);
         });

@@ -11,6 +11,7 @@
 #include "load_stations.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -65,8 +66,8 @@ Wait longest_wait(const Node& node, const Line& line) {
     return longest;
 }
 
-constexpr std::size_t kReadRequest = 8;  // address, function, address, count, CRC
-constexpr std::size_t kReadReply = 5;    // address, function, byte count, CRC
+/// A read and its reply, but for the values.
+constexpr std::size_t kReadOverhead = modbus::kReadRequestAdu + modbus::kReadReplyOverhead;
 
 /// One read of a station, and how many bytes of values answer it.
 struct Read {
@@ -78,7 +79,7 @@ struct Read {
     std::size_t bytes() const { return bits ? (count + 7) / 8 : 2 * count; }
     /// Nothing but the two frames: no read is quicker.
     Duration on_wire(const SerialFormat& serial) const {
-        return wire_time(serial, kReadRequest + kReadReply + bytes());
+        return wire_time(serial, kReadOverhead + bytes());
     }
 };
 
@@ -118,8 +119,8 @@ std::optional<Read> longest_read(const Line& line) {
 std::size_t most_items(const Line& line, bool bits) {
     const Duration deadline = line.arbiter.queue.deadline - 1ns;
     const auto characters = static_cast<std::size_t>(deadline / character_time(line.device.serial));
-    if (characters <= kReadRequest + kReadReply) return 0;
-    const std::size_t bytes = characters - kReadRequest - kReadReply;
+    if (characters <= kReadOverhead) return 0;
+    const std::size_t bytes = characters - kReadOverhead;
     return bits ? bytes * 8 : bytes / 2;
 }
 

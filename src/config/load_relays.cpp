@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "load_stations.hpp"
+#include "panelgate/modbus/span.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
 
@@ -24,13 +25,10 @@ struct End {
 /// Where items really are, in bits: a panel may show the same memory as words and as bits.
 struct Memory {
     const Station* station = nullptr;
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint32_t first = 0;
-    std::uint32_t end = 0;
+    modbus::Span bits;
 
     bool overlaps(const Memory& other) const {
-        return station == other.station && table == other.table && first < other.end &&
-               other.first < end;
+        return station == other.station && bits.overlaps(other.bits);
     }
 };
 
@@ -117,7 +115,7 @@ Memory memory_of(const End& end, std::uint32_t count) {
         end.station->profile->find_area(std::string_view(end.area->view_of));
     const modbus::Table table = words != nullptr ? words->table : end.area->table;
     const std::uint32_t width = modbus::is_bit_table(end.area->table) ? 1 : 16;
-    return {end.station, table, end.end.address * width, (end.end.address + count) * width};
+    return {end.station, {table, end.end.address * width, count * width}};
 }
 
 /// Two relays that write the same items: nobody could say which value they hold.

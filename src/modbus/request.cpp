@@ -3,10 +3,11 @@
 #include <cassert>
 #include <cstdlib>
 
+#include "panelgate/modbus/rtu_frame.hpp"
+
 namespace panelgate::modbus {
 namespace {
 
-constexpr std::size_t kAroundPdu = 3;                        // address before, CRC after
 constexpr std::size_t kFileReference = 7;                    // type, file, record, length
 constexpr std::uint16_t kLoopback = 0;                       // 08/0000 Return Query Data
 constexpr std::uint16_t kListenOnly = 4;                     // 08/0004 Force Listen Only Mode
@@ -139,7 +140,7 @@ Access access_of(ByteView pdu) {
     const std::uint16_t address = field(pdu, 1);
     const std::uint16_t count = field(pdu, 3);
     const auto items = [](Table table, std::uint16_t at, std::uint16_t n) {
-        return std::optional<Range>(Range{table, at, n});
+        return std::optional<Span>(Span{table, at, n});
     };
     switch (function) {
         case kReadCoils:
@@ -169,6 +170,15 @@ Access access_of(ByteView pdu) {
     }
 }
 
+std::optional<Span> read_span(ByteView pdu) {
+    constexpr std::size_t kSize = kReadRequestAdu - kAduOverhead;
+    if (pdu.size() != kSize || pdu[0] < kReadCoils || pdu[0] > kReadInputRegisters)
+        return std::nullopt;
+    const std::optional<Span> span = access_of(pdu).read;
+    if (span->count == 0 || span->end() > kTableItems) return std::nullopt;
+    return span;
+}
+
 bool is_pure_read(ByteView pdu) {
     if (pdu.empty()) return false;
     if (pdu[0] != kEncapsulatedInterface) return is_read(pdu[0]);
@@ -180,13 +190,12 @@ bool is_never_answered(ByteView pdu) {
 }
 
 std::size_t request_adu_length(ByteView heard) {
-    constexpr std::size_t kFixed = 8;  // address, function, two words, CRC
     constexpr std::size_t kByteCount = 6;
     if (heard.size() <= kByteCount) return 0;
     const std::uint8_t function = heard[1];
-    if (function >= kReadCoils && function <= kWriteSingleRegister) return kFixed;
+    if (function >= kReadCoils && function <= kWriteSingleRegister) return kReadRequestAdu;
     const bool many = function == kWriteMultipleCoils || function == kWriteMultipleRegisters;
-    return many ? kFixed + 1 + heard[kByteCount] : 0;
+    return many ? kReadRequestAdu + 1 + heard[kByteCount] : 0;
 }
 
 std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
@@ -194,11 +203,11 @@ std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
     switch (pdu[0]) {
         case kReadCoils:
         case kReadDiscreteInputs:
-            return 5 + bytes_for_bits(field(pdu, 3));
+            return kReadReplyOverhead + bytes_for_bits(field(pdu, 3));
         case kReadHoldingRegisters:
         case kReadInputRegisters:
         case kReadWriteMultipleRegisters:
-            return 5 + std::size_t{2} * field(pdu, 3);
+            return kReadReplyOverhead + std::size_t{2} * field(pdu, 3);
         case kWriteSingleCoil:
         case kWriteSingleRegister:
         case kGetCommEventCounter:
@@ -209,11 +218,11 @@ std::optional<std::size_t> reply_length_from_request(ByteView pdu) {
             return 5;
         case kDiagnostics:
             if (is_never_answered(pdu)) return 0;
-            return field(pdu, 1) == kLoopback ? pdu.size() + kAroundPdu : 8;
+            return field(pdu, 1) == kLoopback ? pdu.size() + kAduOverhead : 8;
         case kReadFileRecord:
             return 5 + file_reply_size(pdu);
         case kWriteFileRecord:
-            return pdu.size() + kAroundPdu;
+            return pdu.size() + kAduOverhead;
         case kMaskWriteRegister:
             return 10;
         default:
@@ -225,6 +234,11 @@ Bytes encode_read(Table table, std::uint16_t address, std::uint16_t count) {
     Writer out;
     out.u8(read_function(table)).u16(address).u16(count);
     return out.take();
+}
+
+Bytes encode_read(const Span& span) {
+    return encode_read(span.table, static_cast<std::uint16_t>(span.first),
+                       static_cast<std::uint16_t>(span.count));
 }
 
 Bytes encode_write_coil(std::uint16_t address, bool value) {

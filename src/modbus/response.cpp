@@ -4,6 +4,7 @@
 #include <cassert>
 
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::modbus {
 namespace {
@@ -21,7 +22,7 @@ bool repeats(ByteView request, ByteView reply, std::size_t size) {
 
 /// As large as the request lets expect (FRM-04).
 bool has_expected_size(ByteView request, ByteView reply) {
-    return reply_length_from_request(request) == reply.size() + 3;
+    return reply_length_from_request(request) == reply.size() + kAduOverhead;
 }
 
 /// 08: the sub-function comes back; 0000 returns the whole request.

@@ -11,10 +11,6 @@
 namespace panelgate::modbus {
 namespace {
 
-constexpr std::size_t kExceptionAdu = 5;  // address, function, code, CRC
-constexpr std::size_t kMinAdu = 4;        // address, function, CRC
-constexpr std::size_t kCrc = 2;
-
 ReplyLength known(std::size_t length) { return {ReplyLength::Kind::known, length}; }
 ReplyLength need_more() { return {ReplyLength::Kind::need_more, 0}; }
 ReplyLength by_silence() { return {ReplyLength::Kind::by_silence, 0}; }
@@ -29,12 +25,14 @@ ReplyLength device_identification_length(ByteView b) {
     for (unsigned object = 0; object < b[7]; ++object) {
         if (b.size() < at + 2) return need_more();
         at += 2u + b[at + 1];
-        if (at + kCrc > kMaxRtuAdu) return by_silence();  // count and bytes disagree (FRM-10)
+        if (at + kCrcSize > kMaxRtuAdu) return by_silence();  // count and bytes disagree (FRM-10)
     }
-    return known(at + kCrc);
+    return known(at + kCrcSize);
 }
 
-ReplyLength by_count(ByteView b) { return b.size() < 3 ? need_more() : known(5u + b[2]); }
+ReplyLength by_count(ByteView b) {
+    return b.size() < 3 ? need_more() : known(kReadReplyOverhead + b[2]);
+}
 
 }  // namespace
 
@@ -118,7 +116,7 @@ std::optional<Bytes> ReplyFramer::scan(bool silence) {
         const std::size_t start = starts_.front();
         auto pdu = judge(start, silence, open);
         if (pdu) {
-            const Inside inside = inside_other(start, start + pdu->size() + 1 + kCrc);
+            const Inside inside = inside_other(start, start + pdu->size() + kAduOverhead);
             inside_ = inside == Inside::perhaps && !silence;
             if (inside_) return std::nullopt;
             if (inside != Inside::yes) return accept(start, std::move(*pdu));
@@ -215,7 +213,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
 /// The PDU of this frame, when it is good and answers.
 std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
     if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame)) return std::nullopt;
-    const ByteView pdu = frame.subspan(1, frame.size() - 1 - kCrc);
+    const ByteView pdu = frame.subspan(1, frame.size() - kAduOverhead);
     if (!answers(request_, pdu)) return std::nullopt;
     return Bytes(pdu.begin(), pdu.end());
 }
@@ -223,7 +221,7 @@ std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
 std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     classify(ByteView(heard_).first(start));
     const std::size_t before = unused_.size();
-    classify(ByteView(heard_).subspan(start + pdu.size() + 1 + kCrc));
+    classify(ByteView(heard_).subspan(start + pdu.size() + kAduOverhead));
     behind_ = unused_.size() - before;
     open_length_ = false;
     inside_ = false;
@@ -245,10 +243,9 @@ void ReplyFramer::discard(std::size_t count) {
 
 /// Not a part of our own frame, which may begin like it.
 bool ReplyFramer::is_own_reply(ByteView damaged) const {
-    constexpr std::size_t kReadRequest = 8;
     if (!is_read(request_[0]) || !expected_) return false;
-    const auto count = static_cast<std::uint8_t>(*expected_ - 3 - kCrc);
-    return damaged.size() >= std::min(*expected_, kReadRequest + 1) && damaged[0] == station_ &&
+    const auto count = static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead);
+    return damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) && damaged[0] == station_ &&
            damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
 }
 

@@ -6,13 +6,11 @@
 #include <map>
 #include <tuple>
 
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "table_map.hpp"
 
 namespace panelgate::points {
 namespace {
-
-constexpr std::array kTables = {modbus::Table::coils, modbus::Table::discrete_inputs,
-                                modbus::Table::input_registers, modbus::Table::holding_registers};
 
 /// Part of a want, or all of it.
 struct Piece {
@@ -23,8 +21,8 @@ struct Piece {
 };
 
 void cut(const Want& want, std::size_t index, std::uint32_t max_items, std::vector<Piece>& out) {
-    const std::uint32_t end = want.address + want.count;
-    for (std::uint32_t first = want.address; first < end; first += max_items)
+    const std::uint32_t end = want.span.end();
+    for (std::uint32_t first = want.span.first; first < end; first += max_items)
         out.push_back({first, std::min(end, first + max_items), want.every, index});
 }
 
@@ -62,7 +60,8 @@ class TablePlanner {
             seconds_.push_back(to_seconds(read_cost(limits, table, count)));
         std::vector<Piece> all;
         for (std::size_t i = 0; i < wants.size(); ++i)
-            if (wants[i].table == table && is_plannable(wants[i])) cut(wants[i], i, max_items, all);
+            if (wants[i].span.table == table && is_plannable(wants[i]))
+                cut(wants[i], i, max_items, all);
         sort_by_start(all);
         for (const Piece& piece : all)
             (piece.end <= map_.reach(piece.first) ? pieces_ : refused_).push_back(piece);
@@ -82,7 +81,8 @@ class TablePlanner {
             read.wants.erase(std::unique(read.wants.begin(), read.wants.end()), read.wants.end());
         }
         std::sort(reads.begin(), reads.end(), [](const PlannedRead& a, const PlannedRead& b) {
-            return std::tie(a.address, b.count, a.every) < std::tie(b.address, a.count, b.every);
+            return std::tie(a.span.first, b.span.count, a.every) <
+                   std::tie(b.span.first, a.span.count, b.every);
         });
         return reads;
     }
@@ -229,7 +229,7 @@ class TablePlanner {
         std::vector<PlannedRead> reads;
         reads.reserve(boxes.size());
         for (const Box& box : boxes)
-            reads.push_back({table_, box.first, box.end - box.first, box.every, {}, false});
+            reads.push_back({{table_, box.first, box.end - box.first}, box.every, {}, false});
         for (const Piece& piece : pieces_) {
             const auto index = find_server(boxes, piece) - boxes.cbegin();
             reads[static_cast<std::size_t>(index)].wants.push_back(piece.want);
@@ -244,7 +244,7 @@ class TablePlanner {
         for (const Piece& piece : refused_) {
             if (before == nullptr || before->first != piece.first || before->end != piece.end)
                 reads.push_back(
-                    {table_, piece.first, piece.end - piece.first, piece.every, {}, true});
+                    {{table_, piece.first, piece.end - piece.first}, piece.every, {}, true});
             reads.back().wants.push_back(piece.want);
             before = &piece;
         }
@@ -260,14 +260,14 @@ class TablePlanner {
 
 /// The read of exactly these pieces.
 PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces) {
-    PlannedRead read{whole.table, pieces.front().first, 0, Duration::max(), {}, false};
+    PlannedRead read{{whole.span.table, pieces.front().first, 0}, Duration::max(), {}, false};
     std::uint32_t end = 0;
     for (const Piece& piece : pieces) {
         end = std::max(end, piece.end);
         read.every = std::min(read.every, piece.every);
         read.wants.push_back(piece.want);
     }
-    read.count = end - read.address;
+    read.span.count = end - read.span.first;
     std::sort(read.wants.begin(), read.wants.end());
     return read;
 }
@@ -300,7 +300,7 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
     PlanLimits limits;
     limits.serial = serial;
     limits.gap = gap;
-    for (const modbus::Table table : kTables) {
+    for (const modbus::Table table : modbus::kTables) {
         const modbus::Function function = modbus::read_function(table);
         if (!profile.has_function(function)) continue;
         limits.of(table).max_items =
@@ -315,19 +315,17 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
 }
 
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count) {
-    constexpr std::size_t kRequest = 8;   // address, function, address, count, CRC
-    constexpr std::size_t kOverhead = 5;  // address, function, byte count, CRC
     const std::size_t data =
         modbus::is_bit_table(table) ? (std::size_t{count} + 7) / 8 : std::size_t{count} * 2;
-    return wire_time(limits.serial, kRequest) + limits.gap + limits.think_time +
-           wire_time(limits.serial, kOverhead + data) + limits.gap;
+    return wire_time(limits.serial, modbus::kReadRequestAdu) + limits.gap + limits.think_time +
+           wire_time(limits.serial, modbus::kReadReplyOverhead + data) + limits.gap;
 }
 
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits) {
     std::vector<PlannedRead> plan;
-    for (const modbus::Table table : kTables) {
+    for (const modbus::Table table : modbus::kTables) {
         const bool wanted = std::any_of(wants.begin(), wants.end(),
-                                        [&](const Want& want) { return want.table == table; });
+                                        [&](const Want& want) { return want.span.table == table; });
         if (!wanted || limits.of(table).max_items == 0) continue;
         std::vector<PlannedRead> reads = TablePlanner(wants, limits, table).run();
         std::move(reads.begin(), reads.end(), std::back_inserter(plan));
@@ -339,9 +337,9 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
                                                           std::span<const Want> wants) {
     std::vector<Piece> pieces;
     for (const std::size_t index : read.wants) {
-        const Span want = wants[index].span();
-        pieces.push_back({std::max(want.address, read.address),
-                          std::min(want.end(), read.span().end()), wants[index].every, index});
+        const modbus::Span& want = wants[index].span;
+        pieces.push_back({std::max(want.first, read.span.first),
+                          std::min(want.end(), read.span.end()), wants[index].every, index});
     }
     if (pieces.empty()) return std::nullopt;
     sort_by_start(pieces);
@@ -351,10 +349,11 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
     return std::pair(read_of(read, all.first(at)), read_of(read, all.subspan(at)));
 }
 
-std::optional<Span> seam(const PlannedRead& left, const PlannedRead& right) {
-    if (left.table != right.table || right.address < left.span().end()) return std::nullopt;
-    const std::uint32_t first = left.span().end() - 1;
-    return Span{left.table, first, right.address + 1 - first};
+std::optional<modbus::Span> seam(const PlannedRead& left, const PlannedRead& right) {
+    const modbus::Table table = left.span.table;
+    if (table != right.span.table || right.span.first < left.span.end()) return std::nullopt;
+    const std::uint32_t first = left.span.end() - 1;
+    return modbus::Span{table, first, right.span.first + 1 - first};
 }
 
 }  // namespace panelgate::points

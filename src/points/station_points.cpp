@@ -7,15 +7,19 @@ namespace panelgate::points {
 std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls) {
     std::vector<Want> wants;
     for (const Point& point : points)
-        wants.push_back({point.table, point.address, point.count(), point.every});
+        wants.push_back({{point.table, point.address, point.count()}, point.every});
     for (const Poll& poll : polls)
-        wants.push_back({poll.table, poll.address, poll.count, poll.every});
+        wants.push_back({{poll.table, poll.address, poll.count}, poll.every});
     return wants;
 }
 
 const Point* StationPoints::find(std::string_view name) const {
     const auto found = std::ranges::find(*points_, name, &Point::name);
     return found == points_->end() ? nullptr : &*found;
+}
+
+const Point* StationPoints::point_of(std::size_t want) const {
+    return want < points_->size() ? &(*points_)[want] : nullptr;
 }
 
 const Reading& StationPoints::reading(const Poll& block) const {

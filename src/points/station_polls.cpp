@@ -22,8 +22,8 @@ PollSchedule schedule_of(const std::vector<PlannedRead>& plan, TimePoint start) 
 }
 
 std::vector<std::uint16_t> items_of(const PlannedRead& read, ByteView reply) {
-    if (!modbus::is_bit_table(read.table)) return modbus::registers_of(reply);
-    const std::vector<bool> bits = modbus::bits_of(reply, read.count);
+    if (!modbus::is_bit_table(read.span.table)) return modbus::registers_of(reply);
+    const std::vector<bool> bits = modbus::bits_of(reply, read.span.count);
     return {bits.begin(), bits.end()};
 }
 
@@ -64,10 +64,7 @@ StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint
 std::vector<StationPolls::Due> StationPolls::take_due(TimePoint now) {
     std::vector<Due> due;
     for (const std::size_t read : schedule_.take_due(now)) {
-        const PlannedRead& planned = plan_[read];
-        due.push_back(
-            {read, modbus::encode_read(planned.table, static_cast<std::uint16_t>(planned.address),
-                                       static_cast<std::uint16_t>(planned.count))});
+        due.push_back({read, modbus::encode_read(plan_[read].span)});
     }
     return due;
 }
@@ -90,13 +87,13 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
 void StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {
     const std::vector<std::uint16_t> items = items_of(read, reply);
     for (const std::size_t index : read.wants) {
-        const Want& want = wants_[index];
+        const modbus::Span& want = wants_[index].span;
         Reading& reading = readings_[index];
         reading.values.resize(want.count);
-        const std::uint32_t first = std::max(want.address, read.address);
-        const std::uint32_t end = std::min(want.span().end(), read.span().end());
+        const std::uint32_t first = std::max(want.first, read.span.first);
+        const std::uint32_t end = std::min(want.end(), read.span.end());
         for (std::uint32_t i = first; i < end; ++i)
-            reading.values[i - want.address] = items[i - read.address];
+            reading.values[i - want.first] = items[i - read.span.first];
         reading.failing = false;
         reading.exception.reset();
         ++reading.good;

@@ -5,8 +5,9 @@
 namespace panelgate::points {
 
 bool is_plannable(const Want& want) {
-    return want.count > 0 && want.address < kTableItems &&
-           want.count <= kTableItems - want.address && want.every > Duration::zero();
+    const modbus::Span& span = want.span;
+    return span.count > 0 && span.first < modbus::kTableItems &&
+           span.count <= modbus::kTableItems - span.first && want.every > Duration::zero();
 }
 
 TableMap::TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table)
@@ -16,8 +17,8 @@ TableMap::TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus
     for (const profile::AddressRange& range : limits.of(table).readable)
         all.push_back({range.first, range.last + 1});
     for (const Want& want : wants)
-        if (want.table == table && is_plannable(want))
-            all.push_back({want.address, want.address + want.count});
+        if (want.span.table == table && is_plannable(want))
+            all.push_back({want.span.first, want.span.end()});
     std::sort(all.begin(), all.end(), by_first);
     for (const Piece& piece : all) {
         if (open_.empty() || piece.first > open_.back().end)
@@ -25,8 +26,8 @@ TableMap::TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus
         else
             open_.back().end = std::max(open_.back().end, piece.end);
     }
-    for (const Span& span : limits.refused)
-        if (span.table == table && span.count > 0) refused_.push_back({span.address, span.end()});
+    for (const modbus::Span& span : limits.refused)
+        if (span.table == table && span.count > 0) refused_.push_back({span.first, span.end()});
     std::sort(refused_.begin(), refused_.end(), by_first);
     for (std::size_t i = refused_.size(); i-- > 1;)
         refused_[i - 1].end = std::min(refused_[i - 1].end, refused_[i].end);

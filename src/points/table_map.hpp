@@ -8,8 +8,6 @@
 
 namespace panelgate::points {
 
-inline constexpr std::uint32_t kTableItems = 65536;  ///< AP 4.3
-
 /// Keeps the contract of Want.
 bool is_plannable(const Want& want);
 

@@ -13,8 +13,8 @@ unsigned write_limit(const PanelProfile& profile, std::uint8_t function) {
                                                            : most;
 }
 
-bool within(const std::optional<modbus::Range>& range, unsigned most) {
-    return !range || (range->count >= 1 && range->count <= most);
+bool within(const std::optional<modbus::Span>& span, unsigned most) {
+    return !span || (span->count >= 1 && span->count <= most);
 }
 
 bool is_coil_value(ByteView pdu) {
@@ -23,9 +23,9 @@ bool is_coil_value(ByteView pdu) {
 
 }  // namespace
 
-const Area* find_readable(const PanelProfile& profile, const modbus::Range& range) {
-    const Area* area = profile.find_area(range.table, range.address);
-    return area != nullptr && area->readable.contains(range.address, range.count) ? area : nullptr;
+const Area* find_readable(const PanelProfile& profile, const modbus::Span& span) {
+    const Area* area = profile.find_area(span.table, span.first);
+    return area != nullptr && area->readable.contains(span.first, span.count) ? area : nullptr;
 }
 
 Judgement judge(const PanelProfile& profile, ByteView pdu) {
@@ -44,7 +44,7 @@ Judgement judge(const PanelProfile& profile, ByteView pdu) {
     const Area* area = find_readable(profile, *access.write);
     if (area == nullptr) return Judgement::illegal_address;
     const bool may =
-        area->writable && area->writable->contains(access.write->address, access.write->count);
+        area->writable && area->writable->contains(access.write->first, access.write->count);
     return may ? Judgement::fine : Judgement::write_protected;
 }
 

@@ -22,16 +22,19 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 using yaml::Problems;
-using Tables = std::array<std::pair<std::string_view, modbus::Table>, 4>;
+using Tables = std::array<std::pair<std::string_view, modbus::Table>, modbus::kTables.size()>;
 
 constexpr std::uint32_t kLastAddress = 65535;
 constexpr int kMaxBaud = 4'000'000;
-constexpr Tables kTables{{{"coils", modbus::Table::coils},
-                          {"discrete-inputs", modbus::Table::discrete_inputs},
-                          {"input-registers", modbus::Table::input_registers},
-                          {"holding-registers", modbus::Table::holding_registers}}};
 constexpr std::array<std::pair<std::string_view, BitDigits>, 3> kBits{
     {{"none", BitDigits::none}, {"hex", BitDigits::hex}, {"decimal", BitDigits::decimal}}};
+
+Tables tables() {
+    Tables words;
+    std::ranges::transform(modbus::kTables, words.begin(),
+                           [](modbus::Table table) { return std::pair(label(table), table); });
+    return words;
+}
 
 /// The integers of a list, each inside [min, max].
 std::vector<int> integers(MapReader& in, std::string_view key, int min, int max) {
@@ -173,8 +176,8 @@ Area load_area(const Node& node, Problems& problems) {
         if (is_map && in.child(key) == nullptr)
             in.problem(key, "an area needs '" + std::string(key) + '\'');
     }
-    area.table = in.choice<modbus::Table>("table", kTables).value_or(area.table);
-    area.also = choices(in, "also", kTables);
+    area.table = in.choice<modbus::Table>("table", tables()).value_or(area.table);
+    area.also = choices(in, "also", tables());
     const auto readable = range(in, "readable");
     area.readable = readable.value_or(AddressRange{});
     area.writable = range(in, "writable");

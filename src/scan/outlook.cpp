@@ -1,13 +1,13 @@
 #include <algorithm>
 
 #include "duplicates.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/scan/scanner.hpp"
 #include "state.hpp"
 
 namespace panelgate::scan {
 namespace {
 
-constexpr std::size_t kRequest = 8;
 constexpr int kProbes = 12;        // of a usual recognition
 constexpr Duration kProbe = 20ms;  // request, think time and reply
 
@@ -27,7 +27,7 @@ std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
 
 /// First pass, second pass of who will be silent, examination of who has answered.
 Duration Scanner::State::asking_cost() const {
-    const Duration wire = wire_time(format, kRequest);
+    const Duration wire = wire_time(format, modbus::kReadRequestAdu);
     const auto first = static_cast<std::int64_t>(first_pass.size());
     const auto second = static_cast<std::int64_t>(second_pass.size()) + first;
     const Duration examining = settings.repeats * (settings.settle + kProbe) + kProbes * kProbe;

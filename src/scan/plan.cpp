@@ -7,6 +7,7 @@
 #include <set>
 
 #include "lists.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scan {
 
@@ -123,10 +124,9 @@ void SearchPlan::hint(const Cell& cell) {
 }
 
 Duration SearchPlan::cost(const Settings& settings) const {
-    constexpr std::size_t kRequest = 8;
     Duration total{};
     for (std::size_t i = at_; i < cells_.size(); ++i) {
-        total += settings.search_timeout + wire_time(cells_[i].format, kRequest);
+        total += settings.search_timeout + wire_time(cells_[i].format, modbus::kReadRequestAdu);
         const bool changes = i + 1 == cells_.size() || cells_[i + 1].format != cells_[i].format;
         if (changes)
             total += settings.leave_timeout - settings.search_timeout + settings.after_format;

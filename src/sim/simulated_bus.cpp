@@ -128,9 +128,8 @@ TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
 
 /// Empty when nobody answers: damage, a broadcast, an address that nobody has.
 Bytes SimulatedBus::State::reply_to(ByteView adu) {
-    constexpr std::size_t kMinAdu = 4;
-    if (adu.size() < kMinAdu || !modbus::crc_ok(adu)) return {};
-    const ByteView pdu = adu.subspan(1, adu.size() - 3);
+    if (!modbus::crc_ok(adu)) return {};
+    const ByteView pdu = adu.subspan(1, adu.size() - modbus::kAduOverhead);
     const TimePoint now = rt::now();
     const std::int64_t wall = rt::local_wall_seconds();
     Bytes answer;

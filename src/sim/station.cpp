@@ -65,8 +65,8 @@ struct Station::State {
     void move(TimePoint now, std::int64_t wall);
     Bytes execute(ByteView pdu);
     Bytes transfer(ByteView pdu, const modbus::Access& access);
-    Bytes read(std::uint8_t function, const modbus::Range& range) const;
-    void write(ByteView pdu, const modbus::Range& range);
+    Bytes read(std::uint8_t function, const modbus::Span& range) const;
+    void write(ByteView pdu, const modbus::Span& range);
     std::uint16_t written(ByteView pdu, const Area& area, std::uint32_t address,
                           std::uint16_t index) const;
 
@@ -157,19 +157,19 @@ Bytes Station::State::transfer(ByteView pdu, const modbus::Access& access) {
     return {pdu.begin(), pdu.end()};  // 16h echoes its request
 }
 
-Bytes Station::State::read(std::uint8_t function, const modbus::Range& range) const {
+Bytes Station::State::read(std::uint8_t function, const modbus::Span& range) const {
     const Area& area = *profile::find_readable(*profile, range);
     if (modbus::is_bit_table(range.table)) {
         std::vector<bool> bits;
         bits.reserve(range.count);
         for (std::uint32_t i = 0; i < range.count; ++i)
-            bits.push_back(memory.get(area, range.address + i) != 0);
+            bits.push_back(memory.get(area, range.first + i) != 0);
         const Bytes packed = modbus::pack_bits(bits);
         return Writer().u8(function).u8(static_cast<unsigned>(packed.size())).raw(packed).take();
     }
     Writer reply;
     reply.u8(function).u8(2u * range.count);
-    for (std::uint32_t i = 0; i < range.count; ++i) reply.u16(memory.get(area, range.address + i));
+    for (std::uint32_t i = 0; i < range.count; ++i) reply.u16(memory.get(area, range.first + i));
     return reply.take();
 }
 
@@ -198,10 +198,10 @@ std::uint16_t Station::State::written(ByteView pdu, const Area& area, std::uint3
     }
 }
 
-void Station::State::write(ByteView pdu, const modbus::Range& range) {
+void Station::State::write(ByteView pdu, const modbus::Span& range) {
     const Area& area = *profile::find_readable(*profile, range);
     for (std::uint16_t i = 0; i < range.count; ++i) {
-        const std::uint32_t address = std::uint32_t{range.address} + i;
+        const std::uint32_t address = range.first + i;
         memory.set(area, address, written(pdu, area, address, i));
     }
 }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "checker.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
+#include "support/read_span.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -20,12 +20,12 @@ constexpr std::uint8_t kBroadcast = 0;
 void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
     if (what != FrameKind::request && what != FrameKind::broadcast)
         return;  // it answers nobody, or the same again
-    const auto span = arbiter::read_span(station, pdu);
+    const auto span = test::read_span(station, pdu);
     std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
-        const auto own = arbiter::read_span(open.job.station, open.job.pdu);
+        const auto own = test::read_span(open.job.station, open.job.pdu);
         const bool goes =
             span && own ? span->contains(*own)
                         : open.job.station == station && std::ranges::equal(open.job.pdu, pdu);
@@ -40,7 +40,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
 /// A read that comes while one which contains it is still leaving goes along with it, unless
 /// something older of its client waits for that station.
 bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
-    const auto own = arbiter::read_span(job.station, job.pdu);
+    const auto own = test::read_span(job.station, job.pdu);
     const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
     if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
     return std::ranges::none_of(open_, [&](const auto& entry) {
@@ -55,24 +55,25 @@ bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
 /// not known here: they count.
 std::size_t Checker::waiting() const {
     std::size_t waiting = 0;
-    std::map<std::pair<unsigned, unsigned>, std::vector<arbiter::ReadSpan>> reads;
+    std::map<std::pair<unsigned, modbus::Table>, std::vector<arbiter::ReadSpan>> reads;
     for (const auto& [ticket, open] : open_) {
         if (open.sent || open.gone) continue;
-        const auto span = arbiter::read_span(open.job.station, open.job.pdu);
+        const auto span = test::read_span(open.job.station, open.job.pdu);
         if (!span || !settings_.share_reads) {
             ++waiting;
         } else {
-            reads[{span->station, span->function}].push_back(*span);
+            reads[{span->station, span->items.table}].push_back(*span);
         }
     }
     for (auto& [table, spans] : reads) {
         std::ranges::sort(spans, [](const arbiter::ReadSpan& a, const arbiter::ReadSpan& b) {
-            return std::tuple(a.address, b.count) < std::tuple(b.address, a.count);
+            return std::tuple(a.items.first, b.items.count) <
+                   std::tuple(b.items.first, a.items.count);
         });
         std::uint32_t end = 0;
         for (const arbiter::ReadSpan& span : spans) {
-            if (span.end() > end) ++waiting;
-            end = std::max(end, span.end());
+            if (span.items.end() > end) ++waiting;
+            end = std::max(end, span.items.end());
         }
     }
     return waiting;

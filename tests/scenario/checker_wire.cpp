@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "checker.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "support/read_span.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -100,7 +100,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
-    attempt_.span = arbiter::read_span(station, pdu);
+    attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
     attempt_.owed = now < watch_.rests_until(station);
     constexpr std::size_t kRemembered = 8;
@@ -223,11 +223,11 @@ void Checker::check_again(std::uint8_t station, ByteView pdu, FrameKind what) {
     const bool was_silent = before != silent_before_.end() && before->second;
     if (was_silent && watch_.only_dies(station) && calm_)
         fail("P4: a silent station was asked again at once");
-    const auto span = arbiter::read_span(station, pdu);
+    const auto span = test::read_span(station, pdu);
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         if (o.gone || o.job.station != station) return false;
-        const auto own = arbiter::read_span(station, o.job.pdu);
+        const auto own = test::read_span(station, o.job.pdu);
         return span && own ? span->contains(*own) : std::ranges::equal(o.job.pdu, pdu);
     });
     if (!wanted) fail("P4: a request went out again for nobody");

@@ -6,7 +6,7 @@
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::test {
@@ -20,7 +20,7 @@ inline arbiter::Group group_of(std::uint8_t station, Bytes pdu, int attempts = 1
     job.pdu = pdu;
     arbiter::Group group;
     group.station = station;
-    group.span = arbiter::read_span(station, pdu);
+    group.span = modbus::read_span(pdu);
     group.pdu = std::move(pdu);
     group.attempts = attempts;
     group.jobs.push_back(std::move(job));

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
 
@@ -17,7 +17,7 @@ struct Group {
     std::vector<Job> jobs;
     std::uint8_t station = 0;
     Bytes pdu;
-    std::optional<ReadSpan> span;
+    std::optional<modbus::Span> span;  ///< of a read that can be shared
     int attempts = 0;
     TimePoint started{};      ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not

@@ -5,6 +5,7 @@
 
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/arbiter/station.hpp"
 
 namespace panelgate::arbiter {

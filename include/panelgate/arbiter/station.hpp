@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
+#include "panelgate/modbus/function.hpp"
 
 namespace panelgate::arbiter {
 
@@ -156,8 +158,10 @@ class Station {
     Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }
     Bytes probe_pdu() const;
-    /// The longest read of this function that it has answered; items.
-    std::uint32_t longest_read(std::uint8_t function) const;
+    /// The longest read of this table that it has answered; items.
+    std::uint32_t longest_read(modbus::Table table) const {
+        return longest_read_[static_cast<std::size_t>(table)];
+    }
     Duration worst_lateness() const { return late_.worst(); }
     /// Until when nobody should send, because of what follows its replies.
     TimePoint trail_until() const {
@@ -213,8 +217,8 @@ class Station {
     TimePoint asked_{};
     Bytes cheapest_read_;  ///< that it has answered
     Bytes last_read_;      ///< what to probe with before it has answered any
-    std::array<std::uint32_t, 5> longest_read_{};  ///< by function 1 to 4
-    Slowest slowest_;                              ///< from request to first sign of the reply
+    std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
+    Slowest slowest_;  ///< from request to first sign of the reply
     TimePoint failed_{};
     int failed_in_a_row_ = 0;
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended

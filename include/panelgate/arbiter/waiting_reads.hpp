@@ -39,9 +39,11 @@ class WaitingReads {
     };
     using Equals = std::map<Ticket, Client>;  ///< never empty, the oldest may count
     using Spans = std::map<ReadSpan, Equals, WiderFirst>;
-    using Place = std::tuple<std::uint8_t, std::uint8_t, std::uint32_t>;
+    using Place = std::tuple<std::uint8_t, modbus::Table, std::uint32_t>;
 
-    static Place place(const ReadSpan& span) { return {span.station, span.function, span.address}; }
+    static Place place(const ReadSpan& span) {
+        return {span.station, span.items.table, span.items.first};
+    }
     bool is_widest(const ReadSpan& span) const;
     void make_widest(Spans::const_iterator it, const Count& count);
     void drop_span(Spans::iterator it, const Count& count);

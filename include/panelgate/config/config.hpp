@@ -13,7 +13,7 @@
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/sim/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
-#include "panelgate/web/settings.hpp"
+#include "panelgate/web/http/settings.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {
@@ -40,7 +40,7 @@ struct Line {
     std::vector<Station> stations;
 };
 
-/// A valid configuration (README, Configuration): every default filled in, every reference resolved.
+/// A valid configuration (README, Configuration): defaults filled in, references resolved.
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
     std::vector<Line> lines;

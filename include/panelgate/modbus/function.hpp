@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
@@ -42,6 +43,8 @@ inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 
 /// The four tables of the data model (AP 4.3).
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
+inline constexpr std::array kTables = {Table::coils, Table::discrete_inputs, Table::input_registers,
+                                       Table::holding_registers};
 /// "holding-registers", the word of the REST path.
 std::string_view label(Table table);
 inline constexpr bool is_bit_table(Table table) {

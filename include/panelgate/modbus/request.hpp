@@ -8,21 +8,14 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::modbus {
 
-/// Items [address, address + count) of one table, 0-based as on the wire.
-struct Range {
-    Table table = Table::holding_registers;
-    std::uint16_t address = 0;
-    std::uint16_t count = 0;
-    friend bool operator==(const Range&, const Range&) = default;
-};
-
 /// What a request reads and writes; nothing for functions without addresses.
 struct Access {
-    std::optional<Range> read;
-    std::optional<Range> write;
+    std::optional<Span> read;
+    std::optional<Span> write;
 };
 
 /// How strictly quantities are judged before transmission (PDU-08).
@@ -38,6 +31,9 @@ Result<void> check_request(ByteView pdu, QuantityCheck check = QuantityCheck::fi
 
 /// Which items a checked request touches.
 Access access_of(ByteView pdu);
+/// What this PDU asks for, when it is a read of a table: 01..04, at least one item, none beyond the
+/// end of the table.
+std::optional<Span> read_span(ByteView pdu);
 /// Repeating it cannot change anything (RTY-02): the reads, and 2B/0E.
 bool is_pure_read(ByteView pdu);
 /// 08/0004 Force Listen Only Mode: a unicast request that is never answered (DIA-01).
@@ -52,6 +48,8 @@ std::size_t request_adu_length(ByteView heard);
 std::optional<std::size_t> reply_length_from_request(ByteView pdu);
 
 Bytes encode_read(Table table, std::uint16_t address, std::uint16_t count);
+/// `span` is what read_span() may give.
+Bytes encode_read(const Span& span);
 Bytes encode_write_coil(std::uint16_t address, bool value);
 Bytes encode_write_register(std::uint16_t address, std::uint16_t value);
 /// At most 2040 coils (255 data bytes); more breaks the caller's contract.

@@ -1,11 +1,19 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "panelgate/base/bytes.hpp"
 
 namespace panelgate::modbus {
+
+inline constexpr std::size_t kCrcSize = 2;
+inline constexpr std::size_t kAduOverhead = 1 + kCrcSize;    ///< address and CRC around a PDU
+inline constexpr std::size_t kMinAdu = kAduOverhead + 1;     ///< address, function, CRC
+inline constexpr std::size_t kExceptionAdu = kMinAdu + 1;    ///< ... and code: the shortest reply
+inline constexpr std::size_t kReadRequestAdu = kMinAdu + 4;  ///< 01 to 06: ... and two words
+inline constexpr std::size_t kReadReplyOverhead = kMinAdu + 1;  ///< 01 to 04: ... and byte count
 
 /// Address, PDU, CRC low byte first: what goes out in one write (TIM-02).
 Bytes encode_adu(std::uint8_t station, ByteView pdu);

@@ -11,31 +11,15 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/span.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::points {
 
-/// Items [address, address + count) of one table, 0-based as on the wire.
-struct Span {
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint32_t address = 0;
-    std::uint32_t count = 1;
-
-    std::uint32_t end() const { return address + count; }  ///< one past the last item
-    bool contains(const Span& other) const {
-        return table == other.table && address <= other.address && other.end() <= end();
-    }
-    friend bool operator==(const Span&, const Span&) = default;
-};
-
 /// Items that somebody wants together (all registers of a 32-bit value) this often.
 struct Want {
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint32_t address = 0;
-    std::uint32_t count = 1;  ///< above 0; address + count is at most 65536
-    Duration every = 1s;      ///< above 0
-
-    Span span() const { return {table, address, count}; }
+    modbus::Span span;    ///< at least one item, none beyond the end of the table
+    Duration every = 1s;  ///< above 0
 };
 
 /// What the panel can do with one table.
@@ -47,12 +31,12 @@ struct TableLimits {
 /// What bounds the reads of one station, and what they cost.
 struct PlanLimits {
     SerialFormat serial;
-    Duration gap = 1750us;              ///< silence before the request and after the reply
-    Duration think_time = 1ms;          ///< of the panel, after the silence that ends the request
-    std::array<TableLimits, 4> tables;  ///< by modbus::Table
+    Duration gap = 1750us;      ///< silence before the request and after the reply
+    Duration think_time = 1ms;  ///< of the panel, after the silence that ends the request
+    std::array<TableLimits, modbus::kTables.size()> tables;  ///< by modbus::Table
     /// Learned from exceptions 02 and 03: no read may contain one of these whole. The caller bounds
     /// how many there are.
-    std::vector<Span> refused;
+    std::vector<modbus::Span> refused;
 
     TableLimits& of(modbus::Table table) { return tables[static_cast<std::size_t>(table)]; }
     const TableLimits& of(modbus::Table table) const {
@@ -68,19 +52,15 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
 
 /// One request of the plan.
 struct PlannedRead {
-    modbus::Table table = modbus::Table::holding_registers;
-    std::uint32_t address = 0;
-    std::uint32_t count = 0;
+    modbus::Span span;
     Duration every{};                ///< the shortest interval of its wants
     std::vector<std::size_t> wants;  ///< indices of what it serves, ascending
     /// It contains a refused span, because what is wanted does: expect an exception.
     bool refused = false;
-
-    Span span() const { return {table, address, count}; }
 };
 
-/// How long a read of `count` items keeps the line from everybody else: request of 8 bytes, gap,
-/// think time, reply of 5 bytes and the data, gap.
+/// How long a read of `count` items keeps the line from everybody else: request, gap, think time,
+/// reply, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
 
 /// Few reads that serve every want, sorted by table and address. Where all intervals are the same
@@ -104,6 +84,6 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
 /// When both halves of a bisected read succeed, what the panel refuses lies between them: the
 /// smallest span that no read may contain then. Nothing when the halves overlap: then only the read
 /// that was bisected is known to be refused.
-std::optional<Span> seam(const PlannedRead& left, const PlannedRead& right);
+std::optional<modbus::Span> seam(const PlannedRead& left, const PlannedRead& right);
 
 }  // namespace panelgate::points

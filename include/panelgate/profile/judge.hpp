@@ -20,7 +20,7 @@ enum class Judgement : std::uint8_t {
 
 Judgement judge(const PanelProfile& profile, ByteView pdu);
 
-/// The one area that holds the whole range, or nullptr.
-const Area* find_readable(const PanelProfile& profile, const modbus::Range& range);
+/// The one area that holds the whole span, or nullptr.
+const Area* find_readable(const PanelProfile& profile, const modbus::Span& span);
 
 }  // namespace panelgate::profile

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scan {
 
@@ -15,7 +16,7 @@ class ReadRequest {
     static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu);
 
     std::uint8_t station() const { return adu_.front(); }
-    ByteView pdu() const { return ByteView(adu_).subspan(1, adu_.size() - 3); }
+    ByteView pdu() const { return ByteView(adu_).subspan(1, adu_.size() - modbus::kAduOverhead); }
     const Bytes& adu() const { return adu_; }
 
   private:

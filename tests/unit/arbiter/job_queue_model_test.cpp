@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
+#include "support/read_span.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -99,7 +99,7 @@ class Model {
     }
     static std::optional<ReadSpan> span_of(const Job& job) {
         if (job.alone || job.station == 0) return std::nullopt;
-        return read_span(job.station, job.pdu);
+        return test::read_span(job.station, job.pdu);
     }
     static Host own(const Job& job) { return job.host == 0 ? 1000 + job.client : job.host; }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "support/hex.hpp"
+#include "support/read_span.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -37,7 +38,7 @@ Duration room(const Job& job) { return job.deadline - job.start_by; }
 
 class ReceptionTest : public testing::Test {
   protected:
-    void remember() { reception_.memory().store(*read_span(17, kRead), kReply, kNow); }
+    void remember() { reception_.memory().store(*test::read_span(17, kRead), kReply, kNow); }
     Reception reception_{Settings{}};
 };
 

@@ -47,7 +47,7 @@ TEST(CheckRequest, DeniesFunctionZeroAndTheReplyRangeWhateverFollows) {
     EXPECT_EQ(fault_of(Bytes(300, 0)), Fault::denied);
 }
 
-/// Every function whose requests have one length (PDU-07): one byte less or more contradicts the function.
+/// Functions whose requests have one length (PDU-07): a byte less or more contradicts them.
 TEST(CheckRequest, WantsTheLengthOfTheFunction) {
     const Bytes requests[] = {"01 00 13 00 13"_hex,
                               "02 00 C4 00 16"_hex,
@@ -174,15 +174,15 @@ TEST(ReplyLengthFromRequest, DoesNotGuess) {
 
 TEST(AccessOf, SaysWhatIsReadAndWritten) {
     const auto holding = [](std::uint16_t at, std::uint16_t n) {
-        return Range{Table::holding_registers, at, n};
+        return Span{Table::holding_registers, at, n};
     };
-    EXPECT_EQ(access_of("01 01 20 00 05"_hex).read, (Range{Table::coils, 0x0120, 5}));
-    EXPECT_EQ(access_of("02 00 00 00 01"_hex).read, (Range{Table::discrete_inputs, 0, 1}));
+    EXPECT_EQ(access_of("01 01 20 00 05"_hex).read, (Span{Table::coils, 0x0120, 5}));
+    EXPECT_EQ(access_of("02 00 00 00 01"_hex).read, (Span{Table::discrete_inputs, 0, 1}));
     EXPECT_EQ(access_of("03 00 6B 00 03"_hex).read, holding(0x6B, 3));
-    EXPECT_EQ(access_of("04 00 08 00 01"_hex).read, (Range{Table::input_registers, 8, 1}));
-    EXPECT_EQ(access_of("05 00 AC FF 00"_hex).write, (Range{Table::coils, 0xAC, 1}));
+    EXPECT_EQ(access_of("04 00 08 00 01"_hex).read, (Span{Table::input_registers, 8, 1}));
+    EXPECT_EQ(access_of("05 00 AC FF 00"_hex).write, (Span{Table::coils, 0xAC, 1}));
     EXPECT_EQ(access_of("06 00 01 00 03"_hex).write, holding(1, 1));
-    EXPECT_EQ(access_of(write_coils(10)).write, (Range{Table::coils, 0, 10}));
+    EXPECT_EQ(access_of(write_coils(10)).write, (Span{Table::coils, 0, 10}));
     EXPECT_EQ(access_of(write_registers(4)).write, holding(0, 4));
     EXPECT_EQ(access_of("16 00 04 00 F2 00 25"_hex).write, holding(4, 1));
     EXPECT_EQ(access_of("18 04 DE"_hex).read, holding(0x04DE, 1));
@@ -197,6 +197,25 @@ TEST(AccessOf, IsNothingForFunctionsWithoutAddresses) {
                              "2B 0E 01 00"_hex, "41 00 01 00 02"_hex}) {
         const Access access = access_of(pdu);
         EXPECT_FALSE(access.read || access.write) << to_hex(pdu);
+    }
+}
+
+TEST(ReadSpan, IsWhatOneOfTheFourReadsAsksFor) {
+    EXPECT_EQ(read_span("04 01 02 00 7D"_hex), (Span{Table::input_registers, 0x102, 125}));
+    for (const std::uint8_t function : "01 02 03 04"_hex) {
+        const Bytes pdu = Writer().u8(function).u16(65535).u16(1).take();
+        const auto last = read_span(pdu);
+        ASSERT_TRUE(last);
+        EXPECT_EQ(encode_read(*last), pdu);
+    }
+}
+
+TEST(ReadSpan, IsNoneWhereNothingIsReadOrMoreThanThereIs) {
+    for (const Bytes& pdu :
+         {""_hex, "03"_hex, "03 00 00 00"_hex, "03 00 00 00 01 00"_hex, "03 00 00 00 00"_hex,
+          "03 FF FF 00 02"_hex, "05 00 00 FF 00"_hex, "06 00 00 00 01"_hex, "83 00 00 00 01"_hex,
+          "17 00 00 00 01 00 00 00 01 02 00 00"_hex, "00 00 00 00 01"_hex}) {
+        EXPECT_FALSE(read_span(pdu)) << to_hex(pdu);
     }
 }
 

@@ -40,7 +40,7 @@ struct Random {
     Table table() { return below(4) == 0 ? Table::coils : kRegisters; }
     Want any_want(std::uint32_t max_count, std::uint32_t intervals) {
         const Duration every = std::array<Duration, 3>{1s, 2s, 10s}[below(intervals)];
-        return {table(), below(80), 1 + below(below(4) == 0 ? max_count : 3), every};
+        return {{table(), below(80), 1 + below(below(4) == 0 ? max_count : 3)}, every};
     }
     std::vector<Want> wants(std::uint32_t most, std::uint32_t max_count, std::uint32_t intervals) {
         std::vector<Want> made(1 + below(most));
@@ -63,38 +63,41 @@ Items open_items(Table table, const std::vector<Want>& wants, const PlanLimits& 
     for (const profile::AddressRange& range : limits.of(table).readable)
         open |= items_of(range.first, range.last + 1 - range.first);
     for (const Want& one : wants)
-        if (one.table == table) open |= items_of(one.address, one.count);
+        if (one.span.table == table) open |= items_of(one.span.first, one.span.count);
     return open;
 }
 
-bool crosses_hole(const Span& read, const std::vector<Want>& wants, const PlanLimits& limits) {
-    return (items_of(read.address, read.count) & ~open_items(read.table, wants, limits)).any();
+bool crosses_hole(const modbus::Span& read, const std::vector<Want>& wants,
+                  const PlanLimits& limits) {
+    return (items_of(read.first, read.count) & ~open_items(read.table, wants, limits)).any();
 }
 
-bool contains_refused(const Span& read, const PlanLimits& limits) {
+bool contains_refused(const modbus::Span& read, const PlanLimits& limits) {
     return std::any_of(limits.refused.begin(), limits.refused.end(),
-                       [&](const Span& span) { return read.contains(span); });
+                       [&](const modbus::Span& span) { return read.contains(span); });
 }
 
 /// The items of a want that a read brings.
-Span part_of(const Want& one, const PlannedRead& read) {
-    const std::uint32_t first = std::max(one.address, read.address);
-    const std::uint32_t end = std::min(one.span().end(), read.span().end());
-    return {one.table, first, end > first ? end - first : 0};
+modbus::Span part_of(const Want& one, const PlannedRead& read) {
+    const std::uint32_t first = std::max(one.span.first, read.span.first);
+    const std::uint32_t end = std::min(one.span.end(), read.span.end());
+    return {one.span.table, first, end > first ? end - first : 0};
 }
 
 /// What is wrong with a read, or "".
 std::string judge(const PlannedRead& read, const std::vector<Want>& wants,
                   const PlanLimits& limits) {
-    if (read.count == 0 || read.count > limits.of(read.table).max_items) return "beyond a limit";
-    if (crosses_hole(read.span(), wants, limits)) return "crosses a hole";
+    if (read.span.count == 0 || read.span.count > limits.of(read.span.table).max_items)
+        return "beyond a limit";
+    if (crosses_hole(read.span, wants, limits)) return "crosses a hole";
     if (read.wants.empty()) return "nobody wants it";
-    if (contains_refused(read.span(), limits) != read.refused) return "refused is wrong";
+    if (contains_refused(read.span, limits) != read.refused) return "refused is wrong";
     for (const std::size_t index : read.wants) {
         const Want& one = wants[index];
-        if (one.table != read.table || part_of(one, read).count == 0) return "serves a stranger";
-        if (read.refused && part_of(one, read) != read.span()) return "refused with others";
-        if (one.count <= limits.of(one.table).max_items && !read.span().contains(one.span()))
+        if (one.span.table != read.span.table || part_of(one, read).count == 0)
+            return "serves a stranger";
+        if (read.refused && part_of(one, read) != read.span) return "refused with others";
+        if (one.span.count <= limits.of(one.span.table).max_items && !read.span.contains(one.span))
             return "a want is torn";
         if (read.every > one.every) return "too rarely";
     }
@@ -104,11 +107,11 @@ std::string judge(const PlannedRead& read, const std::vector<Want>& wants,
 std::string judge(const std::vector<PlannedRead>& plan, const std::vector<Want>& wants,
                   const PlanLimits& limits) {
     std::vector<Items> missing;
-    for (const Want& one : wants) missing.push_back(items_of(one.address, one.count));
+    for (const Want& one : wants) missing.push_back(items_of(one.span.first, one.span.count));
     for (const PlannedRead& read : plan) {
         if (std::string fault = judge(read, wants, limits); !fault.empty()) return fault;
         for (const std::size_t index : read.wants)
-            missing[index] &= ~items_of(read.address, read.count);
+            missing[index] &= ~items_of(read.span.first, read.span.count);
     }
     const bool whole =
         std::all_of(missing.begin(), missing.end(), [](const Items& left) { return left.none(); });
@@ -151,17 +154,17 @@ class ExhaustiveSearch {
     }
     /// -1 when these may not be read together. A want inside a longer read is no reason to refuse.
     double load(const std::vector<Want>& part) const {
-        Span box = part.front().span();
+        modbus::Span box = part.front().span;
         Duration every = part.front().every;
         for (const Want& one : part) {
-            if (one.table != box.table) return -1;
-            const std::uint32_t end = std::max(box.end(), one.span().end());
-            box.address = std::min(box.address, one.address);
-            box.count = end - box.address;
+            if (one.span.table != box.table) return -1;
+            const std::uint32_t end = std::max(box.end(), one.span.end());
+            box.first = std::min(box.first, one.span.first);
+            box.count = end - box.first;
             every = std::min(every, one.every);
         }
-        const bool same = std::all_of(part.begin(), part.end(),
-                                      [&](const Want& one) { return one.span() == box; });
+        const bool same =
+            std::all_of(part.begin(), part.end(), [&](const Want& one) { return one.span == box; });
         if (!same && (box.count > limits_.of(box.table).max_items ||
                       crosses_hole(box, wants_, limits_) || contains_refused(box, limits_)))
             return -1;
@@ -182,7 +185,8 @@ class ExhaustiveSearch {
 double load_of(const std::vector<PlannedRead>& plan, const PlanLimits& limits) {
     double sum = 0;
     for (const PlannedRead& read : plan)
-        sum += to_seconds(read_cost(limits, read.table, read.count)) / to_seconds(read.every);
+        sum += to_seconds(read_cost(limits, read.span.table, read.span.count)) /
+               to_seconds(read.every);
     return sum;
 }
 

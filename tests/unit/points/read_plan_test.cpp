@@ -21,16 +21,18 @@ PlanLimits limits_of(std::uint32_t max_items, std::vector<profile::AddressRange>
 }
 
 Want want(std::uint32_t address, std::uint32_t count = 1, Duration every = 1s) {
-    return {kRegisters, address, count, every};
+    return {{kRegisters, address, count}, every};
 }
 
-std::vector<Span> spans(const std::vector<PlannedRead>& plan) {
-    std::vector<Span> result;
-    for (const PlannedRead& read : plan) result.push_back(read.span());
+std::vector<modbus::Span> spans(const std::vector<PlannedRead>& plan) {
+    std::vector<modbus::Span> result;
+    for (const PlannedRead& read : plan) result.push_back(read.span);
     return result;
 }
 
-Span span(std::uint32_t address, std::uint32_t count) { return {kRegisters, address, count}; }
+modbus::Span span(std::uint32_t address, std::uint32_t count) {
+    return {kRegisters, address, count};
+}
 
 TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfARead) {
     PlanLimits limits = limits_of(125);
@@ -91,13 +93,13 @@ TEST(ReadPlan, CutsAWantThatIsLargerThanARead) {
 }
 
 TEST(ReadPlan, KeepsTablesApart) {
-    const std::vector<Want> wants = {{Table::holding_registers, 1, 1, 1s},
-                                     {Table::input_registers, 2, 1, 1s},
-                                     {Table::coils, 1, 1, 1s}};
+    const std::vector<Want> wants = {{{Table::holding_registers, 1, 1}, 1s},
+                                     {{Table::input_registers, 2, 1}, 1s},
+                                     {{Table::coils, 1, 1}, 1s}};
     const auto plan = plan_reads(wants, limits_of(125, {{0, 100}}));
     ASSERT_THAT(plan, SizeIs(3));
-    EXPECT_EQ(plan[0].table, Table::coils);
-    EXPECT_EQ(plan[1].table, Table::input_registers);
+    EXPECT_EQ(plan[0].span.table, Table::coils);
+    EXPECT_EQ(plan[1].span.table, Table::input_registers);
 }
 
 TEST(ReadPlan, ServesASlowWantByAFastReadThatContainsIt) {
@@ -177,7 +179,7 @@ TEST(ReadPlan, TakesTheProfilesLimitsWithinTheStandards) {
 
 TEST(ReadPlan, PlansFourThousandScatteredBitsAtOnce) {
     std::vector<Want> wants;
-    for (std::uint32_t i = 0; i < 4096; ++i) wants.push_back({Table::coils, i * 16, 1, 1s});
+    for (std::uint32_t i = 0; i < 4096; ++i) wants.push_back({{Table::coils, i * 16, 1}, 1s});
     const PlanLimits limits = limits_of(2000, {{0, 65535}});
     const auto plan = plan_reads(wants, limits);
     EXPECT_THAT(plan, SizeIs(33));  // 125 of them within 2000 items
@@ -189,32 +191,32 @@ TEST(Bisect, CutsAtTheWidestHole) {
     ASSERT_THAT(plan, SizeIs(1));
     const auto halves = bisect(plan[0], wants);
     ASSERT_TRUE(halves.has_value());
-    EXPECT_EQ(halves->first.span(), span(0, 2));
-    EXPECT_EQ(halves->second.span(), span(5, 4));
+    EXPECT_EQ(halves->first.span, span(0, 2));
+    EXPECT_EQ(halves->second.span, span(5, 4));
     EXPECT_THAT(halves->second.wants, ElementsAre(2, 3, 4));
     EXPECT_EQ(seam(halves->first, halves->second), span(1, 5));
 }
 
 TEST(Bisect, CutsInTheMiddleWhenThereIsNoHole) {
     const std::vector<Want> wants = {want(0), want(1), want(2), want(3, 1, 500ms)};
-    const PlannedRead read{kRegisters, 0, 4, 500ms, {0, 1, 2, 3}, false};
+    const PlannedRead read{{kRegisters, 0, 4}, 500ms, {0, 1, 2, 3}, false};
     const auto halves = bisect(read, wants);
     ASSERT_TRUE(halves.has_value());
-    EXPECT_EQ(halves->first.span(), span(0, 2));
+    EXPECT_EQ(halves->first.span, span(0, 2));
     EXPECT_EQ(halves->first.every, 1s);
     EXPECT_EQ(halves->second.every, 500ms);
 }
 
 TEST(Bisect, LeavesAReadOfOneWantOrOfTheSameItemsAlone) {
     const std::vector<Want> wants = {want(4, 2), want(4, 2), want(0, 300)};
-    EXPECT_FALSE(bisect({kRegisters, 4, 2, 1s, {0}, false}, wants).has_value());
-    EXPECT_FALSE(bisect({kRegisters, 4, 2, 1s, {0, 1}, false}, wants).has_value());
-    EXPECT_FALSE(bisect({kRegisters, 125, 125, 1s, {2}, false}, wants).has_value());
+    EXPECT_FALSE(bisect({{kRegisters, 4, 2}, 1s, {0}, false}, wants).has_value());
+    EXPECT_FALSE(bisect({{kRegisters, 4, 2}, 1s, {0, 1}, false}, wants).has_value());
+    EXPECT_FALSE(bisect({{kRegisters, 125, 125}, 1s, {2}, false}, wants).has_value());
 }
 
 TEST(Bisect, KnowsNoSeamBetweenHalvesThatOverlap) {
     const std::vector<Want> wants = {want(0, 4), want(2, 4)};
-    const auto halves = bisect({kRegisters, 0, 6, 1s, {0, 1}, false}, wants);
+    const auto halves = bisect({{kRegisters, 0, 6}, 1s, {0, 1}, false}, wants);
     ASSERT_TRUE(halves.has_value());
     EXPECT_FALSE(seam(halves->first, halves->second).has_value());
 }
@@ -223,8 +225,8 @@ TEST(Bisect, KnowsNoSeamBetweenHalvesThatOverlap) {
 /// reads that are marked. Gives how many exceptions that took.
 int learn(const std::vector<Want>& wants, PlanLimits& limits, const std::set<std::uint32_t>& bad) {
     const auto refuses = [&](const PlannedRead& read) {
-        const auto first = bad.lower_bound(read.address);
-        return first != bad.end() && *first < read.span().end();
+        const auto first = bad.lower_bound(read.span.first);
+        return first != bad.end() && *first < read.span.end();
     };
     int exceptions = 0;
     std::vector<PlannedRead> todo = plan_reads(wants, limits);
@@ -240,7 +242,7 @@ int learn(const std::vector<Want>& wants, PlanLimits& limits, const std::set<std
             if (between && !refuses(halves->first) && !refuses(halves->second))
                 limits.refused.push_back(*between);
         } else {
-            limits.refused.push_back(read.span());
+            limits.refused.push_back(read.span);
         }
     }
     return exceptions;

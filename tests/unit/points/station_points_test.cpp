@@ -21,7 +21,7 @@ TEST(StationPoints, ShowsValuesWithQualityAndAge) {
     const std::vector<Poll> blocks{poll};
     const auto wants = wants_of(points, blocks);
     ASSERT_EQ(wants.size(), 3u);
-    EXPECT_EQ(wants[2].count, 8u);
+    EXPECT_EQ(wants[2].span.count, 8u);
 
     const TimePoint start{1h};
     StationPolls polls(wants, make_plan_limits(profile::PanelProfile(), SerialFormat{}, 2ms),

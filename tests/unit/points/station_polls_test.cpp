@@ -26,7 +26,7 @@ Bytes reply_to(ByteView pdu) {
 }
 
 Want registers(std::uint32_t address, std::uint32_t count = 1, Duration every = 1s) {
-    return {Table::holding_registers, address, count, every};
+    return {{Table::holding_registers, address, count}, every};
 }
 
 /// Plays `span` of time; what is read is answered at once.
@@ -104,7 +104,7 @@ TEST(StationPolls, AWantThatTakesSeveralReadsIsAsOldAsItsOldestPart) {
 }
 
 TEST(StationPolls, BitsAreZeroOrOne) {
-    StationPolls polls({{Table::coils, 0, 3, 1s}}, limits(), kStart);
+    StationPolls polls({{{Table::coils, 0, 3}, 1s}}, limits(), kStart);
     play(polls, kStart, 2s, [](const Bytes&) { return Result<Bytes>(Bytes{1, 1, 0x05}); });
     EXPECT_EQ(polls.reading(0).values, (std::vector<std::uint16_t>{1, 0, 1}));
 }

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/modbus/request.hpp"
+
+namespace panelgate::test {
+
+/// What this PDU asks this station for, when it is a read of a table.
+inline std::optional<arbiter::ReadSpan> read_span(std::uint8_t station, ByteView pdu) {
+    const auto items = modbus::read_span(pdu);
+    if (!items) return std::nullopt;
+    return arbiter::ReadSpan{station, *items};
+}
+
+}  // namespace panelgate::test
