@@ -13,9 +13,7 @@ constexpr std::uint32_t kMost = 100;
 
 Want want(std::uint32_t first, std::uint32_t count) {
     Want made;
-    made.table = kTable;
-    made.address = first;
-    made.count = count;
+    made.span = {kTable, first, count};
     return made;
 }
 
@@ -91,20 +89,20 @@ TEST_F(TableMapTest, OtherTablesAndEmptySpansRefuseNothing) {
 
 TEST_F(TableMapTest, WantsOfOtherTablesOpenNothing) {
     wants = {want(0, 10), want(10, 10)};
-    wants[1].table = modbus::Table::coils;
+    wants[1].span.table = modbus::Table::coils;
     EXPECT_EQ(reach(0), 10u);
 }
 
 TEST_F(TableMapTest, TheLastItemOfTheTableEndsEveryRead) {
-    wants = {want(kTableItems - 2, 2)};
-    EXPECT_EQ(reach(kTableItems - 2), kTableItems);
+    wants = {want(modbus::kTableItems - 2, 2)};
+    EXPECT_EQ(reach(modbus::kTableItems - 2), modbus::kTableItems);
 }
 
 TEST(IsPlannable, AWantHasItemsOfTheTableAndAnInterval) {
-    EXPECT_TRUE(is_plannable(want(0, kTableItems)));
-    EXPECT_TRUE(is_plannable(want(kTableItems - 1, 1)));
-    EXPECT_FALSE(is_plannable(want(kTableItems - 1, 2)));
-    EXPECT_FALSE(is_plannable(want(kTableItems, 1)));
+    EXPECT_TRUE(is_plannable(want(0, modbus::kTableItems)));
+    EXPECT_TRUE(is_plannable(want(modbus::kTableItems - 1, 1)));
+    EXPECT_FALSE(is_plannable(want(modbus::kTableItems - 1, 2)));
+    EXPECT_FALSE(is_plannable(want(modbus::kTableItems, 1)));
     EXPECT_FALSE(is_plannable(want(1, 0xFFFF'FFFF))) << "the sum overflows";
     EXPECT_FALSE(is_plannable(want(0, 0)));
     Want never = want(0, 1);
