@@ -67,19 +67,17 @@ void Gateway::add_relays() {
     for (const points::Relay& relay : config_.relays) routes.push_back(route_of(plant_, relay));
     relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
     relays_->on_state([](const points::RelayStatus& relay) {
-        const auto level = relay.state == "ok" ? rt::LogLevel::info : rt::LogLevel::warn;
-        rt::log(level, "relay", {{"relay", relay.name}, {"state", relay.state}});
+        const bool ok = relay.state == points::RelayState::ok;
+        rt::log(ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
+                {{"relay", relay.name}, {"state", text_of(relay)}});
     });
 }
 
 void Gateway::add_listener(const tcp_server::Settings& settings) {
     tcp_server::UnitMap units(settings, plant_.listener_lines());
     plant_.add_units(units);
-    tcp_server::Hooks hooks;
-    hooks.log = [](std::string_view text) { rt::log(rt::LogLevel::info, text); };
-    hooks.version = PANELGATE_VERSION;
-    listeners_.push_back(
-        std::make_unique<tcp_server::Listener>(executor_, settings, std::move(units), hooks));
+    listeners_.push_back(std::make_unique<tcp_server::Listener>(
+        executor_, settings, std::move(units), PANELGATE_VERSION));
 }
 
 void Gateway::add_http(const web::Settings& settings) {

@@ -4,9 +4,11 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
+#include <variant>
 
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/station_settings.hpp"
@@ -15,16 +17,20 @@
 
 namespace panelgate::bus {
 
-/// Something happened that others may want to know.
-struct BusEvent {
-    enum class Kind : std::uint8_t { line, station, transaction };
-    Kind kind = Kind::line;
-    std::string_view what;  ///< "up", "down"; "online", "late"…; the outcome of a transaction
-    std::string why;        ///< of a line that is down, or that has a finding or lost one
+/// The line came or went, or has a finding or lost one.
+struct LineEvent {
+    bool up = false;
+    std::string why;  ///< of a line that is down; or the finding
+};
+/// A request was answered.
+struct TransactionEvent {
     std::uint8_t station = 0;
     std::uint8_t function = 0;
+    Outcome outcome = Outcome::ok;
     Duration took{};  ///< arrival to answer
 };
+/// Something happened that others may want to know.
+using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent>;
 
 struct Settings {
     std::string name;    ///< of the line

@@ -59,7 +59,7 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
     }
     bus::Request made;
     made.pdu = encode_write(function, static_cast<std::uint16_t>(*address), *cells);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     return made;
 }
 
@@ -87,8 +87,7 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     made.station = static_cast<std::uint8_t>(*station);
     made.pdu = std::move(*pdu);
     made.quantity = modbus::QuantityCheck::wide;
-    made.priority = modbus::is_pure_read(made.pdu) ? arbiter::PriorityClass::read
-                                                   : arbiter::PriorityClass::write;
+    made.priority = modbus::is_pure_read(made.pdu) ? PriorityClass::read : PriorityClass::write;
     const auto allowed = check_raw_station(directory, line, made);
     if (!allowed) return allowed.error();
     return made;

@@ -52,7 +52,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
     bus::Request made;
     made.station = found.station.id;
     made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     made.quantity = modbus::QuantityCheck::wide;
     return made;
 }
@@ -130,7 +130,7 @@ Handling get_relays(HttpRequest, const Api* api) {
     for (const points::RelayStatus& relay : api->providers.relays()) {
         json::object object;
         object["name"] = relay.name;
-        object["state"] = relay.state;
+        object["state"] = text_of(relay);
         object["reads"] = relay.reads;
         object["writes"] = relay.writes;
         object["read_failures"] = relay.read_failures;

@@ -32,7 +32,7 @@ Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
     bus::Request made;
     made.station = items.station.id;
     made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     made.quantity = modbus::QuantityCheck::wide;
     return made;
 }

@@ -77,7 +77,8 @@ class BusTest : public testing::Test {
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
-            if (event.kind == BusEvent::Kind::line && !event.why.empty()) seen.push_back(event.why);
+            const auto* told = std::get_if<LineEvent>(&event);
+            if (told != nullptr && !told->why.empty()) seen.push_back(told->why);
         };
         make_bus();
     }
@@ -114,7 +115,7 @@ TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     EXPECT_EQ(refused.pdu.value(), (Bytes{0x86, 2}));
     EXPECT_FALSE(refused.transmitted);
     EXPECT_TRUE(line->written.empty());
-    EXPECT_EQ(bus->report().stations.back().requests.at({"6", "refused"}), 1u);
+    EXPECT_EQ(bus->report().stations.back().requests.at(6)[Outcome::refused], 1u);
     const Refusal guarded{Refusal::Rule::guard, "oven",
                           modbus::ExceptionCode::illegal_data_address};
     EXPECT_EQ(refused.refusal, guarded);
@@ -216,9 +217,9 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_EQ(line->written[0], "11 03 00 6B 00 03 76 87"_hex);
     const auto trace = bus->trace(10);
     ASSERT_EQ(trace.size(), 2u);
-    EXPECT_EQ(trace[0].direction, TraceFrame::Direction::sent);
+    EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
-    EXPECT_EQ(bus->station_status(17).state, "online");
+    EXPECT_EQ(bus->station_status(17).state, Health::online);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
@@ -246,7 +247,7 @@ TEST_F(BusTest, ASilentStationIsATimeoutAndSaysSoInTheStatus) {
     EXPECT_EQ(answer.pdu.error(), Fault::timeout);
     EXPECT_TRUE(answer.transmitted);
     EXPECT_EQ(line->written.size(), 1u);
-    EXPECT_EQ(bus->station_status(17).state, "suspect");
+    EXPECT_EQ(bus->station_status(17).state, Health::suspect);
 }
 
 TEST_F(BusTest, ABroadcastIsAnsweredWithoutAReply) {
@@ -309,12 +310,11 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
     ask(98, "41 00"_hex);
     const LineReport report = bus->report();
     ASSERT_EQ(report.stations.size(), 3u);
-    const std::pair<std::string, std::string> read_ok{"3", "ok"};
     EXPECT_EQ(report.stations[0].station, "other");
-    EXPECT_EQ(report.stations[0].requests.at(read_ok), 1u);
-    EXPECT_EQ(report.stations[0].requests.count({"other", "damaged"}), 1u);
+    EXPECT_EQ(report.stations[0].requests.at(3)[Outcome::ok], 1u);
+    EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::damaged], 1u);
     EXPECT_EQ(report.stations[1].station, "press");
-    EXPECT_EQ(report.stations[1].requests.at(read_ok), 1u);
+    EXPECT_EQ(report.stations[1].requests.at(3)[Outcome::ok], 1u);
     EXPECT_TRUE(report.stations[1].up);
 }
 
