@@ -8,14 +8,14 @@
 namespace panelgate::points {
 namespace {
 
+using modbus::kTableItems;
+
 constexpr auto kTable = modbus::Table::holding_registers;
 constexpr std::uint32_t kMost = 100;
 
 Want want(std::uint32_t first, std::uint32_t count) {
     Want made;
-    made.table = kTable;
-    made.address = first;
-    made.count = count;
+    made.span = {kTable, first, count};
     return made;
 }
 
@@ -91,7 +91,7 @@ TEST_F(TableMapTest, OtherTablesAndEmptySpansRefuseNothing) {
 
 TEST_F(TableMapTest, WantsOfOtherTablesOpenNothing) {
     wants = {want(0, 10), want(10, 10)};
-    wants[1].table = modbus::Table::coils;
+    wants[1].span.table = modbus::Table::coils;
     EXPECT_EQ(reach(0), 10u);
 }
 
