@@ -8,8 +8,6 @@
 namespace panelgate::points {
 namespace {
 
-using modbus::kTableItems;
-
 constexpr auto kTable = modbus::Table::holding_registers;
 constexpr std::uint32_t kMost = 100;
 
@@ -96,15 +94,15 @@ TEST_F(TableMapTest, WantsOfOtherTablesOpenNothing) {
 }
 
 TEST_F(TableMapTest, TheLastItemOfTheTableEndsEveryRead) {
-    wants = {want(kTableItems - 2, 2)};
-    EXPECT_EQ(reach(kTableItems - 2), kTableItems);
+    wants = {want(modbus::kTableItems - 2, 2)};
+    EXPECT_EQ(reach(modbus::kTableItems - 2), modbus::kTableItems);
 }
 
 TEST(IsPlannable, AWantHasItemsOfTheTableAndAnInterval) {
-    EXPECT_TRUE(is_plannable(want(0, kTableItems)));
-    EXPECT_TRUE(is_plannable(want(kTableItems - 1, 1)));
-    EXPECT_FALSE(is_plannable(want(kTableItems - 1, 2)));
-    EXPECT_FALSE(is_plannable(want(kTableItems, 1)));
+    EXPECT_TRUE(is_plannable(want(0, modbus::kTableItems)));
+    EXPECT_TRUE(is_plannable(want(modbus::kTableItems - 1, 1)));
+    EXPECT_FALSE(is_plannable(want(modbus::kTableItems - 1, 2)));
+    EXPECT_FALSE(is_plannable(want(modbus::kTableItems, 1)));
     EXPECT_FALSE(is_plannable(want(1, 0xFFFF'FFFF))) << "the sum overflows";
     EXPECT_FALSE(is_plannable(want(0, 0)));
     Want never = want(0, 1);
