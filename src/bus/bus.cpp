@@ -34,6 +34,7 @@ struct Bus::State final : public line::Line::Events {
           settings(std::move(s)),
           line(std::move(l)),
           arbiter(settings.arbiter),
+          rights(settings.stations),
           counters(settings.stations),
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
@@ -46,8 +47,7 @@ struct Bus::State final : public line::Line::Events {
     void on_bytes(ByteView bytes) override;
 
     void transact(Request request, AnswerHandler handler);
-    std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
-    void refuse(Pending pending, Fault fault);
+    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -75,6 +75,7 @@ struct Bus::State final : public line::Line::Events {
     Settings settings;
     std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
+    Rights rights;
     RequestCounters counters;
     FlightRecorder recorder;
     DecisionRecorder decisions;
@@ -91,7 +92,7 @@ struct Bus::State final : public line::Line::Events {
 void Bus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
-    observe({BusEvent::Kind::line, "up", {}, 0, 0, {}});
+    observe(LineEvent{true, {}});
     arbiter.set_lead(line->lead());
     arbiter.confirm_ends(line->unsent().has_value());
     drive.hear([this](TimePoint now) {
@@ -104,7 +105,7 @@ void Bus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe({BusEvent::Kind::line, "down", why, 0, 0, {}});
+    observe(LineEvent{false, why});
     drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
 }
 
@@ -124,10 +125,9 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (const auto code = guarded(request)) {
-        Answer refused;
-        refused.pdu = modbus::encode_exception(function, *code);
-        return answer(std::move(entry), std::move(refused));
+    if (auto refusal = rights.judge(request.station, request.pdu)) {
+        Result<Bytes> reply = answer_to(*refusal, function);
+        return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     arbiter::Job job;
     job.station = request.station;
@@ -136,8 +136,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     job.host = request.host;
     job.priority = request.priority;
     const bool read = modbus::is_pure_read(job.pdu);
-    if (job.priority == arbiter::PriorityClass::read && !read)
-        job.priority = arbiter::PriorityClass::write;
+    if (job.priority == PriorityClass::read && !read) job.priority = PriorityClass::write;
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
@@ -145,18 +144,10 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     });
 }
 
-/// Why the panel's profile rules this request out, when its station is guarded.
-std::optional<modbus::ExceptionCode> Bus::State::guarded(const Request& request) const {
-    const auto guard = settings.guards.find(request.station);
-    if (guard == settings.guards.end()) return std::nullopt;
-    const auto code = guard->second(request.pdu);
-    if (!code) return std::nullopt;
-    return static_cast<modbus::ExceptionCode>(*code);
-}
-
-void Bus::State::refuse(Pending entry, Fault fault) {
+void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
     Answer refused;
-    refused.pdu = fault;
+    refused.pdu = std::move(pdu);
+    refused.refusal = std::move(refusal);
     answer(std::move(entry), std::move(refused));
 }
 
@@ -177,21 +168,17 @@ void Bus::State::act(arbiter::Finish& finish) {
 }
 
 void Bus::State::act(arbiter::Note& note) {
-    static constexpr TraceFrame::Direction kDirections[] = {TraceFrame::Direction::sent,
-                                                            TraceFrame::Direction::received,
-                                                            TraceFrame::Direction::discarded};
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "frame",
                 {{"line", settings.name},
-                 {"what", std::string(note.what)},
+                 {"what", std::string(label(note.kind))},
                  {"bytes", to_hex(note.bytes)},
                  {"why", note.why}});
     }
     TraceFrame frame;
     frame.at = note.at;
-    frame.direction = kDirections[static_cast<std::size_t>(note.direction)];
+    frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
-    frame.note = note.what;
     frame.why = std::move(note.why);
     recorder.add(std::move(frame));
 }
@@ -204,7 +191,7 @@ void Bus::State::act(arbiter::Decision& decision) {
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
-    observe({BusEvent::Kind::station, label(event.kind), {}, event.station, 0, {}});
+    observe(event);
     log_event(settings, event);
 }
 
@@ -224,9 +211,9 @@ void Bus::State::check_delivery(TimePoint now) {
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     const Duration took = clock.now() - entry.arrived;
-    const std::string outcome = outcome_of(result);
+    const Outcome outcome = outcome_of(result);
     counters.count(entry.station, entry.function, outcome, took);
-    observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
+    observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
     const bool refused = !result.transmitted && result.source == Source::bus;
@@ -245,20 +232,6 @@ namespace {
 Settings explained(Settings settings) {
     settings.arbiter.explain = true;
     return settings;
-}
-
-std::string_view label(arbiter::EchoMemory::State state) {
-    switch (state) {
-        case arbiter::EchoMemory::State::unknown:
-            return "unknown";
-        case arbiter::EchoMemory::State::absent:
-            return "absent";
-        case arbiter::EchoMemory::State::present:
-            return "present";
-        case arbiter::EchoMemory::State::unclear:
-            return "unclear";
-    }
-    std::abort();
 }
 
 }  // namespace
@@ -300,7 +273,7 @@ LineStatus Bus::status() const {
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.update(state_->clock.now(), state_->arbiter.counters().busy);
-    status.echo = label(state_->arbiter.echo());
+    status.echo = state_->arbiter.echo();
     if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
     status.findings = state_->doctor.findings();
     return status;
@@ -313,9 +286,13 @@ std::vector<ClientShare> Bus::clients() const {
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
-    status.state = label(health.state());
+    status.state = health.state();
     if (const auto last = health.last_success()) status.last_success = state_->clock.now() - *last;
     return status;
+}
+
+std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
+    return state_->rights.judge_write(station);
 }
 
 std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }

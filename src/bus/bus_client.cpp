@@ -10,10 +10,10 @@ ClientId next_client_id() {
     return ++last;
 }
 
-arbiter::Host host_of(std::string_view address) {
+Host host_of(std::string_view address) {
     constexpr std::string_view kMapped = "::ffff:";  // how a listener on [::] sees IPv4
     if (address.starts_with(kMapped)) address.remove_prefix(kMapped.size());
-    const auto hash = static_cast<arbiter::Host>(std::hash<std::string_view>{}(address));
+    const auto hash = static_cast<Host>(std::hash<std::string_view>{}(address));
     return hash == 0 ? 1 : hash;
 }
 

@@ -57,7 +57,8 @@ void Session::close() {
 
 void Session::fail(std::string_view reason, bool protocol_error) {
     if (protocol_error) ++shared_->counters.protocol_errors;
-    shared_->log("connection closed", pipeline_->client(), reason);
+    shared_->log(rt::LogLevel::info, "connection closed",
+                 {{"client", pipeline_->client()}, {"reason", std::string(reason)}});
     close();
 }
 
@@ -99,7 +100,7 @@ void Session::take_adus() {
         if (!event) break;
         progress = true;
         if (std::holds_alternative<modbus::Broken>(*event)) {
-            return fail("reason=\"length outside 2..254\"", true);
+            return fail("length outside 2..254", true);
         }
         if (std::holds_alternative<modbus::SkippedProtocol>(*event)) {
             if (!skip_protocol()) return;
@@ -114,7 +115,7 @@ void Session::take_adus() {
 /// MBAP-06. Does the connection live on?
 bool Session::skip_protocol() {
     if (++bad_protocol_ids_ >= shared_->settings.bad_protocol_ids) {
-        fail("reason=\"protocol id is not 0\"", true);
+        fail("protocol id is not 0", true);
         return false;
     }
     ++shared_->counters.protocol_errors;
@@ -127,9 +128,8 @@ void Session::guard_partial_adu(bool progress) {
     if (!pipeline_->has_room() || !framer_.partial()) return forget_partial_adu();
     if (watching_partial_ && !progress) return;
     watching_partial_ = true;
-    partial_alarm_->arm(
-        shared_->clock.now() + shared_->settings.partial_adu_timeout,
-        [self = shared_from_this()] { self->fail("reason=\"half-sent ADU\"", true); });
+    partial_alarm_->arm(shared_->clock.now() + shared_->settings.partial_adu_timeout,
+                        [self = shared_from_this()] { self->fail("half-sent ADU", true); });
 }
 
 void Session::forget_partial_adu() {
@@ -187,7 +187,7 @@ void Session::watch_output() {
                            self->watching_output_ = false;
                            if (!self->writing_) return;
                            if (self->written_ == written && self->not_taken() == held) {
-                               return self->fail("reason=\"client does not read\"", false);
+                               return self->fail("client does not read", false);
                            }
                            self->watch_output();
                        });

@@ -49,7 +49,7 @@ Kind line_of(HouseKind kind, Random& random) {
 void make_calm(Random& random, Plan& plan) {
     arbiter::Settings& s = plan.settings;
     s.queue = {};
-    s.echo = arbiter::EchoMode::off;
+    s.echo = EchoMode::off;
     s.unlisted.retries = 0;
     s.unlisted.response_timeout = 60ms;
     plan.line = {};

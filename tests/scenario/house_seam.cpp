@@ -84,11 +84,11 @@ void HouseJudge::judge_values(std::uint8_t station, std::uint16_t address,
 
 void HouseSeam::transact(bus::Request request, bus::AnswerHandler handler) {
     Open open{judge_.ask(request.station, request.pdu), request.client,
-              request.priority == arbiter::PriorityClass::poll, polls_};
+              request.priority == PriorityClass::poll, polls_};
     if (open.poll) judge_relay(open);
     const std::uint64_t id = ++last_;
     open_[id] = open;
-    if (flaw_ == Flaw::polls_first && open.poll) request.priority = arbiter::PriorityClass::read;
+    if (flaw_ == Flaw::polls_first && open.poll) request.priority = PriorityClass::read;
     if (flaw_ == Flaw::answers_at_once && id % 50 == 0) {
         inside_ = true;
         hand_over(open, {}, handler, id);

@@ -145,7 +145,7 @@ TEST_F(SessionEnd, ClosesAClientThatTakesNothingForLongAndNobodyElseNotices) {
         idle = context.poll() == 0 && n == 0U ? idle + 1 : 0;
     }
     clock.advance(2 * settings.output_timeout);
-    EXPECT_EQ(logged("does not read"), 1U);
+    EXPECT_EQ(log.count("does not read"), 1U);
     EXPECT_EQ(bystander.ask(1, "41"_hex), *bus1.instant);
     EXPECT_EQ(listener->counters().connections, 1U);
 }
@@ -156,9 +156,11 @@ TEST_F(SessionEnd, ASlowClientThatTakesSomethingInEachPeriodStays) {
     Client client = connect();
     for (int i = 0; i < 5; ++i) {
         EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
+        context.restart();
+        context.poll();  // that it was written is known, too
         clock.advance(settings.output_timeout);
     }
-    EXPECT_EQ(logged("does not read"), 0U);
+    EXPECT_EQ(log.count("does not read"), 0U);
     EXPECT_EQ(listener->counters().connections, 1U);
 }
 
