@@ -136,7 +136,7 @@ TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
     EXPECT_EQ(broadcast.pdu.error(), Fault::denied);
     EXPECT_EQ(broadcast.refusal.value().rule, Refusal::Rule::broadcast_over_read_only);
     EXPECT_TRUE(line->written.empty());
-    EXPECT_EQ(bus->report().stations[1].requests.at({"6", "refused"}), 1u);
+    EXPECT_EQ(bus->report().stations[1].requests.at(6)[Outcome::refused], 1u);
     EXPECT_TRUE(ask(17, kRead).pdu.has_value());
     EXPECT_FALSE(ask(17, kRead).refusal);
 }
