@@ -1,6 +1,7 @@
 #include <boost/json/array.hpp>
 
 #include "api.hpp"
+#include "bus_request.hpp"
 #include "items.hpp"
 #include "json_util.hpp"
 #include "panelgate/modbus/exception.hpp"
@@ -64,12 +65,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
     const auto& profile = found.station.profile != nullptr ? *found.station.profile : kStandard;
     auto pdu = points::write_request(profile, *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
-    bus::Request made;
-    made.station = found.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(found.station.id, std::move(*pdu));
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -124,9 +120,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
-    bus::Request made;
-    made.station = items->station.id;
-    made.pdu = modbus::encode_read(items->span);
+    bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
     bus::Answer answer = co_await transact(request.caller, items->station.bus, std::move(made));
     if (!answer.pdu) co_return to_response(problem_of(answer.pdu.error(), answer.transmitted));
     if (const auto code = modbus::exception_of(*answer.pdu)) {

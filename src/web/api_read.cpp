@@ -2,6 +2,7 @@
 #include <boost/json/array.hpp>
 
 #include "api.hpp"
+#include "bus_request.hpp"
 #include "items.hpp"
 #include "json_util.hpp"
 #include "panelgate/modbus/exception.hpp"
@@ -85,15 +86,6 @@ json::object describe(const Items& items, Reading reading) {
     return body;
 }
 
-bus::Request read_request(const Items& part) {
-    bus::Request request;
-    request.station = part.station.id;
-    request.pdu = modbus::encode_read(part.span);
-    request.priority = arbiter::PriorityClass::read;
-    request.quantity = modbus::QuantityCheck::wide;
-    return request;
-}
-
 std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
                                    ValueType type) {
     if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
@@ -120,7 +112,9 @@ Handling read_items(std::shared_ptr<BusCaller> caller, Items items, ValueType ty
         Items part = items;
         part.span.first = items.span.first + done;
         part.span.count = std::min(limit, items.span.count - done);
-        bus::Request request = read_request(part);
+        auto planned = request_to(part.station.id, modbus::encode_read(part.span));
+        if (!planned) co_return to_response(planned.error());
+        bus::Request request = std::move(*planned);
         bus::Answer answer = co_await transact(caller, items.station.bus, std::move(request));
         const auto failed = take_answer(reading, answer, part, type);
         if (failed) co_return to_response(*failed);

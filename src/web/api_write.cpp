@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "api.hpp"
+#include "bus_request.hpp"
 #include "items.hpp"
 #include "json_util.hpp"
 #include "panelgate/modbus/exception.hpp"
@@ -52,12 +53,7 @@ Parsed<bus::Request> write_request(const HttpRequest& request, Items items) {
     }
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();
-    bus::Request made;
-    made.station = items.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(items.station.id, std::move(*pdu));
 }
 
 Handling write_items(HttpRequest request, Items items) {

@@ -17,7 +17,7 @@
 namespace panelgate::bus {
 
 /// The exception code that a request is answered with instead of being transmitted, or nothing.
-using Guard = std::function<std::optional<std::uint8_t>(ByteView pdu)>;
+using Guard = std::function<std::optional<std::uint8_t>(const modbus::Request&)>;
 
 /// Something happened that others may want to know.
 struct BusEvent {

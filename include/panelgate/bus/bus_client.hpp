@@ -25,11 +25,10 @@ arbiter::Host host_of(std::string_view address);
 /// One request to one station; station 0 is a broadcast.
 struct Request {
     std::uint8_t station = 0;  ///< 0..247
-    Bytes pdu;
+    modbus::Request request;
     ClientId client = 0;
     arbiter::Host host = 0;  ///< the client's address (host_of()); 0: it is its own
-    arbiter::PriorityClass priority = arbiter::PriorityClass::read;
-    modbus::QuantityCheck quantity = modbus::QuantityCheck::fit;
+    bool poll = false;       ///< of the lowest class: clients' own requests go first
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -103,8 +102,8 @@ class BusClient {
     virtual ~BusClient() = default;
 
     /// Hands in a request. The handler is called exactly once, never from inside transact(), at the
-    /// latest at the deadline of the line's queue settings. Checks the PDU (Fault::malformed,
-    /// Fault::denied) and the queue (Fault::busy) itself.
+    /// latest at the deadline of the line's queue settings. Refuses what cannot be answered at this
+    /// address (Fault::denied) or has no place in the queue (Fault::busy).
     virtual void transact(Request request, AnswerHandler handler) = 0;
     /// Forgets a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// one on the wire is completed and then answered normally.

@@ -42,8 +42,7 @@ TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     while (updates[0] < 3 || updates[1] < 3) io.run_one();
     EXPECT_EQ(poller->station(0).reading(0).values, std::vector<std::uint16_t>{42});
     EXPECT_TRUE(poller->station(1).reading(0).failing);
-    for (const bus::Request& request : bus.requests)
-        EXPECT_EQ(request.priority, arbiter::PriorityClass::poll);
+    for (const bus::Request& request : bus.requests) EXPECT_TRUE(request.poll);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
 }
 
