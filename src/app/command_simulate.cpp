@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "gateway.hpp"
 #include "load.hpp"
 #include "panelgate/rt/log.hpp"
 #include "pty_link.hpp"
 #include "run_loop.hpp"
+#include "simulated_line.hpp"
 #include "tcp_bridge.hpp"
 
 namespace panelgate::app {

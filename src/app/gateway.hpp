@@ -1,22 +1,22 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
-#include <deque>
-#include <functional>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
-#include "panelgate/points/counters.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
-#include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
-#include "panelgate/web/directory.hpp"
-#include "panelgate/web/server.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/api/server.hpp"
+#include "plant.hpp"
 
 namespace panelgate::app {
 
@@ -43,35 +43,25 @@ class Gateway {
 
   private:
     void add_line(const config::Line& line, bool simulate);
-    void add_stations(const config::Line& line, bus::Bus& bus, sim::SimulatedBus* simulated);
+    void add_poller(const config::Line& line, bus::Bus& bus);
+    void add_relays();
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
-    void add_points(const config::Line& line, bus::Bus& bus);
-    void add_relays();
-    void publish_points(std::size_t first, const std::vector<std::size_t>& wants,
-                        std::size_t station);
-    std::vector<points::PointSample> point_samples() const;
-    std::vector<points::RelaySample> relay_samples() const;
     std::string metrics_text() const;
 
     boost::asio::any_io_executor executor_;
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
+    Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;
-    std::deque<points::StationPoints> points_;  ///< referred to by the directory
     std::unique_ptr<points::Relays> relays_;
-    std::vector<tcp_server::LineInfo> lines_;
-    web::Directory directory_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;
     std::size_t open_listeners_ = 0;
     bool ready_ = false;
 };
-
-/// A simulated bus with the configured stations of a line.
-std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
-                                                 const config::Line& line);
 
 }  // namespace panelgate::app

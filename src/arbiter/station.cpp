@@ -219,7 +219,10 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     if (health_.offline() || suspect() || stranger() || spent) return short_wait(line);
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.
     if (hurry && slowest() && group.request.is_read()) return std::min(timeout(), short_wait(line));
-    return timeout();
+    // A write that is not repeated is waited for as long as the configuration says: the panel may
+    // just have become slower than it has taught, and nothing else tells whether it was executed.
+    const bool repeatable = group.request.is_read() || settings_.retry_writes;
+    return repeatable ? timeout() : whole;
 }
 
 modbus::Request Station::probe() const {

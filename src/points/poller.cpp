@@ -1,5 +1,6 @@
 #include "panelgate/points/poller.hpp"
 
+#include <algorithm>
 #include <boost/asio/steady_timer.hpp>
 #include <optional>
 #include <utility>
@@ -55,7 +56,7 @@ void Poller::State::on_answer(std::size_t index, std::size_t read, const bus::An
                               TimePoint asked) {
     // Asked is the safe side: the value is at most as old as that.
     const auto wants = stations[index].polls.on_answer(rt::now(), read, answer.pdu, asked);
-    if (update && !wants.empty()) update(index, wants);
+    if (update && !wants.empty()) update(stations[index].id, wants);
     arm();
 }
 
@@ -105,10 +106,9 @@ void Poller::stop() {
     for (const State::Station& station : state_->stations) state_->bus.cancel(station.client);
 }
 
-std::size_t Poller::size() const { return state_->stations.size(); }
-
-const StationPolls& Poller::station(std::size_t index) const {
-    return state_->stations[index].polls;
+const StationPolls* Poller::find(std::uint8_t station) const {
+    const auto found = std::ranges::find(state_->stations, station, &State::Station::id);
+    return found == state_->stations.end() ? nullptr : &found->polls;
 }
 
 }  // namespace panelgate::points

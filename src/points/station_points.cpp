@@ -18,6 +18,10 @@ const Point* StationPoints::find(std::string_view name) const {
     return found == points_->end() ? nullptr : &*found;
 }
 
+const Point* StationPoints::point_of(std::size_t want) const {
+    return want < points_->size() ? &(*points_)[want] : nullptr;
+}
+
 const Reading& StationPoints::reading(const Poll& block) const {
     const auto index = static_cast<std::size_t>(&block - blocks_->data());
     return polls_->reading(points_->size() + index);

@@ -1,22 +1,47 @@
 #include "panelgate/rt/asio_clock.hpp"
 
-#include <chrono>
-#include <ctime>
+#include <boost/asio/steady_timer.hpp>
+#include <cstdint>
+#include <utility>
 
 namespace panelgate::rt {
+namespace {
 
-TimePoint now() { return std::chrono::steady_clock::now(); }
+/// A timer that was due when it was cancelled completes nevertheless: what was armed is known by
+/// its number.
+class AsioAlarm final : public Alarm {
+  public:
+    explicit AsioAlarm(const boost::asio::any_io_executor& executor) : timer_(executor) {}
+    ~AsioAlarm() override { *armed_ = 0; }
 
-double wall_seconds() {
-    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
-        .count();
-}
+    void arm(TimePoint when, Handler ring) override {
+        const std::uint64_t number = ++last_;
+        *armed_ = number;
+        timer_.expires_at(when);
+        timer_.async_wait(
+            [armed = armed_, number, ring = std::move(ring)](boost::system::error_code) {
+                if (*armed != number) return;
+                *armed = 0;
+                ring();
+            });
+    }
+    void cancel() override {
+        *armed_ = 0;
+        timer_.cancel();
+    }
 
-std::int64_t local_wall_seconds() {
-    const std::time_t utc = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-    std::tm local{};
-    localtime_r(&utc, &local);
-    return static_cast<std::int64_t>(utc) + local.tm_gmtoff;
-}
+  private:
+    boost::asio::steady_timer timer_;
+    std::uint64_t last_ = 0;
+    std::shared_ptr<std::uint64_t> armed_ = std::make_shared<std::uint64_t>(0);  ///< 0: nothing
+};
+
+}  // namespace
+
+AsioClock::AsioClock(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
+
+TimePoint AsioClock::now() const { return std::chrono::steady_clock::now(); }
+
+std::unique_ptr<Alarm> AsioClock::make_alarm() { return std::make_unique<AsioAlarm>(executor_); }
 
 }  // namespace panelgate::rt

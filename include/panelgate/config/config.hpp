@@ -13,7 +13,7 @@
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/sim/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
-#include "panelgate/web/settings.hpp"
+#include "panelgate/web/http/settings.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {

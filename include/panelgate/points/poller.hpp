@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -22,8 +23,8 @@ struct PolledStation {
 /// station. One thread; the bus outlives it.
 class Poller {
   public:
-    /// Called after each answer, with the station's index and its wants that were read or failed.
-    using Update = std::function<void(std::size_t station, const std::vector<std::size_t>& wants)>;
+    /// Called after each answer, with the station's id and its wants that were read or failed.
+    using Update = std::function<void(std::uint8_t station, const std::vector<std::size_t>& wants)>;
 
     Poller(boost::asio::any_io_executor executor, bus::BusClient& bus,
            std::vector<PolledStation> stations);
@@ -36,9 +37,8 @@ class Poller {
     /// Takes what waits back from the bus.
     void stop();
 
-    std::size_t size() const;
-    /// By the order of the constructor's list.
-    const StationPolls& station(std::size_t index) const;
+    /// Of the station with this id; null when it is not polled.
+    const StationPolls* find(std::uint8_t station) const;
 
   private:
     struct State;

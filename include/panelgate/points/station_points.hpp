@@ -33,6 +33,8 @@ class StationPoints {
 
     const std::vector<Point>& points() const { return *points_; }
     const Point* find(std::string_view name) const;
+    /// Whose want this is; null: a poll block's.
+    const Point* point_of(std::size_t want) const;
     PointReading read(const Point& point, TimePoint now) const;
     const std::vector<Poll>& blocks() const { return *blocks_; }
     /// What has become of one of the blocks.

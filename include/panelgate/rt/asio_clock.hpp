@@ -1,16 +1,24 @@
 #pragma once
 
-#include <cstdint>
+#include <boost/asio/any_io_executor.hpp>
+#include <memory>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::rt {
 
-/// The machine's monotonic clock. With wall_seconds() the only place that asks it.
-TimePoint now();
-/// Wall clock: seconds since 1970, for log lines, metrics and panels' clocks; never for timing.
-double wall_seconds();
-/// The same as local time, as if it were UTC: what a clock on the wall shows.
-std::int64_t local_wall_seconds();
+/// The machine's monotonic clock; its alarms ring from the executor's loop. With wall_seconds() the
+/// only place that asks the machine for the time.
+class AsioClock final : public Clock {
+  public:
+    explicit AsioClock(boost::asio::any_io_executor executor);
+
+    TimePoint now() const override;
+    std::unique_ptr<Alarm> make_alarm() override;
+
+  private:
+    boost::asio::any_io_executor executor_;
+};
 
 }  // namespace panelgate::rt

@@ -5,10 +5,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
+#include <ostream>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "golden_cases.hpp"
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 
@@ -19,28 +22,37 @@ namespace fs = std::filesystem;
 
 const fs::path kFolder = fs::path(SOURCE_ROOT) / "tests/golden/config";
 
-std::string read_file(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
+struct Place {
+    fs::path file;
+    std::string name;
+};
+void PrintTo(const Place& place, std::ostream* out) { *out << place.file.filename() << place.name; }
 
-std::vector<fs::path> cases() {
+std::vector<fs::path> files() {
     std::vector<fs::path> paths;
-    for (const fs::directory_entry& entry : fs::directory_iterator(kFolder)) {
-        if (entry.path().extension() == ".yaml") paths.push_back(entry.path());
-    }
+    for (const fs::directory_entry& entry : fs::directory_iterator(kFolder))
+        paths.push_back(entry.path());
     std::ranges::sort(paths);
     return paths;
 }
 
+std::vector<Place> places() {
+    std::vector<Place> all;
+    for (const fs::path& file : files()) {
+        for (const GoldenCase& one : parse_golden(read_text(file)).cases)
+            all.push_back({file, one.name});
+    }
+    return all;
+}
+
 /// What the user reads: the problems, or the warnings of a valid file.
-std::string told(const fs::path& path) {
+std::string told(const std::string& configuration) {
     const MemoryFiles files({{"/run/secrets/ops", "  secret \n"},
                              {"/run/secrets/empty", " \n"},
                              {"/run/secrets/two", "one two\n"},
                              {"/etc/panelgate/profiles/broken.yaml", "descriptions: x: y\n"}});
-    yaml::Problems problems(path.filename().string());
-    const auto config = load(read_file(path), files, problems);
+    yaml::Problems problems("panelgate.yaml");
+    const auto config = load(configuration, files, problems);
     EXPECT_EQ(config.has_value(), problems.empty());
     if (!config) return problems.text();
     std::string warnings;
@@ -48,32 +60,55 @@ std::string told(const fs::path& path) {
     return warnings;
 }
 
-class ConfigGolden : public ::testing::TestWithParam<fs::path> {};
+class ConfigGolden : public ::testing::TestWithParam<Place> {};
 
 /// With PANELGATE_WRITE_GOLDEN in the environment the texts are written instead: read them well.
 TEST_P(ConfigGolden, SaysExactlyThis) {
-    fs::path expected = GetParam();
-    expected.replace_extension(".txt");
-    const std::string text = told(GetParam());
-    if (std::getenv("PANELGATE_WRITE_GOLDEN") != nullptr) std::ofstream(expected) << text;
-    ASSERT_TRUE(fs::exists(expected)) << expected;
-    EXPECT_EQ(text, read_file(expected));
+    GoldenFile file = parse_golden(read_text(GetParam().file));
+    GoldenCase& one = file.at(GetParam().name);
+    const std::string text = told(file.configuration_of(one));
+    if (std::getenv("PANELGATE_WRITE_GOLDEN") != nullptr) {
+        one.expected = text;
+        std::ofstream(GetParam().file, std::ios::binary) << write_golden(file);
+    }
+    EXPECT_EQ(text, one.expected);
 }
 
-std::string name_of(const ::testing::TestParamInfo<fs::path>& info) {
-    std::string name = info.param.stem().string();
+std::string name_of(const ::testing::TestParamInfo<Place>& info) {
+    std::string name = info.param.name;
     std::ranges::replace_if(name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
     return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Files, ConfigGolden, ::testing::ValuesIn(cases()), name_of);
+INSTANTIATE_TEST_SUITE_P(Files, ConfigGolden, ::testing::ValuesIn(places()), name_of);
 
-TEST(ConfigGoldenFolder, HasATextForEveryFileAndNoOther) {
-    std::size_t texts = 0;
-    for (const fs::directory_entry& entry : fs::directory_iterator(kFolder))
-        texts += entry.path().extension() == ".txt" ? 1U : 0U;
-    EXPECT_EQ(texts, cases().size());
-    EXPECT_GE(cases().size(), 25U);
+TEST(ConfigGoldenFolder, HoldsNothingButCasesAndEachNameOnce) {
+    std::set<std::string> names;
+    for (const fs::path& file : files()) {
+        const std::string text = read_text(file);
+        EXPECT_EQ(write_golden(parse_golden(text)), text) << file;
+    }
+    for (const Place& place : places()) names.insert(place.name);
+    EXPECT_EQ(names.size(), places().size());
+    EXPECT_GE(names.size(), 116U);
+}
+
+TEST(ConfigGoldenFolder, PutsTheLinesOfACaseIntoItsPrelude) {
+    const std::string text =
+        "# about\na:\n<case>\nz: 1\n\n==== one\n  b: 2\n----\nf:2:3: no\n\n==== two whole\nc: "
+        "3\n----\n";
+    const GoldenFile file = parse_golden(text);
+    ASSERT_EQ(file.cases.size(), 2U);
+    EXPECT_EQ(file.configuration_of(file.cases[0]), "a:\n  b: 2\nz: 1\n");
+    EXPECT_EQ(file.cases[0].expected, "f:2:3: no\n");
+    EXPECT_EQ(file.configuration_of(file.cases[1]), "c: 3\n");
+    EXPECT_EQ(file.cases[1].expected, "");
+    EXPECT_EQ(write_golden(file), text);
+}
+
+TEST(ConfigGoldenFolder, ALineOfNoCaseIsRefused) {
+    EXPECT_THROW(parse_golden("==== one\na: 1\n----\nsaid\n\nlost\n"), std::invalid_argument);
+    EXPECT_THROW(parse_golden("a: 1\n\n==== one\nb: 1\n----\n"), std::invalid_argument);
 }
 
 }  // namespace

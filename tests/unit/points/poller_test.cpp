@@ -23,7 +23,7 @@ class PollerTest : public testing::Test {
         stations[0] = {5, {{{Table::holding_registers, 100, 1}, 1ms}}, limits()};
         stations[1] = {9, {{{Table::holding_registers, 7, 1}, 1ms}}, limits()};
         poller = std::make_unique<Poller>(io.get_executor(), bus, std::move(stations));
-        poller->on_update([this](std::size_t station, const std::vector<std::size_t>& wants) {
+        poller->on_update([this](std::uint8_t station, const std::vector<std::size_t>& wants) {
             updates[station] += wants.size();
         });
     }
@@ -34,14 +34,15 @@ class PollerTest : public testing::Test {
     boost::asio::io_context io{1};
     test::FakeBus bus{io.get_executor()};
     std::unique_ptr<Poller> poller;
-    std::map<std::size_t, std::size_t> updates;
+    std::map<std::uint8_t, std::size_t> updates;  ///< wants, by station
 };
 
 TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     poller->start();
-    while (updates[0] < 3 || updates[1] < 3) io.run_one();
-    EXPECT_EQ(poller->station(0).reading(0).values, std::vector<std::uint16_t>{42});
-    EXPECT_TRUE(poller->station(1).reading(0).failing);
+    while (updates[5] < 3 || updates[9] < 3) io.run_one();
+    EXPECT_EQ(poller->find(5)->reading(0).values, std::vector<std::uint16_t>{42});
+    EXPECT_TRUE(poller->find(9)->reading(0).failing);
+    EXPECT_EQ(poller->find(7), nullptr);
     for (const bus::Request& request : bus.requests) EXPECT_TRUE(request.poll);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
 }
@@ -53,7 +54,7 @@ TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {
     poller->stop();
     EXPECT_EQ(bus.cancelled.size(), 2u);
     io.run();
-    EXPECT_EQ(updates[0] + updates[1], 0u);
+    EXPECT_EQ(updates[5] + updates[9], 0u);
 }
 
 }  // namespace

@@ -5,22 +5,14 @@
 #include <random>
 
 #include "panelgate/points/value.hpp"
-#include "panelgate/profile/load_profile.hpp"
+#include "point_of.hpp"
 
 namespace panelgate::points {
 namespace {
 
-using Words = std::vector<std::uint16_t>;
-
-Point point_of(Type type, WordOrder order = WordOrder::abcd) {
-    Point point;
-    point.name = "x";
-    point.at = "R20";
-    point.address = 20;
-    point.type = type;
-    point.word_order = order;
-    point.writable = true;
-    if (type == Type::string) point.length = 5;
+Point text_of_five() {
+    Point point = point_of(Type::string);
+    point.length = 5;
     return point;
 }
 
@@ -138,7 +130,7 @@ TEST(Value, TypesAreNotMixed) {
 }
 
 TEST(Value, ATextIsAlwaysUtf8) {
-    const Point point = point_of(Type::string);
+    const Point point = text_of_five();
     EXPECT_EQ(decode(point, Words{0xFF41, 0x4200, 0}), Value(std::string("\xEF\xBF\xBD"
                                                                          "AB")));
     EXPECT_EQ(decode(point, Words{0xC3A9, 0xE282, 0xAC00}),
@@ -151,7 +143,7 @@ TEST(Value, ATextIsAlwaysUtf8) {
 }
 
 TEST(Value, ATextEndsAtItsLengthItsFirstNulAndBeforeItsPadding) {
-    const Point point = point_of(Type::string);
+    const Point point = text_of_five();
     EXPECT_EQ(decode(point, Words{0x4142, 0x4344, 0x4546}), Value(std::string("ABCDE")));
     EXPECT_EQ(decode(point, Words{0x4142, 0x0044, 0x4500}), Value(std::string("AB")));
     EXPECT_EQ(decode(point, Words{0x4120, 0x2020, 0x2020}), Value(std::string("A")));
@@ -194,37 +186,6 @@ TEST(Value, ScaledValuesRoundTripForEveryWholeTypeAndOrder) {
             }
         }
     }
-}
-
-TEST(WriteRequest, ATextLongerThanOneWriteIsRefusedAndNotCut) {
-    const profile::Catalogue shipped = profile::Catalogue::shipped();
-    Point point = point_of(Type::string);
-    point.length = 248;
-    const auto refused = write_request(*shipped.find("generic"), point, std::string("a"));
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_EQ(refused.error().message, "generic takes at most 123 registers in one write, not 124");
-    EXPECT_EQ(why_unwritable(*shipped.find("generic"), point), refused.error().message);
-    EXPECT_EQ(why_unwritable(*shipped.find("panasonic-gt"), point), std::nullopt);
-    point.length = 246;
-    EXPECT_TRUE(write_request(*shipped.find("generic"), point, std::string("a")).has_value());
-}
-
-TEST(WriteRequest, APanelWithoutTheFunctionIsToldBeforeAnythingIsWritten) {
-    profile::PanelProfile panel;
-    panel.name = "reader";
-    for (const std::uint8_t code : {modbus::kReadHoldingRegisters, modbus::kWriteSingleRegister}) {
-        profile::FunctionRule rule;
-        rule.code = code;
-        panel.functions.push_back(rule);
-    }
-    EXPECT_EQ(why_unwritable(panel, point_of(Type::u16)), std::nullopt);
-    EXPECT_EQ(why_unwritable(panel, point_of(Type::f32)),
-              "reader has no function that writes 2 registers at once");
-    Point coil = point_of(Type::boolean);
-    coil.table = modbus::Table::coils;
-    EXPECT_EQ(why_unwritable(panel, coil), "reader has no function that writes coils");
-    coil.table = modbus::Table::discrete_inputs;
-    EXPECT_EQ(why_unwritable(panel, coil), "R20 is in a table that cannot be written");
 }
 
 }  // namespace

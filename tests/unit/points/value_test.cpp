@@ -6,24 +6,10 @@
 #include <limits>
 #include <random>
 
-#include "panelgate/profile/load_profile.hpp"
-#include "support/hex.hpp"
+#include "point_of.hpp"
 
 namespace panelgate::points {
 namespace {
-
-using Words = std::vector<std::uint16_t>;
-
-Point point_of(Type type, WordOrder order = WordOrder::abcd) {
-    Point point;
-    point.name = "x";
-    point.at = "D0";
-    point.type = type;
-    point.word_order = order;
-    point.writable = true;
-    if (type == Type::string) point.length = 6;
-    return point;
-}
 
 struct Vector {
     const char* name;
@@ -171,57 +157,6 @@ TEST(Value, ABitOfAWord) {
     point.bit = 3;
     EXPECT_EQ(decode(point, Words{0x0008}), Value(true));
     EXPECT_EQ(decode(point, Words{0xFFF7}), Value(false));
-}
-
-const profile::Catalogue& shipped() {
-    static const profile::Catalogue catalogue = profile::Catalogue::shipped();
-    return catalogue;
-}
-
-std::string write(const char* profile, const Point& point, const Value& value) {
-    const auto pdu = write_request(*shipped().find(profile), point, value);
-    return pdu ? to_hex(*pdu) : pdu.error().message;
-}
-
-TEST(WriteRequest, TakesTheFunctionThatThePanelHas) {
-    Point point = point_of(Type::u16);
-    point.address = 100;
-    EXPECT_EQ(write("generic", point, std::int64_t{7}), "06 00 64 00 07");
-    point.type = Type::f32;
-    point.word_order = WordOrder::cdab;
-    EXPECT_EQ(write("generic", point, 21.5), "10 00 64 00 02 04 00 00 41 ac");
-    point.table = modbus::Table::coils;
-    point.type = Type::boolean;
-    EXPECT_EQ(write("generic", point, true), "05 00 64 ff 00");
-    point.writable = false;
-    EXPECT_EQ(write("generic", point, true), "x is not writable");
-}
-
-TEST(WriteRequest, ABitOfAWordIsNeverReadChangedAndWritten) {
-    Point point = point_of(Type::boolean);
-    point.bit = 4;
-    point.address = 18;
-    EXPECT_EQ(write("generic", point, true), "16 00 12 ff ef 00 10");
-    EXPECT_EQ(write("autonics-gplp-s", point, true), "0f 01 24 00 01 01 01") << "UB184";
-    EXPECT_NE(write("panasonic-gt", point, true).find("can write no single bit of D0"),
-              std::string::npos)
-        << write("panasonic-gt", point, true);
-}
-
-TEST(Interpretations, ShowOneBlockInEveryWay) {
-    const auto all = interpretations(Words{0x41AC, 0x0000});
-    const auto find = [&](Type type, WordOrder order) {
-        for (const Interpretation& one : all) {
-            if (one.type == type && one.order == order) return one.values;
-        }
-        return std::vector<std::string>{"none"};
-    };
-    EXPECT_EQ(find(Type::f32, WordOrder::abcd), std::vector<std::string>{"21.5"});
-    EXPECT_EQ(find(Type::u16, WordOrder::abcd), (std::vector<std::string>{"16812", "0"}));
-    EXPECT_EQ(find(Type::u32, WordOrder::cdab), std::vector<std::string>{"16812"});
-    EXPECT_EQ(find(Type::bcd16, WordOrder::abcd), (std::vector<std::string>{"", "0"}));
-    EXPECT_EQ(find(Type::u16, WordOrder::cdab), std::vector<std::string>{"none"});
-    EXPECT_EQ(find(Type::f64, WordOrder::abcd), std::vector<std::string>{"none"});
 }
 
 }  // namespace

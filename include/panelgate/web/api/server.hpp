@@ -1,0 +1,57 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/points/relay_status.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/http/settings.hpp"
+
+namespace panelgate::web {
+
+class HttpListener;
+
+/// What the server shows besides the directory. The functions are called in the one thread.
+struct Providers {
+    std::function<std::string()> metrics_text;
+    std::string metrics_type;     ///< the content type of that text
+    std::function<bool()> ready;  ///< do configuration and listeners stand?
+    std::string version;
+    std::function<TimePoint()> now;  ///< the machine's monotonic clock
+    std::function<std::vector<points::RelayStatus>()> relays;
+    EventHub* events = nullptr;  ///< never null; outlives the server
+};
+
+/// HTTP/1.1: probes, metrics and the REST API of contract section 5. Lives in the one thread that
+/// runs the executor; the directory and what it points to outlive the server.
+class Server {
+  public:
+    Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
+           Providers providers);
+    /// Ends everything that stop() would let finish; answers still owed are not sent.
+    ~Server();
+    Server(const Server&) = delete;
+    Server& operator=(const Server&) = delete;
+
+    /// Opens the listener. On an error (address in use, not an address…) nothing is open.
+    boost::system::error_code start();
+    /// The port that is listened on; 0 before start().
+    std::uint16_t port() const;
+    /// Closes the listener and idle connections; running requests are answered, then closed.
+    void stop();
+    /// Connections open now; after stop() it falls to 0.
+    std::size_t connections() const;
+
+  private:
+    std::shared_ptr<HttpListener> listener_;
+};
+
+}  // namespace panelgate::web

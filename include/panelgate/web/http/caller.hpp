@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace panelgate::web {
+
+/// Who asks over one connection. Shared by the session and by what works for it; one thread.
+class Caller {
+  public:
+    /// `id` is of this connection alone; `address` has no port, "" when it is not known.
+    Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {}
+
+    std::uint64_t id() const { return id_; }
+    const std::string& address() const { return address_; }
+    /// The connection is over: nobody waits for an answer, and what the site is made of may be
+    /// gone.
+    bool has_left() const { return left_; }
+    /// What is called once when the connection is over. Of several for one `whom` the first counts;
+    /// was this the first? Nothing may be asked of a caller that has left.
+    bool at_leaving(const void* whom, std::function<void()> farewell) {
+        return farewells_.emplace(whom, std::move(farewell)).second;
+    }
+    void leave() {
+        if (std::exchange(left_, true)) return;
+        for (const auto& [whom, farewell] : std::exchange(farewells_, {})) farewell();
+    }
+
+  private:
+    std::uint64_t id_;
+    std::string address_;
+    bool left_ = false;
+    std::map<const void*, std::function<void()>> farewells_;
+};
+
+}  // namespace panelgate::web

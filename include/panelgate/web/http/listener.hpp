@@ -1,0 +1,44 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <set>
+
+#include "panelgate/web/http/site.hpp"
+
+namespace panelgate::web {
+
+class HttpSession;
+
+/// Accepts connections and owns their sessions. Lives in the one thread that runs the executor.
+class HttpListener : public std::enable_shared_from_this<HttpListener> {
+  public:
+    HttpListener(boost::asio::any_io_executor executor, std::shared_ptr<const Site> site);
+
+    /// On an error (address in use, not an address…) nothing is open.
+    boost::system::error_code open();
+    /// The port that is listened on; 0 before open().
+    std::uint16_t port() const;
+    /// Closes the listener and idle connections; running requests are answered, then closed.
+    void stop();
+    /// Closes everything; answers still owed are not sent.
+    void abandon();
+    std::size_t connections() const { return sessions_.size(); }
+
+  private:
+    static boost::asio::awaitable<void> accept_loop(std::shared_ptr<HttpListener> self);
+    void take(boost::asio::ip::tcp::socket socket);
+
+    std::shared_ptr<const Site> site_;
+    boost::asio::ip::tcp::acceptor acceptor_;
+    boost::asio::steady_timer pause_;  ///< after a failed accept
+    std::set<std::shared_ptr<HttpSession>> sessions_;
+};
+
+}  // namespace panelgate::web

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panelgate/web/http/caller.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+
+namespace panelgate::web {
+
+/// A request as handlers see it; nothing of Beast.
+struct HttpRequest {
+    std::string method;
+    std::vector<std::string> path;               ///< segments, percent-decoded
+    std::map<std::string, std::string> query;    ///< decoded; of equal names the last
+    std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
+    std::string body;
+    std::vector<std::string> arguments;  ///< what the route's {} stood for
+    std::shared_ptr<Caller> caller;
+};
+/// The request headers that anything here looks at.
+inline constexpr const char* kHeadersRead[] = {"authorization", "origin", "content-type"};
+
+struct HttpResponse {
+    unsigned status = 200;
+    std::string content_type = "application/json";
+    std::string body;
+    std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
+    /// Not null: there is no body, events follow for as long as the client listens.
+    std::shared_ptr<EventHub::Listener> events;
+};
+
+}  // namespace panelgate::web

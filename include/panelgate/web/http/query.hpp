@@ -1,0 +1,19 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
+
+namespace panelgate::web {
+
+/// The whole text as a number of this base, without sign, or nothing.
+std::optional<unsigned> to_number(std::string_view text, int base = 10);
+
+/// A query value as a whole number in [low, high]; `fallback` when it is not given.
+Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
+                              unsigned high, unsigned fallback);
+
+}  // namespace panelgate::web

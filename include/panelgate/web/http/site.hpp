@@ -1,0 +1,33 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/settings.hpp"
+
+namespace panelgate::web {
+
+using Handling = boost::asio::awaitable<HttpResponse>;
+
+/// A path, what may be done there, by whom, and who does it.
+struct Route {
+    std::string_view verb;     ///< "GET" stands for HEAD, too
+    std::string_view pattern;  ///< {} stands for any one segment
+    Role needed = Role::none;
+    std::function<Handling(HttpRequest)> handler;
+};
+
+/// What a server serves. Shared by its sessions; the first route that fits is taken.
+struct Site {
+    Settings settings;
+    std::string product;  ///< of the header Server: "name/1.2.3"
+    std::vector<Route> routes;
+    std::function<std::uint64_t()> next_caller;  ///< numbers connections
+};
+
+}  // namespace panelgate::web

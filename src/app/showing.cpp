@@ -1,0 +1,105 @@
+#include "showing.hpp"
+
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <utility>
+
+#include "panelgate/points/value.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
+#include "panelgate/web/api/event_text.hpp"
+
+namespace panelgate::app {
+namespace {
+
+/// How REST reaches the faults of a simulated panel; null for a real one. The bus outlives it.
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bus,
+                                                           std::uint8_t station) {
+    if (bus == nullptr || !bus->has(station)) return nullptr;
+    web::SimulatedPanel panel;
+    panel.faults = [bus, station] { return sim::to_numbers(bus->faults(station)); };
+    panel.set_faults = [bus, station](const sim::FaultNumbers& numbers) {
+        sim::Misbehaviour faults;
+        auto wrong = sim::from_numbers(numbers, faults);
+        if (!wrong) bus->set_faults(station, faults);
+        return wrong;
+    };
+    return std::make_shared<const web::SimulatedPanel>(std::move(panel));
+}
+
+web::StationEntry entry_of(const Station& station) {
+    web::StationEntry entry;
+    static_cast<bus::StationRef&>(entry) = station;
+    entry.profile = station.configured->profile;
+    entry.read_only = station.configured->read_only;
+    entry.unit = station.unit;
+    entry.points = station.points ? &*station.points : nullptr;
+    entry.simulated = simulated_panel(station.simulated, station.id);
+    return entry;
+}
+
+}  // namespace
+
+web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic) {
+    web::Directory directory;
+    directory.generic = &generic;
+    for (const Line& line : plant.lines()) {
+        directory.lines.push_back(
+            {line.configured->name, line.device, line.bus, !line.configured->refuse_unlisted});
+    }
+    for (const Station& station : plant.stations()) directory.stations.push_back(entry_of(station));
+    return directory;
+}
+
+std::vector<points::PointSample> point_samples(const Plant& plant, TimePoint now) {
+    std::vector<points::PointSample> samples;
+    for (const Station& station : plant.stations()) {
+        if (!station.points) continue;
+        for (const points::Point& point : station.points->points()) {
+            const points::PointReading reading = station.points->read(point, now);
+            points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
+            if (reading.value && reading.quality == points::Quality::good)
+                sample.value = points::number_of(*reading.value);
+            if (reading.age) sample.age = to_seconds(*reading.age);
+            samples.push_back(std::move(sample));
+        }
+    }
+    return samples;
+}
+
+std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays) {
+    std::vector<points::RelaySample> samples;
+    for (const points::RelayStatus& relay : relays) {
+        samples.push_back({relay.name, relay.state == "ok", relay.reads, relay.writes,
+                           relay.read_failures, relay.write_failures});
+    }
+    return samples;
+}
+
+void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
+             const bus::BusEvent& event) {
+    if (hub.is_idle()) return;
+    const std::string station = plant.name_of(line, event.station);
+    switch (event.kind) {
+        case bus::BusEvent::Kind::line:
+            return hub.publish("line", web::line_event(line, event.what, event.why));
+        case bus::BusEvent::Kind::station:
+            return hub.publish("station", web::station_event(line, station, event.what));
+        case bus::BusEvent::Kind::transaction:
+            return hub.publish("transaction", web::transaction_event(line, station, event.function,
+                                                                     event.what, event.took));
+    }
+    std::abort();
+}
+
+void publish_points(web::EventHub& hub, const Station& station,
+                    const std::vector<std::size_t>& wants, TimePoint now) {
+    if (hub.is_idle() || !station.points) return;
+    for (const std::size_t want : wants) {
+        const points::Point* point = station.points->point_of(want);
+        if (point == nullptr) continue;  // a poll block
+        hub.publish("point", web::point_event(station, *point, station.points->read(*point, now)));
+    }
+}
+
+}  // namespace panelgate::app

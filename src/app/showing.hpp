@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/points/counters.hpp"
+#include "panelgate/points/relay_status.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+#include "plant.hpp"
+
+namespace panelgate::app {
+
+// What others are shown of the plant. Nothing here touches a bus (P10).
+
+/// REST's view. `generic` is the profile of stations that the configuration does not list; it and
+/// the plant outlive the view.
+web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic);
+
+/// Every point of the plant at a scrape.
+std::vector<points::PointSample> point_samples(const Plant& plant, TimePoint now);
+std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays);
+
+/// Tells those who listen, if anybody does, what has happened on a line.
+void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
+             const bus::BusEvent& event);
+/// The same: what has become of the points that are among these wants of the station's polls.
+void publish_points(web::EventHub& hub, const Station& station,
+                    const std::vector<std::size_t>& wants, TimePoint now);
+
+}  // namespace panelgate::app

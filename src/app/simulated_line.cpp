@@ -1,0 +1,27 @@
+#include "simulated_line.hpp"
+
+#include <utility>
+#include <vector>
+
+#include "panelgate/rt/log.hpp"
+#include "panelgate/sim/station.hpp"
+
+namespace panelgate::app {
+
+std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
+                                                 const config::Line& line) {
+    std::vector<sim::Station> stations;
+    for (const config::Station& station : line.stations)
+        stations.emplace_back(*station.profile, station.id);
+    sim::Settings settings;
+    settings.serial = line.device.serial;
+    settings.echo = line.simulated_echo;
+    for (const config::Station& station : line.stations)
+        settings.faults[station.id] = station.faults;
+    auto bus =
+        std::make_unique<sim::SimulatedBus>(std::move(executor), settings, std::move(stations));
+    rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});
+    return bus;
+}
+
+}  // namespace panelgate::app

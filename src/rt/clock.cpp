@@ -1,0 +1,22 @@
+#include "panelgate/rt/clock.hpp"
+
+#include <chrono>
+#include <ctime>
+
+namespace panelgate::rt {
+
+TimePoint now() { return std::chrono::steady_clock::now(); }
+
+double wall_seconds() {
+    return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
+        .count();
+}
+
+std::int64_t local_wall_seconds() {
+    const std::time_t utc = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+    std::tm local{};
+    localtime_r(&utc, &local);
+    return static_cast<std::int64_t>(utc) + local.tm_gmtoff;
+}
+
+}  // namespace panelgate::rt

@@ -1,0 +1,130 @@
+#include "answer.hpp"
+
+#include <boost/json/object.hpp>
+#include <boost/json/serialize.hpp>
+#include <chrono>
+#include <cstdlib>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+unsigned status_of(Fault fault) {
+    switch (fault) {
+        case Fault::denied:
+            return 403;
+        case Fault::malformed:
+            return 400;
+        case Fault::not_routed:
+            return 404;
+        case Fault::busy:
+        case Fault::expired:
+        case Fault::cancelled:
+            return 503;
+        case Fault::line_down:
+        case Fault::line_lost:
+        case Fault::damaged:
+            return 502;
+        case Fault::timeout:
+        case Fault::offline:
+            return 504;
+    }
+    std::abort();
+}
+
+const char* detail_of(Fault fault) {
+    switch (fault) {
+        case Fault::denied:
+            return "no request may carry this function here";
+        case Fault::malformed:
+            return "the request contradicts its function code";
+        case Fault::not_routed:
+            return "no line has this station";
+        case Fault::busy:
+            return "the line's queue is full; try again";
+        case Fault::expired:
+            return "the line could not take the request before its deadline";
+        case Fault::line_down:
+            return "the line's device is not there";
+        case Fault::line_lost:
+            return "the line was lost while the request was on its way";
+        case Fault::timeout:
+            return "the station did not answer in time";
+        case Fault::damaged:
+            return "only damaged replies came back";
+        case Fault::offline:
+            return "the station is silent; it is probed from time to time";
+        case Fault::cancelled:
+            return "the gateway is stopping";
+    }
+    std::abort();
+}
+
+/// The panel manual's word for an exception code, or "".
+std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) {
+    for (const profile::ExceptionMeaning& exception : profile.exceptions) {
+        if (exception.code == code) return exception.meaning;
+    }
+    return {};
+}
+
+}  // namespace
+
+HttpResponse json_response(unsigned status, const json::value& body) {
+    HttpResponse response;
+    response.status = status;
+    response.body = json::serialize(body) + "\n";
+    return response;
+}
+
+Problem problem_of(Fault fault, bool transmitted) {
+    Problem made = problem(status_of(fault), detail_of(fault));
+    made.kind = label(fault);
+    made.extensions["modbus_exception"] = static_cast<std::uint8_t>(modbus::to_exception(fault));
+    made.extensions["transmitted"] = transmitted;
+    if (made.status == 503) made.headers.emplace_back("Retry-After", "1");
+    return made;
+}
+
+Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile) {
+    std::string detail = "the panel answered exception " + std::to_string(code) + ": ";
+    detail += modbus::describe_exception(code);
+    const std::string meaning = meaning_of(code, profile);
+    if (!meaning.empty()) detail += " (" + meaning + ")";
+    Problem made = problem(code >= 1 && code <= 4 ? 422 : 502, std::move(detail));
+    made.kind = "exception";
+    made.extensions["modbus_exception"] = code;
+    made.extensions["transmitted"] = true;
+    return made;
+}
+
+std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile) {
+    if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
+    const auto code = modbus::exception_of(*answer.pdu);
+    if (code) return problem_of_exception(*code, profile);
+    return std::nullopt;
+}
+
+HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile) {
+    const auto failed = problem_of(answer, profile);
+    if (failed) return to_response(*failed);
+    json::object body;
+    body["transmitted"] = true;
+    body["confirmed"] = true;
+    return json_response(200, body);
+}
+
+std::int64_t whole_ms(Duration duration) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
+}
+
+std::string upper_hex(ByteView bytes, std::string_view separator) {
+    std::string text = to_hex(bytes, separator);
+    for (char& c : text) c = c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
+    return text;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,117 @@
+#include "body.hpp"
+
+#include <algorithm>
+#include <boost/json/array.hpp>
+#include <boost/json/serialize.hpp>
+#include <boost/json/stream_parser.hpp>
+#include <cmath>
+#include <optional>
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+Problem bad_json(std::string_view body, std::size_t at, const std::string& what) {
+    const std::string_view before = body.substr(0, std::min(at, body.size()));
+    const auto line = 1 + std::ranges::count(before, '\n');
+    const auto line_start = before.rfind('\n');
+    const auto column = before.size() - (line_start == before.npos ? 0 : line_start + 1) + 1;
+    return problem(400, "the body is not JSON: line " + std::to_string(line) + ", column " +
+                            std::to_string(column) + ": " + what);
+}
+
+/// The number when it is whole and fits; JSON has no integers of its own.
+std::optional<std::int64_t> as_whole(const json::value& value) {
+    if (value.is_int64()) return value.get_int64();
+    if (!value.is_double()) return std::nullopt;
+    const double number = value.get_double();
+    if (number != std::floor(number) || std::abs(number) > 1e15) return std::nullopt;
+    return static_cast<std::int64_t>(number);
+}
+
+Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
+    if (modbus::is_bit_table(table)) {
+        if (value.is_bool()) return static_cast<std::uint16_t>(value.get_bool() ? 1 : 0);
+        const auto bit = as_whole(value);
+        if (bit && (*bit == 0 || *bit == 1)) return static_cast<std::uint16_t>(*bit);
+        return problem(400, "a bit is true, false, 1 or 0, not " + json::serialize(value));
+    }
+    const auto number = as_whole(value);
+    if (number && *number >= -32768 && *number <= 65535) {
+        return static_cast<std::uint16_t>(*number & 0xFFFF);
+    }
+    return problem(400, "a register is a whole number from 0 to 65535, or from -32768, not " +
+                            json::serialize(value));
+}
+
+}  // namespace
+
+Parsed<json::object> parse_object(std::string_view body) {
+    json::stream_parser parser;
+    boost::system::error_code error;
+    const std::size_t used = parser.write_some(body.data(), body.size(), error);
+    if (error) return bad_json(body, used, error.message());
+    if (!parser.done()) parser.finish(error);
+    if (error) return bad_json(body, body.size(), error.message());
+    if (used < body.size()) return bad_json(body, used, "something follows the value");
+    const json::value value = parser.release();
+    if (!value.is_object()) return problem(400, "the body must be a JSON object");
+    return value.get_object();
+}
+
+Parsed<std::int64_t> whole_number(const json::value& value, std::string_view name, std::int64_t low,
+                                  std::int64_t high) {
+    const auto number = as_whole(value);
+    if (number && *number >= low && *number <= high) return *number;
+    return problem(400, std::string(name) + " must be a whole number from " + std::to_string(low) +
+                            " to " + std::to_string(high) + ", not " + json::serialize(value));
+}
+
+Parsed<std::int64_t> number_member(const json::object& object, std::string_view name,
+                                   std::int64_t low, std::int64_t high) {
+    const json::value* member = object.if_contains(name);
+    if (member == nullptr) return problem(400, "the body lacks " + std::string(name));
+    return whole_number(*member, name, low, high);
+}
+
+Parsed<std::string> string_member(const json::object& object, std::string_view name) {
+    const json::value* member = object.if_contains(name);
+    if (member == nullptr) return problem(400, "the body lacks " + std::string(name));
+    if (!member->is_string()) return problem(400, std::string(name) + " must be a string");
+    return std::string(member->get_string());
+}
+
+Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, modbus::Table table) {
+    const json::value* member = object.if_contains("values");
+    if (member == nullptr || !member->is_array() || member->get_array().empty()) {
+        return problem(400, R"(the body must be {"values": [...]} with at least one value)");
+    }
+    std::vector<std::uint16_t> cells;
+    for (const json::value& value : member->get_array()) {
+        const auto parsed = cell(value, table);
+        if (!parsed) return parsed.error();
+        cells.push_back(*parsed);
+    }
+    return cells;
+}
+
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
+    const auto object = parse_object(body);
+    if (!object) return object.error();
+    return values_member(*object, table);
+}
+
+Parsed<points::Value> value_of(std::string_view text) {
+    const auto body = parse_object(text);
+    if (!body) return body.error();
+    const json::value* value = body->if_contains("value");
+    if (value == nullptr) return problem(400, "the body needs \"value\"");
+    if (value->is_bool()) return points::Value(value->get_bool());
+    if (value->is_int64()) return points::Value(value->get_int64());
+    if (value->is_uint64()) return points::Value(value->get_uint64());
+    if (value->is_double()) return points::Value(value->get_double());
+    if (value->is_string()) return points::Value(std::string(value->get_string()));
+    return problem(400, "value must be a number, true, false or a text");
+}
+
+}  // namespace panelgate::web

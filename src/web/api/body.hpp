@@ -1,0 +1,37 @@
+#pragma once
+
+#include <boost/json/object.hpp>
+#include <boost/json/value.hpp>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/points/value.hpp"
+#include "panelgate/web/http/problem.hpp"
+
+namespace panelgate::web {
+
+/// The body as an object; 400 with line and column of what is wrong.
+Parsed<boost::json::object> parse_object(std::string_view body);
+
+/// A whole number in [low, high]; `name` is for the 400's text. 10.0 is whole.
+Parsed<std::int64_t> whole_number(const boost::json::value& value, std::string_view name,
+                                  std::int64_t low, std::int64_t high);
+/// The same of a required member.
+Parsed<std::int64_t> number_member(const boost::json::object& object, std::string_view name,
+                                   std::int64_t low, std::int64_t high);
+Parsed<std::string> string_member(const boost::json::object& object, std::string_view name);
+
+/// The member "values" as cells of a table: bits are true, false, 0 or 1; registers are 0..65535,
+/// or -32768..-1 for their two's complement. At least one.
+Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
+                                                 modbus::Table table);
+/// The same of a body that is nothing else: {"values": [...]}.
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table);
+
+/// A point's new value: {"value": ...}.
+Parsed<points::Value> value_of(std::string_view body);
+
+}  // namespace panelgate::web

@@ -1,0 +1,146 @@
+#include <algorithm>
+
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "bus_request.hpp"
+#include "handlers.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "station_path.hpp"
+#include "write_plan.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+/// The function that most of the line's listed panels take as a broadcast; the preferred one when
+/// they do not decide.
+std::uint8_t broadcast_function(const Directory& directory, const LineEntry& line,
+                                const std::vector<std::uint8_t>& functions) {
+    const auto takers = [&](std::uint8_t function) {
+        return std::ranges::count_if(directory.stations, [&](const StationEntry& station) {
+            if (station.line != line.name) return false;
+            const auto* rule = station.profile->find_function(function);
+            return rule != nullptr && rule->broadcast;
+        });
+    };
+    return *std::ranges::max_element(functions, {}, takers);
+}
+
+/// A broadcast reaches every station: one that must not be written forbids it.
+Parsed<void> check_nobody_is_read_only(const Directory& directory, const LineEntry& line) {
+    for (const StationEntry& station : directory.stations) {
+        if (station.line != line.name || !station.read_only) continue;
+        return problem(
+            403, "a broadcast would write to station '" + station.name + "', which is read-only");
+    }
+    return {};
+}
+
+Parsed<void> check_no_verify(const json::object& body) {
+    const json::value* verify = body.if_contains("verify");
+    if (verify == nullptr || (verify->is_bool() && !verify->get_bool())) return {};
+    return problem(400, "verify must be false: verifying a broadcast is not supported");
+}
+
+Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEntry& line,
+                                       const json::object& body) {
+    const auto verify = check_no_verify(body);
+    if (!verify) return verify.error();
+    const auto word = string_member(body, "table");
+    if (!word) return word.error();
+    const auto table = parse_table(*word, 400);
+    if (!table) return table.error();
+    if (!is_writable(*table)) return problem(422, *word + " cannot be written");
+    const auto address = number_member(body, "address", 0, 0xFFFF);
+    if (!address) return address.error();
+    const auto cells = values_member(body, *table);
+    if (!cells) return cells.error();
+    const auto open = check_nobody_is_read_only(directory, line);
+    if (!open) return open.error();
+
+    const auto functions = write_functions(*table, cells->size());
+    const std::uint8_t function = broadcast_function(directory, line, functions);
+    const unsigned limit = directory.generic->max_count(function);
+    if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
+        return problem(422, "at most " + std::to_string(limit) +
+                                " values in one broadcast, up to address 65535");
+    }
+    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
+}
+
+Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
+                               bool reads) {
+    if (id == 0) return check_nobody_is_read_only(directory, line);
+    const std::string name = line.name + ":" + std::to_string(id);
+    const auto station = directory.find_station(name);
+    if (!station) return problem(404, "there is no station '" + name + "'");
+    if (station->read_only && !reads) {
+        return problem(403, "station '" + station->name + "' is read-only");
+    }
+    return {};
+}
+
+Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
+                                 const json::object& body) {
+    const auto station = number_member(body, "station", 0, modbus::kMaxStation);
+    if (!station) return station.error();
+    const auto hex = string_member(body, "pdu");
+    if (!hex) return hex.error();
+    auto pdu = from_hex(*hex);
+    if (!pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) {
+        return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
+    }
+    const auto id = static_cast<std::uint8_t>(*station);
+    const std::uint8_t function = pdu->front();
+    auto made = request_to(id, std::move(*pdu));
+    const bool reads = made ? made->request.is_read() : modbus::is_read(function);
+    const auto allowed = check_raw_station(directory, line, id, reads);
+    if (!allowed) return allowed.error();
+    return made;
+}
+
+HttpResponse broadcast_answer(const bus::Answer& answer) {
+    if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
+    json::object body;
+    body["transmitted"] = true;
+    body["confirmed"] = false;
+    return json_response(202, body);
+}
+
+HttpResponse raw_answer(const bus::Answer& answer) {
+    if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
+    json::object body;
+    body["pdu"] = upper_hex(*answer.pdu, "");
+    if (const auto code = modbus::exception_of(*answer.pdu)) body["exception"] = *code;
+    return json_response(200, body);
+}
+
+}  // namespace
+
+Handling post_broadcast(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto body = parse_object(request.body);
+    if (!body) co_return to_response(body.error());
+    auto planned = broadcast_request(*api->directory, **line, *body);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
+    co_return broadcast_answer(answer);
+}
+
+Handling post_raw(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto body = parse_object(request.body);
+    if (!body) co_return to_response(body.error());
+    auto planned = raw_request(*api->directory, **line, *body);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
+    co_return raw_answer(answer);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,49 @@
+#include "panelgate/web/api/directory.hpp"
+
+#include <algorithm>
+#include <charconv>
+
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::web {
+namespace {
+
+std::optional<std::uint8_t> parse_id(std::string_view text) {
+    unsigned id = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+    if (id < 1 || id > modbus::kMaxStation) return std::nullopt;
+    return static_cast<std::uint8_t>(id);
+}
+
+}  // namespace
+
+const LineEntry* Directory::find_line(std::string_view name) const {
+    const auto line = std::ranges::find(lines, name, &LineEntry::name);
+    return line == lines.end() ? nullptr : &*line;
+}
+
+std::optional<StationEntry> Directory::find_station(std::string_view name) const {
+    const auto named = std::ranges::find(stations, name, &StationEntry::name);
+    if (named != stations.end()) return *named;
+
+    const auto colon = name.rfind(':');
+    if (colon == std::string_view::npos) return std::nullopt;
+    const LineEntry* line = find_line(name.substr(0, colon));
+    const auto id = parse_id(name.substr(colon + 1));
+    if (line == nullptr || !id) return std::nullopt;
+    for (const StationEntry& station : stations) {
+        if (station.line == line->name && station.id == *id) return station;
+    }
+    if (!line->pass_unlisted_stations) return std::nullopt;
+    StationEntry unlisted;
+    unlisted.name = line->name + ":" + std::to_string(*id);
+    unlisted.line = line->name;
+    unlisted.id = *id;
+    unlisted.bus = line->bus;
+    unlisted.profile = generic;
+    unlisted.unknown_panel = true;
+    return unlisted;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,43 @@
+#pragma once
+
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/api/server.hpp"
+#include "panelgate/web/http/site.hpp"
+
+namespace panelgate::web {
+
+/// What handlers work on. The directory outlives every caller that has not left.
+struct Api {
+    const Directory* directory = nullptr;
+    Providers providers;
+};
+
+Handling get_index(HttpRequest request, const Api* api);
+Handling get_healthz(HttpRequest request, const Api* api);
+Handling get_readyz(HttpRequest request, const Api* api);
+Handling get_metrics(HttpRequest request, const Api* api);
+
+Handling get_lines(HttpRequest request, const Api* api);
+Handling get_line(HttpRequest request, const Api* api);
+Handling get_trace(HttpRequest request, const Api* api);
+Handling post_broadcast(HttpRequest request, const Api* api);
+Handling post_raw(HttpRequest request, const Api* api);
+
+Handling get_stations(HttpRequest request, const Api* api);
+Handling get_station(HttpRequest request, const Api* api);
+Handling get_table(HttpRequest request, const Api* api);
+Handling put_table(HttpRequest request, const Api* api);
+Handling get_points(HttpRequest request, const Api* api);
+Handling get_point(HttpRequest request, const Api* api);
+Handling put_point(HttpRequest request, const Api* api);
+Handling get_interpretations(HttpRequest request, const Api* api);
+Handling get_events(HttpRequest request, const Api* api);
+Handling get_relays(HttpRequest request, const Api* api);
+
+Handling get_simulated(HttpRequest request, const Api* api);
+Handling put_simulated(HttpRequest request, const Api* api);
+
+Handling get_device(HttpRequest request, const Api* api);
+Handling put_device(HttpRequest request, const Api* api);
+
+}  // namespace panelgate::web

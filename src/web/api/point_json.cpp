@@ -1,0 +1,26 @@
+#include "point_json.hpp"
+
+#include <variant>
+
+#include "answer.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+
+json::object point_json(const points::Point& point, const points::PointReading& reading) {
+    json::object object;
+    object["name"] = point.name;
+    object["value"] = nullptr;
+    if (reading.value)
+        object["value"] = std::visit([](const auto& v) { return json::value(v); }, *reading.value);
+    if (reading.label) object["label"] = *reading.label;
+    object["unit"] = point.unit;
+    object["quality"] = label(reading.quality);
+    object["age_ms"] = nullptr;
+    if (reading.age) {
+        object["age_ms"] = whole_ms(*reading.age);
+    }
+    return object;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,142 @@
+#include <boost/json/array.hpp>
+
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "bus_request.hpp"
+#include "handlers.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "point_json.hpp"
+#include "station_path.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+using points::Point;
+
+json::object describe(const Api& api, const points::StationPoints& station, const Point& point) {
+    json::object object = point_json(point, station.read(point, api.providers.now()));
+    object["at"] = point.at;
+    object["type"] = label(point.type);
+    object["writable"] = point.writable;
+    return object;
+}
+
+struct Found {
+    StationEntry station;
+    const Point* point = nullptr;
+};
+
+Parsed<Found> find_point(const HttpRequest& request, const Directory& directory) {
+    auto station = find_station(directory, request.arguments[0]);
+    if (!station) return station.error();
+    const Point* point =
+        station->points != nullptr ? station->points->find(request.arguments[1]) : nullptr;
+    if (point == nullptr) {
+        return problem(
+            404, "station '" + station->name + "' has no point '" + request.arguments[1] + '\'');
+    }
+    return Found{std::move(*station), point};
+}
+
+Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
+    if (found.station.read_only)
+        return problem(403, "station '" + found.station.name + "' is read-only");
+    const auto value = value_of(body);
+    if (!value) return value.error();
+    auto pdu = points::write_request(*found.station.profile, *found.point, *value);
+    if (!pdu) return problem(422, pdu.error().message);
+    return request_to(found.station.id, std::move(*pdu));
+}
+
+json::array describe(const std::vector<points::Interpretation>& all) {
+    json::array list;
+    for (const points::Interpretation& one : all) {
+        json::object object;
+        object["type"] = label(one.type);
+        object["word_order"] = label(one.order);
+        json::array values;
+        for (const std::string& value : one.values)
+            values.push_back(value.empty() ? json::value(nullptr) : json::value(value));
+        object["values"] = std::move(values);
+        list.push_back(std::move(object));
+    }
+    return list;
+}
+
+}  // namespace
+
+Handling get_points(HttpRequest request, const Api* api) {
+    const auto station = find_station(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    json::array list;
+    if (station->points != nullptr) {
+        for (const Point& point : station->points->points())
+            list.push_back(describe(*api, *station->points, point));
+    }
+    json::object body;
+    body["points"] = std::move(list);
+    co_return json_response(200, body);
+}
+
+Handling get_point(HttpRequest request, const Api* api) {
+    const auto found = find_point(request, *api->directory);
+    if (!found) co_return to_response(found.error());
+    co_return json_response(200, describe(*api, *found->station.points, *found->point));
+}
+
+Handling put_point(HttpRequest request, const Api* api) {
+    const auto found = find_point(request, *api->directory);
+    if (!found) co_return to_response(found.error());
+    auto planned = write_of(*found, request.body);
+    if (!planned) co_return to_response(planned.error());
+    bus::Request made = std::move(*planned);
+    bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
+    co_return write_answer(answer, *found->station.profile);
+}
+
+Handling get_interpretations(HttpRequest request, const Api* api) {
+    auto items = items_of_table_path(request, *api->directory);
+    if (!items) co_return to_response(items.error());
+    constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
+    if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
+        co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
+    bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
+    bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
+    const auto failed = problem_of(answer, *items->station.profile);
+    if (failed) co_return to_response(*failed);
+    const auto registers = modbus::registers_of(*answer.pdu);
+    json::object body;
+    body["station"] = items->station.name;
+    body["address"] = items->span.first;
+    body["raw"] = json::array(registers.begin(), registers.end());
+    body["interpretations"] = describe(points::interpretations(registers));
+    co_return json_response(200, body);
+}
+
+Handling get_relays(HttpRequest, const Api* api) {
+    json::array list;
+    const TimePoint now = api->providers.now();
+    for (const points::RelayStatus& relay : api->providers.relays()) {
+        json::object object;
+        object["name"] = relay.name;
+        object["state"] = relay.state;
+        object["reads"] = relay.reads;
+        object["writes"] = relay.writes;
+        object["read_failures"] = relay.read_failures;
+        object["write_failures"] = relay.write_failures;
+        object["last_write_ms"] = nullptr;
+        if (relay.last_write) {
+            object["last_write_ms"] = whole_ms(now - *relay.last_write);
+        }
+        list.push_back(std::move(object));
+    }
+    json::object body;
+    body["relays"] = std::move(list);
+    co_return json_response(200, body);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,59 @@
+#include "routes.hpp"
+
+#include <string_view>
+#include <utility>
+
+namespace panelgate::web {
+namespace {
+
+constexpr Role kFree = Role::none;
+constexpr Role kSee = Role::viewer;
+constexpr Role kChange = Role::operator_;
+
+struct Row {
+    std::string_view verb;
+    std::string_view pattern;
+    Handling (*handler)(HttpRequest, const Api*);
+    Role needed;
+};
+constexpr Row kRows[] = {
+    {"GET", "/", get_index, kSee},
+    {"GET", "/healthz", get_healthz, kFree},
+    {"GET", "/readyz", get_readyz, kFree},
+    {"GET", "/metrics", get_metrics, kSee},
+    {"GET", "/api/v1/lines", get_lines, kSee},
+    {"GET", "/api/v1/lines/{}", get_line, kSee},
+    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee},
+    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange},
+    {"POST", "/api/v1/lines/{}/raw", post_raw, kChange},
+    {"GET", "/api/v1/stations", get_stations, kSee},
+    {"GET", "/api/v1/stations/{}", get_station, kSee},
+    {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
+    {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
+    {"GET", "/api/v1/events", get_events, kSee},
+    {"GET", "/api/v1/relays", get_relays, kSee},
+    {"GET", "/api/v1/stations/{}/points", get_points, kSee},
+    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee},
+    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange},
+    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee},
+    // Before the tables: "devices" is none of them.
+    {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee},
+    {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange},
+    {"GET", "/api/v1/stations/{}/{}/{}", get_table, kSee},
+    {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange},
+};
+
+}  // namespace
+
+std::vector<Route> routes(std::shared_ptr<const Api> api) {
+    std::vector<Route> made;
+    for (const Row& row : kRows) {
+        const auto call = [api, handler = row.handler](HttpRequest request) {
+            return handler(std::move(request), api.get());
+        };
+        made.push_back({row.verb, row.pattern, row.needed, call});
+    }
+    return made;
+}
+
+}  // namespace panelgate::web

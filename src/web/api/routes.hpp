@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "handlers.hpp"
+#include "panelgate/web/http/site.hpp"
+
+namespace panelgate::web {
+
+/// Every path of the contract's section 5. The handlers share the API.
+std::vector<Route> routes(std::shared_ptr<const Api> api);
+
+}  // namespace panelgate::web

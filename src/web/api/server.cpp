@@ -1,0 +1,35 @@
+#include "panelgate/web/api/server.hpp"
+
+#include <utility>
+
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/web/http/listener.hpp"
+#include "panelgate/web/http/site.hpp"
+#include "routes.hpp"
+
+namespace panelgate::web {
+
+Server::Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
+               Providers providers) {
+    auto api = std::make_shared<Api>();
+    api->directory = &directory;
+    api->providers = std::move(providers);
+    auto site = std::make_shared<Site>();
+    site->settings = std::move(settings);
+    site->product = "panelgate/" + api->providers.version;
+    site->routes = routes(std::move(api));
+    site->next_caller = bus::next_client_id;
+    listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
+}
+
+Server::~Server() { listener_->abandon(); }
+
+boost::system::error_code Server::start() { return listener_->open(); }
+
+std::uint16_t Server::port() const { return listener_->port(); }
+
+void Server::stop() { listener_->stop(); }
+
+std::size_t Server::connections() const { return listener_->connections(); }
+
+}  // namespace panelgate::web

@@ -1,0 +1,74 @@
+#include <boost/json/array.hpp>
+
+#include "answer.hpp"
+#include "handlers.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "station_path.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+json::object describe(const StationEntry& station) {
+    const bus::StationStatus status = station.bus->station_status(station.id);
+    json::object object;
+    object["name"] = station.name;
+    object["line"] = station.line;
+    object["id"] = station.id;
+    object["profile"] = nullptr;
+    if (!station.unknown_panel) object["profile"] = station.profile->name;
+    object["unit"] = nullptr;
+    if (station.unit) object["unit"] = *station.unit;
+    object["state"] = status.state;
+    object["read_only"] = station.read_only;
+    object["last_success_ms"] = nullptr;
+    if (status.last_success) {
+        object["last_success_ms"] = whole_ms(*status.last_success);
+    }
+    return object;
+}
+
+json::object describe(const points::StationPoints& points, const points::Poll& block,
+                      TimePoint now) {
+    const points::Reading& reading = points.reading(block);
+    json::object object;
+    object["read"] = block.read;
+    object["count"] = block.count;
+    object["every_ms"] = whole_ms(block.every);
+    object["quality"] = label(points::quality_of(reading, block.every, now));
+    object["age_ms"] = nullptr;
+    if (reading.sampled) object["age_ms"] = whole_ms(now - *reading.sampled);
+    object["good"] = reading.good;
+    object["failed"] = reading.failed;
+    return object;
+}
+
+json::array describe_polls(const points::StationPoints* points, TimePoint now) {
+    json::array polls;
+    if (points == nullptr) return polls;
+    for (const points::Poll& block : points->blocks())
+        polls.push_back(describe(*points, block, now));
+    return polls;
+}
+
+}  // namespace
+
+Handling get_stations(HttpRequest, const Api* api) {
+    json::array stations;
+    for (const StationEntry& station : api->directory->stations) {
+        stations.push_back(describe(station));
+    }
+    json::object body;
+    body["stations"] = std::move(stations);
+    co_return json_response(200, body);
+}
+
+Handling get_station(HttpRequest request, const Api* api) {
+    const auto station = find_station(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    json::object body = describe(*station);
+    body["polls"] = describe_polls(station->points, api->providers.now());
+    co_return json_response(200, body);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,48 @@
+#include <string_view>
+#include <utility>
+
+#include "handlers.hpp"
+
+namespace panelgate::web {
+namespace {
+
+HttpResponse text_response(unsigned status, std::string body,
+                           std::string_view content_type = "text/plain; charset=utf-8") {
+    HttpResponse response;
+    response.status = status;
+    response.content_type = content_type;
+    response.body = std::move(body);
+    return response;
+}
+
+constexpr std::string_view kIndex = R"(<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>panelgate</title></head><body>
+<h1>panelgate</h1>
+<ul>
+<li><a href="/api/v1/stations">stations</a></li>
+<li><a href="/api/v1/lines">lines</a></li>
+<li><a href="/metrics">metrics</a></li>
+<li><a href="/healthz">healthz</a></li>
+<li><a href="/readyz">readyz</a></li>
+</ul>
+</body></html>
+)";
+
+}  // namespace
+
+Handling get_index(HttpRequest, const Api*) {
+    co_return text_response(200, std::string(kIndex), "text/html; charset=utf-8");
+}
+
+Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok\n"); }
+
+Handling get_readyz(HttpRequest, const Api* api) {
+    if (api->providers.ready()) co_return text_response(200, "ready\n");
+    co_return text_response(503, "not ready\n");
+}
+
+Handling get_metrics(HttpRequest, const Api* api) {
+    co_return text_response(200, api->providers.metrics_text(), api->providers.metrics_type);
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <optional>
+
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "panelgate/web/http/settings.hpp"
+
+namespace panelgate::web {
+
+/// May this request do what needs the role? 401 for a wrong token, or for none where one would
+/// help; 403 for a token whose role is not enough. A request that changes something and comes from
+/// a browser (Origin) must say application/json (415): a foreign page cannot do that unasked.
+std::optional<Problem> check_access(const HttpRequest& request, Role needed,
+                                    const Settings& settings);
+
+}  // namespace panelgate::web

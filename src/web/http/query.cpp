@@ -1,0 +1,25 @@
+#include "panelgate/web/http/query.hpp"
+
+#include <charconv>
+#include <system_error>
+
+namespace panelgate::web {
+
+std::optional<unsigned> to_number(std::string_view text, int base) {
+    unsigned number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
+    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+    return number;
+}
+
+Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
+                              unsigned high, unsigned fallback) {
+    const auto given = request.query.find(name);
+    if (given == request.query.end()) return fallback;
+    const auto number = to_number(given->second);
+    if (number && *number >= low && *number <= high) return *number;
+    return problem(400, name + " must be a whole number from " + std::to_string(low) + " to " +
+                            std::to_string(high));
+}
+
+}  // namespace panelgate::web

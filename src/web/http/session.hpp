@@ -1,0 +1,56 @@
+#pragma once
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <memory>
+#include <optional>
+
+#include "panelgate/web/http/site.hpp"
+
+namespace panelgate::web {
+
+/// One HTTP connection: reads a request, answers it, and again. Owned by the listener until run()
+/// has ended; everything in the one thread.
+class HttpSession : public std::enable_shared_from_this<HttpSession> {
+  public:
+    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<const Site> site);
+
+    /// Serves until the client goes away, breaks the protocol, is idle for too long, or stop().
+    static boost::asio::awaitable<void> run(std::shared_ptr<HttpSession> self);
+    /// Answers the request that runs, then closes; closes at once when none does.
+    void stop();
+    /// Closes at once; whoever works for the client is told.
+    void abandon();
+
+  private:
+    using Parser = boost::beast::http::request_parser<boost::beast::http::string_body>;
+    using ErrorCode = boost::system::error_code;
+
+    boost::asio::awaitable<ErrorCode> receive();
+    boost::asio::awaitable<ErrorCode> receive_body();
+    boost::asio::awaitable<bool> serve_one();
+    boost::asio::awaitable<HttpResponse> handle(HttpRequest request);
+    boost::asio::awaitable<bool> refuse(ErrorCode why);
+    boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
+    boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
+    boost::asio::awaitable<void> drain();
+    void watch_for_departure();
+    bool client_has_left();
+    void close();
+
+    boost::beast::tcp_stream stream_;
+    std::shared_ptr<const Site> site_;
+    std::shared_ptr<Caller> caller_;
+    boost::beast::flat_buffer buffer_;
+    std::optional<Parser> parser_;
+    std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
+    bool busy_ = false;  ///< a whole request is here and not yet answered
+    bool stopping_ = false;
+    bool watching_ = false;  ///< an async_wait of watch_for_departure() is pending
+};
+
+}  // namespace panelgate::web

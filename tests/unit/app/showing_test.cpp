@@ -1,0 +1,137 @@
+#include "showing.hpp"
+
+#include <gmock/gmock.h>
+
+#include <boost/asio/io_context.hpp>
+#include <memory>
+
+#include "support/fake_bus.hpp"
+
+namespace panelgate::app {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// press 31 has one point and one poll block, meter 5 may only be read.
+class ShowingTest : public testing::Test {
+  protected:
+    ShowingTest() {
+        panel.name = "test-panel";
+        floor.name = "floor1";
+        floor.device.device = "/dev/ttyUSB0";
+        floor.stations.resize(2);
+        config::Station& press = floor.stations[0];
+        press.id = 31;
+        press.name = "press";
+        press.profile = &panel;
+        press.points.resize(1);
+        press.points[0].name = "temperature";
+        press.points[0].unit = "celsius";
+        press.polls.resize(1);
+        press.polls[0].address = 300;
+        config::Station& meter = floor.stations[1];
+        meter.id = 5;
+        meter.name = "meter";
+        meter.profile = &panel;
+        meter.read_only = true;
+        plant.add(floor, bus, nullptr);
+        polls = std::make_unique<points::StationPolls>(
+            points::wants_of(press.points, press.polls),
+            points::make_plan_limits(panel, SerialFormat{}, 2ms), now);
+        plant.at("floor1", 31).points.emplace(press.points, press.polls, *polls);
+    }
+    /// The poll of the point brings a value.
+    void poll() {
+        while (points::quality_of(polls->reading(0), 1s, now) != points::Quality::good) {
+            now = std::max(now, *polls->next_due());
+            for (const auto& due : polls->take_due(now)) {
+                Bytes reply = Writer().u8(3).u8(2).u16(215).take();
+                polls->on_answer(now, due.read, Result<Bytes>(std::move(reply)), now);
+            }
+        }
+    }
+
+    boost::asio::io_context io;
+    test::FakeBus bus{io.get_executor()};
+    profile::PanelProfile panel;
+    config::Line floor;
+    Plant plant;
+    TimePoint now{1h};
+    std::unique_ptr<points::StationPolls> polls;
+    web::EventHub hub;
+};
+
+TEST_F(ShowingTest, RestSeesTheStationsOfThePlant) {
+    profile::PanelProfile generic;
+    generic.name = "generic";
+    const web::Directory directory = directory_of(plant, generic);
+    ASSERT_EQ(directory.lines.size(), 1u);
+    EXPECT_EQ(directory.find_line("floor1")->device, "/dev/ttyUSB0");
+    ASSERT_EQ(directory.stations.size(), 2u);
+    const auto press = directory.find_station("floor1:31");
+    ASSERT_TRUE(press);
+    EXPECT_EQ(press->name, "press");
+    EXPECT_EQ(press->bus, &bus);
+    EXPECT_EQ(press->profile, &panel);
+    EXPECT_FALSE(press->unknown_panel);
+    EXPECT_FALSE(press->read_only);
+    EXPECT_EQ(press->points, &*plant.find("press")->points);
+    EXPECT_EQ(press->simulated, nullptr);
+    EXPECT_TRUE(directory.find_station("meter")->read_only);
+    EXPECT_EQ(directory.find_station("meter")->points, nullptr);
+}
+
+TEST_F(ShowingTest, AStationThatNobodyHasListedIsAPanelOfAnyKind) {
+    profile::PanelProfile generic;
+    const auto stranger = directory_of(plant, generic).find_station("floor1:9");
+    ASSERT_TRUE(stranger);
+    EXPECT_EQ(stranger->profile, &generic);
+    EXPECT_TRUE(stranger->unknown_panel);
+    floor.refuse_unlisted = true;
+    EXPECT_FALSE(directory_of(plant, generic).find_station("floor1:9"));
+}
+
+TEST_F(ShowingTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
+    auto samples = point_samples(plant, now);
+    ASSERT_EQ(samples.size(), 1u);
+    EXPECT_EQ(samples[0].line, "floor1");
+    EXPECT_EQ(samples[0].station, "press");
+    EXPECT_EQ(samples[0].point, "temperature");
+    EXPECT_EQ(samples[0].unit, "celsius");
+    EXPECT_FALSE(samples[0].value);
+    EXPECT_FALSE(samples[0].age);
+    poll();
+    samples = point_samples(plant, now + 1s);
+    EXPECT_EQ(samples[0].value, 215);
+    EXPECT_EQ(samples[0].age, 1);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ShowingTest, TellsOfStationsByTheirNames) {
+    const auto listener = hub.listen({});
+    bus::BusEvent event;
+    event.kind = bus::BusEvent::Kind::station;
+    event.what = "offline";
+    for (const int id : {31, 9}) {
+        event.station = static_cast<std::uint8_t>(id);
+        publish(hub, plant, "floor1", event);
+    }
+    const std::string told = listener->take();
+    EXPECT_THAT(told, HasSubstr(R"("station":"press")"));
+    EXPECT_THAT(told, HasSubstr(R"("station":"9")"));
+}
+
+TEST_F(ShowingTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
+    const auto listener = hub.listen({});
+    poll();
+    publish_points(hub, *plant.find("press"), {1}, now);
+    EXPECT_EQ(listener->take(), "");
+    publish_points(hub, *plant.find("press"), {0, 1}, now);
+    const std::string told = listener->take();
+    EXPECT_THAT(told, HasSubstr(R"("name":"temperature")"));
+    EXPECT_THAT(told, HasSubstr(R"("line":"floor1","station":"press")"));
+    EXPECT_EQ(told.find("id: 2"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace panelgate::app

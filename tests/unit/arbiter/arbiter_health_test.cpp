@@ -1,0 +1,120 @@
+// What those that do not answer may cost (P4).
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "arbiter_fixture.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+/// Takes station 17 offline.
+void silence(BusScript& bus) {
+    while (!bus.arbiter().health(17).offline()) {
+        if (bus.arbiter().idle()) bus.submit(17, kRead, 7);
+        bus.run_for(100ms);
+    }
+}
+
+TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
+    for (int i = 0; i < 3; ++i) {
+        const Ticket ticket = bus.submit(17, kRead);
+        bus.run_for(3s);
+        EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
+    }
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::offline);
+    const std::size_t frames = bus.sent.size();
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
+    EXPECT_EQ(bus.sent.size(), frames);
+}
+
+TEST_F(ArbiterTest, P4QueuedRequestsOfAStationThatGoesOfflineAreAnsweredAtOnce) {
+    settings.queue.deadline = 60s;
+    BusScript script{settings};
+    std::vector<Ticket> tickets;
+    for (unsigned i = 0; i < 6; ++i) tickets.push_back(script.submit(17, read_at(i), i + 1));
+    while (!script.arbiter().health(17).offline()) script.run_for(10ms);
+    for (const Ticket ticket : tickets) EXPECT_TRUE(script.answered(ticket));
+    EXPECT_EQ(script.answer(tickets[5]).pdu.error(), Fault::offline);
+    EXPECT_FALSE(script.answer(tickets[5]).transmitted);
+}
+
+TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBringsItBack) {
+    silence(bus);
+    const std::size_t before = bus.sent.size();
+    const Duration busy = bus.arbiter().counters().busy;
+    bus.run_for(1000s);
+    EXPECT_GT(bus.sent.size(), before + 10) << "it is asked again and again";
+    EXPECT_LT(to_seconds(bus.arbiter().counters().busy - busy), 0.05 * 1000);
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+    const Ticket ticket = bus.submit(17, kRead);
+    ASSERT_TRUE(bus.next_sent(1s));
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answer(ticket).pdu.has_value());
+}
+
+TEST_F(ArbiterTest, P4AProbeOfAStationWhosePaceIsKnownIsShort) {
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.run_for(4ms);
+    bus.hear_reply(17, kReply);
+    silence(bus);
+    ASSERT_TRUE(bus.next_sent(60s));
+    const Ticket other = bus.submit(18, kRead);
+    const TimePoint asked = bus.now();
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().adu[0], 18);
+    EXPECT_LT(bus.now() - asked, 50ms);
+    EXPECT_FALSE(bus.answered(other));
+}
+
+TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    silence(bus);
+    bus.run_for(20s);
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
+    const Ticket write = bus.submit(17, kWrite);
+    EXPECT_EQ(bus.try_submit(17, kWrite).error(), Fault::offline);
+    while (bus.sent.back().adu[1] != 6) ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kWrite);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
+    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+}
+
+TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {
+    for (int i = 0; i < 5; ++i) {
+        bus.submit(17, kRead);
+        for (int attempt = 0; attempt < 2; ++attempt) {
+            if (attempt > 0 || bus.sent.empty() || bus.now() >= bus.sent.back().at + 10ms) {
+                ASSERT_TRUE(attempt == 0 || bus.next_sent());
+            }
+            bus.run_to_end_of_request();
+            bus.hear(ByteView(modbus::encode_adu(17, kReply)).first(6));
+        }
+        bus.run_for(30ms);
+    }
+    EXPECT_FALSE(bus.arbiter().health(17).offline());
+}
+
+TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
+    bus.submit(17, read_at(1), 1);
+    ASSERT_EQ(bus.sent.size(), 1u);
+    bus.submit(18, read_at(2), 2);
+    ASSERT_TRUE(bus.next_sent());
+    ASSERT_EQ(bus.sent.back().adu[0], 18) << "another one goes first";
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
+    bus.cancel(1);
+    EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 1);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,114 @@
+// What is owed (P1): no reply answers a request that it was not given for.
+#include <gtest/gtest.h>
+
+#include "arbiter_fixture.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+TEST_F(ArbiterTest, OtherStationsAreAskedBetweenTheAttemptsWhenOnlyTheStationIsQuarantined) {
+    settings.quarantine = Quarantine::station;
+    BusScript script{settings};
+    script.submit(17, kRead, 1);
+    const Ticket other = script.submit(18, kRead, 2);
+    const auto second = script.next_sent();
+    ASSERT_TRUE(second);
+    EXPECT_EQ(second->adu[0], 18);
+    script.run_to_end_of_request();
+    script.hear_reply(18, kReply);
+    EXPECT_TRUE(script.answered(other));
+    EXPECT_EQ(script.next_sent()->adu[0], 17);
+}
+
+TEST_F(ArbiterTest, P1WhereTheLineRestsAllWaitUntilALateReplyCanNoLongerCome) {
+    settings.quarantine = Quarantine::line;
+    BusScript script{settings};
+    const Ticket silent = script.submit(17, kRead, 1);
+    const Ticket other = script.submit(18, kRead, 2);
+    ASSERT_EQ(script.next_sent()->adu[0], 17);  // its retry comes first
+    const auto next = script.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->adu[0], 18);
+    ASSERT_TRUE(script.answered(silent));
+    EXPECT_EQ(next->at - script.answer(silent).at, 500ms);
+    script.run_to_end_of_request();
+    script.hear_reply(18, kReply);
+    EXPECT_EQ(script.answer(other).pdu.value(), kReply);
+}
+
+TEST_F(ArbiterTest, P1ALateReplyOfTheSameShapeAnswersNobodyAndEndsTheRest) {
+    settings.stations[0].retries = 0;
+    BusScript script{settings};
+    const Ticket first = script.submit(17, read_at(1), 1);
+    const Ticket second = script.submit(17, read_at(2), 2);
+    while (!script.answered(first)) script.run_for(1ms);
+    script.run_for(300ms);
+    script.hear_reply(17, kReply);  // of the first: same station, function and length
+    script.run_for(100ms);
+    EXPECT_FALSE(script.answered(second));
+    EXPECT_EQ(script.events.size(), 1u);
+    EXPECT_EQ(script.events[0].kind, StationEvent::Kind::late);
+    ASSERT_EQ(script.sent.size(), 2u);
+    script.hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script.answer(second).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+}
+
+TEST_F(ArbiterTest, P1BytesBeforeAReplyCouldHaveBegunAreStaleOnARealLine) {
+    settings.paced = true;
+    BusScript script{settings};
+    const Ticket ticket = script.submit(17, kRead);
+    script.run_for(1ms);  // the request is still leaving
+    script.hear_reply(17, kReply);
+    script.run_for(30ms);
+    EXPECT_FALSE(script.answered(ticket));
+    script.hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script.answer(ticket).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+}
+
+TEST_F(ArbiterTest, P1AStationThatSaysItsRepliesTwiceIsLeftAloneUntilTheSecondHasPassed) {
+    const auto ask = [&](Client client) {
+        bus.submit(17, kRead, client);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear_reply(17, kReply);
+        return bus.now();
+    };
+    ask(1);
+    bus.run_for(80ms);
+    bus.hear_reply(17, kReply);  // the copy
+    bus.run_for(200ms);
+    const TimePoint replied = ask(1);
+    bus.submit(17, read_at(5), 1);
+    bus.submit(18, kRead, 2);
+    EXPECT_EQ(bus.next_sent()->adu[0], 18) << "the others need not wait";
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(18, kReply);
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_GE(next->at - replied, Duration(120ms));
+}
+
+TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
+    bus.submit(17, read_at(1), 1);
+    bus.run_to_end_of_request();
+    bus.line_down();
+    bus.line_up();
+    const Ticket same = bus.submit(17, read_at(2), 2);
+    const Ticket other = bus.submit(18, read_at(2), 3);
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().adu[0], 18) << "others need not wait";
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);  // handed to the new connection
+    EXPECT_FALSE(bus.answered(other));
+    bus.run_for(30ms);
+    bus.hear_reply(18, kReply);
+    EXPECT_TRUE(bus.answered(other));
+    EXPECT_FALSE(bus.answered(same));
+    ASSERT_TRUE(bus.next_sent(10ms)) << "nothing is owed any more";
+    EXPECT_EQ(bus.sent.back().adu[0], 17);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,138 @@
+// Writes, broadcasts and deadlines (P2, P3): nothing is done twice, or for nobody.
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <variant>
+
+#include "arbiter_fixture.hpp"
+#include "support/hex.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
+    for (const Bytes& write :
+         {kWrite, "05 00 01 FF 00"_hex, "10 00 01 00 01 02 00 03"_hex, "0F 00 01 00 01 01 01"_hex,
+          "16 00 04 00 F2 00 25"_hex, "17 00 03 00 01 00 0E 00 01 02 00 FF"_hex, "41 01 02"_hex}) {
+        BusScript script{settings};
+        const Ticket ticket = script.submit(17, write);
+        script.run_for(5s);
+        EXPECT_EQ(script.sent.size(), 1u) << to_hex(write);
+        EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
+        EXPECT_TRUE(script.answer(ticket).transmitted);
+    }
+}
+
+TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationSaysSo) {
+    settings.stations[0].retry_writes = true;
+    BusScript script{settings};
+    script.submit(17, kWrite);
+    script.run_for(5s);
+    EXPECT_EQ(script.sent.size(), 2u);
+}
+
+TEST_F(ArbiterTest, BroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnaround) {
+    const Ticket broadcast = bus.submit(0, kWrite, 1, PriorityClass::write);
+    bus.submit(17, kRead, 2);
+    const TimePoint end = bus.now() + wire_time(settings.serial, 8);
+    bus.run_until(end);
+    ASSERT_TRUE(bus.answered(broadcast));
+    EXPECT_EQ(bus.answer(broadcast).pdu.value(), kWrite);
+    const auto next = bus.next_sent();
+    ASSERT_TRUE(next);
+    EXPECT_EQ(next->at - end, 100ms);
+    EXPECT_EQ(bus.arbiter().counters().broadcasts, 1u);
+}
+
+TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessStoodStill) {
+    Arbiter arbiter(settings);
+    const TimePoint start{1h};
+    arbiter.on_line_up(start);
+    const Job job{
+        .request = test::request_of(kWrite), .client = 1, .priority = PriorityClass::write};
+    const TimePoint free = start + 1s;
+    arbiter.on_deadline(free);
+    ASSERT_TRUE(arbiter.submit(free, job));
+    arbiter.on_deadline(free + settings.queue.deadline + 1s);
+    int answers = 0;
+    while (auto action = arbiter.poll_action()) {
+        const auto* finish = std::get_if<Finish>(&*action);
+        if (finish == nullptr) continue;
+        ++answers;
+        EXPECT_EQ(finish->pdu.error(), Fault::timeout);
+    }
+    EXPECT_EQ(answers, 1);
+}
+
+TEST_F(ArbiterTest, BroadcastOfSeveralIsAnsweredWithAddressAndQuantity) {
+    const Ticket ticket = bus.submit(0, "10 00 64 00 02 04 00 0A 01 02"_hex);
+    bus.run_for(1s);
+    EXPECT_EQ(bus.sent.size(), 1u);
+    EXPECT_EQ(bus.answer(ticket).pdu.value(), "10 00 64 00 02"_hex);
+}
+
+TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
+    const Ticket broadcast = bus.submit(0, kWrite);
+    const Ticket read = bus.submit(17, kRead, 2);
+    bus.run_to_end_of_request();
+    bus.run_for(10ms);
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answered(broadcast));
+    EXPECT_FALSE(bus.answered(read));
+}
+
+/// It repeats another one, so it waits for what else may come; meanwhile the process stands still.
+TEST_F(ArbiterTest, P3AReplyThatWasHeldBackIsNotGivenToWhomItIsTooLateFor) {
+    bus.submit(17, read_at(1));
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    const Ticket second = bus.submit(17, read_at(2));
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    bus.hear_reply(17, kReply);
+    ASSERT_FALSE(bus.answered(second));
+    bus.arbiter().on_deadline(bus.now() + settings.queue.deadline);
+    std::optional<Finish> answer;
+    while (auto action = bus.arbiter().poll_action()) {
+        if (const auto* finish = std::get_if<Finish>(&*action)) answer = *finish;
+    }
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->ticket, second);
+    ASSERT_FALSE(answer->pdu);
+    EXPECT_EQ(answer->pdu.error(), Fault::timeout);
+}
+
+TEST_F(ArbiterTest, P3ExpiresWhatCannotFinishBeforeItsDeadlineWithoutTouchingTheWire) {
+    settings.queue.deadline = 400ms;
+    BusScript script{settings};
+    const Ticket first = script.submit(17, kRead, 1);
+    const Ticket second = script.submit(18, kRead, 2);
+    const TimePoint start = script.now();
+    script.run_for(1s);
+    // The first is cut at its deadline, the second was never started.
+    EXPECT_EQ(script.answer(first).pdu.error(), Fault::timeout);
+    EXPECT_EQ(script.answer(first).at - start, 400ms);
+    EXPECT_EQ(script.answer(second).pdu.error(), Fault::expired);
+    EXPECT_FALSE(script.answer(second).transmitted);
+    EXPECT_LT(script.answer(second).at - start, 400ms);
+    EXPECT_EQ(script.sent.size(), 1u);
+}
+
+TEST_F(ArbiterTest, P2ACancelledClientsQueueNeverReachesTheWire) {
+    const Ticket on_wire = bus.submit(17, kRead, 1);
+    const Ticket queued = bus.submit(17, kWrite, 1);
+    bus.cancel(1);
+    EXPECT_EQ(bus.answer(queued).pdu.error(), Fault::cancelled);
+    EXPECT_FALSE(bus.answer(queued).transmitted);
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_EQ(bus.answer(on_wire).pdu.value(), kReply);
+    bus.run_for(5s);
+    EXPECT_EQ(bus.sent.size(), 1u);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

@@ -1,0 +1,127 @@
+#include "dispatch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "held_bus.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+const Bytes kRead = "03 00 00 00 01"_hex;
+const Bytes kWrite = "06 00 01 00 03"_hex;
+const Bytes kTooMuch = "03 00 00 00 7E"_hex;  // 126 registers
+
+/// A listener of two lines: stations 1 and 2 on "a", 2 of them only to be read; 3 on "b".
+class DispatchTest : public ::testing::Test {
+  protected:
+    /// "to a/1", "to everybody on a, b", "itself", or the exception code as "refused 01".
+    std::string decided(std::uint8_t unit, const Bytes& pdu) {
+        const UnitMap units(settings,
+                            {{"a", &bus_a, {1, 2}, {2}, false}, {"b", &bus_b, {3}, {}, false}});
+        const Decision decision = decide(unit, pdu, settings, units);
+        if (const auto* refuse = std::get_if<Refuse>(&decision))
+            return "refused " + to_hex(Bytes{static_cast<std::uint8_t>(refuse->code)});
+        if (const auto* forward = std::get_if<Forward>(&decision))
+            return "to " + name_of(forward->target.bus) + '/' +
+                   std::to_string(forward->target.station);
+        if (std::holds_alternative<Diagnose>(decision)) return "itself";
+        std::string text = "to everybody on";
+        for (const bus::BusClient* line : std::get<Broadcast>(decision).lines)
+            text += ' ' + name_of(line);
+        return text;
+    }
+    std::string name_of(const bus::BusClient* line) const { return line == &bus_a ? "a" : "b"; }
+
+    boost::asio::io_context context;
+    HeldBus bus_a{context};
+    HeldBus bus_b{context};
+    Settings settings;
+};
+
+TEST_F(DispatchTest, ForwardsToTheStationThatTheUnitStandsFor) {
+    settings.units[101] = {"b", 3};
+    EXPECT_EQ(decided(1, kRead), "to a/1");
+    EXPECT_EQ(decided(1, kWrite), "to a/1");
+    EXPECT_EQ(decided(3, kRead), "to b/3");
+    EXPECT_EQ(decided(101, kWrite), "to b/3");
+}
+
+TEST_F(DispatchTest, AFunctionThatCannotBeIsRefusedWhoeverIsAsked) {
+    for (const Bytes& pdu : {"00 00 00"_hex, "80 01"_hex, "83 02"_hex, "FF"_hex}) {
+        EXPECT_EQ(decided(1, pdu), "refused 01") << to_hex(pdu);
+        EXPECT_EQ(decided(77, pdu), "refused 01") << to_hex(pdu);
+        EXPECT_EQ(decided(255, pdu), "refused 01") << to_hex(pdu);
+    }
+    EXPECT_EQ(decided(77, {}), "refused 03");
+}
+
+TEST_F(DispatchTest, AListenerOnlyForReadsRefusesEverythingElseWhoeverIsAsked) {
+    settings.read_only = true;
+    EXPECT_EQ(decided(1, kRead), "to a/1");
+    for (const std::uint8_t unit : Bytes{0, 1, 3, 77, 255})
+        EXPECT_EQ(decided(unit, kWrite), "refused 01") << int{unit};
+    EXPECT_EQ(decided(1, "17 00 00 00 01 00 05 00 01 02 00 00"_hex), "refused 01")
+        << "it reads, and writes as well";
+    EXPECT_EQ(decided(1, "41 01"_hex), "refused 01") << "nobody knows what it does";
+}
+
+TEST_F(DispatchTest, AStationOnlyForReadsRefusesEverythingElse) {
+    EXPECT_EQ(decided(2, kRead), "to a/2");
+    EXPECT_EQ(decided(2, kWrite), "refused 01");
+    EXPECT_EQ(decided(2, "41 01"_hex), "refused 01");
+    settings.units[102] = {"a", 2};
+    EXPECT_EQ(decided(102, kWrite), "refused 01") << "by another name, too";
+}
+
+TEST_F(DispatchTest, AUnitThatNobodyHasIsToldBeforeTheRequestIsLookedAt) {
+    EXPECT_EQ(decided(77, kRead), "refused 0a");
+    EXPECT_EQ(decided(77, kTooMuch), "refused 0a");
+    EXPECT_EQ(decided(248, kWrite), "refused 0a");
+}
+
+TEST_F(DispatchTest, ARequestThatContradictsItselfDoesNotLeave) {
+    EXPECT_EQ(decided(1, kTooMuch), "refused 03");
+    EXPECT_EQ(decided(1, "03 00 00"_hex), "refused 03");
+    EXPECT_EQ(decided(1, "10 00 00 00 02 04 00 01"_hex), "refused 03");
+}
+
+TEST_F(DispatchTest, TheDiagnosticsUnitIsTheGatewayUnlessItIsGivenAway) {
+    EXPECT_EQ(decided(255, kRead), "itself");
+    EXPECT_EQ(decided(255, kWrite), "itself") << "whether it can be written it says itself";
+    settings.units[255] = {"b", 3};
+    EXPECT_EQ(decided(255, kRead), "to b/3");
+    settings.units.clear();
+    settings.diagnostics_unit.reset();
+    EXPECT_EQ(decided(255, kRead), "refused 0a");
+}
+
+TEST_F(DispatchTest, OnlyAWriteIsBroadcastAndOnlyWhereAllMayBeWritten) {
+    settings.lines = {"b"};
+    EXPECT_EQ(decided(0, kWrite), "to everybody on b");
+    EXPECT_EQ(decided(0, kRead), "refused 01");
+    EXPECT_EQ(decided(0, "10 00 00 00 02 04 00 01"_hex), "refused 03");
+    settings.lines = {"a", "b"};
+    EXPECT_EQ(decided(0, kWrite), "refused 01") << "station 2 is among them";
+    settings.units[100] = {"b", 0};
+    EXPECT_EQ(decided(100, kWrite), "to everybody on b");
+    settings.units[200] = {"a", 0};
+    EXPECT_EQ(decided(200, kWrite), "refused 01");
+}
+
+TEST_F(DispatchTest, WhereBroadcastsAreDeniedNoRequestToAllIsLookedAt) {
+    settings.lines = {"b"};
+    settings.broadcast = BroadcastMode::deny;
+    EXPECT_EQ(decided(0, kWrite), "refused 01");
+    EXPECT_EQ(decided(0, "10 00 00 00 02 04 00 01"_hex), "refused 01");
+    EXPECT_EQ(decided(3, kWrite), "to b/3");
+}
+
+}  // namespace
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,69 @@
+#include "answer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/json/parse.hpp>
+
+#include "support/fake_bus.hpp"
+
+namespace panelgate::web {
+namespace {
+
+boost::json::object told(const Problem& problem) {
+    return boost::json::parse(to_response(problem).body).as_object();
+}
+
+TEST(Answer, TellsAFaultWithTheExceptionThatModbusClientsGetAndWhetherItLeft) {
+    const auto object = told(problem_of(Fault::timeout, true));
+    EXPECT_EQ(object.at("type"), "urn:panelgate:problem:timeout");
+    EXPECT_EQ(object.at("status"), 504);
+    EXPECT_EQ(object.at("modbus_exception"), 11);
+    EXPECT_EQ(object.at("transmitted"), true);
+}
+
+TEST(Answer, AsksToTryAgainOnlyWhereThatMayHelp) {
+    ASSERT_EQ(problem_of(Fault::busy, false).headers.size(), 1u);
+    EXPECT_EQ(problem_of(Fault::busy, false).headers[0].first, "Retry-After");
+    EXPECT_TRUE(problem_of(Fault::timeout, true).headers.empty());
+    EXPECT_TRUE(problem_of(Fault::line_down, false).headers.empty());
+}
+
+TEST(Answer, AddsTheManualsWordToAnException) {
+    profile::PanelProfile panel;
+    panel.exceptions.push_back({2, "Address is outside the range"});
+    const Problem known = problem_of_exception(2, panel);
+    EXPECT_EQ(known.status, 422u);
+    EXPECT_TRUE(known.detail.starts_with("the panel answered exception 2: ")) << known.detail;
+    EXPECT_TRUE(known.detail.ends_with(" (Address is outside the range)")) << known.detail;
+    EXPECT_FALSE(problem_of_exception(3, panel).detail.ends_with(")"));
+    EXPECT_EQ(told(known).at("modbus_exception"), 2);
+}
+
+TEST(Answer, BlamesTheRequestForExceptionsOneToFourOnly) {
+    EXPECT_EQ(problem_of_exception(1, {}).status, 422u);
+    EXPECT_EQ(problem_of_exception(4, {}).status, 422u);
+    EXPECT_EQ(problem_of_exception(0, {}).status, 502u);
+    EXPECT_EQ(problem_of_exception(5, {}).status, 502u);
+}
+
+TEST(Answer, OfAWriteSaysWhatIsSure) {
+    const auto confirmed = write_answer(test::FakeBus::reply({6, 0, 1, 0, 2}), {});
+    EXPECT_EQ(confirmed.status, 200u);
+    EXPECT_EQ(confirmed.body, "{\"transmitted\":true,\"confirmed\":true}\n");
+    EXPECT_EQ(write_answer(test::FakeBus::reply({0x86, 2}), {}).status, 422u);
+    EXPECT_EQ(write_answer(test::FakeBus::fault(Fault::timeout, true), {}).status, 504u);
+}
+
+TEST(Answer, RoundsMillisecondsTowardsZero) {
+    EXPECT_EQ(whole_ms(1'999'999ns), 1);
+    EXPECT_EQ(whole_ms(-1'999'999ns), -1);
+}
+
+TEST(Answer, WritesBytesInCapitals) {
+    const Bytes bytes{0x1f, 0x01, 0xff};
+    EXPECT_EQ(upper_hex(bytes), "1F 01 FF");
+    EXPECT_EQ(upper_hex(bytes, ""), "1F01FF");
+}
+
+}  // namespace
+}  // namespace panelgate::web

@@ -1,0 +1,86 @@
+#include "body.hpp"
+
+#include <gmock/gmock.h>
+
+#include <boost/json/parse.hpp>
+#include <boost/json/serialize.hpp>
+#include <string>
+
+namespace panelgate::web {
+namespace {
+
+using modbus::Table;
+using ::testing::ElementsAre;
+using ::testing::StartsWith;
+using Cells = std::vector<std::uint16_t>;
+
+std::string registers_error(const std::string& body) {
+    const auto cells = cells_of(body, Table::holding_registers);
+    if (cells) return "";
+    EXPECT_EQ(cells.error().status, 400u);
+    return cells.error().detail;
+}
+
+TEST(Body, TakesRegistersUnsignedOrAsTwosComplement) {
+    EXPECT_THAT(*cells_of(R"({"values":[0, 65535, -1, -32768, 10.0]})", Table::holding_registers),
+                ElementsAre(0, 0xFFFF, 0xFFFF, 0x8000, 10));
+    for (const char* value : {"65536", "-32769", "1.5", "\"1\"", "true", "null", "[1]", "1e16"}) {
+        EXPECT_THAT(registers_error(std::string("{\"values\":[1, ") + value + "]}"),
+                    StartsWith("a register is a whole number from 0 to 65535, or from -32768, not"))
+            << value;
+    }
+}
+
+TEST(Body, TakesBitsAsBooleansOrNumbers) {
+    EXPECT_THAT(*cells_of(R"({"values":[true, false, 1, 0, 1.0]})", Table::coils),
+                ElementsAre(1, 0, 1, 0, 1));
+    const auto two = cells_of(R"({"values":[2]})", Table::coils);
+    ASSERT_FALSE(two);
+    EXPECT_EQ(two.error().detail, "a bit is true, false, 1 or 0, not 2");
+}
+
+TEST(Body, WantsValues) {
+    for (const char* body : {"{}", R"({"values":[]})", R"({"values":1})", R"({"value":[1]})"}) {
+        EXPECT_EQ(registers_error(body),
+                  R"(the body must be {"values": [...]} with at least one value)")
+            << body;
+    }
+}
+
+TEST(Body, PointsAtWhatIsNoJson) {
+    EXPECT_THAT(registers_error("{\"values\":\n [1,, 2]}"),
+                StartsWith("the body is not JSON: line 2, column 5: "));
+    EXPECT_THAT(registers_error("{\"values\":[1]"),
+                StartsWith("the body is not JSON: line 1, column 14: "));
+    EXPECT_THAT(registers_error(""), StartsWith("the body is not JSON: line 1, column 1: "));
+    EXPECT_EQ(registers_error("{} x"),
+              "the body is not JSON: line 1, column 4: something follows the value");
+    EXPECT_EQ(registers_error("[1]"), "the body must be a JSON object");
+}
+
+TEST(Body, TakesAPointsValueAsItIs) {
+    using points::Value;
+    EXPECT_EQ(*value_of(R"({"value":true})"), Value(true));
+    EXPECT_EQ(*value_of(R"({"value":-5})"), Value(std::int64_t{-5}));
+    EXPECT_EQ(*value_of(R"({"value":18446744073709551615})"), Value(18446744073709551615u));
+    EXPECT_EQ(*value_of(R"({"value":1.5})"), Value(1.5));
+    EXPECT_EQ(*value_of(R"({"value":"Ok"})"), Value(std::string("Ok")));
+    EXPECT_EQ(value_of("{}").error().detail, "the body needs \"value\"");
+    for (const char* body : {R"({"value":null})", R"({"value":[1]})", R"({"value":{}})"}) {
+        EXPECT_EQ(value_of(body).error().detail, "value must be a number, true, false or a text");
+    }
+}
+
+TEST(Body, GivesMembersOfTheirKind) {
+    const auto object = boost::json::parse(R"({"n":7.0,"t":"x"})").as_object();
+    EXPECT_EQ(*number_member(object, "n", 0, 7), 7);
+    EXPECT_EQ(number_member(object, "n", 0, 6).error().detail,
+              "n must be a whole number from 0 to 6, not 7E0");
+    EXPECT_EQ(number_member(object, "m", 0, 6).error().detail, "the body lacks m");
+    EXPECT_EQ(*string_member(object, "t"), "x");
+    EXPECT_EQ(string_member(object, "n").error().detail, "n must be a string");
+    EXPECT_EQ(string_member(object, "m").error().detail, "the body lacks m");
+}
+
+}  // namespace
+}  // namespace panelgate::web

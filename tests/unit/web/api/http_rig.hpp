@@ -1,0 +1,146 @@
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <boost/asio/io_context.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "panelgate/web/api/server.hpp"
+#include "support/fake_bus.hpp"
+#include "support/http_client.hpp"
+
+namespace panelgate::web {
+
+namespace http = boost::beast::http;
+using boost::asio::ip::tcp;
+using test::Client;
+using test::json_of;
+using test::Reply;
+
+/// Words UW (read to 999, write to 499) and bits UB over them; GR is read-only; TM is an input.
+inline profile::PanelProfile test_profile() {
+    using modbus::Table;
+    profile::PanelProfile profile;
+    profile.name = "test-panel";
+    const auto area = [&](const char* name, Table table, std::uint32_t last) -> profile::Area& {
+        profile::Area& made = profile.areas.emplace_back();
+        made.name = name;
+        made.notation.prefix = name;
+        made.table = table;
+        made.readable = {0, last};
+        return made;
+    };
+    area("UW", Table::holding_registers, 999).writable = profile::AddressRange{0, 499};
+    profile::Area& bits = area("UB", Table::coils, 15999);
+    bits.notation.bit = profile::BitDigits::hex;
+    bits.view_of = "UW";
+    bits.writable = profile::AddressRange{0, 7999};
+    area("TM", Table::input_registers, 99);
+    profile::Area& gdt = area("GDT", Table::input_registers, 99);
+    gdt.also = {Table::holding_registers};
+    gdt.writable = profile::AddressRange{0, 99};
+    for (const int code : {1, 3, 5, 6, 16}) {
+        profile.functions.push_back({static_cast<std::uint8_t>(code), 0, true, ""});
+    }
+    profile.functions[1].max_count = 32;  // 03
+    profile.functions[4].max_count = 4;   // 16
+    profile.exceptions.push_back({2, "Address is outside the range"});
+    return profile;
+}
+
+/// A server on loopback with a line floor1: press (31, with test_profile), meter (5, read-only, of
+/// which nobody knows what panel it is). Line floor2 has the same bus and refuses unlisted
+/// stations.
+class HttpRig : public ::testing::Test {
+  protected:
+    HttpRig() : bus(io.get_executor()), panel(test_profile()) {
+        settings.port = 0;
+        settings.anonymous = Role::operator_;
+        directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
+        directory.lines.push_back({"floor2", "/dev/ttyUSB1", &bus, false});
+        directory.generic = shipped.find("generic");
+        StationEntry press;
+        static_cast<bus::StationRef&>(press) = {"press", "floor1", 31, &bus};
+        press.profile = &panel;
+        press.unit = 101;
+        directory.stations.push_back(std::move(press));
+        bus.script = [](const bus::Request& request) { return answer_from_addresses(request); };
+    }
+    ~HttpRig() override {
+        server.reset();
+        io.poll();
+    }
+
+    void add_meter() {
+        StationEntry meter;
+        static_cast<bus::StationRef&>(meter) = {"meter", "floor1", 5, &bus};
+        meter.profile = directory.generic;
+        meter.unknown_panel = true;
+        meter.read_only = true;
+        directory.stations.push_back(std::move(meter));
+    }
+    Server& start() {
+        Providers providers;
+        providers.metrics_text = [] { return "up 1\n"; };
+        providers.metrics_type = "text/plain; version=0.0.4; charset=utf-8";
+        providers.ready = [this] { return ready; };
+        providers.version = "1.2.3";
+        providers.now = [this] { return now; };
+        providers.relays = [this] { return relays; };
+        providers.events = &events;
+        server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
+        EXPECT_FALSE(server->start());
+        return *server;
+    }
+    Client connect() {
+        if (!server) start();
+        return Client(io, server->port());
+    }
+    Reply ask(const std::string& method, const std::string& target, const std::string& body = "",
+              const std::string& headers = "") {
+        return connect().ask(method, target, body, headers);
+    }
+    Reply get(const std::string& target) { return ask("GET", target); }
+    std::string last_pdu() const { return to_hex(bus.requests.back().request.pdu()); }
+
+    /// Register n holds n, bit n is set when n is odd; writes are confirmed.
+    static bus::Answer answer_from_addresses(const bus::Request& request) {
+        Reader in(request.request.pdu());
+        const std::uint8_t function = in.u8();
+        const std::uint16_t address = in.u16();
+        const std::uint16_t count = in.u16();
+        Writer out;
+        out.u8(function);
+        if (function == 1 || function == 2) {
+            std::vector<bool> bits;
+            for (unsigned i = 0; i < count; ++i) bits.push_back((address + i) % 2 == 1);
+            const Bytes packed = modbus::pack_bits(bits);
+            out.u8(static_cast<unsigned>(packed.size())).raw(packed);
+        } else if (function == 3 || function == 4) {
+            out.u8(2u * count);
+            for (unsigned i = 0; i < count; ++i) out.u16(address + i);
+        } else {
+            out.u16(address).u16(count);
+        }
+        return test::FakeBus::reply(out.take());
+    }
+
+    boost::asio::io_context io;
+    test::FakeBus bus;
+    profile::Catalogue shipped = profile::Catalogue::shipped();
+    profile::PanelProfile panel;
+    Directory directory;
+    Settings settings;
+    TimePoint now{1h};
+    std::vector<points::RelayStatus> relays;
+    EventHub events;
+    bool ready = true;
+    std::unique_ptr<Server> server;
+};
+
+}  // namespace panelgate::web

@@ -1,0 +1,86 @@
+#include "access.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace panelgate::web {
+namespace {
+
+Settings with_tokens(Role anonymous) {
+    Settings settings;
+    settings.anonymous = anonymous;
+    settings.tokens.push_back({"panel", Role::viewer, "see-me"});
+    settings.tokens.push_back({"ops", Role::operator_, "let-me"});
+    settings.tokens.push_back({"broken", Role::operator_, ""});
+    return settings;
+}
+
+HttpRequest asking(const std::string& authorization, const std::string& method = "GET") {
+    HttpRequest request;
+    request.method = method;
+    if (!authorization.empty()) request.headers["authorization"] = authorization;
+    return request;
+}
+
+/// The status of the refusal; 0: it may.
+unsigned refusal(const HttpRequest& request, Role needed, Role anonymous) {
+    const auto refused = check_access(request, needed, with_tokens(anonymous));
+    return refused ? refused->status : 0;
+}
+
+TEST(Access, AsksNobodyForWhatEverybodyMay) {
+    EXPECT_EQ(refusal(asking("Bearer wrong"), Role::none, Role::none), 0u);
+}
+
+TEST(Access, GivesWhoHasNoTokenTheAnonymousRole) {
+    EXPECT_EQ(refusal(asking(""), Role::viewer, Role::none), 401u);
+    EXPECT_EQ(refusal(asking(""), Role::viewer, Role::viewer), 0u);
+    EXPECT_EQ(refusal(asking(""), Role::operator_, Role::viewer), 401u);
+    EXPECT_EQ(refusal(asking(""), Role::operator_, Role::operator_), 0u);
+}
+
+TEST(Access, GivesATokenItsOwnRoleEvenWhereAnonymousMayDoMore) {
+    EXPECT_EQ(refusal(asking("Bearer see-me"), Role::viewer, Role::none), 0u);
+    EXPECT_EQ(refusal(asking("Bearer see-me"), Role::operator_, Role::operator_), 403u);
+    EXPECT_EQ(refusal(asking("Bearer let-me"), Role::operator_, Role::none), 0u);
+    EXPECT_EQ(refusal(asking("Bearer wrong"), Role::viewer, Role::operator_), 401u);
+}
+
+TEST(Access, TakesASecretOnlyWholeAndNeverAnEmptyOne) {
+    for (const char* token : {"let-m", "let-mee", "let-melet-me", "LET-ME", "", " let-me"}) {
+        EXPECT_EQ(refusal(asking(std::string("Bearer ") + token), Role::viewer, Role::none), 401u)
+            << token;
+    }
+}
+
+TEST(Access, ReadsTheSchemeWithoutRegardToCase) {
+    EXPECT_EQ(refusal(asking("bEARER let-me"), Role::operator_, Role::none), 0u);
+    for (const char* text : {"Basic let-me", "Bearer", "Bearerlet-me", "let-me"}) {
+        EXPECT_EQ(refusal(asking(text), Role::viewer, Role::none), 401u) << text;
+    }
+}
+
+TEST(Access, SaysHowToAskAgain) {
+    const auto refused = check_access(asking(""), Role::viewer, with_tokens(Role::none));
+    ASSERT_TRUE(refused);
+    ASSERT_EQ(refused->headers.size(), 1u);
+    EXPECT_EQ(refused->headers[0].first, "WWW-Authenticate");
+    EXPECT_EQ(refused->headers[0].second, "Bearer realm=\"panelgate\"");
+}
+
+TEST(Access, TakesNoFormFromAForeignPage) {
+    HttpRequest request = asking("", "POST");
+    request.headers["origin"] = "http://evil.example";
+    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
+    request.headers["content-type"] = "text/plain";
+    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
+    request.headers["content-type"] = "application/json; charset=utf-8";
+    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u);
+    request.headers.erase("content-type");
+    request.method = "GET";
+    EXPECT_EQ(refusal(request, Role::viewer, Role::viewer), 0u);
+}
+
+}  // namespace
+}  // namespace panelgate::web

@@ -1,0 +1,90 @@
+#include "router.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <exception>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace panelgate::web {
+namespace {
+
+/// Answers with its name and what the pattern's {} stood for.
+Handling echo(std::string name, HttpRequest request) {
+    HttpResponse response;
+    response.body = std::move(name);
+    for (const std::string& argument : request.arguments) response.body += " " + argument;
+    co_return response;
+}
+
+class Router : public ::testing::Test {
+  protected:
+    void add(const char* verb, const char* pattern, Role needed = Role::none) {
+        const std::string name = std::string(verb) + " " + pattern;
+        site.routes.push_back({verb, pattern, needed, [name](HttpRequest request) {
+                                   return echo(name, std::move(request));
+                               }});
+    }
+    HttpResponse ask(const char* method, std::vector<std::string> path) {
+        HttpRequest request;
+        request.method = method;
+        request.path = std::move(path);
+        boost::asio::io_context io;
+        HttpResponse got;
+        boost::asio::co_spawn(io, dispatch(std::move(request), &site),
+                              [&](std::exception_ptr, HttpResponse made) { got = made; });
+        io.run();
+        return got;
+    }
+    Site site;
+};
+
+TEST_F(Router, TakesTheFirstRouteThatFits) {
+    add("GET", "/");
+    add("GET", "/a/fixed");
+    add("GET", "/a/{}");
+    add("GET", "/a/{}/b/{}");
+    EXPECT_EQ(ask("GET", {}).body, "GET /");
+    EXPECT_EQ(ask("GET", {"a", "fixed"}).body, "GET /a/fixed");
+    EXPECT_EQ(ask("GET", {"a", "x/y"}).body, "GET /a/{} x/y");
+    EXPECT_EQ(ask("GET", {"a", "x", "b", ""}).body, "GET /a/{}/b/{} x ");
+}
+
+TEST_F(Router, KnowsNoPathThatIsShorterOrLonger) {
+    add("GET", "/a/{}");
+    EXPECT_EQ(ask("GET", {}).status, 404u);
+    EXPECT_EQ(ask("GET", {"a"}).status, 404u);
+    EXPECT_EQ(ask("GET", {"a", "b", "c"}).status, 404u);
+    EXPECT_EQ(ask("GET", {"A", "b"}).status, 404u);
+}
+
+TEST_F(Router, AnswersHeadAsGet) {
+    add("GET", "/a");
+    EXPECT_EQ(ask("HEAD", {"a"}).body, "GET /a");
+}
+
+TEST_F(Router, NamesTheMethodsOfAPathEachOnce) {
+    add("GET", "/a/{}");
+    add("PUT", "/a/{}");
+    add("GET", "/{}/b");
+    const HttpResponse response = ask("POST", {"a", "b"});
+    EXPECT_EQ(response.status, 405u);
+    ASSERT_EQ(response.headers.size(), 1u);
+    EXPECT_EQ(response.headers[0].first, "Allow");
+    EXPECT_EQ(response.headers[0].second, "GET, HEAD, PUT");
+}
+
+TEST_F(Router, AsksForTheRoleOfTheRouteAndOnlyThen) {
+    site.settings.anonymous = Role::viewer;
+    add("GET", "/a", Role::viewer);
+    add("PUT", "/a", Role::operator_);
+    EXPECT_EQ(ask("GET", {"a"}).status, 200u);
+    EXPECT_EQ(ask("PUT", {"a"}).status, 401u);
+    EXPECT_EQ(ask("PUT", {"b"}).status, 404u);
+}
+
+}  // namespace
+}  // namespace panelgate::web
