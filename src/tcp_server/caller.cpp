@@ -4,7 +4,7 @@
 
 namespace panelgate::tcp_server {
 
-Caller::Caller(std::string name, arbiter::Host host) : name_(std::move(name)), host_(host) {}
+Caller::Caller(std::string name, bus::Host host) : name_(std::move(name)), host_(host) {}
 
 void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {

@@ -105,9 +105,9 @@ arbiter::Job Customers::draw_job(Customer& customer) {
         job.request =
             test::request_of(random_.chance(plan.writes) ? draw_write() : draw_read(customer));
     }
-    job.priority = !job.request.is_read() ? arbiter::PriorityClass::write
-                   : plan.polls           ? arbiter::PriorityClass::poll
-                                          : arbiter::PriorityClass::read;
+    job.priority = !job.request.is_read() ? PriorityClass::write
+                   : plan.polls           ? PriorityClass::poll
+                                          : PriorityClass::read;
     return job;
 }
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/echo_state.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
@@ -57,16 +57,9 @@ bool holds_fragment(ByteView heard, ByteView frame);
 /// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
 class EchoMemory {
   public:
-    enum class State : std::uint8_t {
-        unknown,
-        absent,
-        present,
-        unclear,  ///< a part of a read came back in front of its answer: whole echoes may come
-    };
-
     explicit EchoMemory(EchoMode mode);
 
-    State state() const { return state_; }
+    EchoState state() const { return state_; }
     /// The device was opened again: it may be another one.
     void forget();
     EchoFilter::Expect expect(const modbus::Request& request) const;
@@ -89,7 +82,7 @@ class EchoMemory {
 
   private:
     EchoMode mode_;
-    State state_;
+    EchoState state_;
 };
 
 }  // namespace panelgate::arbiter

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
 
