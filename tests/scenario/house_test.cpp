@@ -2,7 +2,7 @@
 // and with what the panel really held.
 //
 // PANELGATE_SCENARIO_SEED    this seed alone, with its history
-// PANELGATE_HOUSE_SEEDS      of each kind (default 60; a tenth with sanitizers)
+// PANELGATE_HOUSE_SEEDS      of each kind (default 100; a tenth with sanitizers)
 
 #include "house.hpp"
 
@@ -24,7 +24,7 @@ std::uint64_t number_from(const char* variable, std::uint64_t fallback) {
 }
 
 std::uint64_t wanted_seeds() {
-    const std::uint64_t all = number_from("PANELGATE_HOUSE_SEEDS", 60);
+    const std::uint64_t all = number_from("PANELGATE_HOUSE_SEEDS", 100);
     const bool slow = number_from("PANELGATE_SANITIZED", 0) != 0;
     return slow ? std::max<std::uint64_t>(all / 10, 1) : all;
 }

@@ -8,6 +8,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "support/fake_bus.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -43,9 +44,9 @@ TEST_F(WiringTest, ABusIsToldWhatMayBeDoneToItsStations) {
 TEST_F(WiringTest, AGuardRefusesAsThePanelWould) {
     const bus::Guard guard = bus_settings(floor).stations.at(31).guard;
     ASSERT_TRUE(guard);
-    EXPECT_EQ(guard("03 0000 0001"_hex), std::nullopt);
-    EXPECT_EQ(guard("41"_hex), 1) << "no function of its profile";
-    EXPECT_EQ(guard("05 0000 1234"_hex), 3) << "no value of a coil";
+    EXPECT_EQ(guard(test::request_of("03 0000 0001"_hex)), std::nullopt);
+    EXPECT_EQ(guard(test::request_of("41"_hex)), 1) << "no function of its profile";
+    EXPECT_EQ(guard(test::request_of("05 0000 1234"_hex)), 3) << "no value of a coil";
 }
 
 TEST_F(WiringTest, OnlyStationsWithPointsOrPollBlocksArePolled) {

@@ -11,6 +11,7 @@
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 #include "support/memory_line.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::bus {
 namespace {
@@ -32,8 +33,8 @@ class BusTest : public testing::Test {
         settings.arbiter.stations[0].id = 17;
         settings.stations[17].name = "press";
         settings.stations[18].name = "oven";
-        settings.stations[18].guard = [](ByteView pdu) {
-            return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
+        settings.stations[18].guard = [](const modbus::Request& request) {
+            return request.function() == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
@@ -50,13 +51,11 @@ class BusTest : public testing::Test {
     }
     bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
     /// Asks and runs the loop until answered.
-    Answer ask(std::uint8_t station, Bytes pdu, ClientId client = 1) {
+    Answer ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1, bool poll = false) {
         std::optional<Answer> got;
-        Request request;
-        request.station = station;
-        request.pdu = std::move(pdu);
-        request.client = client;
-        bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+        bus->transact(
+            {.station = station, .request = test::request_of(pdu), .client = client, .poll = poll},
+            [&](Answer answer) { got = std::move(answer); });
         EXPECT_FALSE(got) << "answered from inside transact()";
         EXPECT_TRUE(run_until([&] { return got.has_value(); })) << "it is never answered";
         return got.value_or(Answer{});
@@ -191,11 +190,23 @@ TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
     EXPECT_FALSE(answer.transmitted);
 }
 
+TEST_F(BusTest, GivesPollsReadsAndWritesTheirClass) {
+    bus->start();
+    ask(17, kRead);
+    ask(17, kWrite);
+    ask(17, "41 00"_hex);
+    ask(17, kRead, 1, true);
+    ask(17, kWrite, 1, true);
+    std::vector<std::string> classes;
+    for (const TraceFrame& frame : bus->trace(100)) {
+        if (frame.kind == FrameKind::request)
+            classes.push_back(frame.why.substr(0, frame.why.find(' ')));
+    }
+    EXPECT_EQ(classes, (std::vector<std::string>{"read", "write", "write", "poll", "poll"}));
+}
+
 TEST_F(BusTest, RefusesWhatMayNotBeTransmitted) {
     bus->start();
-    EXPECT_EQ(ask(17, "03 00 6B"_hex).pdu.error(), Fault::malformed);
-    EXPECT_EQ(ask(17, "83 00"_hex).pdu.error(), Fault::denied);
-    EXPECT_EQ(ask(17, {}).pdu.error(), Fault::malformed);
     EXPECT_EQ(ask(0, kRead).pdu.error(), Fault::denied);
     EXPECT_EQ(ask(17, "08 00 04 00 00"_hex).pdu.error(), Fault::denied);
     EXPECT_TRUE(line->written.empty());
@@ -232,13 +243,11 @@ TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
     bus->start();
     int answers = 0;
     std::function<void()> again = [&] {
-        Request request;
-        request.station = 17;
-        request.pdu = kRead;
-        bus->transact(std::move(request), [&](const Answer& answer) {
-            EXPECT_TRUE(answer.pdu.has_value());
-            if (++answers < 20) again();
-        });
+        bus->transact({.station = 17, .request = test::request_of(kRead)},
+                      [&](const Answer& answer) {
+                          EXPECT_TRUE(answer.pdu.has_value());
+                          if (++answers < 20) again();
+                      });
     };
     again();
     EXPECT_TRUE(run_until([&] { return answers == 20; }));
@@ -249,10 +258,8 @@ TEST_F(BusTest, P1AReplyThatLiesInTheDeviceWhenItsTimeIsOverIsNoTimeout) {
     line->reply.clear();
     bus->start();
     std::optional<Answer> got;
-    Request request;
-    request.station = 17;
-    request.pdu = kWrite;
-    bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+    bus->transact({.station = 17, .request = test::request_of(kWrite)},
+                  [&](Answer answer) { got = std::move(answer); });
     ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
     clock.advance(1ms);
     line->come(modbus::encode_adu(17, kWrite));
@@ -268,11 +275,9 @@ TEST_F(BusTest, P1StaleBytesAreReadBeforeARequestIsSent) {
     clock.advance(1s);
     line->come(modbus::encode_adu(17, "03 06 0B AD 0B AD 0B AD"_hex));
     std::optional<Answer> got;
-    Request request;
-    request.station = 17;
-    request.pdu = kRead;
     const TimePoint asked = clock.now();
-    bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+    bus->transact({.station = 17, .request = test::request_of(kRead)},
+                  [&](Answer answer) { got = std::move(answer); });
     EXPECT_TRUE(line->written.empty()) << "the wire is not quiet yet";
     ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
     EXPECT_GE(clock.now() - asked, silent_interval({1000000, 8, Parity::none, 1}));
@@ -286,10 +291,8 @@ TEST_F(BusTest, RefusalsAreHandedOutAMillisecondApart) {
     bus->start();
     int refused = 0;
     const auto ask_wrongly = [&] {
-        Request request;
-        request.station = 17;
-        request.pdu = "03 00"_hex;
-        bus->transact(std::move(request), [&](const Answer&) { ++refused; });
+        bus->transact({.station = 0, .request = test::request_of(kRead)},
+                      [&](const Answer&) { ++refused; });
     };
     ask_wrongly();
     ask_wrongly();
@@ -309,10 +312,7 @@ TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
     bus->start();
     std::vector<Fault> faults;
     for (const char* pdu : {"03 00 00 00 01", "03 00 10 00 01", "03 00 20 00 01"}) {
-        Request request;
-        request.station = 17;
-        request.pdu = from_hex(pdu).value();
-        bus->transact(std::move(request),
+        bus->transact({.station = 17, .request = test::request_of(from_hex(pdu).value())},
                       [&](const Answer& a) { faults.push_back(a.pdu.error()); });
     }
     ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
