@@ -102,8 +102,8 @@ constexpr Broken kBroken[] = {
     {Flaw::answers_twice, HouseKind::sound, "AnswersTwice", "a request was answered twice"},
     {Flaw::answers_never, HouseKind::sound, "AnswersNever", "a request was never answered"},
     {Flaw::answers_at_once, HouseKind::sound, "AnswersAtOnce", "answered from inside transact()"},
-    {Flaw::answers_the_other, HouseKind::sound, "AnswersTheOther", "P1"},
-    {Flaw::remembers, HouseKind::memory, "Remembers", "P"},
+    {Flaw::answers_the_other, HouseKind::sound, "AnswersTheOther", "P1: "},
+    {Flaw::remembers, HouseKind::memory, "Remembers", "P1: a value that the station did not have"},
     {Flaw::polls_first, HouseKind::calm, "PollsFirst", "P9: polls went before"},
 };
 INSTANTIATE_TEST_SUITE_P(Every, BrokenHouse, testing::ValuesIn(kBroken),

@@ -20,7 +20,7 @@ namespace panelgate::line {
 /// deadline has come, `settled(now)` when it wants nothing more for now.
 ///
 /// All of them outlive it. Verbs and acting may lead to further verbs (a write that fails takes the
-/// line down): the outermost loop then drains, nothing recurses.
+/// line down): the outermost loop then drains, nothing recurses (HR-14).
 template <class Machine, class Host>
 class Drive {
   public:
