@@ -14,8 +14,8 @@
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
-#include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/api/server.hpp"
+#include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
 
 namespace panelgate::app {

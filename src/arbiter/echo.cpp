@@ -52,52 +52,53 @@ Bytes EchoFilter::release() {
             frame_.begin() + static_cast<std::ptrdiff_t>(std::exchange(matched_, 0))};
 }
 
-EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(State::unknown) { forget(); }
+EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(EchoState::unknown) { forget(); }
 
 void EchoMemory::forget() {
     switch (mode_) {
         case EchoMode::automatic:
-            state_ = State::unknown;
+            state_ = EchoState::unknown;
             return;
         case EchoMode::on:
-            state_ = State::present;
+            state_ = EchoState::present;
             return;
         case EchoMode::off:
-            state_ = State::absent;
+            state_ = EchoState::absent;
             return;
     }
     std::abort();
 }
 
 EchoFilter::Expect EchoMemory::expect(ByteView request) const {
-    if (state_ == State::present) return EchoFilter::Expect::certainly;
+    if (state_ == EchoState::present) return EchoFilter::Expect::certainly;
     // Reads go on watching: an adapter that is said or was found to have no echo may have one.
-    if (state_ == State::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
+    if (state_ == EchoState::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
     return EchoFilter::Expect::perhaps;
 }
 
 bool EchoMemory::must_be_learned_before(ByteView request, bool tried) const {
-    const bool open = state_ == State::unknown || (state_ == State::unclear && !tried);
+    const bool open = state_ == EchoState::unknown || (state_ == EchoState::unclear && !tried);
     return open && !modbus::is_pure_read(request);
 }
 
 bool EchoMemory::on_echo(ByteView request) {
-    if (state_ == State::present || !teaches_echo(request)) return false;
-    state_ = State::present;
+    if (state_ == EchoState::present || !teaches_echo(request)) return false;
+    state_ = EchoState::present;
     return true;
 }
 
 void EchoMemory::on_reply_without_echo(ByteView request, bool fragment) {
-    if (state_ == State::present || state_ == State::absent || !teaches_echo(request)) return;
-    state_ = fragment ? State::unclear : State::absent;
+    if (state_ == EchoState::present || state_ == EchoState::absent || !teaches_echo(request))
+        return;
+    state_ = fragment ? EchoState::unclear : EchoState::absent;
 }
 
 void EchoMemory::on_unclear() {
-    if (state_ == State::unknown) state_ = State::unclear;
+    if (state_ == EchoState::unknown) state_ = EchoState::unclear;
 }
 
 void EchoMemory::on_unanswered(ByteView request) {
-    if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = State::unclear;
+    if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = EchoState::unclear;
 }
 
 void EchoMemory::on_mismatch() {

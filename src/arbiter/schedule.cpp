@@ -179,7 +179,7 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
-    // Longer than another timeout is no worth: a collision costs one.
+    // A rest longer than another timeout is not worth it: that is what a collision costs.
     const Duration worst = station.worst_lateness();
     const bool is_late =
         failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;

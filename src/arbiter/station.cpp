@@ -29,8 +29,8 @@ void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     rest_for_owed(now);
 }
 
-/// Of those that it may be the reply to, the oldest that could still come: one of long ago must not
-/// make a later one look late.
+/// When the request left that a frame of this kind answers: the oldest one whose reply could still
+/// come. An older one would make the reply look later than it is.
 TimePoint Station::answered_request(TimePoint now) const {
     const auto open = [&](TimePoint sent) {
         return now < sent + settings_.response_timeout + late_.value();

@@ -35,8 +35,8 @@ bool has_swapped_crc(ByteView heard) {
 void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
-    actions_.push_back(Note{
-        now, Note::Direction::received, modbus::encode_adu(station, attempt.reply()), "reply", {}});
+    actions_.push_back(
+        Note{now, FrameKind::reply, modbus::encode_adu(station, attempt.reply()), {}});
     StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
     counters.turnaround.observe(think);

@@ -29,10 +29,10 @@ ClientId next_client_id() {
     return ++last;
 }
 
-arbiter::Host host_of(std::string_view address) {
+Host host_of(std::string_view address) {
     constexpr std::string_view kMapped = "::ffff:";  // how a listener on [::] sees IPv4
     if (address.starts_with(kMapped)) address.remove_prefix(kMapped.size());
-    const auto hash = static_cast<arbiter::Host>(std::hash<std::string_view>{}(address));
+    const auto hash = static_cast<Host>(std::hash<std::string_view>{}(address));
     return hash == 0 ? 1 : hash;
 }
 
@@ -50,6 +50,7 @@ struct Bus::State final : public line::Line::Events,
         : settings(std::move(s)),
           line(std::move(l)),
           arbiter(settings.arbiter),
+          rights(settings.stations),
           counters(settings.stations),
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
@@ -62,8 +63,7 @@ struct Bus::State final : public line::Line::Events,
     void on_bytes(ByteView bytes) override;
 
     void transact(Request request, AnswerHandler handler);
-    std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
-    void refuse(Pending pending, Fault fault);
+    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void pump();
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
@@ -89,6 +89,7 @@ struct Bus::State final : public line::Line::Events,
     Settings settings;
     std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
+    Rights rights;
     RequestCounters counters;
     FlightRecorder recorder;
     DecisionRecorder decisions;
@@ -109,7 +110,7 @@ struct Bus::State final : public line::Line::Events,
 void Bus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
-    observe({BusEvent::Kind::line, "up", {}, 0, 0, {}});
+    observe(LineEvent{true, {}});
     arbiter.set_lead(line->lead());
     arbiter.confirm_ends(line->unsent().has_value());
     arbiter.on_line_up(rt::now());
@@ -121,7 +122,7 @@ void Bus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe({BusEvent::Kind::line, "down", why, 0, 0, {}});
+    observe(LineEvent{false, why});
     arbiter.on_line_down(rt::now());
     pump();
 }
@@ -142,10 +143,9 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (const auto code = guarded(request)) {
-        Answer refused;
-        refused.pdu = modbus::encode_exception(function, *code);
-        return answer(std::move(entry), std::move(refused));
+    if (auto refusal = rights.judge(request.station, request.pdu)) {
+        Result<Bytes> reply = answer_to(*refusal, function);
+        return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     line->poll_input();
     arbiter::Job job;
@@ -155,31 +155,22 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     job.host = request.host;
     job.priority = request.priority;
     const bool read = modbus::is_pure_read(job.pdu);
-    if (job.priority == arbiter::PriorityClass::read && !read)
-        job.priority = arbiter::PriorityClass::write;
+    if (job.priority == PriorityClass::read && !read) job.priority = PriorityClass::write;
     const Result<arbiter::Ticket> ticket = arbiter.submit(rt::now(), std::move(job));
     if (!ticket) return refuse(std::move(entry), ticket.error());
     pending.emplace(*ticket, std::move(entry));
     pump();
 }
 
-/// Why the panel's profile rules this request out, when its station is guarded.
-std::optional<modbus::ExceptionCode> Bus::State::guarded(const Request& request) const {
-    const auto guard = settings.guards.find(request.station);
-    if (guard == settings.guards.end()) return std::nullopt;
-    const auto code = guard->second(request.pdu);
-    if (!code) return std::nullopt;
-    return static_cast<modbus::ExceptionCode>(*code);
-}
-
-void Bus::State::refuse(Pending entry, Fault fault) {
+void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
     Answer refused;
-    refused.pdu = fault;
+    refused.pdu = std::move(pdu);
+    refused.refusal = std::move(refusal);
     answer(std::move(entry), std::move(refused));
 }
 
 /// Acts on what the arbiter wants until it wants nothing. Acting can lead back here (a write that
-/// fails takes the line down): the outer loop then drains (house rule 14).
+/// fails takes the line down): the outer loop then drains (HR-14).
 void Bus::State::pump() {
     if (pumping) return;
     pumping = true;
@@ -208,21 +199,17 @@ void Bus::State::act(arbiter::Finish& finish) {
 }
 
 void Bus::State::act(arbiter::Note& note) {
-    static constexpr TraceFrame::Direction kDirections[] = {TraceFrame::Direction::sent,
-                                                            TraceFrame::Direction::received,
-                                                            TraceFrame::Direction::discarded};
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "frame",
                 {{"line", settings.name},
-                 {"what", std::string(note.what)},
+                 {"what", std::string(label(note.kind))},
                  {"bytes", to_hex(note.bytes)},
                  {"why", note.why}});
     }
     TraceFrame frame;
     frame.at = note.at;
-    frame.direction = kDirections[static_cast<std::size_t>(note.direction)];
+    frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
-    frame.note = note.what;
     frame.why = std::move(note.why);
     recorder.add(std::move(frame));
 }
@@ -235,7 +222,7 @@ void Bus::State::act(arbiter::Decision& decision) {
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
-    observe({BusEvent::Kind::station, label(event.kind), {}, event.station, 0, {}});
+    observe(event);
     log_event(settings, event);
 }
 
@@ -273,9 +260,9 @@ void Bus::State::check_delivery(TimePoint now) {
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     const Duration took = rt::now() - entry.arrived;
-    const std::string outcome = outcome_of(result);
+    const Outcome outcome = outcome_of(result);
     counters.count(entry.station, entry.function, outcome, took);
-    observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
+    observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
     const bool refused = !result.transmitted && result.source == Source::bus;
@@ -305,20 +292,6 @@ namespace {
 Settings explained(Settings settings) {
     settings.arbiter.explain = true;
     return settings;
-}
-
-std::string_view label(arbiter::EchoMemory::State state) {
-    switch (state) {
-        case arbiter::EchoMemory::State::unknown:
-            return "unknown";
-        case arbiter::EchoMemory::State::absent:
-            return "absent";
-        case arbiter::EchoMemory::State::present:
-            return "present";
-        case arbiter::EchoMemory::State::unclear:
-            return "unclear";
-    }
-    std::abort();
 }
 
 }  // namespace
@@ -360,7 +333,7 @@ LineStatus Bus::status() const {
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
-    status.echo = label(state_->arbiter.echo());
+    status.echo = state_->arbiter.echo();
     if (state_->up) state_->doctor.glance(rt::now(), state_->arbiter, *state_->line);
     status.findings = state_->doctor.findings();
     return status;
@@ -373,9 +346,13 @@ std::vector<ClientShare> Bus::clients() const {
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
-    status.state = label(health.state());
+    status.state = health.state();
     if (const auto last = health.last_success()) status.last_success = rt::now() - *last;
     return status;
+}
+
+std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
+    return state_->rights.judge_write(station);
 }
 
 std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }

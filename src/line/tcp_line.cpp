@@ -15,6 +15,7 @@
 
 #include "descriptor_line.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/keep_alive.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -28,30 +29,22 @@ constexpr Duration kConnectTimeout = 5s;
 /// How long the kernel goes on with bytes that the server does not acknowledge, or has no room for
 /// (TCP_USER_TIMEOUT). Its own patience, 15 minutes, would keep the line up without a server. Five
 /// retransmissions fit in (after 0.2, 0.6, 1.4, 3 and 6.2 s, the last one at the limit).
-constexpr int kPatience = 6;  // s
+constexpr std::chrono::seconds kPatience{6};
 
 /// Probes of an idle connection. The patience above ends them too, in place of their number: so the
 /// first has to be early enough for three of them. A server that has gone is noticed within it also
 /// while nobody asks.
-constexpr int kIdle = 3;        // s before the first probe
-constexpr int kProbePause = 1;  // s
-constexpr int kProbes = 3;
-static_assert(kIdle + kProbes * kProbePause <= kPatience);
+constexpr rt::KeepAlive kKeepAlive{3s, 1s, 3};
+static_assert(kKeepAlive.silence + kKeepAlive.probes * kKeepAlive.pause <= kPatience);
 
 /// A server may keep an acknowledgement back until there is something to send with it: Linux and
 /// Windows up to 200 ms. What it has had for a shorter time says nothing.
 constexpr Duration kDelayedAck = 200ms;
 
 void set_options(int fd) {
-    const auto set = [fd](int level, int name, int value) {
-        ::setsockopt(fd, level, name, &value, sizeof value);
-    };
-    set(IPPROTO_TCP, TCP_NODELAY, 1);
-    set(IPPROTO_TCP, TCP_USER_TIMEOUT, kPatience * 1000);
-    set(SOL_SOCKET, SO_KEEPALIVE, 1);
-    set(IPPROTO_TCP, TCP_KEEPIDLE, kIdle);
-    set(IPPROTO_TCP, TCP_KEEPINTVL, kProbePause);
-    set(IPPROTO_TCP, TCP_KEEPCNT, kProbes);
+    rt::set_up_socket(fd, kKeepAlive);
+    const int patience = static_cast<int>(std::chrono::milliseconds(kPatience).count());
+    ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof patience);
 }
 
 /// Nothing on a name. A number needs no resolver, which answers one line after the other: a name

@@ -59,7 +59,7 @@ bool is_encapsulated(ByteView pdu) {
     return pdu.size() >= 2 && (pdu[1] != kMeiDeviceIdentification || pdu.size() == 4);
 }
 
-/// Table A. Functions without a row have no rule.
+/// Lengths of requests (PDU-07). Functions without a row have no rule.
 bool length_matches(ByteView pdu) {
     switch (pdu[0]) {
         case kReadCoils:

@@ -45,7 +45,7 @@ void Poller::State::ask(std::size_t index, StationPolls::Due due) {
     request.station = stations[index].id;
     request.pdu = std::move(due.pdu);
     request.client = stations[index].client;
-    request.priority = arbiter::PriorityClass::poll;
+    request.priority = PriorityClass::poll;
     request.quantity = modbus::QuantityCheck::wide;
     bus.transact(std::move(request), [weak = weak_from_this(), index, read = due.read,
                                       asked = rt::now()](const bus::Answer& answer) {

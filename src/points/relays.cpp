@@ -16,7 +16,7 @@ namespace {
 
 /// Why an answer is none; empty when it is one.
 std::string failure_of(const bus::Answer& answer) {
-    if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
+    if (!answer.pdu) return std::string(label(outcome_of(answer.pdu.error())));
     const auto code = modbus::exception_of(*answer.pdu);
     return code ? "exception " + std::to_string(*code) : std::string();
 }
@@ -58,7 +58,7 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void on_written(Entry& entry, const bus::Answer& answer);
     void check_target(Entry& entry);
     void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
-    void set(Entry& entry, std::string state);
+    void set(Entry& entry, RelayState state, std::string why = {});
 
     std::vector<std::unique_ptr<Entry>> entries;
     Changed changed;
@@ -79,7 +79,7 @@ void Relays::State::arm(Entry& entry) {
 
 void Relays::State::ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then) {
     request.client = entry.client;
-    request.priority = arbiter::PriorityClass::poll;
+    request.priority = PriorityClass::poll;
     request.quantity = modbus::QuantityCheck::wide;
     bus.transact(std::move(request),
                  [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
@@ -100,7 +100,7 @@ void Relays::State::read(Entry& entry) {
 void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     if (const std::string why = failure_of(answer); !why.empty()) {
         ++entry.status.read_failures;
-        set(entry, "source failing: " + why);
+        set(entry, RelayState::source_failing, why);
         arm(entry);
         return;
     }
@@ -120,29 +120,30 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
 /// Nothing has to be written; but a target that has gone may come back with something else.
 void Relays::State::check_target(Entry& entry) {
     const bool line_up = entry.route.to->status().up;
-    const bool offline =
-        line_up && entry.route.to->station_status(entry.route.to_station).state == "offline";
-    if (line_up && !offline) return set(entry, "ok");
+    const Health health = entry.route.to->station_status(entry.route.to_station).state;
+    if (line_up && health != Health::offline) return set(entry, RelayState::ok);
     entry.written.clear();
-    set(entry, std::string("target failing: ") + (line_up ? "offline" : "line_down"));
+    set(entry, RelayState::target_failing,
+        std::string(label(line_up ? Outcome::offline : Outcome::line_down)));
 }
 
 void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
     if (const std::string why = failure_of(answer); !why.empty()) {
         entry.written.clear();  // whatever the target holds now: it is written again
         ++entry.status.write_failures;
-        set(entry, "target failing: " + why);
+        set(entry, RelayState::target_failing, why);
     } else {
         ++entry.status.writes;
         entry.status.last_write = rt::now();
-        set(entry, "ok");
+        set(entry, RelayState::ok);
     }
     arm(entry);
 }
 
-void Relays::State::set(Entry& entry, std::string state) {
-    if (entry.status.state == state) return;
-    entry.status.state = std::move(state);
+void Relays::State::set(Entry& entry, RelayState state, std::string why) {
+    if (entry.status.state == state && entry.status.why == why) return;
+    entry.status.state = state;
+    entry.status.why = std::move(why);
     if (changed) changed(entry.status);
 }
 

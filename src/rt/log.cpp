@@ -5,6 +5,7 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace panelgate::rt {
@@ -36,6 +37,14 @@ spdlog::logger& logger() {
         return made;
     }();
     return *instance;
+}
+
+/// Of the LogTap that lives.
+std::shared_ptr<std::vector<std::string>> g_tapped;
+
+std::string_view label(LogLevel level) {
+    const spdlog::string_view_t word = spdlog::level::to_string_view(level_of(level));
+    return {word.data(), word.size()};
 }
 
 /// JSON string escapes; good for text too.
@@ -74,7 +83,11 @@ void set_up_log(const LogSettings& settings) {
 
 bool log_enabled(LogLevel level) { return logger().should_log(level_of(level)); }
 
-void log(LogLevel level, std::string_view event, LogFields fields) {
+void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields) {
+    log(level, event, std::span(fields.begin(), fields.size()));
+}
+
+void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
     std::string line;
     if (g_format == LogFormat::json) {
@@ -86,7 +99,17 @@ void log(LogLevel level, std::string_view event, LogFields fields) {
         for (const auto& [key, value] : fields)
             line += fmt::format(" {}={}", key, text_value(value));
     }
+    if (g_tapped) return g_tapped->push_back(fmt::format("{} {}", label(level), line));
     logger().log(level_of(level), line);
+}
+
+LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) { g_tapped = lines_; }
+
+LogTap::~LogTap() { g_tapped.reset(); }
+
+std::size_t LogTap::count(std::string_view part) const {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        *lines_, [&](const std::string& line) { return line.find(part) != std::string::npos; }));
 }
 
 }  // namespace panelgate::rt

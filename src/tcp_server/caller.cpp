@@ -6,7 +6,7 @@
 
 namespace panelgate::tcp_server {
 
-Caller::Caller(std::string name, arbiter::Host host) : name_(std::move(name)), host_(host) {}
+Caller::Caller(std::string name, bus::Host host) : name_(std::move(name)), host_(host) {}
 
 void Caller::transact(bus::BusClient* bus, std::uint8_t station, const modbus::Adu& adu,
                       bus::AnswerHandler handler) {
@@ -16,8 +16,7 @@ void Caller::transact(bus::BusClient* bus, std::uint8_t station, const modbus::A
     request.pdu = adu.pdu;
     request.client = client_;
     request.host = host_;
-    request.priority = modbus::is_pure_read(adu.pdu) ? arbiter::PriorityClass::read
-                                                     : arbiter::PriorityClass::write;
+    request.priority = modbus::is_pure_read(adu.pdu) ? PriorityClass::read : PriorityClass::write;
     bus->transact(std::move(request), std::move(handler));
 }
 

@@ -13,7 +13,7 @@ namespace panelgate::tcp_server {
 class Caller {
   public:
     /// `name` is its address with the port; connections from one address share a host.
-    Caller(std::string name, arbiter::Host host);
+    Caller(std::string name, bus::Host host);
 
     const std::string& name() const { return name_; }
     /// Hands the PDU to a bus, for one of its stations; 0: all of them.
@@ -24,7 +24,7 @@ class Caller {
 
   private:
     std::string name_;
-    arbiter::Host host_;
+    bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();
     std::set<bus::BusClient*> used_;
 };

@@ -1,7 +1,5 @@
 #include "dispatch.hpp"
 
-#include <algorithm>
-
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -11,12 +9,14 @@ namespace {
 using modbus::ExceptionCode;
 
 Refuse refuse(Fault fault) { return Refuse{modbus::to_exception(fault)}; }
+Refuse refuse(const bus::Refusal& refusal) { return Refuse{refusal.code}; }
 
-Decision decide_broadcast(ByteView pdu, const Settings& settings, const UnitMap& units,
+Decision decide_broadcast(ByteView pdu, const Settings& settings,
                           std::vector<bus::BusClient*> lines) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied);
-    const auto read_only = [&](const bus::BusClient* line) { return units.holds_read_only(line); };
-    if (std::ranges::any_of(lines, read_only)) return refuse(Fault::denied);
+    for (const bus::BusClient* line : lines) {  // all of them before any is asked
+        if (const auto refusal = line->refusal_of_write(0)) return refuse(*refusal);
+    }
     if (!modbus::is_broadcastable(pdu[0])) return refuse(Fault::denied);
     if (const auto checked = modbus::check_request(pdu); !checked) return refuse(checked.error());
     return Broadcast{std::move(lines)};
@@ -32,10 +32,13 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (settings.diagnostics_unit == unit && !units.is_alias(unit)) return Diagnose{};
 
     std::vector<bus::BusClient*> lines = units.broadcast_lines(unit);
-    if (!lines.empty()) return decide_broadcast(pdu, settings, units, std::move(lines));
+    if (!lines.empty()) return decide_broadcast(pdu, settings, std::move(lines));
     const Result<Target> target = units.route(unit);
     if (!target) return refuse(target.error());
-    if (writes && target->read_only) return refuse(Fault::denied);
+    if (writes) {
+        if (const auto refusal = target->bus->refusal_of_write(target->station))
+            return refuse(*refusal);
+    }
     if (const auto checked = modbus::check_request(pdu); !checked) return refuse(checked.error());
     return Forward{*target};
 }

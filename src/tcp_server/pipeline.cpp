@@ -35,7 +35,7 @@ Bytes reply_pdu(std::uint8_t function, const Result<Bytes>& pdu) {
 Bytes diagnose(ByteView request, const Shared& shared) {
     Diagnostics state;
     state.uptime = rt::now() - shared.started;
-    state.version = shared.hooks.version;
+    state.version = shared.version;
     for (const bus::BusClient* line : shared.units.lines()) {
         const bus::LineStatus status = line->status();
         state.lines.push_back({status.up, status.queue_depth, status.load_percent});

@@ -59,7 +59,8 @@ void Session::close() {
 
 void Session::fail(std::string_view reason, bool protocol_error) {
     if (protocol_error) ++shared_->counters.protocol_errors;
-    shared_->log("connection closed", pipeline_->client(), reason);
+    shared_->log(rt::LogLevel::info, "connection closed",
+                 {{"client", pipeline_->client()}, {"reason", std::string(reason)}});
     close();
 }
 
@@ -101,7 +102,7 @@ void Session::take_adus() {
         if (!event) break;
         progress = true;
         if (std::holds_alternative<modbus::Broken>(*event)) {
-            return fail("reason=\"length outside 2..254\"", true);
+            return fail("length outside 2..254", true);
         }
         if (std::holds_alternative<modbus::SkippedProtocol>(*event)) {
             if (!skip_protocol()) return;
@@ -116,7 +117,7 @@ void Session::take_adus() {
 /// MBAP-06. Does the connection live on?
 bool Session::skip_protocol() {
     if (++bad_protocol_ids_ >= shared_->settings.bad_protocol_ids) {
-        fail("reason=\"protocol id is not 0\"", true);
+        fail("protocol id is not 0", true);
         return false;
     }
     ++shared_->counters.protocol_errors;
@@ -134,7 +135,7 @@ void Session::guard_partial_adu(bool progress) {
     partial_timer_.async_wait(
         [self = shared_from_this(), watch = partial_watch_](error_code error) {
             if (error || self->closed_ || self->partial_watch_ != watch) return;
-            self->fail("reason=\"half-sent ADU\"", true);
+            self->fail("half-sent ADU", true);
         });
 }
 
@@ -196,7 +197,7 @@ void Session::watch_output() {
             self->watching_output_ = false;
             if (!self->writing_) return;
             if (self->written_ == written && self->not_taken() == held) {
-                return self->fail("reason=\"client does not read\"", false);
+                return self->fail("client does not read", false);
             }
             self->watch_output();
         });

@@ -31,7 +31,7 @@ class Checker {
     void on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job);
     void on_refused(TimePoint now, const arbiter::Job& job, Fault fault);
     /// `what`: the word of its note. `dead`: no panel can hear it.
-    void on_transmit(TimePoint now, const Bytes& adu, std::string_view what, bool dead);
+    void on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool dead);
     void on_finish(TimePoint now, const arbiter::Finish& finish);
     /// All that it had to say to a new request has been said.
     void on_settled();
@@ -107,14 +107,14 @@ class Checker {
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
     void check_write_sent(std::uint8_t station, ByteView pdu);
-    void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
+    void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     TimePoint owed_until() const;
     // Who waits, and whose turn it is (checker_queue.cpp)
-    void mark_sent(std::uint8_t station, ByteView pdu, std::string_view what);
+    void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
     void check_turn(bool write);

@@ -17,8 +17,9 @@ constexpr std::uint8_t kBroadcast = 0;
 
 /// What goes with this frame: what it contains and may run, nothing older of its client waiting for
 /// that station, nor a broadcast. What was sent before and is not this frame waits again.
-void Checker::mark_sent(std::uint8_t station, ByteView pdu, std::string_view what) {
-    if (what != "request" && what != "broadcast") return;  // it answers nobody, or the same again
+void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
+    if (what != FrameKind::request && what != FrameKind::broadcast)
+        return;  // it answers nobody, or the same again
     const auto span = test::read_span(station, pdu);
     std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
     for (auto& [ticket, open] : open_) {
@@ -108,7 +109,7 @@ void Checker::check_turn(bool write) {
     const auto starves = std::ranges::find_if(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         const auto client = clients_.find(o.job.client);
-        return !o.sent && !o.gone && o.job.priority == arbiter::PriorityClass::read &&
+        return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
                o.turn + kWritesInARow < frames_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
                !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&

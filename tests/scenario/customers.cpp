@@ -104,9 +104,9 @@ arbiter::Job Customers::draw_job(Customer& customer) {
         job.station = plan.stations[random_.below(static_cast<unsigned>(plan.stations.size()))];
         job.pdu = random_.chance(plan.writes) ? draw_write() : draw_read(customer);
     }
-    job.priority = !modbus::is_pure_read(job.pdu) ? arbiter::PriorityClass::write
-                   : plan.polls                   ? arbiter::PriorityClass::poll
-                                                  : arbiter::PriorityClass::read;
+    job.priority = !modbus::is_pure_read(job.pdu) ? PriorityClass::write
+                   : plan.polls                   ? PriorityClass::poll
+                                                  : PriorityClass::read;
     return job;
 }
 

@@ -15,7 +15,6 @@ using arbiter::Client;
 using arbiter::Host;
 using arbiter::Job;
 using arbiter::JobQueue;
-using arbiter::PriorityClass;
 using arbiter::QueueSettings;
 using arbiter::Ticket;
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/echo_state.hpp"
 
 namespace panelgate::arbiter {
 
@@ -56,16 +56,9 @@ bool holds_fragment(ByteView heard, ByteView frame);
 /// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
 class EchoMemory {
   public:
-    enum class State : std::uint8_t {
-        unknown,
-        absent,
-        present,
-        unclear,  ///< a part of a read came back in front of its answer: whole echoes may come
-    };
-
     explicit EchoMemory(EchoMode mode);
 
-    State state() const { return state_; }
+    EchoState state() const { return state_; }
     /// The device was opened again: it may be another one.
     void forget();
     EchoFilter::Expect expect(ByteView request) const;
@@ -88,7 +81,7 @@ class EchoMemory {
 
   private:
     EchoMode mode_;
-    State state_;
+    EchoState state_;
 };
 
 }  // namespace panelgate::arbiter

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {

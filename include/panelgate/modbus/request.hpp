@@ -25,7 +25,7 @@ enum class QuantityCheck {
 };
 
 /// Is this PDU one that may be transmitted? Function 0 or 128..255: Fault::denied. A length that
-/// contradicts the function (PDU-07, Table A) or a reply that cannot fit: Fault::malformed.
+/// contradicts the function (PDU-07) or a reply that cannot fit: Fault::malformed.
 /// Unknown functions have no length rule and pass. An empty PDU is malformed.
 Result<void> check_request(ByteView pdu, QuantityCheck check = QuantityCheck::fit);
 
@@ -43,7 +43,7 @@ bool is_never_answered(ByteView pdu);
 /// tell it: 01 to 06, 0F and 10. 0: nothing tells, or too little is there to tell.
 std::size_t request_adu_length(ByteView heard);
 
-/// Lq of Table B: length of the normal RTU reply (address to CRC) when the request tells it;
+/// Length of the normal RTU reply (address to CRC) when the request tells it;
 /// 0 for 08/0004; nothing when only the reply tells.
 std::optional<std::size_t> reply_length_from_request(ByteView pdu);
 

@@ -8,6 +8,7 @@
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "point_json.hpp"
+#include "refusal.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -42,8 +43,8 @@ Parsed<Found> find_point(const HttpRequest& request, const Directory& directory)
 }
 
 Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
-    if (found.station.read_only)
-        return problem(403, "station '" + found.station.name + "' is read-only");
+    const auto allowed = check_may_write(*found.station.bus, found.station.id);
+    if (!allowed) return allowed.error();
     const auto value = value_of(body);
     if (!value) return value.error();
     auto pdu = points::write_request(*found.station.profile, *found.point, *value);
@@ -51,7 +52,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
     bus::Request made;
     made.station = found.station.id;
     made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     made.quantity = modbus::QuantityCheck::wide;
     return made;
 }
@@ -129,7 +130,7 @@ Handling get_relays(HttpRequest, const Api* api) {
     for (const points::RelayStatus& relay : api->providers.relays()) {
         json::object object;
         object["name"] = relay.name;
-        object["state"] = relay.state;
+        object["state"] = text_of(relay);
         object["reads"] = relay.reads;
         object["writes"] = relay.writes;
         object["read_failures"] = relay.read_failures;

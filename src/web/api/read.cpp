@@ -82,7 +82,7 @@ bus::Request read_request(const Items& part) {
     bus::Request request;
     request.station = part.station.id;
     request.pdu = modbus::encode_read(part.span);
-    request.priority = arbiter::PriorityClass::read;
+    request.priority = PriorityClass::read;
     request.quantity = modbus::QuantityCheck::wide;
     return request;
 }

@@ -7,6 +7,7 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
+#include "refusal.hpp"
 #include "station_path.hpp"
 #include "write_plan.hpp"
 
@@ -21,9 +22,8 @@ Problem not_writable(modbus::Table table) {
 
 /// The request that writes the body's values, or why there is none.
 Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
-    if (items.station.read_only) {
-        return problem(403, "station '" + items.station.name + "' is read-only");
-    }
+    const auto allowed = check_may_write(*items.station.bus, items.station.id);
+    if (!allowed) return allowed.error();
     if (!is_writable(items.span.table)) return not_writable(items.span.table);
     const auto cells = cells_of(body, items.span.table);
     if (!cells) return cells.error();
@@ -32,7 +32,7 @@ Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
     bus::Request made;
     made.station = items.station.id;
     made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
+    made.priority = PriorityClass::write;
     made.quantity = modbus::QuantityCheck::wide;
     return made;
 }

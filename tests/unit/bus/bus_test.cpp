@@ -62,7 +62,6 @@ class MemoryLine final : public line::Line {
 class BusTest : public testing::Test {
   protected:
     BusTest() {
-        Settings settings;
         settings.name = "floor1";
         settings.device = "memory";
         settings.arbiter.serial = {1000000, 8, Parity::none, 1};
@@ -71,14 +70,19 @@ class BusTest : public testing::Test {
         settings.arbiter.offline.after = 5;
         settings.arbiter.stations = {settings.arbiter.unlisted};
         settings.arbiter.stations[0].id = 17;
-        settings.stations[17] = "press";
-        settings.guards[18] = [](ByteView pdu) {
+        settings.stations[17].name = "press";
+        settings.stations[18].name = "oven";
+        settings.stations[18].guard = [](ByteView pdu) {
             return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
-            if (event.kind == BusEvent::Kind::line && !event.why.empty()) seen.push_back(event.why);
+            const auto* told = std::get_if<LineEvent>(&event);
+            if (told != nullptr && !told->why.empty()) seen.push_back(told->why);
         };
+        make_bus();
+    }
+    void make_bus() {
         auto memory = std::make_unique<MemoryLine>(io);
         line = memory.get();
         bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
@@ -99,6 +103,7 @@ class BusTest : public testing::Test {
     }
 
     boost::asio::io_context io{1};
+    Settings settings;
     MemoryLine* line = nullptr;
     std::vector<std::string> seen;  ///< why the line's state is not just that
     std::unique_ptr<Bus> bus;
@@ -110,8 +115,40 @@ TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     EXPECT_EQ(refused.pdu.value(), (Bytes{0x86, 2}));
     EXPECT_FALSE(refused.transmitted);
     EXPECT_TRUE(line->written.empty());
-    EXPECT_EQ(bus->report().stations.front().requests.at({"6", "refused"}), 1u);
+    EXPECT_EQ(bus->report().stations.back().requests.at(6)[Outcome::refused], 1u);
+    const Refusal guarded{Refusal::Rule::guard, "oven",
+                          modbus::ExceptionCode::illegal_data_address};
+    EXPECT_EQ(refused.refusal, guarded);
     EXPECT_TRUE(ask(18, kRead).pdu.has_value());
+}
+
+TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
+    settings.stations[17].access = Access::read_only;
+    make_bus();
+    bus->start();
+    const Answer write = ask(17, kWrite);
+    EXPECT_EQ(write.pdu.error(), Fault::denied);
+    EXPECT_FALSE(write.transmitted);
+    ASSERT_TRUE(write.refusal);
+    EXPECT_EQ(write.refusal->rule, Refusal::Rule::read_only);
+    EXPECT_EQ(write.refusal->station, "press");
+    const Answer broadcast = ask(0, kWrite);
+    EXPECT_EQ(broadcast.pdu.error(), Fault::denied);
+    EXPECT_EQ(broadcast.refusal.value().rule, Refusal::Rule::broadcast_over_read_only);
+    EXPECT_TRUE(line->written.empty());
+    EXPECT_EQ(bus->report().stations[1].requests.at({"6", "refused"}), 1u);
+    EXPECT_TRUE(ask(17, kRead).pdu.has_value());
+    EXPECT_FALSE(ask(17, kRead).refusal);
+}
+
+TEST_F(BusTest, SaysEarlyWhatItWouldRefuse) {
+    EXPECT_EQ(bus->refusal_of_write(17), std::nullopt);
+    settings.stations[17].access = Access::read_only;
+    make_bus();
+    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Refusal::Rule::read_only);
+    EXPECT_EQ(bus->refusal_of_write(18), std::nullopt) << "its guard wants to see the write";
+    EXPECT_EQ(bus->refusal_of_write(0).value().station, "press");
+    EXPECT_TRUE(bus->idle());
 }
 
 TEST_F(BusTest, AsksALineThatCanTellWhetherTheRequestHasLeft) {
@@ -180,9 +217,9 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_EQ(line->written[0], "11 03 00 6B 00 03 76 87"_hex);
     const auto trace = bus->trace(10);
     ASSERT_EQ(trace.size(), 2u);
-    EXPECT_EQ(trace[0].direction, TraceFrame::Direction::sent);
+    EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
-    EXPECT_EQ(bus->station_status(17).state, "online");
+    EXPECT_EQ(bus->station_status(17).state, Health::online);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
@@ -210,7 +247,7 @@ TEST_F(BusTest, ASilentStationIsATimeoutAndSaysSoInTheStatus) {
     EXPECT_EQ(answer.pdu.error(), Fault::timeout);
     EXPECT_TRUE(answer.transmitted);
     EXPECT_EQ(line->written.size(), 1u);
-    EXPECT_EQ(bus->station_status(17).state, "suspect");
+    EXPECT_EQ(bus->station_status(17).state, Health::suspect);
 }
 
 TEST_F(BusTest, ABroadcastIsAnsweredWithoutAReply) {
@@ -272,13 +309,12 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
     ask(99, kRead);
     ask(98, "41 00"_hex);
     const LineReport report = bus->report();
-    ASSERT_EQ(report.stations.size(), 2u);
-    const std::pair<std::string, std::string> read_ok{"3", "ok"};
+    ASSERT_EQ(report.stations.size(), 3u);
     EXPECT_EQ(report.stations[0].station, "other");
-    EXPECT_EQ(report.stations[0].requests.at(read_ok), 1u);
-    EXPECT_EQ(report.stations[0].requests.count({"other", "damaged"}), 1u);
+    EXPECT_EQ(report.stations[0].requests.at(3)[Outcome::ok], 1u);
+    EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::damaged], 1u);
     EXPECT_EQ(report.stations[1].station, "press");
-    EXPECT_EQ(report.stations[1].requests.at(read_ok), 1u);
+    EXPECT_EQ(report.stations[1].requests.at(3)[Outcome::ok], 1u);
     EXPECT_TRUE(report.stations[1].up);
 }
 

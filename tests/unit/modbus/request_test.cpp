@@ -47,7 +47,7 @@ TEST(CheckRequest, DeniesFunctionZeroAndTheReplyRangeWhateverFollows) {
     EXPECT_EQ(fault_of(Bytes(300, 0)), Fault::denied);
 }
 
-/// Every row of Table A with one length: one byte less or more contradicts the function.
+/// Functions whose requests have one length (PDU-07): a byte less or more contradicts them.
 TEST(CheckRequest, WantsTheLengthOfTheFunction) {
     const Bytes requests[] = {"01 00 13 00 13"_hex,
                               "02 00 C4 00 16"_hex,

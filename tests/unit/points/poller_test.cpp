@@ -44,7 +44,7 @@ TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     EXPECT_TRUE(poller->find(9)->reading(0).failing);
     EXPECT_EQ(poller->find(7), nullptr);
     for (const bus::Request& request : bus.requests)
-        EXPECT_EQ(request.priority, arbiter::PriorityClass::poll);
+        EXPECT_EQ(request.priority, PriorityClass::poll);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
 }
 

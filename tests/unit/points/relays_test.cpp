@@ -26,7 +26,7 @@ class RelaysTest : public testing::Test {
         from.script = [this](const bus::Request&) { return source; };
         to.script = [this](const bus::Request&) { return target; };
         relays = std::make_unique<Relays>(io.get_executor(), std::vector{route});
-        relays->on_state([this](const RelayStatus& status) { states.push_back(status.state); });
+        relays->on_state([this](const RelayStatus& status) { states.push_back(text_of(status)); });
         relays->start();
     }
     void run_until(const std::function<bool()>& done) {
@@ -49,7 +49,7 @@ TEST_F(RelaysTest, WritesWhatItHasJustRead) {
     EXPECT_EQ(from.requests[0].pdu, "03 00 64 00 02"_hex);
     EXPECT_EQ(to.requests[0].pdu, "10 00 C8 00 02 04 00 01 00 02"_hex);
     EXPECT_EQ(to.requests[0].station, 20);
-    EXPECT_EQ(to.requests[0].priority, arbiter::PriorityClass::poll);
+    EXPECT_EQ(to.requests[0].priority, PriorityClass::poll);
     EXPECT_EQ(states, std::vector<std::string>{"ok"});
     EXPECT_EQ(status().name, "press/UW100 to oven/GDT200");
 }
@@ -72,7 +72,7 @@ TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItI
     to.line.up = true;
     run_until([&] { return status().writes >= 2; });
     run_until([&] { return states.back() == "ok"; });
-    to.stations[20] = {"offline", {}};
+    to.stations[20] = {Health::offline, {}};
     run_until([&] { return states.back() == "target failing: offline"; });
 }
 
@@ -94,7 +94,7 @@ TEST_F(RelaysTest, AWriteThatFailedIsTriedAgainThoughNothingChanged) {
     EXPECT_EQ(states, std::vector<std::string>{"target failing: offline"});
     target = test::FakeBus::reply("10 00 C8 00 02"_hex);
     run_until([&] { return status().writes == 1; });
-    EXPECT_EQ(status().state, "ok");
+    EXPECT_EQ(status().state, RelayState::ok);
 }
 
 TEST_F(RelaysTest, StopsWithWhatItHasOpen) {

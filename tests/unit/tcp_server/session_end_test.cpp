@@ -142,7 +142,7 @@ TEST_F(SessionEnd, ClosesAClientThatTakesNothingForLongAndNobodyElseNotices) {
     EXPECT_TRUE(run_until([&] {
         const auto n = slow.try_send(ByteView(request).subspan(offset));
         offset = (offset + n.value_or(0)) % request.size();
-        return logged("does not read") == 1;
+        return log.count("does not read") == 1;
     }));
     EXPECT_EQ(bystander.ask(1, "41"_hex), *bus1.instant);
     EXPECT_EQ(listener->counters().connections, 1U);

@@ -157,7 +157,7 @@ TEST_F(SessionPipeline, RefusalsAndItsOwnRegistersKeepTheirPlaces) {
 TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
     settings.lines = {"floor1", "floor2"};
     settings.in_flight = 2;
-    lines[0].read_only.clear();
+    bus1.rights = {};
     start();
     Client client = connect();
     client.send(reads(2) + modbus::encode_mbap(2, 0, "06 0000 0001"_hex) +

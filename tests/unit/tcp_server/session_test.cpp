@@ -175,9 +175,9 @@ TEST_F(Session, GivesWritesTheirOwnClass) {
     Client client = connect();
     for (const Bytes& pdu : {read_pdu(0), "06 0000 0001"_hex, "41 00"_hex}) client.ask(1, pdu);
     ASSERT_EQ(bus1.seen.size(), 3U);
-    EXPECT_EQ(bus1.seen[0].priority, arbiter::PriorityClass::read);
-    EXPECT_EQ(bus1.seen[1].priority, arbiter::PriorityClass::write);
-    EXPECT_EQ(bus1.seen[2].priority, arbiter::PriorityClass::write);
+    EXPECT_EQ(bus1.seen[0].priority, PriorityClass::read);
+    EXPECT_EQ(bus1.seen[1].priority, PriorityClass::write);
+    EXPECT_EQ(bus1.seen[2].priority, PriorityClass::write);
 }
 
 TEST_F(Session, LetsNobodyWriteThroughAReadOnlyListener) {

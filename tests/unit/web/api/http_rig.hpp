@@ -82,6 +82,7 @@ class HttpRig : public ::testing::Test {
         meter.profile = directory.generic;
         meter.unknown_panel = true;
         meter.read_only = true;
+        bus.rights = bus::Rights({{5, {"meter", bus::Access::read_only, {}}}});
         directory.stations.push_back(std::move(meter));
     }
     Server& start() {

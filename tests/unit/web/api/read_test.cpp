@@ -14,7 +14,7 @@ TEST_F(ApiRead, GivesRegistersWithWhereTheyCameFrom) {
         "notation":"UW100","values":[100,101],"age_ms":0,"source":"bus"})"));
     EXPECT_EQ(last_pdu(), "03 00 64 00 02");
     EXPECT_EQ(bus.requests[0].station, 31);
-    EXPECT_EQ(bus.requests[0].priority, arbiter::PriorityClass::read);
+    EXPECT_EQ(bus.requests[0].priority, PriorityClass::read);
     EXPECT_EQ(bus.requests[0].quantity, modbus::QuantityCheck::wide);
     EXPECT_NE(bus.requests[0].client, 0u);
 }

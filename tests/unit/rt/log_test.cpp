@@ -1,0 +1,35 @@
+#include "panelgate/rt/log.hpp"
+
+#include <gmock/gmock.h>
+
+namespace panelgate::rt {
+namespace {
+
+using ::testing::ElementsAre;
+
+class LogTest : public ::testing::Test {
+  protected:
+    ~LogTest() override { set_up_log({}); }
+    LogTap tap;
+};
+
+TEST_F(LogTest, QuotesInTextOnlyWhatHasToBe) {
+    log(LogLevel::info, "line up", {{"line", "floor1"}, {"why", "say \"no\""}, {"empty", ""}});
+    EXPECT_THAT(tap.lines(), ElementsAre(R"(info line up line=floor1 why="say \"no\"" empty="")"));
+}
+
+TEST_F(LogTest, GivesEachFieldAKeyOfItsOwnInJson) {
+    set_up_log({LogLevel::info, LogFormat::json});
+    log(LogLevel::warn, "cannot accept", {{"listener", "127.0.0.1:502"}, {"reason", "a\tb"}});
+    EXPECT_THAT(tap.lines(), ElementsAre("warning \"event\":\"cannot accept\",\"listener\":"
+                                         "\"127.0.0.1:502\",\"reason\":\"a\\u0009b\""));
+}
+
+TEST_F(LogTest, SaysNothingBelowItsLevel) {
+    set_up_log({LogLevel::warn, LogFormat::text});
+    log(LogLevel::info, "line up");
+    EXPECT_EQ(tap.count(""), 0u);
+}
+
+}  // namespace
+}  // namespace panelgate::rt
