@@ -43,7 +43,7 @@ TEST(ReadCache, P6AWriteForgetsWhatItMayChange) {
           Case{17, "05 04 00 FF 00"_hex, false}, Case{17, "41 01"_hex, false}}) {
         ReadCache cache;
         cache.store(*test::read_span(17, kRead), kReply, TimePoint{});
-        cache.on_write(TimePoint{1h}, c.station, c.request);
+        cache.on_write(TimePoint{1h}, c.station, test::request_of(c.request));
         EXPECT_EQ(cache.size(), c.kept ? 1u : 0u) << to_hex(c.request);
     }
 }
