@@ -12,8 +12,8 @@ namespace {
 
 /// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
 bus::Guard guard_of(const profile::PanelProfile& profile) {
-    return [&profile](ByteView pdu) -> std::optional<std::uint8_t> {
-        switch (profile::judge(profile, pdu)) {
+    return [&profile](const modbus::Request& request) -> std::optional<std::uint8_t> {
+        switch (profile::judge(profile, request)) {
             case profile::Judgement::fine:
                 return std::nullopt;
             case profile::Judgement::illegal_function:

@@ -4,15 +4,14 @@
 #include <cstdlib>
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
-#include "rules.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 
-bool teaches_echo(ByteView request) {
-    if (!modbus::is_pure_read(request)) return false;
-    const auto reply = modbus::reply_length_from_request(request);
-    return reply && *reply != request.size() + modbus::kAduOverhead;
+bool teaches_echo(const modbus::Request& request) {
+    if (!request.is_read()) return false;
+    const auto reply = request.reply_length();
+    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
 }
 
 bool holds_fragment(ByteView heard, ByteView frame) {
@@ -69,25 +68,25 @@ void EchoMemory::forget() {
     std::abort();
 }
 
-EchoFilter::Expect EchoMemory::expect(ByteView request) const {
+EchoFilter::Expect EchoMemory::expect(const modbus::Request& request) const {
     if (state_ == EchoState::present) return EchoFilter::Expect::certainly;
     // Reads go on watching: an adapter that is said or was found to have no echo may have one.
     if (state_ == EchoState::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
     return EchoFilter::Expect::perhaps;
 }
 
-bool EchoMemory::must_be_learned_before(ByteView request, bool tried) const {
+bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tried) const {
     const bool open = state_ == EchoState::unknown || (state_ == EchoState::unclear && !tried);
-    return open && !modbus::is_pure_read(request);
+    return open && !request.is_read();
 }
 
-bool EchoMemory::on_echo(ByteView request) {
+bool EchoMemory::on_echo(const modbus::Request& request) {
     if (state_ == EchoState::present || !teaches_echo(request)) return false;
     state_ = EchoState::present;
     return true;
 }
 
-void EchoMemory::on_reply_without_echo(ByteView request, bool fragment) {
+void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment) {
     if (state_ == EchoState::present || state_ == EchoState::absent || !teaches_echo(request))
         return;
     state_ = fragment ? EchoState::unclear : EchoState::absent;
@@ -97,7 +96,7 @@ void EchoMemory::on_unclear() {
     if (state_ == EchoState::unknown) state_ = EchoState::unclear;
 }
 
-void EchoMemory::on_unanswered(ByteView request) {
+void EchoMemory::on_unanswered(const modbus::Request& request) {
     if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = EchoState::unclear;
 }
 

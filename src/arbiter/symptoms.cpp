@@ -81,9 +81,9 @@ void Ledger::count_damaged(const Attempt& attempt) {
     const Group& group = attempt.group();
     const ByteView bytes = attempt.damaged_bytes();
     Symptoms& symptoms = symptoms_of(group.station);
-    const auto expected = modbus::reply_length_from_request(group.pdu);
+    const auto expected = group.request.reply_length();
     const bool head = bytes.size() >= 2 && bytes[0] == group.station &&
-                      (bytes[1] & ~modbus::kExceptionBit) == group.pdu[0];
+                      (bytes[1] & ~modbus::kExceptionBit) == group.request.function();
     if (expected && bytes.size() == *expected) {
         ++symptoms.damaged_exact;
     } else if (expected && bytes.size() < *expected) {

@@ -22,6 +22,11 @@ namespace asio = boost::asio;
 
 namespace {
 constexpr auto kRefusalPause = 1ms;
+
+PriorityClass priority_of(const Request& request) {
+    if (request.poll) return PriorityClass::poll;
+    return request.request.is_read() ? PriorityClass::read : PriorityClass::write;
+}
 }  // namespace
 
 ClientId next_client_id() {
@@ -135,27 +140,23 @@ void Bus::State::on_bytes(ByteView bytes) {
 }
 
 void Bus::State::transact(Request request, AnswerHandler handler) {
-    const std::uint8_t function = request.pdu.empty() ? std::uint8_t{0} : request.pdu[0];
-    Pending entry{std::move(handler), request.station, function, rt::now()};
-    const Result<void> legal = modbus::check_request(request.pdu, request.quantity);
-    if (!legal) return refuse(std::move(entry), legal.error());
+    const modbus::Request& what = request.request;
+    Pending entry{std::move(handler), request.station, what.function(), rt::now()};
     const bool broadcast = request.station == 0;
-    if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
+    if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (auto refusal = rights.judge(request.station, request.pdu)) {
-        Result<Bytes> reply = answer_to(*refusal, function);
+    if (auto refusal = rights.judge(request.station, what)) {
+        Result<Bytes> reply = answer_to(*refusal, what.function());
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     line->poll_input();
-    arbiter::Job job;
-    job.station = request.station;
-    job.pdu = std::move(request.pdu);
-    job.client = request.client;
-    job.host = request.host;
-    job.priority = request.priority;
-    const bool read = modbus::is_pure_read(job.pdu);
-    if (job.priority == PriorityClass::read && !read) job.priority = PriorityClass::write;
+    const PriorityClass priority = priority_of(request);
+    arbiter::Job job{.station = request.station,
+                     .request = std::move(request.request),
+                     .client = request.client,
+                     .host = request.host,
+                     .priority = priority};
     const Result<arbiter::Ticket> ticket = arbiter.submit(rt::now(), std::move(job));
     if (!ticket) return refuse(std::move(entry), ticket.error());
     pending.emplace(*ticket, std::move(entry));

@@ -1,7 +1,5 @@
 #include "panelgate/bus/rights.hpp"
 
-#include "panelgate/modbus/request.hpp"
-
 namespace panelgate::bus {
 
 Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function) {
@@ -10,14 +8,14 @@ Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function) {
     return Fault::denied;
 }
 
-std::optional<Refusal> Rights::judge(std::uint8_t station, ByteView pdu) const {
+std::optional<Refusal> Rights::judge(std::uint8_t station, const modbus::Request& request) const {
     if (station == 0) return judge_broadcast();
-    if (!modbus::is_pure_read(pdu)) {
+    if (!request.is_read()) {
         if (auto refusal = judge_write(station)) return refusal;
     }
     const auto listed = stations_.find(station);
     if (listed == stations_.end() || !listed->second.guard) return std::nullopt;
-    const auto code = listed->second.guard(pdu);
+    const auto code = listed->second.guard(request);
     if (!code) return std::nullopt;
     return Refusal{Refusal::Rule::guard, listed->second.name,
                    static_cast<modbus::ExceptionCode>(*code)};

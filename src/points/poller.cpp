@@ -41,12 +41,10 @@ void Poller::State::ask_all() {
 }
 
 void Poller::State::ask(std::size_t index, StationPolls::Due due) {
-    bus::Request request;
-    request.station = stations[index].id;
-    request.pdu = std::move(due.pdu);
-    request.client = stations[index].client;
-    request.priority = PriorityClass::poll;
-    request.quantity = modbus::QuantityCheck::wide;
+    bus::Request request{.station = stations[index].id,
+                         .request = std::move(due.request),
+                         .client = stations[index].client,
+                         .poll = true};
     bus.transact(std::move(request), [weak = weak_from_this(), index, read = due.read,
                                       asked = rt::now()](const bus::Answer& answer) {
         const auto self = weak.lock();

@@ -57,7 +57,7 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void on_read(Entry& entry, const bus::Answer& answer);
     void on_written(Entry& entry, const bus::Answer& answer);
     void check_target(Entry& entry);
-    void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
+    void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
     void set(Entry& entry, RelayState state, std::string why = {});
 
     std::vector<std::unique_ptr<Entry>> entries;
@@ -77,24 +77,22 @@ void Relays::State::arm(Entry& entry) {
     });
 }
 
-void Relays::State::ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then) {
-    request.client = entry.client;
-    request.priority = PriorityClass::poll;
-    request.quantity = modbus::QuantityCheck::wide;
-    bus.transact(std::move(request),
-                 [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
-                     const auto self = weak.lock();
-                     if (self && self->running) (self.get()->*then)(entry, answer);
-                 });
+void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu,
+                        Then then) {
+    auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
+    if (!request) return (this->*then)(entry, bus::Answer{.pdu = request.error()});
+    bus.transact(
+        {.station = station, .request = std::move(*request), .client = entry.client, .poll = true},
+        [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
+            const auto self = weak.lock();
+            if (self && self->running) (self.get()->*then)(entry, answer);
+        });
 }
 
 void Relays::State::read(Entry& entry) {
     const Relay& relay = entry.route.relay;
-    bus::Request request;
-    request.station = entry.route.from_station;
-    request.pdu = modbus::encode_read(relay.from.table, relay.from.address,
-                                      static_cast<std::uint16_t>(relay.count));
-    ask(entry, *entry.route.from, std::move(request), &State::on_read);
+    ask(entry, *entry.route.from, entry.route.from_station,
+        modbus::encode_read({relay.from.table, relay.from.address, relay.count}), &State::on_read);
 }
 
 void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
@@ -105,16 +103,14 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
         return;
     }
     ++entry.status.reads;
-    bus::Request request;
-    request.station = entry.route.to_station;
-    request.pdu = write_of(entry.route, *answer.pdu);
-    if (entry.route.relay.on_change && request.pdu == entry.written) {
+    Bytes write = write_of(entry.route, *answer.pdu);
+    if (entry.route.relay.on_change && write == entry.written) {
         check_target(entry);
         arm(entry);
         return;
     }
-    entry.written = request.pdu;
-    ask(entry, *entry.route.to, std::move(request), &State::on_written);
+    entry.written = write;
+    ask(entry, *entry.route.to, entry.route.to_station, std::move(write), &State::on_written);
 }
 
 /// Nothing has to be written; but a target that has gone may come back with something else.

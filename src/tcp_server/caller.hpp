@@ -5,7 +5,7 @@
 #include <string>
 
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -16,8 +16,8 @@ class Caller {
     Caller(std::string name, bus::Host host);
 
     const std::string& name() const { return name_; }
-    /// Hands the PDU to a bus, for one of its stations; 0: all of them.
-    void transact(bus::BusClient* bus, std::uint8_t station, const modbus::Adu& adu,
+    /// Hands the request to a bus, for one of its stations; 0: all of them.
+    void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
     /// Takes back what still waits on the buses; it is answered Fault::cancelled.
     void withdraw();

@@ -6,6 +6,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
 
@@ -17,9 +18,11 @@ struct Refuse {
 };
 struct Forward {
     Target target;
+    modbus::Request request;
 };
 struct Broadcast {
     std::vector<bus::BusClient*> lines;
+    modbus::Request request;
 };
 struct Diagnose {};  ///< the gateway answers from its own registers
 using Decision = std::variant<Refuse, Forward, Broadcast, Diagnose>;

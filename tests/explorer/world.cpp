@@ -8,6 +8,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::explorer {
 namespace {
@@ -81,14 +82,13 @@ void World::submit(const Wish& wish) {
     if (wish.write) open.value = ++writes_;
     Writer pdu;
     pdu.u8(wish.write ? 6 : 3).u16(wish.address).u16(wish.write ? open.value : wish.count);
-    arbiter::Job job;
-    job.station = wish.station;
-    job.pdu = pdu.take();
-    job.client = wish.client;
-    job.priority = wish.write ? PriorityClass::write : PriorityClass::read;
+    arbiter::Job job{.station = wish.station,
+                     .request = test::request_of(pdu.take()),
+                     .client = wish.client,
+                     .priority = wish.write ? PriorityClass::write : PriorityClass::read};
     note({.verb = test::BusStep::Verb::submit,
           .station = wish.station,
-          .bytes = job.pdu,
+          .bytes = job.request.pdu(),
           .client = wish.client,
           .priority = job.priority});
     const auto ticket = subject_.submit(now_, std::move(job));

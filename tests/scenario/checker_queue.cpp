@@ -25,10 +25,10 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
-        const auto own = test::read_span(open.job.station, open.job.pdu);
-        const bool goes =
-            span && own ? span->contains(*own)
-                        : open.job.station == station && std::ranges::equal(open.job.pdu, pdu);
+        const auto own = test::read_span(open.job.station, open.job.request.pdu());
+        const bool goes = span && own ? span->contains(*own)
+                                      : open.job.station == station &&
+                                            std::ranges::equal(open.job.request.pdu(), pdu);
         if (goes && (open.sent || !behind.contains(open.job.client))) {
             open.sent = true;
         } else {
@@ -40,7 +40,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
 /// A read that comes while one which contains it is still leaving goes along with it, unless
 /// something older of its client waits for that station.
 bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
-    const auto own = test::read_span(job.station, job.pdu);
+    const auto own = test::read_span(job.station, job.request.pdu());
     const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
     if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
     return std::ranges::none_of(open_, [&](const auto& entry) {
@@ -58,7 +58,7 @@ std::size_t Checker::waiting() const {
     std::map<std::pair<unsigned, modbus::Table>, std::vector<arbiter::ReadSpan>> reads;
     for (const auto& [ticket, open] : open_) {
         if (open.sent || open.gone) continue;
-        const auto span = test::read_span(open.job.station, open.job.pdu);
+        const auto span = test::read_span(open.job.station, open.job.request.pdu());
         if (!span || !settings_.share_reads) {
             ++waiting;
         } else {

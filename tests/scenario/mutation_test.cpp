@@ -55,9 +55,9 @@ struct GivesAnOldValue : Tampered {
     bool tamper(TimePoint, Finish& finish) override {
         if (!is_good(finish) || !is_read(finish)) return true;
         const Job& job = job_of(finish);
-        const bool of_memory = job.pdu[1] * 256 + job.pdu[2] >= kMemory;
+        const bool of_memory = job.request.pdu()[1] * 256 + job.request.pdu()[2] >= kMemory;
         if (of_memory != wants_memory_) return true;
-        Bytes& known = known_[{job.station, job.pdu}];
+        Bytes& known = known_[{job.station, job.request.pdu()}];
         if (known.empty()) known = *finish.pdu;
         finish.pdu = std::exchange(known, *finish.pdu);
         return true;
@@ -91,7 +91,7 @@ struct InventsAnException : Tampered {
 struct ConfirmsWhatTimedOut : Tampered {
     using Tampered::Tampered;
     bool tamper(TimePoint, Finish& finish) override {
-        const Bytes& pdu = job_of(finish).pdu;
+        const Bytes& pdu = job_of(finish).request.pdu();
         if (!finish.pdu && finish.pdu.error() == Fault::timeout && !is_read(finish))
             finish.pdu = Bytes(pdu.begin(), pdu.begin() + 5);
         return true;

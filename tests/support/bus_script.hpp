@@ -15,6 +15,7 @@
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_step.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::test {
 
@@ -50,17 +51,14 @@ class BusScript {
     }
     Result<arbiter::Ticket> try_submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
                                        PriorityClass priority = PriorityClass::read) {
-        arbiter::Job job;
-        job.station = station;
-        job.pdu = std::move(pdu);
-        job.client = client;
-        job.priority = priority;
+        const arbiter::Job job{
+            .station = station, .request = request_of(pdu), .client = client, .priority = priority};
         record({.verb = BusStep::Verb::submit,
                 .station = station,
-                .bytes = job.pdu,
+                .bytes = std::move(pdu),
                 .client = client,
                 .priority = priority});
-        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, std::move(job));
+        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, job);
         if (ticket) accepted.push_back(*ticket);
         drain();
         return ticket;

@@ -31,11 +31,10 @@ Host host_of(std::string_view address);
 /// One request to one station; station 0 is a broadcast.
 struct Request {
     std::uint8_t station = 0;  ///< 0..247
-    Bytes pdu;
+    modbus::Request request;
     ClientId client = 0;
-    Host host = 0;  ///< the client's address (host_of()); 0: it is its own
-    PriorityClass priority = PriorityClass::read;
-    modbus::QuantityCheck quantity = modbus::QuantityCheck::fit;
+    Host host = 0;      ///< the client's address (host_of()); 0: it is its own
+    bool poll = false;  ///< of the lowest class: clients' own requests go first
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -109,8 +108,9 @@ class BusClient {
     virtual ~BusClient() = default;
 
     /// Hands in a request. The handler is called exactly once, never from inside transact(), at the
-    /// latest at the deadline of the line's queue settings. Checks the PDU (Fault::malformed,
-    /// Fault::denied), the rights (Answer::refusal) and the queue (Fault::busy) itself.
+    /// latest at the deadline of the line's queue settings. Refuses what cannot be answered at this
+    /// address (Fault::denied), what the rights forbid (Answer::refusal), and what has no place in
+    /// the queue (Fault::busy).
     virtual void transact(Request request, AnswerHandler handler) = 0;
     /// Why transact() would refuse every write to this station (0: every broadcast), if it would.
     /// For those who have to say so before they know the write, or before they ask other lines.

@@ -9,6 +9,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/bus/station_settings.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
 
@@ -36,8 +37,8 @@ class Rights {
     Rights() = default;
     explicit Rights(Stations stations) : stations_(std::move(stations)) {}
 
-    /// Of a legal request; station 0 is a broadcast.
-    std::optional<Refusal> judge(std::uint8_t station, ByteView pdu) const;
+    /// Station 0 is a broadcast.
+    std::optional<Refusal> judge(std::uint8_t station, const modbus::Request& request) const;
     /// What judge() says to every write to this station, whatever it writes.
     std::optional<Refusal> judge_write(std::uint8_t station) const;
 

@@ -6,12 +6,12 @@
 #include <optional>
 #include <string>
 
-#include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
 
 /// The exception code that a request is answered with instead of being transmitted, or nothing.
-using Guard = std::function<std::optional<std::uint8_t>(ByteView pdu)>;
+using Guard = std::function<std::optional<std::uint8_t>(const modbus::Request&)>;
 
 enum class Access : std::uint8_t { read_write, read_only };
 

@@ -3,6 +3,7 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -57,20 +58,17 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
         return problem(422, "at most " + std::to_string(limit) +
                                 " values in one broadcast, up to address 65535");
     }
-    bus::Request made;
-    made.pdu = encode_write(function, static_cast<std::uint16_t>(*address), *cells);
-    made.priority = PriorityClass::write;
-    return made;
+    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
 }
 
-Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line,
-                               const bus::Request& made) {
-    if (made.station == 0) return check_may_write(*line.bus, 0);
-    const std::string name = line.name + ":" + std::to_string(made.station);
+Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
+                               bool reads) {
+    if (id == 0) return check_may_write(*line.bus, 0);
+    const std::string name = line.name + ":" + std::to_string(id);
     const auto station = directory.find_station(name);
     if (!station) return problem(404, "there is no station '" + name + "'");
-    if (modbus::is_pure_read(made.pdu)) return {};
-    return check_may_write(*line.bus, made.station);
+    if (reads) return {};
+    return check_may_write(*line.bus, id);
 }
 
 Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
@@ -83,12 +81,11 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     if (!pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) {
         return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
     }
-    bus::Request made;
-    made.station = static_cast<std::uint8_t>(*station);
-    made.pdu = std::move(*pdu);
-    made.quantity = modbus::QuantityCheck::wide;
-    made.priority = modbus::is_pure_read(made.pdu) ? PriorityClass::read : PriorityClass::write;
-    const auto allowed = check_raw_station(directory, line, made);
+    const auto id = static_cast<std::uint8_t>(*station);
+    const std::uint8_t function = pdu->front();
+    auto made = request_to(id, std::move(*pdu));
+    const bool reads = made ? made->request.is_read() : modbus::is_read(function);
+    const auto allowed = check_raw_station(directory, line, id, reads);
     if (!allowed) return allowed.error();
     return made;
 }

@@ -3,6 +3,7 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
@@ -49,12 +50,7 @@ Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
     if (!value) return value.error();
     auto pdu = points::write_request(*found.station.profile, *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
-    bus::Request made;
-    made.station = found.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(found.station.id, std::move(*pdu));
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -109,9 +105,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
-    bus::Request made;
-    made.station = items->station.id;
-    made.pdu = modbus::encode_read(items->span);
+    bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
     const auto failed = problem_of(answer, *items->station.profile);
     if (failed) co_return to_response(*failed);

@@ -6,6 +6,7 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "refusal.hpp"
 #include "station_path.hpp"
@@ -29,12 +30,7 @@ Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
     if (!cells) return cells.error();
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();
-    bus::Request made;
-    made.station = items.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(items.station.id, std::move(*pdu));
 }
 
 Handling write_items(HttpRequest request, Parsed<Items> items) {

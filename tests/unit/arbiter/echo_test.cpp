@@ -5,6 +5,7 @@
 #include "panelgate/modbus/exception.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -61,15 +62,16 @@ TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
 
 TEST(EchoMemory, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
     EchoMemory memory(EchoMode::automatic);
-    EXPECT_FALSE(memory.on_echo(kWriteRegister));
+    EXPECT_FALSE(memory.on_echo(test::request_of(kWriteRegister)));
     EXPECT_EQ(memory.state(), EchoState::unknown);
-    EXPECT_FALSE(memory.on_echo("01 03 00 00 18"_hex)) << "24 coils: its reply has 8 bytes, too";
+    EXPECT_FALSE(memory.on_echo(test::request_of("01 03 00 00 18"_hex)))
+        << "24 coils: its reply has 8 bytes, too";
     EXPECT_EQ(memory.state(), EchoState::unknown);
-    EXPECT_TRUE(memory.on_echo(kRead));
-    EXPECT_FALSE(memory.on_echo(kRead)) << "no news";
-    EXPECT_EQ(memory.expect(kWriteRegister), Expect::certainly);
+    EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
+    EXPECT_FALSE(memory.on_echo(test::request_of(kRead))) << "no news";
+    EXPECT_EQ(memory.expect(test::request_of(kWriteRegister)), Expect::certainly);
     memory.forget();
-    EXPECT_TRUE(memory.must_be_learned_before(kWriteRegister, false));
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
 }
 
 class Echo : public testing::Test {
@@ -165,13 +167,13 @@ TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
     EchoMemory memory(EchoMode::automatic);
     const Bytes read = "03 00 00 00 03"_hex;
     const Bytes write = "06 00 00 00 03"_hex;
-    ASSERT_TRUE(memory.on_echo(read));
-    memory.on_unanswered(read);
+    ASSERT_TRUE(memory.on_echo(test::request_of(read)));
+    memory.on_unanswered(test::request_of(read));
     EXPECT_EQ(memory.state(), EchoState::present) << "no read is answered by itself";
-    memory.on_unanswered(write);
+    memory.on_unanswered(test::request_of(write));
     EXPECT_EQ(memory.state(), EchoState::unclear);
-    EXPECT_TRUE(memory.must_be_learned_before(write, false));
-    memory.on_reply_without_echo(read, false);
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(write), false));
+    memory.on_reply_without_echo(test::request_of(read), false);
     EXPECT_EQ(memory.state(), EchoState::absent);
 }
 

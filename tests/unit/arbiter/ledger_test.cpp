@@ -10,6 +10,7 @@
 
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -57,8 +58,7 @@ TEST_F(LedgerTest, SaysEverythingOnceInTheOrderInWhichItHappened) {
 }
 
 TEST_F(LedgerTest, AnAnswerSaysWhetherItsRequestWasEverSent) {
-    Job job;
-    job.ticket = 5;
+    Job job{.ticket = 5, .request = test::request_of(kRead)};
     ledger.finish(job, Fault::timeout);
     job.attempts = 1;
     ledger.finish(job, kReply, true);

@@ -6,6 +6,7 @@
 
 #include "support/hex.hpp"
 #include "support/read_span.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -45,7 +46,7 @@ TEST(ReadCache, P6AWriteForgetsWhatItMayChange) {
           Case{17, "05 04 00 FF 00"_hex, false}, Case{17, "41 01"_hex, false}}) {
         ReadCache cache;
         cache.store(*test::read_span(17, kRead), kReply, TimePoint{});
-        cache.on_write(TimePoint{1h}, c.station, c.request);
+        cache.on_write(TimePoint{1h}, c.station, test::request_of(c.request));
         EXPECT_EQ(cache.size(), c.kept ? 1u : 0u) << to_hex(c.request);
     }
 }
@@ -79,14 +80,14 @@ TEST(ReadCache, TheYoungestValueAnswers) {
 TEST(ReadCache, P6WhatWasReadBeforeAWriteIsNotKeptWhenItComesBehindIt) {
     for (const std::uint8_t written : Bytes{17, 0}) {
         ReadCache cache;
-        cache.on_write(kStart, written, kWrite);
+        cache.on_write(kStart, written, test::request_of(kWrite));
         cache.store(*test::read_span(17, kRead), kReply, kStart);
         EXPECT_EQ(cache.size(), 0u) << "nobody knows which came first";
         cache.store(*test::read_span(17, kRead), kReply, kStart + 1ms);
         EXPECT_EQ(cache.size(), 1u);
     }
     ReadCache cache;
-    cache.on_write(kStart, 18, kWrite);
+    cache.on_write(kStart, 18, test::request_of(kWrite));
     cache.store(*test::read_span(17, kRead), kReply, kStart);
     EXPECT_EQ(cache.size(), 1u) << "another station was written to";
 }

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/modbus/request.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -37,15 +37,15 @@ class ScheduleTest : public testing::Test {
     static Bytes read_of(unsigned address) { return Writer().u8(3).u16(address).u16(1).take(); }
     /// A read, or a write, of a client of its own, that touches no other one.
     Job job(std::uint8_t station, bool write = false) {
-        Job made;
-        made.ticket = ++ticket;
-        made.client = ticket;
-        made.station = station;
-        const auto address = static_cast<unsigned>(10 * ticket);
-        made.pdu = write ? Writer().u8(6).u16(address).u16(1).take() : read_of(address);
-        made.priority = write ? PriorityClass::write : PriorityClass::read;
-        made.deadline = made.start_by = now + 1h;
-        return made;
+        const auto address = static_cast<unsigned>(10 * ++ticket);
+        const Bytes pdu = write ? Writer().u8(6).u16(address).u16(1).take() : read_of(address);
+        return {.ticket = ticket,
+                .station = station,
+                .request = test::request_of(pdu),
+                .client = ticket,
+                .priority = write ? PriorityClass::write : PriorityClass::read,
+                .deadline = now + 1h,
+                .start_by = now + 1h};
     }
     Ticket wait(std::uint8_t station, bool write = false) {
         Job made = job(station, write);
@@ -54,13 +54,9 @@ class ScheduleTest : public testing::Test {
         return given;
     }
     Group failed(std::uint8_t station) {
-        Group group;
-        group.station = station;
-        group.jobs.push_back(job(station));
-        group.pdu = group.jobs.front().pdu;
-        group.attempts = 1;
+        const Job one = job(station);
         stations.of(station);
-        return group;
+        return {.jobs = {one}, .station = station, .request = one.request, .attempts = 1};
     }
     Schedule::Next next() { return schedule.next(now, stations, quiet, echo, {}); }
     /// Which stations are asked, one after the other: "2 1 r3", r for what goes again.
@@ -186,12 +182,12 @@ TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadTellsWhetherTheLineHearsItself) {
     ASSERT_TRUE(reading);
     EXPECT_EQ(reading->learns_for, write);
     EXPECT_TRUE(reading->jobs.empty());
-    EXPECT_EQ(reading->pdu[0], 3);
+    EXPECT_EQ(reading->request.function(), 3);
     echo.on_unclear();
     const auto writing = next().group;
     ASSERT_TRUE(writing);
     ASSERT_EQ(writing->jobs.size(), 1u) << "what did not tell is not asked for ever";
-    EXPECT_EQ(writing->pdu[0], 6);
+    EXPECT_EQ(writing->request.function(), 6);
     EXPECT_EQ(writing->jobs.front().ticket, write);
 }
 
@@ -218,7 +214,7 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallWhatIsOwedWantsANewWay) {
 TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
     const Group group = failed(1);
     Station& station = stations.of(1);
-    station.owe(now, group.pdu, now - 500ms);
+    station.owe(now, group.request.pdu(), now - 500ms);
     EXPECT_FALSE(schedule.line_rests_until(now, group, now - 500ms, station))
         << "its replies have never been late";
     settings.quarantine = Quarantine::line;
@@ -234,8 +230,8 @@ TEST_F(ScheduleTest, PartsOfWhatWasAskedForTogetherGoAgainButThoseOfWhoHasLeft) 
     Group group = failed(1);
     group.jobs.push_back(job(1));
     group.jobs.push_back(job(1));
-    group.pdu = Writer().u8(3).u16(0).u16(100).take();
-    group.span = modbus::read_span(group.pdu);
+    group.request = test::request_of(Writer().u8(3).u16(0).u16(100).take());
+    group.span = group.request.span();
     const Ticket left = group.jobs[1].ticket;
     group.jobs[1].gone = true;
     const auto gone = schedule.give_back(group);

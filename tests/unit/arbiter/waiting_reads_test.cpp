@@ -10,6 +10,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "support/read_span.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -26,10 +27,8 @@ class WaitingReadsTest : public testing::Test {
         ReadSpan span;
     };
     Job job(Client client) {
-        Job made;
-        made.ticket = ++ticket;
-        made.client = client;
-        return made;
+        const Bytes read = Writer().u8(3).u16(0).u16(1).take();  // its span is told beside it
+        return {.ticket = ++ticket, .request = test::request_of(read), .client = client};
     }
     void add(const Job& job, const ReadSpan& span) {
         reads.add(job, span, count());

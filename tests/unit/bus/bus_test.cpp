@@ -8,6 +8,7 @@
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::bus {
 namespace {
@@ -72,8 +73,8 @@ class BusTest : public testing::Test {
         settings.arbiter.stations[0].id = 17;
         settings.stations[17].name = "press";
         settings.stations[18].name = "oven";
-        settings.stations[18].guard = [](ByteView pdu) {
-            return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
+        settings.stations[18].guard = [](const modbus::Request& request) {
+            return request.function() == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
@@ -88,13 +89,11 @@ class BusTest : public testing::Test {
         bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
     }
     /// Asks and runs the loop until answered.
-    Answer ask(std::uint8_t station, Bytes pdu, ClientId client = 1) {
+    Answer ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1, bool poll = false) {
         std::optional<Answer> got;
-        Request request;
-        request.station = station;
-        request.pdu = std::move(pdu);
-        request.client = client;
-        bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+        bus->transact(
+            {.station = station, .request = test::request_of(pdu), .client = client, .poll = poll},
+            [&](Answer answer) { got = std::move(answer); });
         EXPECT_FALSE(got) << "answered from inside transact()";
         io.restart();
         while (!got && io.run_one() > 0) {
@@ -136,7 +135,7 @@ TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
     EXPECT_EQ(broadcast.pdu.error(), Fault::denied);
     EXPECT_EQ(broadcast.refusal.value().rule, Refusal::Rule::broadcast_over_read_only);
     EXPECT_TRUE(line->written.empty());
-    EXPECT_EQ(bus->report().stations[1].requests.at({"6", "refused"}), 1u);
+    EXPECT_EQ(bus->report().stations[1].requests.at(6)[Outcome::refused], 1u);
     EXPECT_TRUE(ask(17, kRead).pdu.has_value());
     EXPECT_FALSE(ask(17, kRead).refusal);
 }
@@ -230,11 +229,22 @@ TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
     EXPECT_FALSE(answer.transmitted);
 }
 
+TEST_F(BusTest, GivesPollsReadsAndWritesTheirClass) {
+    bus->start();
+    ask(17, kRead);
+    ask(17, kWrite);
+    ask(17, "41 00"_hex);
+    ask(17, kRead, 1, true);
+    ask(17, kWrite, 1, true);
+    std::vector<std::string> classes;
+    for (const TraceFrame& frame : bus->trace(100)) {
+        if (frame.kind == FrameKind::request) classes.push_back(frame.why.substr(0, frame.why.find(' ')));
+    }
+    EXPECT_EQ(classes, (std::vector<std::string>{"read", "write", "write", "poll", "poll"}));
+}
+
 TEST_F(BusTest, RefusesWhatMayNotBeTransmitted) {
     bus->start();
-    EXPECT_EQ(ask(17, "03 00 6B"_hex).pdu.error(), Fault::malformed);
-    EXPECT_EQ(ask(17, "83 00"_hex).pdu.error(), Fault::denied);
-    EXPECT_EQ(ask(17, {}).pdu.error(), Fault::malformed);
     EXPECT_EQ(ask(0, kRead).pdu.error(), Fault::denied);
     EXPECT_EQ(ask(17, "08 00 04 00 00"_hex).pdu.error(), Fault::denied);
     EXPECT_TRUE(line->written.empty());
@@ -271,13 +281,11 @@ TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
     bus->start();
     int answers = 0;
     std::function<void()> again = [&] {
-        Request request;
-        request.station = 17;
-        request.pdu = kRead;
-        bus->transact(std::move(request), [&](const Answer& answer) {
-            EXPECT_TRUE(answer.pdu.has_value());
-            if (++answers < 20) again();
-        });
+        bus->transact({.station = 17, .request = test::request_of(kRead)},
+                      [&](const Answer& answer) {
+                          EXPECT_TRUE(answer.pdu.has_value());
+                          if (++answers < 20) again();
+                      });
     };
     again();
     while (answers < 20 && io.run_one() > 0) {
@@ -290,10 +298,7 @@ TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
     bus->start();
     std::vector<Fault> faults;
     for (const char* pdu : {"03 00 00 00 01", "03 00 10 00 01", "03 00 20 00 01"}) {
-        Request request;
-        request.station = 17;
-        request.pdu = from_hex(pdu).value();
-        bus->transact(std::move(request),
+        bus->transact({.station = 17, .request = test::request_of(from_hex(pdu).value())},
                       [&](const Answer& a) { faults.push_back(a.pdu.error()); });
     }
     while (line->written.empty()) io.run_one();

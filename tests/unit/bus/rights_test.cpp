@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::bus {
 namespace {
@@ -18,38 +19,39 @@ Rights plant() {
     stations[31].name = "press";
     stations[5] = {"meter", Access::read_only, {}};
     stations[20].name = "oven";
-    stations[20].guard = [](ByteView pdu) {
-        return pdu[0] > 6 ? std::optional<std::uint8_t>(1) : std::nullopt;
+    stations[20].guard = [](const modbus::Request& request) {
+        return request.function() > 6 ? std::optional<std::uint8_t>(1) : std::nullopt;
     };
     return Rights(std::move(stations));
 }
 
 TEST(Rights, AllowWhatNothingForbids) {
-    EXPECT_EQ(plant().judge(31, kWrite), std::nullopt);
-    EXPECT_EQ(plant().judge(99, kWrite), std::nullopt) << "nobody has listed it";
-    EXPECT_EQ(Rights().judge(5, kWrite), std::nullopt);
-    EXPECT_EQ(Rights().judge(0, kWrite), std::nullopt);
+    EXPECT_EQ(plant().judge(31, test::request_of(kWrite)), std::nullopt);
+    EXPECT_EQ(plant().judge(99, test::request_of(kWrite)), std::nullopt) << "nobody has listed it";
+    EXPECT_EQ(Rights().judge(5, test::request_of(kWrite)), std::nullopt);
+    EXPECT_EQ(Rights().judge(0, test::request_of(kWrite)), std::nullopt);
 }
 
 TEST(Rights, OnlyPureReadsReachAStationThatMayOnlyBeRead) {
-    EXPECT_EQ(plant().judge(5, kRead), std::nullopt);
+    EXPECT_EQ(plant().judge(5, test::request_of(kRead)), std::nullopt);
     const Refusal refusal{Rule::read_only, "meter", modbus::ExceptionCode::illegal_function};
-    EXPECT_EQ(plant().judge(5, kWrite), refusal);
-    EXPECT_EQ(plant().judge(5, "17 0000 0001 0000 0001 02 0001"_hex), refusal) << "it writes too";
-    EXPECT_EQ(plant().judge(5, "41"_hex), refusal) << "nobody knows what it does";
+    EXPECT_EQ(plant().judge(5, test::request_of(kWrite)), refusal);
+    EXPECT_EQ(plant().judge(5, test::request_of("17 0000 0001 0000 0001 02 0001"_hex)), refusal)
+        << "it writes too";
+    EXPECT_EQ(plant().judge(5, test::request_of("41"_hex)), refusal) << "nobody knows what it does";
 }
 
 TEST(Rights, ABroadcastOverAStationThatMayOnlyBeReadIsRefused) {
     const Refusal refusal{Rule::broadcast_over_read_only, "meter",
                           modbus::ExceptionCode::illegal_function};
-    EXPECT_EQ(plant().judge(0, kWrite), refusal);
+    EXPECT_EQ(plant().judge(0, test::request_of(kWrite)), refusal);
 }
 
 TEST(Rights, AGuardSaysWithWhatCodeItRefuses) {
     const Refusal refusal{Rule::guard, "oven", modbus::ExceptionCode::illegal_function};
-    EXPECT_EQ(plant().judge(20, "10 0000 0001 02 0001"_hex), refusal);
-    EXPECT_EQ(plant().judge(20, kWrite), std::nullopt);
-    EXPECT_EQ(plant().judge(20, kRead), std::nullopt);
+    EXPECT_EQ(plant().judge(20, test::request_of("10 0000 0001 02 0001"_hex)), refusal);
+    EXPECT_EQ(plant().judge(20, test::request_of(kWrite)), std::nullopt);
+    EXPECT_EQ(plant().judge(20, test::request_of(kRead)), std::nullopt);
 }
 
 TEST(Rights, AGuardAnswersAsItsPanelWould) {
@@ -62,15 +64,15 @@ TEST(Rights, AGuardAnswersAsItsPanelWould) {
 TEST(Rights, AccessIsJudgedBeforeTheGuardIsAsked) {
     Stations stations;
     stations[5] = {"meter", Access::read_only,
-                   [](ByteView) { return std::optional<std::uint8_t>(2); }};
+                   [](const modbus::Request&) { return std::optional<std::uint8_t>(2); }};
     const Rights rights(std::move(stations));
-    EXPECT_EQ(rights.judge(5, kWrite).value().rule, Rule::read_only);
-    EXPECT_EQ(rights.judge(5, kRead).value().rule, Rule::guard);
+    EXPECT_EQ(rights.judge(5, test::request_of(kWrite)).value().rule, Rule::read_only);
+    EXPECT_EQ(rights.judge(5, test::request_of(kRead)).value().rule, Rule::guard);
 }
 
 TEST(Rights, TellOfEveryWriteWhatTheyTellOfEach) {
-    EXPECT_EQ(plant().judge_write(5), plant().judge(5, kWrite));
-    EXPECT_EQ(plant().judge_write(0), plant().judge(0, kWrite));
+    EXPECT_EQ(plant().judge_write(5), plant().judge(5, test::request_of(kWrite)));
+    EXPECT_EQ(plant().judge_write(0), plant().judge(0, test::request_of(kWrite)));
     EXPECT_EQ(plant().judge_write(31), std::nullopt);
     EXPECT_EQ(plant().judge_write(20), std::nullopt) << "a guard has to see the write";
 }

@@ -172,6 +172,39 @@ TEST(ReplyLengthFromRequest, DoesNotGuess) {
     }
 }
 
+TEST(Request, IsMadeOfWhatMayBeTransmittedOnly) {
+    const Bytes most = "03 00 00 00 7E"_hex;  // 126 registers
+    EXPECT_EQ(Request::make({}, QuantityCheck::fit).error(), Fault::malformed);
+    EXPECT_EQ(Request::make("03 00 6B"_hex, QuantityCheck::wide).error(), Fault::malformed);
+    EXPECT_EQ(Request::make("83 00"_hex, QuantityCheck::wide).error(), Fault::denied);
+    EXPECT_EQ(Request::make(most, QuantityCheck::fit).error(), Fault::malformed);
+    EXPECT_EQ(Request::make(most, QuantityCheck::wide)->pdu(), most);
+}
+
+TEST(Request, KnowsWhatItIs) {
+    for (const Bytes& pdu :
+         {"03 00 6B 00 03"_hex, "01 00 00 00 00"_hex, "02 FF FF 00 02"_hex, "06 00 01 00 03"_hex,
+          write_coils(10), read_write(2, 1), read_file(3), "07"_hex, "08 00 04 00 00"_hex,
+          "18 04 DE"_hex, "2B 0E 01 00"_hex, "2B 0D 01"_hex, "5A 01 02"_hex}) {
+        const Request request = Request::make(pdu, QuantityCheck::fit).value();
+        EXPECT_EQ(request.pdu(), pdu);
+        EXPECT_EQ(request.function(), pdu[0]);
+        EXPECT_EQ(request.is_read(), is_pure_read(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.is_broadcastable(), is_broadcastable(pdu[0])) << to_hex(pdu);
+        EXPECT_EQ(request.is_never_answered(), is_never_answered(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.span(), read_span(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.access().read, access_of(pdu).read) << to_hex(pdu);
+        EXPECT_EQ(request.access().write, access_of(pdu).write) << to_hex(pdu);
+        EXPECT_EQ(request.reply_length(), reply_length_from_request(pdu)) << to_hex(pdu);
+    }
+}
+
+TEST(Request, OfASpanReadsIt) {
+    const Span span{Table::input_registers, 0x102, 127};
+    EXPECT_EQ(Request::read(span).pdu(), "04 01 02 00 7F"_hex);
+    EXPECT_EQ(Request::read(span).span(), span);
+}
+
 TEST(AccessOf, SaysWhatIsReadAndWritten) {
     const auto holding = [](std::uint16_t at, std::uint16_t n) {
         return Span{Table::holding_registers, at, n};

@@ -12,11 +12,11 @@ namespace {
 
 class RelaysTest : public testing::Test {
   protected:
-    void make(bool on_change) {
+    void make(bool on_change, std::uint32_t count = 2) {
         RelayRoute route;
         route.relay.from = {"press", "UW100", modbus::Table::holding_registers, 100};
         route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, 200};
-        route.relay.count = 2;
+        route.relay.count = count;
         route.relay.every = 1ms;
         route.relay.on_change = on_change;
         route.from = &from;
@@ -46,12 +46,19 @@ class RelaysTest : public testing::Test {
 TEST_F(RelaysTest, WritesWhatItHasJustRead) {
     make(false);
     run_until([&] { return status().writes >= 3; });
-    EXPECT_EQ(from.requests[0].pdu, "03 00 64 00 02"_hex);
-    EXPECT_EQ(to.requests[0].pdu, "10 00 C8 00 02 04 00 01 00 02"_hex);
+    EXPECT_EQ(from.requests[0].request.pdu(), "03 00 64 00 02"_hex);
+    EXPECT_EQ(to.requests[0].request.pdu(), "10 00 C8 00 02 04 00 01 00 02"_hex);
     EXPECT_EQ(to.requests[0].station, 20);
-    EXPECT_EQ(to.requests[0].priority, PriorityClass::poll);
+    EXPECT_TRUE(to.requests[0].poll);
     EXPECT_EQ(states, std::vector<std::string>{"ok"});
     EXPECT_EQ(status().name, "press/UW100 to oven/GDT200");
+}
+
+TEST_F(RelaysTest, ABlockThatNoReplyHoldsIsNotAskedForAndTheSourceFails) {
+    make(false, 200);
+    run_until([&] { return status().read_failures >= 3; });
+    EXPECT_TRUE(from.requests.empty());
+    EXPECT_EQ(states, std::vector<std::string>{"source failing: refused"});
 }
 
 TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
@@ -60,7 +67,7 @@ TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
     EXPECT_EQ(to.requests.size(), 1u);
     source = test::FakeBus::reply("03 04 00 01 00 03"_hex);
     run_until([&] { return to.requests.size() == 2; });
-    EXPECT_EQ(to.requests[1].pdu, "10 00 C8 00 02 04 00 01 00 03"_hex);
+    EXPECT_EQ(to.requests[1].request.pdu(), "10 00 C8 00 02 04 00 01 00 03"_hex);
 }
 
 TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItIsBack) {

@@ -36,7 +36,7 @@ class SmallPipeline : public ::testing::Test {
     std::uint16_t taken = 0;
     int told = 0;
     std::shared_ptr<Shared> shared = std::make_shared<Shared>(
-        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, {}, true}}), {}, {}, {}});
+        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, true}}), {}, {}, {}});
     std::shared_ptr<Pipeline> pipeline = std::make_shared<Pipeline>(
         shared, Caller("10.0.0.7:5000", bus::host_of("10.0.0.7")), [this] { ++told; });
 };

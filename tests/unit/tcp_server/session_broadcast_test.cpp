@@ -19,7 +19,7 @@ TEST_F(SessionBroadcast, AnswersABroadcastAsSoonAsItHasLeft) {
     client.request(1, 0, kWrite);
     ASSERT_TRUE(run_until_held(1));
     EXPECT_EQ(bus1.held[0].request.station, 0);
-    EXPECT_EQ(bus1.held[0].request.priority, PriorityClass::write);
+    EXPECT_FALSE(bus1.held[0].request.request.is_read());
     bus1.answer(0, kWritten);
     EXPECT_EQ(client.receive(), (modbus::Adu{1, 0, kWritten}));
     EXPECT_TRUE(bus2.seen.empty()) << "a line of another listener";

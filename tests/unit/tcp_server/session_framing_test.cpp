@@ -45,7 +45,7 @@ TEST_F(SessionFraming, TakesTheShortestAndTheLongestLength) {
     Client client = connect();
     EXPECT_EQ(client.ask(1, "07"_hex), "07 00"_hex);
     EXPECT_EQ(client.ask(1, "41"_hex + Bytes(252, 1)), "07 00"_hex);
-    EXPECT_EQ(bus1.seen.back().pdu.size(), 253U);
+    EXPECT_EQ(bus1.seen.back().request.pdu().size(), 253U);
 }
 
 TEST_F(SessionFraming, ClosesAConnectionThatSendsHalfAnAdu) {

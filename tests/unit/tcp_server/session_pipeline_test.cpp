@@ -24,7 +24,7 @@ class SessionPipeline : public Loopback {
         for (std::uint16_t i = first; i < end; ++i) {
             ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
             ASSERT_LE(bus1.held.size(), settings.in_flight);
-            ASSERT_EQ(bus1.held[0].request.pdu, read_pdu(i));
+            ASSERT_EQ(bus1.held[0].request.request.pdu(), read_pdu(i));
             bus1.answer(0, reply_to_read(i));
             ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
         }
@@ -120,7 +120,7 @@ TEST_F(SessionPipeline, ASlowPanelHoldsUpNoOtherUntilEightyAnswersAreMissing) {
     client.send(reads(8));
     for (std::uint16_t i = 1; i < 5; ++i) {
         ASSERT_TRUE(run_until_held(2));
-        ASSERT_EQ(bus1.held[1].request.pdu, read_pdu(i));
+        ASSERT_EQ(bus1.held[1].request.request.pdu(), read_pdu(i));
         bus1.answer(1, reply_to_read(i));
     }
     do_all_that_is_due();

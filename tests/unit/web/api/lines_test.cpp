@@ -129,7 +129,7 @@ TEST_F(ApiLines, PassesARawRequestAndItsReply) {
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(), json_of(R"({"pdu":"030400640065"})"));
     EXPECT_EQ(bus.requests[0].station, 5);
-    EXPECT_EQ(bus.requests[0].priority, PriorityClass::read);
+    EXPECT_FALSE(bus.requests[0].poll);
 }
 
 TEST_F(ApiLines, GivesAPanelsExceptionToARawRequestAsAnAnswer) {
@@ -149,10 +149,13 @@ TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {
     EXPECT_EQ(status(R"({"station":5,"pdu":""})"), 400u);
     EXPECT_EQ(status(R"({"station":5,"pdu":7})"), 400u);
     EXPECT_EQ(status(R"({"station":5,"pdu":")" + std::string(508, '0') + "\"}"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"030001"})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"0300010080"})"), 400u) << "more than a reply holds";
     EXPECT_EQ(status(R"({"station":5,"pdu":"0600010002"})"), 403u);
     EXPECT_EQ(status(R"({"station":9,"pdu":"0300010001"})", "floor2"), 404u);
     EXPECT_TRUE(bus.requests.empty());
     EXPECT_EQ(status(R"({"station":5,"pdu":"0300010001"})"), 200u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"030001007f"})"), 200u) << "a GT's larger frames";
 }
 
 }  // namespace
