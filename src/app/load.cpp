@@ -1,6 +1,7 @@
 #include "load.hpp"
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -9,6 +10,15 @@
 #include "panelgate/config/real_files.hpp"
 
 namespace panelgate::app {
+namespace {
+
+std::optional<std::string> environment(const std::string& name) {
+    const char* value = std::getenv(name.c_str());
+    if (value == nullptr) return std::nullopt;
+    return value;
+}
+
+}  // namespace
 
 Loaded load_file(const std::string& path) {
     const auto text = config::RealFiles().read(path);
@@ -23,7 +33,7 @@ Loaded load_file(const std::string& path) {
 Loaded load_text(std::string_view text, const std::string& name) {
     yaml::Problems problems(name);
     Loaded loaded;
-    loaded.config = config::load(text, config::RealFiles(), problems);
+    loaded.config = config::load(text, config::RealFiles(), problems, environment);
     if (!loaded.config) {
         std::cerr << problems.text();
         loaded.code = kBadConfig;
