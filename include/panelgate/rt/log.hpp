@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -9,13 +11,33 @@
 
 namespace panelgate::rt {
 
+class Clock;
+
 using LogFields = std::initializer_list<std::pair<std::string_view, std::string>>;
 
-/// To stderr; a pipe that is full or closed loses lines, never blocks or ends the program.
+/// To stderr, whose reader may be slow, stopped or gone: nobody waits for it. Lines that it does
+/// not take wait (LogOutput); then they are lost and counted.
 void set_up_log(const LogSettings& settings);
 bool log_enabled(LogLevel level);
+/// Lines that nobody will see, because stderr's reader stood still.
+std::uint64_t log_lines_dropped();
+
+/// Hands over what waits, now and then, for as long as it lives.
+class LogDrain {
+  public:
+    explicit LogDrain(Clock& clock);
+    ~LogDrain();
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;
+};
+
 /// One line an event: `2026-11-21T10:00:00.123Z info line up line=floor1 device=/dev/x`. Values
-/// with blanks or quotes are quoted; control characters are escaped.
+/// with blanks or quotes are quoted; control characters are escaped. The first two fields say whom
+/// it is about: from error to info, the same event of the same subject is soon left out
+/// (LogThrottle), and what follows tells how often in the field `left_out`. Of a field `client` the
+/// port does not count.
 void log(LogLevel level, std::string_view event, LogFields fields = {});
 
 }  // namespace panelgate::rt
