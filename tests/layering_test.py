@@ -1,121 +1,192 @@
 #!/usr/bin/env python3
-"""layering_test.py SOURCE_ROOT: the table of src/README.md, held against every #include.
+"""layering_test.py SOURCE_ROOT: the rules of src/README.md that can be held against the text.
 
-First it plants violations in a copy of a small tree and sees that each is found.
+The table "Who may include whom" against every #include, every name of another module and the
+DEPENDS of src/CMakeLists.txt; who reads a clock; how long files and functions are. First it plants
+violations in a small tree and sees that each is found.
 """
 import pathlib
 import re
 import sys
 import tempfile
 
-# module -> (our modules, or single headers, that it may include; third-party prefixes)
-ASIO = ("boost/asio/", "boost/system/")
-RESULT = ("boost/system/result.hpp",)
-COUNTERS = {"arbiter/counters.hpp", "bus/counters.hpp", "line/counters.hpp", "points/counters.hpp",
-            "tcp_server/counters.hpp"}
-SETTINGS = {"arbiter/settings.hpp", "bus/settings.hpp", "line/settings.hpp", "points/settings.hpp", "rt/settings.hpp",
-            "points/point.hpp",
-            "sim/settings.hpp", "tcp_server/settings.hpp", "web/http/settings.hpp"}
-EVERYTHING = {"base", "yaml", "modbus", "profile", "arbiter", "rt", "line", "bus", "tcp_server", "sim", "doctor",
-              "scan", "metrics", "points", "web/http", "web/api", "config", "app"}
-TABLE = {
-    "base": (set(), RESULT),
-    "yaml": ({"base"}, RESULT),
-    "modbus": ({"base"}, ()),
-    "profile": ({"base", "modbus", "yaml"}, RESULT),
-    "arbiter": ({"base", "modbus"}, ()),
-    "rt": ({"base"}, ASIO + ("spdlog/", "fmt/")),
-    "line": ({"base", "rt"}, ASIO),
-    "doctor": ({"base"} | COUNTERS, ()),
-    "bus": ({"base", "rt", "modbus", "arbiter", "line", "doctor"}, ASIO),
-    "points": ({"base", "rt", "modbus", "profile", "bus", "arbiter"}, RESULT),
-    "tcp_server": ({"base", "rt", "modbus", "bus"}, ASIO),
-    "sim": ({"base", "rt", "modbus", "profile", "line"}, ASIO),
-    "scan": ({"base", "modbus", "profile"}, ()),
-    "metrics": ({"base", "modbus"} | COUNTERS, ("prometheus/",)),
-    "web/http": ({"base", "rt"}, ASIO + ("boost/beast/", "boost/json")),
-    "web/api": ({"base", "modbus", "profile", "bus", "points", "web/http"}, ASIO + ("boost/json",)),
-    "config": ({"base", "modbus", "profile", "yaml"} | SETTINGS, RESULT),
-    "app": (EVERYTHING, ASIO + ("CLI/", "boost/json")),
-}
-# Files with a rule of their own: path in the tree -> third-party prefixes instead of the module's.
-FILES = {
-    "include/panelgate/points/poller.hpp": ASIO,
-    "src/points/poller.cpp": ASIO,
-    "include/panelgate/points/relays.hpp": ASIO,
-    "src/points/relays.cpp": ASIO,
-    "src/yaml/document.cpp": ("yaml-cpp/",),
-    "src/rt/asio_impl.cpp": ASIO + ("boost/beast/src.hpp",),
-    "src/sim/station.cpp": (),
-    "include/panelgate/sim/station.hpp": (),
+from function_lengths import cpp_functions, python_functions
+
+# What the third column calls a library -> the headers it means.
+LIBRARIES = {
+    "result": ("boost/system/result.hpp",),
+    "Asio": ("boost/asio/", "boost/system/"),
+    "Beast": ("boost/beast/", "boost/optional"),
+    "Boost.JSON": ("boost/json",),
+    "CLI11": ("CLI/",),
+    "prometheus-cpp": ("prometheus/",),
+    "spdlog": ("spdlog/", "fmt/"),
+    "yaml-cpp": ("yaml-cpp/",),
 }
 THIRD_PARTY = re.compile(r"^(boost|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
-CLOCK = re.compile(r"(?<!\brt)::now\s*\(")
+CLOCK = re.compile(r"::now\s*\(")
 DETACHED = re.compile(r"\bdetached\b")
+STRING = re.compile(r'"(?:\\.|[^"\\])*"')
 MAX_LINES = 400
+MAX_FUNCTION = {"src": 40, "include": 40, "tests": 60}
 
 
-def module_of(path):
-    """A folder, or a wing of one, with a row of its own."""
-    folders = path.split("/")
-    wing = "/".join(folders[:2])
-    return wing if wing in TABLE else folders[0]
+class Row:
+    """A module: what it may include (modules and single headers), and third parties by file."""
+
+    def __init__(self, root, may_include, third_party):
+        self.modules, self.headers = set(), set()
+        for word in re.findall(r"`[^`]+`|[\w/]+", may_include.replace("any ", "")):
+            name = word.strip("`")
+            if word == name:
+                self.modules.add(name)
+            elif "/" in name:
+                self.headers.add(name)
+            else:  # any module's
+                folder = root / "include/panelgate"
+                self.headers |= {p.relative_to(folder).as_posix() for p in folder.rglob(name)}
+        self.third_party = [  # (headers, "only" or "not" or "", stems of files)
+            (LIBRARIES[name], mode, set(re.findall(r"`(\w+)`", stems)))
+            for name, mode, stems in re.findall(r"([\w.-]+)(?: \((only|not) ([^)]*)\))?(?:, |$)", third_party)
+            if name in LIBRARIES]
+
+    def may_include(self, header, target):
+        return "everything" in self.modules or target in self.modules or header in self.headers
+
+    def may_name(self, module):
+        named = self.modules | {header.rsplit("/", 1)[0] for header in self.headers}
+        return "everything" in named or any(name.split("/")[0] == module for name in named)
+
+    def may_use(self, header, stem):
+        return any(header.startswith(headers) and (not mode or (stem in stems) == (mode == "only"))
+                   for headers, mode, stems in self.third_party)
 
 
-def is_allowed(module, header, allowed):
-    target = module_of(header)
-    return target == module or target in allowed or header in allowed
+def read_table(root):
+    section = (root / "src/README.md").read_text().split("## Who may include whom")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| ([\w/]+) \| ([^|]*) \| ([^|]*) \|$", section, re.M)
+    return {module: Row(root, may, third) for module, may, third in rows if module != "module"}
 
 
-def judge_include(module, path, root, mark, header):
-    allowed, third_party = TABLE[module]
-    third_party = FILES.get(path, third_party)
-    if header.startswith("panelgate/"):
-        if not is_allowed(module, header.removeprefix("panelgate/"), allowed):
-            return f"{module} may not include {header}"
-    elif header == "boost/asio.hpp":
-        return "boost/asio.hpp costs two seconds a file: include the parts"
-    elif THIRD_PARTY.match(header):
-        if not header.startswith(tuple(third_party)):
-            return f"{path} may not include <{header}>"
-    elif mark == '"' and not (root / "src" / module / header).exists():
-        return f'"{header}" is not a file of src/{module}'
-    return None
+def read_depends(root):
+    text = (root / "src/CMakeLists.txt").read_text()
+    found = re.findall(r"^panelgate_module\(([\w/]+)(?: DEPENDS ([\w/\s]*?))?(?: LIBRARIES [^)]*)?\)", text, re.M)
+    return {module: set(depends.split()) for module, depends in found}
 
 
-def judge_line(module, path, root, line):
-    found = INCLUDE.match(line)
-    if found:
-        return judge_include(module, path, root, *found.groups())
-    code = line.split("//")[0]
-    if module != "rt" and CLOCK.search(code):
-        return "only rt reads a clock: take the time as an argument or call rt::now()"
-    if module != "rt" and DETACHED.search(code):
-        return "nothing is detached: somebody owns every coroutine"
-    return None
+class Tree:
+    def __init__(self, root):
+        self.root = root
+        self.table = read_table(root)
+        self.used = {module: set() for module in self.table}  # by includes
+        folders = {module.split("/")[0] for module in self.table} - {"base"}
+        self.name = re.compile(rf"(?<![\w:])(?:panelgate::)?({'|'.join(sorted(folders))})::\w")
+
+    def module_of(self, path):
+        """A folder, or a wing of one, that has a row of its own."""
+        folders = path.split("/")
+        wing = "/".join(folders[:2])
+        return wing if wing in self.table else folders[0]
+
+    def judge_include(self, module, path, mark, header):
+        row = self.table[module]
+        if header.startswith("panelgate/"):
+            header = header.removeprefix("panelgate/")
+            target = self.module_of(header)
+            if target != module:
+                self.used[module].add(target)
+                if not row.may_include(header, target):
+                    return f"{module} may not include {header}"
+        elif header == "boost/asio.hpp":
+            return "boost/asio.hpp costs two seconds a file: include the parts"
+        elif THIRD_PARTY.match(header):
+            if not row.may_use(header, pathlib.Path(path).stem):
+                return f"{path} may not include <{header}>"
+        elif mark == '"' and not (self.root / "src" / module / header).exists():
+            return f'"{header}" is not a file of src/{module}'
+        return None
+
+    def judge_line(self, module, path, line):
+        if found := INCLUDE.match(line):
+            return self.judge_include(module, path, *found.groups())
+        code = STRING.sub('""', line).split("//")[0]
+        if module != "rt" and CLOCK.search(code):
+            return "only rt reads a clock: take the time as an argument, or an rt::Clock"
+        if module != "rt" and DETACHED.search(code):
+            return "nothing is detached: somebody owns every coroutine"
+        for name in self.name.findall(code):
+            if name != module.split("/")[0] and not self.table[module].may_name(name):
+                return f"{module} may not name {name}::"
+        return None
+
+    def judge_file(self, file):
+        path = file.relative_to(self.root).as_posix()
+        text = file.read_text()
+        module = self.module_of(path.removeprefix("src/").removeprefix("include/panelgate/"))
+        if module not in self.table:
+            yield 1, f"module '{module}' is not in the table"
+            return
+        for number, line in enumerate(text.splitlines(), 1):
+            if problem := self.judge_line(module, path, line):
+                yield number, problem
+
+    def judge_depends(self):
+        """DEPENDS is what a module's files include, no more and no less."""
+        for module, depends in read_depends(self.root).items():
+            used = self.used.get(module, set())
+            for name in sorted(depends ^ used):
+                wrong = "is in DEPENDS, but nothing includes it" if name in depends else "is missing in DEPENDS"
+                yield f"src/CMakeLists.txt:1: {module}: {name} {wrong}"
+
+
+def judge_lengths(file, top):
+    text = file.read_text()
+    lines = text.count("\n")
+    if lines > MAX_LINES:
+        yield lines, f"{lines} lines, {MAX_LINES} at most"
+    functions = python_functions(text) if file.suffix == ".py" else cpp_functions(text)
+    for first, length, name in functions:
+        if length > MAX_FUNCTION[top]:
+            yield first, f"{name} has {length} lines, {MAX_FUNCTION[top]} at most"
 
 
 def check(root):
-    """FILE:LINE: what is wrong, for all of src/ and include/."""
-    problems = []
-    files = [p for top in ("src", "include/panelgate") for p in sorted((root / top).rglob("*.[ch]pp"))]
-    for file in files:
-        path = file.relative_to(root).as_posix()
-        module = module_of(path.removeprefix("src/").removeprefix("include/panelgate/"))
-        lines = file.read_text().splitlines()
-        if module not in TABLE:
-            problems.append(f"{path}:1: module '{module}' is not in the table")
-            continue
-        if len(lines) > MAX_LINES:
-            problems.append(f"{path}:{len(lines)}: {len(lines)} lines, {MAX_LINES} at most")
-        for number, line in enumerate(lines, 1):
-            problem = judge_line(module, path, root, line)
-            if problem:
-                problems.append(f"{path}:{number}: {problem}")
-    return len(files), problems
+    """FILE:LINE: what is wrong, for src/, include/ and the lengths in tests/."""
+    tree = Tree(root)
+    problems, count = [], 0
+    for top in MAX_FUNCTION:
+        for file in sorted((root / top).rglob("*")):
+            if file.suffix not in (".cpp", ".hpp", ".py"):
+                continue
+            count += 1
+            path = file.relative_to(root).as_posix()
+            found = list(judge_lengths(file, top)) + (list(tree.judge_file(file)) if top != "tests" else [])
+            problems += [f"{path}:{number}: {problem}" for number, problem in found]
+    return count, problems + list(tree.judge_depends())
 
 
+TABLE = """## Who may include whom
+| module | may include | third party |
+|---|---|---|
+| base | — | result |
+| yaml | base | yaml-cpp (only `document`) |
+| modbus | base | — |
+| arbiter | base, modbus | — |
+| rt | base | Asio, spdlog |
+| line | base, rt | Asio, termios |
+| bus | base, rt, arbiter, line | Asio |
+| tcp_server | base, bus | Asio |
+| sim | base | Asio (not `station`) |
+| metrics | any `counters.hpp` | — |
+| web/http | base, rt | Asio, Beast |
+| web/api | base, web/http | — |
+| config | any `settings.hpp`, `bus/point.hpp` | — |
+| app | everything | CLI11 |
+
+## Next
+"""
+LONG = "int f() {\n" + "    ++i;\n" * 39 + "}"
 PLANTED = {
     "src/modbus/a.cpp": '#include "panelgate/bus/bus.hpp"',
     "src/metrics/b.cpp": '#include "panelgate/bus/bus.hpp"',
@@ -128,26 +199,49 @@ PLANTED = {
     "src/line/g.cpp": '#include "../bus/bus.hpp"',
     "include/panelgate/base/h.hpp": "\n" * MAX_LINES + "int x;",
     "src/newcomer/i.cpp": "int x;",
-    "src/web/http/j.cpp": '#include "panelgate/bus/bus_client.hpp"',
-    "src/web/http/k.cpp": '#include "panelgate/web/api/directory.hpp"',
-    "src/web/l.cpp": "int x;",
+    "src/web/http/j.cpp": '#include "panelgate/web/api/api.hpp"',
+    "src/web/http/k.cpp": '#include "panelgate/bus/bus.hpp"',
+    "src/tcp_server/l.cpp": "void f(arbiter::Host host);",
+    "src/base/m.cpp": "namespace panelgate {\n" + LONG + "\n}",
+    "include/panelgate/base/n.hpp": "class A {\n  public:\n    explicit A(int x) : x_{x}, y_(x) {\n"
+                                    + "        ++x_;\n" * 40 + "    }\n};",
+    "tests/unit/o_test.cpp": "TEST(Thing, IsLong) {\n" + "    ++i;  // }\n" * 60 + "}",
+    "tests/unit/p_test.cpp": "\n" * MAX_LINES + "int x;",
+    "tests/q.py": "def f():\n" + "    pass\n" * 60,
 }
 HARMLESS = {
-    "src/bus/fine.cpp": '#include "panelgate/rt/asio_clock.hpp"\nauto t = rt::now();  // not ::now()',
-    "src/config/fine.cpp": '#include "panelgate/web/http/settings.hpp"\n#include <vector>',
+    "src/README.md": TABLE,
+    "src/CMakeLists.txt": "panelgate_module(base)\npanelgate_module(bus DEPENDS rt LIBRARIES Boost::headers)\n"
+                          "panelgate_module(config DEPENDS web/http bus)",
+    "include/panelgate/web/http/settings.hpp": "",
+    "src/bus/fine.cpp": '#include "panelgate/rt/clock.hpp"\nauto t = clock.now();  // not ::now(), web::now\narbiter::Job j;',
+    "src/config/fine.cpp": '#include "panelgate/web/http/settings.hpp"\n#include "panelgate/bus/point.hpp"\n'
+                           "#include <vector>\nweb::Settings s; std::string_view t = \"sim::x\";",
     "src/rt/fine.cpp": "auto t = std::chrono::steady_clock::now();",
     "src/yaml/document.cpp": "#include <yaml-cpp/yaml.h>",
+    "src/base/fine.cpp": "struct T {\n" + "    int x = '{';\n" * 60 + "};\n" + LONG.replace("    ++i;\n", "", 1)
+                         + "constexpr int k[] = {\n" + "    f(1),\n" * 60 + "};",
 }
+
+
+def found_in(files):
+    """Which files of a tree like this have a problem."""
+    with tempfile.TemporaryDirectory() as name:
+        root = pathlib.Path(name)
+        for path, text in files.items():
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text + "\n")
+        return sorted(problem.split(":")[0] for problem in check(root)[1])
 
 
 def self_test():
-    with tempfile.TemporaryDirectory() as name:
-        root = pathlib.Path(name)
-        for path, text in {**PLANTED, **HARMLESS}.items():
-            (root / path).parent.mkdir(parents=True, exist_ok=True)
-            (root / path).write_text(text + "\n")
-        found = sorted(problem.split(":")[0] for problem in check(root)[1])
-        assert found == sorted(PLANTED), f"planted {sorted(PLANTED)}, found {found}"
+    found = found_in({**PLANTED, **HARMLESS})
+    assert found == sorted(PLANTED), f"planted {sorted(PLANTED)}, found {found}"
+    fine = HARMLESS["src/CMakeLists.txt"]
+    for wrong in (fine.replace("DEPENDS rt", "DEPENDS rt line"), fine.replace(" bus)", ")")):
+        assert found_in({**HARMLESS, "src/CMakeLists.txt": wrong}) == ["src/CMakeLists.txt"], wrong
+    no_row = HARMLESS["src/README.md"].replace("| rt |", "| clocks |")
+    assert "src/rt/fine.cpp" in found_in({**HARMLESS, "src/README.md": no_row}), "a module without a row"
 
 
 def main():

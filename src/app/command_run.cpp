@@ -24,6 +24,8 @@ namespace {
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
+    for (const std::string& warning : config.warnings)
+        rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
@@ -32,7 +34,7 @@ ExitCode serve(config::Config config, bool simulate,
     try {
         gateway.start();
     } catch (const std::system_error& error) {
-        std::cerr << "panelgate: " << error.what() << '\n';
+        rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
     started(gateway);

@@ -1,147 +1,20 @@
-#include <sys/ioctl.h>
-#include <unistd.h>
-
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/signal_set.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <csignal>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "commands.hpp"
 #include "panelgate/config/profiles_dir.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/line/tcp_line.hpp"
-#include "panelgate/line/tty_line.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/scan/options.hpp"
 #include "panelgate/scan/report.hpp"
-#include "panelgate/scan/scanner.hpp"
+#include "scan_run.hpp"
 
 namespace panelgate::app {
 namespace {
-
-namespace asio = boost::asio;
-using boost::system::error_code;
-
-/// One line on stderr that is drawn again and again, when stderr is a terminal; else nothing.
-class ProgressLine {
-  public:
-    bool is_shown() const { return shown_; }
-    void draw(const scan::Progress& progress) const {
-        std::cerr << '\r' << scan::format_progress(progress, width() - 1) << kClear << std::flush;
-    }
-    void clear() const {
-        if (shown_) std::cerr << '\r' << kClear << std::flush;
-    }
-
-  private:
-    static constexpr const char* kClear = "\x1b[K";  // to the end of the line
-    static std::size_t width() {
-        constexpr std::size_t kUsual = 80;
-        winsize size{};
-        const bool known = ::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
-        return known ? size.ws_col : kUsual;
-    }
-    bool shown_ = ::isatty(STDERR_FILENO) == 1;
-};
-
-/// Drives a Scanner over a line until it is done, the line fails or a signal comes.
-class ScanRun final : public line::Line::Events {
-  public:
-    /// `settings` and `profiles` outlive it.
-    ScanRun(asio::io_context& io, const scan::Settings& settings,
-            const profile::Catalogue& profiles, const line::Settings& device)
-        : io_(io),
-          settings_(settings),
-          profiles_(profiles),
-          line_(settings.remote ? line::make_tcp_line(io.get_executor(), device)
-                                : line::make_tty_line(io.get_executor(), device)),
-          alarm_(io),
-          redraw_(io),
-          signals_(io, SIGINT, SIGTERM) {}
-
-    void run() {
-        signals_.async_wait([this](error_code error, int) {
-            if (!error) end("interrupted");
-        });
-        line_->start(*this);
-        io_.run();
-        line_->stop();
-        progress_.clear();
-    }
-    /// Why it ended early; empty when it did not.
-    const std::string& cut_short() const { return cut_short_; }
-    /// The line never came up.
-    bool has_begun() const { return scanner_ != nullptr; }
-    scan::Result result() const { return scanner_->result(); }
-
-    void on_up() override {
-        scanner_ = std::make_unique<scan::Scanner>(profiles_, settings_, rt::now());
-        if (progress_.is_shown()) redraw();
-        pump();
-    }
-    void on_down(const std::string& why) override { end(why); }
-    void on_bytes(ByteView bytes) override {
-        if (!scanner_) return;
-        scanner_->on_rx(rt::now(), bytes);
-        pump();
-    }
-
-  private:
-    void end(const std::string& why) {
-        cut_short_ = why;
-        io_.stop();
-    }
-    void act(const scan::SetFormat& set) { line_->set_format(set.format); }
-    void act(const scan::Transmit& transmit) { line_->write(transmit.request.adu()); }
-    void pump() {
-        if (pumping_) return;
-        pumping_ = true;
-        while (const auto action = scanner_->poll_action())
-            std::visit([this](const auto& a) { act(a); }, *action);
-        pumping_ = false;
-        if (scanner_->done()) return io_.stop();
-        arm();
-    }
-    void arm() {
-        const auto next = scanner_->next_deadline();
-        if (!next) return;
-        alarm_.expires_at(*next);
-        alarm_.async_wait([this](error_code error) {
-            if (error) return;
-            line_->poll_input();  // what has arrived by now came before whatever is due now
-            scanner_->set_latency(line_->latency());
-            scanner_->on_deadline(rt::now());
-            pump();
-        });
-    }
-    void redraw() {
-        constexpr Duration kPause = 200ms;
-        progress_.draw(scanner_->progress(rt::now()));
-        redraw_.expires_after(kPause);
-        redraw_.async_wait([this](error_code error) {
-            if (!error) redraw();
-        });
-    }
-
-    asio::io_context& io_;
-    const scan::Settings& settings_;
-    const profile::Catalogue& profiles_;
-    std::unique_ptr<line::Line> line_;
-    std::unique_ptr<scan::Scanner> scanner_;  ///< since the line is up
-    ProgressLine progress_;
-    asio::steady_timer alarm_;
-    asio::steady_timer redraw_;
-    asio::signal_set signals_;
-    std::string cut_short_;
-    bool pumping_ = false;
-};
 
 /// Settings of the command line; nothing (and told) when something is wrong with it.
 std::optional<scan::Settings> parse_options(const ScanOptions& options) {
@@ -205,7 +78,7 @@ ExitCode scan(const ScanOptions& options) {
     rt::set_up_log(quiet);
     line::Settings device;
     device.device = options.device;
-    asio::io_context io(1);
+    boost::asio::io_context io(1);
     ScanRun run(io, *settings, profiles, device);
     run.run();
     if (!run.has_begun()) {

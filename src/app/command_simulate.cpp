@@ -1,13 +1,16 @@
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/io_context.hpp>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
 #include "load.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "pty_link.hpp"
 #include "run_loop.hpp"
@@ -46,47 +49,63 @@ bool parse_links(const std::vector<std::string>& texts, const config::Config& co
     return true;
 }
 
+/// The panels of all lines, and the ways to them.
+class Panels {
+  public:
+    explicit Panels(boost::asio::any_io_executor executor)
+        : executor_(std::move(executor)), clock_(executor_) {}
+
+    /// `link`: where the line's pty is reached, or empty. Throws std::system_error.
+    void add(const config::Line& line, const std::string& link) {
+        buses_.push_back(simulate_line(executor_, clock_, line));
+        buses_.back()->start();
+        const std::string device = buses_.back()->device();
+        if (link.empty()) return;
+        if (!link.starts_with(kTcp)) {
+            links_.push_back(std::make_unique<PtyLink>(link, device));
+            return;
+        }
+        const auto endpoint = config::parse_endpoint(link.substr(kTcp.size()));
+        bridges_.push_back(std::make_unique<TcpBridge>(executor_, *endpoint, device));
+        const std::string port = std::to_string(bridges_.back()->port());
+        rt::log(rt::LogLevel::info, "listening",
+                {{"line", line.name}, {"rtu_over_tcp", endpoint->address + ':' + port}});
+    }
+    void stop() {
+        bridges_.clear();
+        for (const auto& bus : buses_) bus->stop();
+    }
+
+  private:
+    boost::asio::any_io_executor executor_;
+    rt::AsioClock clock_;
+    std::vector<std::unique_ptr<sim::SimulatedBus>> buses_;
+    std::vector<std::unique_ptr<PtyLink>> links_;
+    std::vector<std::unique_ptr<TcpBridge>> bridges_;
+};
+
 }  // namespace
 
 ExitCode simulate(const std::string& file, const std::vector<std::string>& texts) {
     const Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
+    print_warnings(*loaded.config);
     std::map<std::string, std::string> links;
     if (!parse_links(texts, *loaded.config, links)) return kUsage;
 
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
+    rt::AsioClock clock(io.get_executor());
+    const rt::LogDrain drain(clock);
     SignalLoop loop(io);
-    std::vector<std::unique_ptr<sim::SimulatedBus>> buses;
-    std::vector<std::unique_ptr<PtyLink>> made;
-    std::vector<std::unique_ptr<TcpBridge>> bridges;
+    Panels panels(io.get_executor());
     try {
-        for (const config::Line& line : loaded.config->lines) {
-            buses.push_back(simulate_line(io.get_executor(), line));
-            buses.back()->start();
-            const auto link = links.find(line.name);
-            if (link == links.end()) continue;
-            if (!link->second.starts_with(kTcp)) {
-                made.push_back(std::make_unique<PtyLink>(link->second, buses.back()->device()));
-                continue;
-            }
-            const auto endpoint = config::parse_endpoint(link->second.substr(kTcp.size()));
-            bridges.push_back(
-                std::make_unique<TcpBridge>(io.get_executor(), *endpoint, buses.back()->device()));
-            rt::log(rt::LogLevel::info, "listening",
-                    {{"line", line.name},
-                     {"rtu_over_tcp",
-                      endpoint->address + ':' + std::to_string(bridges.back()->port())}});
-        }
+        for (const config::Line& line : loaded.config->lines) panels.add(line, links[line.name]);
     } catch (const std::system_error& error) {
         std::cerr << "panelgate: " << error.what() << '\n';
         return kUnavailable;
     }
-    loop.run({[] {}, [] { return true; },
-              [&] {
-                  bridges.clear();
-                  for (const auto& bus : buses) bus->stop();
-              }});
+    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }});
     return kFine;
 }
 

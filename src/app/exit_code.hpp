@@ -2,7 +2,7 @@
 
 namespace panelgate::app {
 
-/// Exit codes of contract 2, after sysexits(3).
+/// Exit codes (README, Configuration), after sysexits(3).
 enum ExitCode : int {
     kFine = 0,
     kUsage = 64,

@@ -1,7 +1,5 @@
 #include "gateway.hpp"
 
-#include <cstdlib>
-#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -9,87 +7,15 @@
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/metrics/process.hpp"
-#include "panelgate/profile/judge.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "showing.hpp"
 #include "simulated_line.hpp"
+#include "wiring.hpp"
 
 namespace panelgate::app {
 
-namespace {
-
-/// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
-bus::Guard guard_of(const profile::PanelProfile& profile) {
-    return [&profile](ByteView pdu) -> std::optional<std::uint8_t> {
-        switch (profile::judge(profile, pdu)) {
-            case profile::Judgement::fine:
-                return std::nullopt;
-            case profile::Judgement::illegal_function:
-                return std::uint8_t{1};
-            case profile::Judgement::illegal_address:
-            case profile::Judgement::write_protected:
-                return std::uint8_t{2};
-            case profile::Judgement::illegal_value:
-                return std::uint8_t{3};
-        }
-        std::abort();
-    };
-}
-
-Duration frame_gap(const config::Line& line, std::uint8_t station) {
-    std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
-    for (const arbiter::StationSettings& settings : line.arbiter.stations) {
-        if (settings.id == station) gap = settings.frame_gap;
-    }
-    return gap.value_or(silent_interval(line.device.serial));
-}
-
-bus::Settings bus_settings(const config::Line& line) {
-    bus::Settings settings;
-    settings.name = line.name;
-    settings.device = line.device.device;
-    settings.arbiter = line.arbiter;
-    for (const config::Station& station : line.stations) {
-        settings.stations[station.id] = station.name;
-        if (station.guard) settings.guards[station.id] = guard_of(*station.profile);
-    }
-    return settings;
-}
-
-std::vector<points::PolledStation> polled_stations(const config::Line& line) {
-    std::vector<points::PolledStation> polled;
-    for (const config::Station& station : line.stations) {
-        if (station.points.empty() && station.polls.empty()) continue;
-        points::PolledStation& entry = polled.emplace_back();
-        entry.id = station.id;
-        entry.wants = points::wants_of(station.points, station.polls);
-        entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
-                                                frame_gap(line, station.id));
-    }
-    return polled;
-}
-
-/// A relay whose ends the plant has: the configuration was checked.
-points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
-    const Station& from = *plant.find(relay.from.station);
-    const Station& to = *plant.find(relay.to.station);
-    const auto multiple = modbus::is_bit_table(relay.to.table) ? modbus::kWriteMultipleCoils
-                                                               : modbus::kWriteMultipleRegisters;
-    points::RelayRoute route;
-    route.relay = relay;
-    route.from = from.bus;
-    route.from_station = from.id;
-    route.to = to.bus;
-    route.to_station = to.id;
-    route.to_has_multiple = to.configured->profile->has_function(multiple);
-    return route;
-}
-
-}  // namespace
-
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
-    : executor_(std::move(executor)), config_(std::move(config)) {
+    : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
@@ -104,7 +30,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     line::Settings device = line.device;
     sim::SimulatedBus* simulated = nullptr;
     if (simulate || line.kind == config::Line::Kind::simulated) {
-        simulated_.push_back(simulate_line(executor_, line));
+        simulated_.push_back(simulate_line(executor_, clock_, line));
         simulated = simulated_.back().get();
         device.device = simulated->device();
         device.rs485 = {};
@@ -112,9 +38,10 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     }
     const bool remote = line.kind == config::Line::Kind::tcp && simulated == nullptr;
     settings.arbiter.may_stall = remote;
-    auto wire = remote ? line::make_tcp_line(executor_, std::move(device))
-                       : line::make_tty_line(executor_, std::move(device));
-    buses_.push_back(std::make_unique<bus::Bus>(executor_, std::move(settings), std::move(wire)));
+    auto wire = remote ? line::make_tcp_line(executor_, clock_, std::move(device))
+                       : line::make_tty_line(executor_, clock_, std::move(device));
+    buses_.push_back(
+        std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
     plant_.add(line, *buses_.back(), simulated);
     add_poller(line, *buses_.back());
 }
@@ -123,7 +50,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
 void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
     auto polled = polled_stations(line);
     if (polled.empty()) return;
-    pollers_.push_back(std::make_unique<points::Poller>(executor_, bus, std::move(polled)));
+    pollers_.push_back(std::make_unique<points::Poller>(clock_, bus, std::move(polled)));
     points::Poller& poller = *pollers_.back();
     for (const config::Station& station : line.stations) {
         const points::StationPolls* polls = poller.find(station.id);
@@ -131,28 +58,26 @@ void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
         plant_.at(line.name, station.id).points.emplace(station.points, station.polls, *polls);
     }
     poller.on_update([this, name = line.name](std::uint8_t id, const auto& wants) {
-        publish_points(events_, plant_.at(name, id), wants, rt::now());
+        publish_points(events_, plant_.at(name, id), wants, clock_.now());
     });
 }
 
 void Gateway::add_relays() {
     std::vector<points::RelayRoute> routes;
     for (const points::Relay& relay : config_.relays) routes.push_back(route_of(plant_, relay));
-    relays_ = std::make_unique<points::Relays>(executor_, std::move(routes));
+    relays_ = std::make_unique<points::Relays>(clock_, std::move(routes));
     relays_->on_state([](const points::RelayStatus& relay) {
-        const auto level = relay.state == "ok" ? rt::LogLevel::info : rt::LogLevel::warn;
-        rt::log(level, "relay", {{"relay", relay.name}, {"state", relay.state}});
+        const bool ok = relay.state == points::RelayState::ok;
+        rt::log(ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
+                {{"relay", relay.name}, {"state", text_of(relay)}});
     });
 }
 
 void Gateway::add_listener(const tcp_server::Settings& settings) {
     tcp_server::UnitMap units(settings, plant_.listener_lines());
     plant_.add_units(units);
-    tcp_server::Hooks hooks;
-    hooks.log = [](std::string_view text) { rt::log(rt::LogLevel::info, text); };
-    hooks.version = PANELGATE_VERSION;
-    listeners_.push_back(
-        std::make_unique<tcp_server::Listener>(executor_, settings, std::move(units), hooks));
+    listeners_.push_back(std::make_unique<tcp_server::Listener>(
+        executor_, clock_, settings, std::move(units), PANELGATE_VERSION));
 }
 
 void Gateway::add_http(const web::Settings& settings) {
@@ -161,7 +86,7 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.metrics_type = metrics::kContentType;
     providers.ready = [this] { return ready_; };
     providers.version = PANELGATE_VERSION;
-    providers.now = rt::now;
+    providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };
     directory_ = directory_of(plant_, *config_.profiles->find("generic"));
@@ -216,10 +141,11 @@ std::string Gateway::metrics_text() const {
     metrics::Snapshot snapshot;
     for (const auto& bus : buses_) snapshot.lines.push_back(bus->report());
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
-    snapshot.points = point_samples(plant_, rt::now());
+    snapshot.points = point_samples(plant_, clock_.now());
     snapshot.relays = relay_samples(relays_->status());
     snapshot.version = PANELGATE_VERSION;
     snapshot.process = metrics::read_process_facts();
+    snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     return metrics::exposition(snapshot);
 }
 

@@ -11,11 +11,12 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
-#include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/api/server.hpp"
+#include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
 
 namespace panelgate::app {
@@ -50,6 +51,7 @@ class Gateway {
     std::string metrics_text() const;
 
     boost::asio::any_io_executor executor_;
+    rt::AsioClock clock_;
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
     Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it

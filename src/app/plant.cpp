@@ -70,7 +70,6 @@ std::vector<tcp_server::LineInfo> Plant::listener_lines() const {
         info.pass_unlisted = !line.configured->refuse_unlisted;
         for (const config::Station& station : line.configured->stations) {
             info.stations.push_back(station.id);
-            if (station.read_only) info.read_only.push_back(station.id);
         }
     }
     return infos;

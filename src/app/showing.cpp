@@ -1,9 +1,9 @@
 #include "showing.hpp"
 
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
 #include <utility>
+#include <variant>
 
 #include "panelgate/points/value.hpp"
 #include "panelgate/sim/misbehaviour.hpp"
@@ -38,6 +38,26 @@ web::StationEntry entry_of(const Station& station) {
     return entry;
 }
 
+/// Puts what a bus tells into the words of /api/v1/events.
+struct Publisher {
+    web::EventHub& hub;
+    const Plant& plant;
+    const std::string& line;
+
+    void operator()(const bus::LineEvent& event) const {
+        hub.publish("line", web::line_event(line, event.up ? "up" : "down", event.why));
+    }
+    void operator()(const arbiter::StationEvent& event) const {
+        const std::string station = plant.name_of(line, event.station);
+        hub.publish("station", web::station_event(line, station, label(event.kind)));
+    }
+    void operator()(const bus::TransactionEvent& event) const {
+        const std::string station = plant.name_of(line, event.station);
+        hub.publish("transaction", web::transaction_event(line, station, event.function,
+                                                          label(event.outcome), event.took));
+    }
+};
+
 }  // namespace
 
 web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic) {
@@ -70,26 +90,15 @@ std::vector<points::PointSample> point_samples(const Plant& plant, TimePoint now
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays) {
     std::vector<points::RelaySample> samples;
     for (const points::RelayStatus& relay : relays) {
-        samples.push_back({relay.name, relay.state == "ok", relay.reads, relay.writes,
-                           relay.read_failures, relay.write_failures});
+        samples.push_back({relay.name, relay.state == points::RelayState::ok, relay.reads,
+                           relay.writes, relay.read_failures, relay.write_failures});
     }
     return samples;
 }
 
 void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
              const bus::BusEvent& event) {
-    if (hub.is_idle()) return;
-    const std::string station = plant.name_of(line, event.station);
-    switch (event.kind) {
-        case bus::BusEvent::Kind::line:
-            return hub.publish("line", web::line_event(line, event.what, event.why));
-        case bus::BusEvent::Kind::station:
-            return hub.publish("station", web::station_event(line, station, event.what));
-        case bus::BusEvent::Kind::transaction:
-            return hub.publish("transaction", web::transaction_event(line, station, event.function,
-                                                                     event.what, event.took));
-    }
-    std::abort();
+    if (!hub.is_idle()) std::visit(Publisher{hub, plant, line}, event);
 }
 
 void publish_points(web::EventHub& hub, const Station& station,

@@ -9,7 +9,7 @@
 namespace panelgate::app {
 
 std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
-                                                 const config::Line& line) {
+                                                 rt::Clock& clock, const config::Line& line) {
     std::vector<sim::Station> stations;
     for (const config::Station& station : line.stations)
         stations.emplace_back(*station.profile, station.id);
@@ -18,8 +18,8 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
     settings.echo = line.simulated_echo;
     for (const config::Station& station : line.stations)
         settings.faults[station.id] = station.faults;
-    auto bus =
-        std::make_unique<sim::SimulatedBus>(std::move(executor), settings, std::move(stations));
+    auto bus = std::make_unique<sim::SimulatedBus>(std::move(executor), clock, settings,
+                                                   std::move(stations));
     rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});
     return bus;
 }

@@ -10,6 +10,6 @@ namespace panelgate::app {
 
 /// A simulated bus with the configured stations of a line.
 std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
-                                                 const config::Line& line);
+                                                 rt::Clock& clock, const config::Line& line);
 
 }  // namespace panelgate::app

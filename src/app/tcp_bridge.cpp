@@ -7,8 +7,11 @@
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/write.hpp>
 #include <cerrno>
+#include <string>
 #include <system_error>
 #include <utility>
+
+#include "panelgate/rt/log.hpp"
 
 namespace panelgate::app {
 
@@ -19,14 +22,13 @@ using boost::system::error_code;
 struct TcpBridge::State : std::enable_shared_from_this<TcpBridge::State> {
     using Buffer = std::array<std::uint8_t, 1024>;
 
-    explicit State(const asio::any_io_executor& executor)
-        : acceptor(executor), client(executor), device(executor) {}
+    explicit State(const asio::any_io_executor& executor) : client(executor), device(executor) {}
 
-    void accept();
+    /// Takes the place of the one before.
+    void serve(tcp::socket socket);
     void from_client(std::uint64_t connection);
     void from_device();
 
-    tcp::acceptor acceptor;
     tcp::socket client;
     asio::posix::stream_descriptor device;
     std::uint64_t connections = 0;  ///< a completion of an earlier one is stale
@@ -34,14 +36,11 @@ struct TcpBridge::State : std::enable_shared_from_this<TcpBridge::State> {
     Buffer down{};
 };
 
-void TcpBridge::State::accept() {
-    acceptor.async_accept([self = shared_from_this()](error_code error, tcp::socket socket) {
-        if (error) return;
-        self->client = std::move(socket);
-        self->client.set_option(tcp::no_delay(true), error);
-        self->from_client(++self->connections);
-        self->accept();
-    });
+void TcpBridge::State::serve(tcp::socket socket) {
+    client = std::move(socket);
+    error_code ignored;
+    client.set_option(tcp::no_delay(true), ignored);
+    from_client(++connections);
 }
 
 void TcpBridge::State::from_client(std::uint64_t connection) {
@@ -72,29 +71,28 @@ void TcpBridge::State::from_device() {
 
 TcpBridge::TcpBridge(const asio::any_io_executor& executor, const config::Endpoint& endpoint,
                      const std::string& device)
-    : state_(std::make_shared<State>(executor)) {
+    : state_(std::make_shared<State>(executor)),
+      acceptor_(
+          executor, [state = state_.get()](tcp::socket socket) { state->serve(std::move(socket)); },
+          [](const error_code& why) {
+              rt::log(rt::LogLevel::warn, "cannot accept", {{"reason", why.message()}});
+          }) {
     const int fd = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) throw std::system_error(errno, std::generic_category(), device);
     state_->device.assign(fd);
-    const std::string name = endpoint.address + ':' + std::to_string(endpoint.port);
-    const tcp::endpoint where(asio::ip::make_address(endpoint.address), endpoint.port);
-    error_code error;
-    state_->acceptor.open(where.protocol(), error);
-    if (!error) state_->acceptor.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) state_->acceptor.bind(where, error);
-    if (!error) state_->acceptor.listen(1, error);
-    if (error) throw std::system_error(error, "cannot listen on " + name);
-    state_->accept();
+    if (const error_code error = acceptor_.open(endpoint.address, endpoint.port)) {
+        throw std::system_error(
+            error, "cannot listen on " + endpoint.address + ':' + std::to_string(endpoint.port));
+    }
     state_->from_device();
 }
 
 TcpBridge::~TcpBridge() {
     error_code ignored;
-    state_->acceptor.close(ignored);
     state_->client.close(ignored);
     state_->device.close(ignored);
 }
 
-std::uint16_t TcpBridge::port() const { return state_->acceptor.local_endpoint().port(); }
+std::uint16_t TcpBridge::port() const { return acceptor_.port(); }
 
 }  // namespace panelgate::app

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/acceptor.hpp"
 
 namespace panelgate::app {
 
@@ -25,6 +26,7 @@ class TcpBridge {
   private:
     struct State;
     std::shared_ptr<State> state_;
+    rt::Acceptor acceptor_;
 };
 
 }  // namespace panelgate::app

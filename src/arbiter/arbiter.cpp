@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "explain.hpp"
-#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
@@ -90,7 +89,7 @@ void Arbiter::on_line_down(TimePoint now) {
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
         if (!attempt.is_broadcast())
-            stations_.of(group.station).owe(now, group.pdu, attempt.timing().sent);
+            stations_.of(group.station).owe(now, group.request.pdu(), attempt.timing().sent);
         for (const Job& job : group.jobs) ledger_.finish(job, Fault::line_lost);
     }
     for (const Job& job : schedule_.backlog().clear())
@@ -188,7 +187,7 @@ bool Arbiter::start_next(TimePoint now) {
 }
 
 void Arbiter::start(TimePoint now, Group group) {
-    Bytes adu = modbus::encode_adu(group.station, group.pdu);
+    Bytes adu = modbus::encode_adu(group.station, group.request.pdu());
     if (++group.attempts == 1) group.started = now;
     for (Job& job : group.jobs) {
         if (job.attempts++ == 0) ledger_.on_started(now, job);
@@ -205,13 +204,12 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }
-    if (!modbus::is_pure_read(group.pdu))
-        reception_.memory().on_write(now, group.station, group.pdu);
+    if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
     std::string why;
     if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue());
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
-    const EchoFilter echo(adu, echo_memory_.expect(group.pdu));
+    const EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, echo);
     ledger_.transmit(now, *active_, std::move(adu), why);
 }

@@ -31,7 +31,7 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
     : group_(std::move(group)),
       timing_(timing),
       echo_(std::move(echo)),
-      framer_(group_.station, group_.pdu),
+      framer_(group_.station, group_.request.pdu()),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
@@ -49,7 +49,7 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     const ByteView rest = echo_.feed(bytes);
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
-        lender_.emplace(group_.station, group_.pdu);
+        lender_.emplace(group_.station, group_.request.pdu());
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
@@ -120,7 +120,7 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
         // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
-        const bool other = !exception && part.bytes[1] != group_.pdu[0];
+        const bool other = !exception && part.bytes[1] != group_.request.function();
         (other ? disturbed_ : wrong_) = true;
         strange_ = strange_ || other;
     }
@@ -199,7 +199,7 @@ void Attempt::on_end(TimePoint now, Duration left) {
 /// Nothing, when what stands in front of the reply may have been an echo that was damaged.
 void Attempt::teach(EchoMemory& memory) const {
     const bool clean = !echo_.mismatch() && noise_in_front_ * 2 < echo_.frame().size();
-    if (!echoed() && (fragment_ || clean)) memory.on_reply_without_echo(group_.pdu, fragment_);
+    if (!echoed() && (fragment_ || clean)) memory.on_reply_without_echo(group_.request, fragment_);
 }
 
 Duration Attempt::waited(TimePoint now) const {

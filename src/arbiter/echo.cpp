@@ -4,15 +4,14 @@
 #include <cstdlib>
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
-#include "rules.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 
-bool teaches_echo(ByteView request) {
-    if (!modbus::is_pure_read(request)) return false;
-    const auto reply = modbus::reply_length_from_request(request);
-    return reply && *reply != request.size() + modbus::kAduOverhead;
+bool teaches_echo(const modbus::Request& request) {
+    if (!request.is_read()) return false;
+    const auto reply = request.reply_length();
+    return reply && *reply != request.pdu().size() + modbus::kAduOverhead;
 }
 
 bool holds_fragment(ByteView heard, ByteView frame) {
@@ -52,52 +51,53 @@ Bytes EchoFilter::release() {
             frame_.begin() + static_cast<std::ptrdiff_t>(std::exchange(matched_, 0))};
 }
 
-EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(State::unknown) { forget(); }
+EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(EchoState::unknown) { forget(); }
 
 void EchoMemory::forget() {
     switch (mode_) {
         case EchoMode::automatic:
-            state_ = State::unknown;
+            state_ = EchoState::unknown;
             return;
         case EchoMode::on:
-            state_ = State::present;
+            state_ = EchoState::present;
             return;
         case EchoMode::off:
-            state_ = State::absent;
+            state_ = EchoState::absent;
             return;
     }
     std::abort();
 }
 
-EchoFilter::Expect EchoMemory::expect(ByteView request) const {
-    if (state_ == State::present) return EchoFilter::Expect::certainly;
+EchoFilter::Expect EchoMemory::expect(const modbus::Request& request) const {
+    if (state_ == EchoState::present) return EchoFilter::Expect::certainly;
     // Reads go on watching: an adapter that is said or was found to have no echo may have one.
-    if (state_ == State::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
+    if (state_ == EchoState::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
     return EchoFilter::Expect::perhaps;
 }
 
-bool EchoMemory::must_be_learned_before(ByteView request, bool tried) const {
-    const bool open = state_ == State::unknown || (state_ == State::unclear && !tried);
-    return open && !modbus::is_pure_read(request);
+bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tried) const {
+    const bool open = state_ == EchoState::unknown || (state_ == EchoState::unclear && !tried);
+    return open && !request.is_read();
 }
 
-bool EchoMemory::on_echo(ByteView request) {
-    if (state_ == State::present || !teaches_echo(request)) return false;
-    state_ = State::present;
+bool EchoMemory::on_echo(const modbus::Request& request) {
+    if (state_ == EchoState::present || !teaches_echo(request)) return false;
+    state_ = EchoState::present;
     return true;
 }
 
-void EchoMemory::on_reply_without_echo(ByteView request, bool fragment) {
-    if (state_ == State::present || state_ == State::absent || !teaches_echo(request)) return;
-    state_ = fragment ? State::unclear : State::absent;
+void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment) {
+    if (state_ == EchoState::present || state_ == EchoState::absent || !teaches_echo(request))
+        return;
+    state_ = fragment ? EchoState::unclear : EchoState::absent;
 }
 
 void EchoMemory::on_unclear() {
-    if (state_ == State::unknown) state_ = State::unclear;
+    if (state_ == EchoState::unknown) state_ = EchoState::unclear;
 }
 
-void EchoMemory::on_unanswered(ByteView request) {
-    if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = State::unclear;
+void EchoMemory::on_unanswered(const modbus::Request& request) {
+    if (mode_ == EchoMode::automatic && !teaches_echo(request)) state_ = EchoState::unclear;
 }
 
 void EchoMemory::on_mismatch() {

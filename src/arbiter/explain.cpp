@@ -1,7 +1,6 @@
 #include "explain.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 namespace panelgate::arbiter::explain {
 namespace {
@@ -11,22 +10,8 @@ std::string ms(Duration duration) {
     return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " ms";
 }
 
-std::string_view word(PriorityClass priority) {
-    switch (priority) {
-        case PriorityClass::write:
-            return "write";
-        case PriorityClass::read:
-            return "read";
-        case PriorityClass::poll:
-            return "poll";
-        case PriorityClass::probe:
-            return "probe";
-    }
-    std::abort();
-}
-
 std::string who(const Job& job) {
-    return std::string(word(job.priority)) + " of client " + std::to_string(job.client) +
+    return std::string(label(job.priority)) + " of client " + std::to_string(job.client) +
            " to station " + std::to_string(job.station);
 }
 

@@ -4,15 +4,13 @@
 #include <iterator>
 
 #include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
 JobQueue::Entry JobQueue::entry_of(Job job) {
     std::optional<ReadSpan> span;
-    if (!job.alone && job.station != 0) {
-        if (const auto items = modbus::read_span(job.pdu)) span = {job.station, *items};
-    }
+    const auto& items = job.request.span();
+    if (items && !job.alone && job.station != 0) span = {job.station, *items};
     return {std::move(job), span};
 }
 

@@ -20,8 +20,8 @@ JobQueue::Admission JobQueue::push(Job job) {
     return admission;
 }
 
-/// Where others rode on what goes, they count in its place and may have to go as well: all of it,
-/// or nothing.
+/// When the victim carried others, these count in its place and may have to go as well. Tried on a
+/// copy: either there is room in the end, or nothing changes.
 bool JobQueue::make_room(const Job& newcomer, std::vector<Job>& shed) {
     const auto first = find_victim(newcomer);
     if (!first) return false;
@@ -70,8 +70,8 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
         [](const Holder&) { return false; });
 }
 
-/// Of the greediest of those that have something to give; of several the newest, or it would be the
-/// same one's turn to lose every time, and nothing of it would ever be served.
+/// The victim of the greediest client that has one. Among equals the newest request loses: if it
+/// were always the same client's, nothing of that client would ever be served.
 std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
                                                     const Ask& writes_too) const {
     std::optional<Victim> best;
@@ -100,10 +100,9 @@ std::optional<JobQueue::Victim> JobQueue::victim_of(const Holder& holder, bool w
     return best;
 }
 
-/// The newest of a lane that makes room; when none does, because others would count in its place,
-/// the newest that counts: then at least no more wait than before. What stays behind it are reads,
-/// which nothing that is answered busy can make wrong. Nor may anything younger wait on the other
-/// side of a broadcast.
+/// The newest of a lane whose removal makes room; if none does, because others would count in its
+/// place, the newest that counts. Only reads stay behind it, so order is not broken by its loss;
+/// for the same reason nothing younger may wait on the other side of a broadcast.
 std::optional<JobQueue::Victim> JobQueue::victim_in(const Holder& holder,
                                                     std::uint8_t station) const {
     const auto& lanes = holder.source.lanes;

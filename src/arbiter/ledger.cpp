@@ -12,30 +12,30 @@ namespace panelgate::arbiter {
 
 namespace {
 
-std::string_view word(Ledger::Part what) {
+FrameKind kind_of(Ledger::Part what) {
     switch (what) {
         case Ledger::Part::damaged:
-            return "damaged";
+            return FrameKind::damaged;
         case Ledger::Part::echo:
-            return "echo";
+            return FrameKind::echo;
         case Ledger::Part::request:
-            return "foreign request";
+            return FrameKind::foreign_request;
         case Ledger::Part::late:
-            return "late";
+            return FrameKind::late;
         case Ledger::Part::copy:
-            return "copy";
+            return FrameKind::copy;
         case Ledger::Part::unasked:
         case Ledger::Part::unknown:
-            return "foreign";
+            return FrameKind::foreign;
     }
     std::abort();
 }
 
-std::string_view word(const Group& group) {
-    if (group.learns_for != 0) return "learn echo";
-    if (group.station == kBroadcast) return "broadcast";
-    if (group.probe) return "probe";
-    return group.attempts > 1 ? "retry" : "request";
+FrameKind kind_of(const Group& group) {
+    if (group.learns_for != 0) return FrameKind::learn_echo;
+    if (group.station == kBroadcast) return FrameKind::broadcast;
+    if (group.probe) return FrameKind::probe;
+    return group.attempts > 1 ? FrameKind::retry : FrameKind::request;
 }
 
 }  // namespace
@@ -61,7 +61,7 @@ void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, std::str
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
-    actions_.push_back(Note{now, Note::Direction::sent, adu, word(group), std::move(why)});
+    actions_.push_back(Note{now, kind_of(group), adu, std::move(why)});
     actions_.push_back(Transmit{std::move(adu)});
 }
 
@@ -113,7 +113,7 @@ void Ledger::on_stray(TimePoint now, const modbus::Unused& part, Part what, std:
     if (what == Part::unasked || what == Part::unknown || what == Part::request)
         ++of(asked).foreign_frames;
     count_stray(part, what, asked, lateness);
-    actions_.push_back(Note{now, Note::Direction::discarded, part.bytes, word(what), {}});
+    actions_.push_back(Note{now, kind_of(what), part.bytes, {}});
 }
 
 }  // namespace panelgate::arbiter

@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
@@ -39,9 +38,9 @@ std::optional<ReadCache::Hit> ReadCache::find(const ReadSpan& span, TimePoint no
     return std::nullopt;
 }
 
-void ReadCache::on_write(TimePoint now, std::uint8_t station, ByteView request) {
+void ReadCache::on_write(TimePoint now, std::uint8_t station, const modbus::Request& request) {
     written_[station] = now;
-    const std::optional<modbus::Span> items = modbus::access_of(request).write;
+    const std::optional<modbus::Span> items = request.access().write;
     entries_.remove_if([&](const Entry& entry) {
         return (station == kBroadcast || entry.span.station == station) &&
                may_change(items, entry.span.items);

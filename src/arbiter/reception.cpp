@@ -4,15 +4,15 @@
 #include <cstddef>
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
 
 void Reception::stamp(TimePoint now, Job& job) {
-    const std::size_t request = job.pdu.size() + modbus::kAduOverhead;
+    const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
-        std::max(modbus::reply_length_from_request(job.pdu).value_or(0), modbus::kExceptionAdu);
+        std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
     const Duration needed = job.station == kBroadcast
                                 ? wire_time(serial_, request)
                                 : wire_time(serial_, request + reply) + silent_interval(serial_);
@@ -25,7 +25,7 @@ void Reception::stamp(TimePoint now, Job& job) {
 std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const Job& job,
                                                             Duration max_age) {
     if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
-    const auto span = modbus::read_span(job.pdu);
+    const auto& span = job.request.span();
     if (!span) return std::nullopt;
     auto hit = memory_.find({job.station, *span}, now, max_age);
     if (!hit) return std::nullopt;

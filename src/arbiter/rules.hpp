@@ -28,7 +28,7 @@ inline bool begins_with_request(ByteView heard, ByteView own) {
 /// This job's items are among those of a transaction with its station.
 inline bool contained_in(const std::optional<modbus::Span>& span, const Job& job) {
     if (!span || job.alone) return false;
-    const auto own = modbus::read_span(job.pdu);
+    const auto& own = job.request.span();
     return own && span->contains(*own);
 }
 

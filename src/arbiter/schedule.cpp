@@ -4,7 +4,6 @@
 #include <iterator>
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
@@ -21,20 +20,18 @@ bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, 
 }
 
 /// A read that no client asked for.
-Group read_for_nobody(std::uint8_t station, Bytes pdu) {
-    Group group;
-    group.station = station;
-    group.span = modbus::read_span(pdu);
-    group.pdu = std::move(pdu);
-    return group;
+Group read_for_nobody(std::uint8_t station, modbus::Request request) {
+    const std::optional<modbus::Span> span = request.span();
+    return {.station = station, .request = std::move(request), .span = span};
 }
 
 /// P8: nobody knows yet whether this line hears itself, and this job could be confirmed by its own
 /// echo. A read of the same station tells.
 Group learning_for(const Job& job, const Station& station) {
-    Bytes pdu = station.probe_pdu();
-    if (!teaches_echo(pdu)) pdu = modbus::encode_read(modbus::Table::holding_registers, 0, 1);
-    Group group = read_for_nobody(job.station, std::move(pdu));
+    modbus::Request probe = station.probe();
+    if (!teaches_echo(probe))
+        probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
+    Group group = read_for_nobody(job.station, std::move(probe));
     group.learns_for = job.ticket;
     return group;
 }
@@ -42,7 +39,7 @@ Group learning_for(const Job& job, const Station& station) {
 /// At once when the reply that its station owes is to this very request, else behind that (P1).
 TimePoint repeat_from(const Group& group, const Stations& stations) {
     const Station* station = stations.find(group.station);
-    return station->may_ask(TimePoint{}, group.pdu) ? TimePoint{} : station->rested();
+    return station->may_ask(TimePoint{}, group.request.pdu()) ? TimePoint{} : station->rested();
 }
 
 }  // namespace
@@ -108,7 +105,7 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     if (now < quiet.quarantined_until()) return std::nullopt;
     const auto station = stations.next_to_probe(now);
     if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = read_for_nobody(*station, stations.find(*station)->probe_pdu());
+    Group group = read_for_nobody(*station, stations.find(*station)->probe());
     group.probe = true;
     return group;
 }
@@ -139,14 +136,13 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return {std::nullopt, true};
     others_.erase(next->station);
     if (turns_ > 0) --turns_;
-    if (!broadcast && echo.must_be_learned_before(next->pdu, next->ticket == learned_for_)) {
+    if (!broadcast && echo.must_be_learned_before(next->request, next->ticket == learned_for_)) {
         learned_for_ = next->ticket;
         return {learning_for(*next, stations.of(next->station)), false};
     }
     Job job = *backlog_.queue().pop(test);
     if (broadcast) {
-        Group group;
-        group.pdu = job.pdu;
+        Group group{.request = job.request};
         group.jobs.push_back(std::move(job));
         return {std::move(group), false};
     }
@@ -179,7 +175,7 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
-    // Longer than another timeout is no worth: a collision costs one.
+    // A rest longer than another timeout is not worth it: that is what a collision costs.
     const Duration worst = station.worst_lateness();
     const bool is_late =
         failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
@@ -191,7 +187,7 @@ void Schedule::retry(Group group, Duration patience) {
     constexpr Duration kDear = 100ms;
     const bool first = !backlog_.has_retries();
     // A write that goes again has had its turn among the writes.
-    dear_ = dear_ || (patience > kDear && modbus::is_pure_read(group.pdu));
+    dear_ = dear_ || (patience > kDear && group.request.is_read());
     backlog_.retry(std::move(group));
     if (first) let_others_go_first();
 }

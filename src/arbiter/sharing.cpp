@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
-#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -21,29 +20,28 @@ std::uint32_t known_length(const Station& station, const modbus::Span& span) {
 }  // namespace
 
 Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const {
-    Group group;
-    group.station = leader.station;
-    group.pdu = leader.pdu;
-    if (share_ && !leader.alone) group.span = modbus::read_span(leader.pdu);
+    Group group{.station = leader.station, .request = leader.request};
+    if (share_ && !leader.alone) group.span = leader.request.span();
     group.jobs.push_back(std::move(leader));
     while (group.span) {
         const std::uint32_t before = group.span->count;
         for (Job& job : queue.take_all(group.station, [&](const Job& other) {
                  if (!joins(group, other, station)) return false;
-                 group.span = join(*group.span, *modbus::read_span(other.pdu));
+                 group.span = join(*group.span, *other.request.span());
                  return true;
              })) {
             group.jobs.push_back(std::move(job));
         }
         if (group.span->count == before) break;
     }
-    if (group.span) group.pdu = modbus::encode_read(*group.span);
+    if (group.span && group.span != group.request.span())
+        group.request = modbus::Request::read(*group.span);
     return group;
 }
 
 bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
     if (job.alone || job.station != group.station) return false;
-    const auto span = modbus::read_span(job.pdu);
+    const auto& span = job.request.span();
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
@@ -55,7 +53,7 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
 }
 
 std::vector<Job> Sharing::split(Group& group) {
-    const auto stays = [&](const Job& job) { return job.pdu == group.pdu || job.gone; };
+    const auto stays = [&](const Job& job) { return job.request == group.request || job.gone; };
     if (group.joined()) {
         if (refused_.size() >= kRemembered) refused_.pop_front();
         refused_.push_back({group.station, *group.span});
@@ -71,8 +69,8 @@ std::vector<Job> Sharing::split(Group& group) {
 }
 
 Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) {
-    if (job.pdu == group.pdu || modbus::exception_of(reply)) return reply;
-    return slice_reply(*group.span, reply, *modbus::read_span(job.pdu));
+    if (job.request == group.request || modbus::exception_of(reply)) return reply;
+    return slice_reply(*group.span, reply, *job.request.span());
 }
 
 }  // namespace panelgate::arbiter

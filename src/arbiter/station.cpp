@@ -4,8 +4,6 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
-#include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::arbiter {
@@ -29,8 +27,8 @@ void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     rest_for_owed(now);
 }
 
-/// Of those that it may be the reply to, the oldest that could still come: one of long ago must not
-/// make a later one look late.
+/// When the request left that a frame of this kind answers: the oldest one whose reply could still
+/// come. An older one would make the reply look later than it is.
 TimePoint Station::answered_request(TimePoint now) const {
     const auto open = [&](TimePoint sent) {
         return now < sent + settings_.response_timeout + late_.value();
@@ -61,7 +59,7 @@ void Station::on_proved(TimePoint now, TimePoint sent) {
 void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
     if (now >= not_before_ && !held_back) owed_.clear();
     asked_ = now;
-    if (group.span) last_read_ = group.pdu;
+    if (group.span) last_read_ = group.request;
 }
 
 Stray Station::judge(TimePoint now, ByteView pdu) const {
@@ -134,7 +132,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     result.trailed = trail_.seen();
     trail_.on_reply(now);
     if (attempt.was_held() && copies_.is_copy(now, attempt.reply())) copies_.on_confirmed();
-    copies_.on_reply(now, group.pdu, attempt.reply());
+    copies_.on_reply(now, group.request.pdu(), attempt.reply());
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
@@ -147,8 +145,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (!group.span || exception) return result;
     std::uint32_t& longest = longest_read_[static_cast<std::size_t>(group.span->table)];
     longest = std::max(longest, group.span->count);
-    const auto cheapest = modbus::read_span(cheapest_read_);
-    if (!cheapest || group.span->count < cheapest->count) cheapest_read_ = group.pdu;
+    if (!cheapest_read_ || group.span->count < cheapest_read_->span()->count)
+        cheapest_read_ = group.request;
     return result;
 }
 
@@ -183,7 +181,7 @@ bool Station::on_given_up(TimePoint now, Fault fault) {
 bool Station::may_retry(const Group& group) const {
     if (group.abandoned() || health_.offline() || failing() || stranger()) return false;
     if (suspect() && !group.first_silence) return false;
-    const bool harmless = modbus::is_pure_read(group.pdu) || settings_.retry_writes;
+    const bool harmless = group.request.is_read() || settings_.retry_writes;
     return harmless && group.attempts <= settings_.retries;
 }
 
@@ -220,18 +218,17 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
     }
     if (health_.offline() || suspect() || stranger() || spent) return short_wait(line);
     // Not a write: what it needs may be longer, and its outcome is worth waiting for.
-    if (hurry && slowest() && modbus::is_pure_read(group.pdu))
-        return std::min(timeout(), short_wait(line));
+    if (hurry && slowest() && group.request.is_read()) return std::min(timeout(), short_wait(line));
     // A write that is not repeated is waited for as long as the configuration says: the panel may
     // just have become slower than it has taught, and nothing else tells whether it was executed.
-    const bool repeatable = modbus::is_pure_read(group.pdu) || settings_.retry_writes;
+    const bool repeatable = group.request.is_read() || settings_.retry_writes;
     return repeatable ? timeout() : whole;
 }
 
-Bytes Station::probe_pdu() const {
-    if (!cheapest_read_.empty()) return cheapest_read_;
-    if (!last_read_.empty()) return last_read_;
-    return modbus::encode_read(modbus::Table::holding_registers, 0, 1);
+modbus::Request Station::probe() const {
+    if (cheapest_read_) return *cheapest_read_;
+    return last_read_ ? *last_read_
+                      : modbus::Request::read({modbus::Table::holding_registers, 0, 1});
 }
 
 }  // namespace panelgate::arbiter

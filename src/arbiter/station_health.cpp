@@ -1,13 +1,12 @@
 #include "panelgate/arbiter/station_health.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 namespace panelgate::arbiter {
 
 bool StationHealth::on_reply(TimePoint now) {
     const bool back = offline();
-    state_ = State::online;
+    state_ = Health::online;
     silent_ = 0;
     last_success_ = now;
     return back;
@@ -15,7 +14,7 @@ bool StationHealth::on_reply(TimePoint now) {
 
 void StationHealth::on_damaged() {
     silent_ = 0;
-    state_ = State::suspect;
+    state_ = Health::suspect;
 }
 
 bool StationHealth::on_silence(TimePoint now, bool at_once) {
@@ -26,10 +25,10 @@ bool StationHealth::on_silence(TimePoint now, bool at_once) {
         return false;
     }
     if (silent_ < settings_.after && !at_once) {
-        state_ = State::suspect;
+        state_ = Health::suspect;
         return false;
     }
-    state_ = State::offline;
+    state_ = Health::offline;
     pause_ = settings_.probe_min;
     next_probe_ = now + pause_;
     next_half_open_ = now + pause_;
@@ -40,20 +39,6 @@ bool StationHealth::take_half_open(TimePoint now) {
     if (now < next_half_open_) return false;
     next_half_open_ = now + pause_;
     return true;
-}
-
-std::string_view label(StationHealth::State state) {
-    switch (state) {
-        case StationHealth::State::unknown:
-            return "unknown";
-        case StationHealth::State::online:
-            return "online";
-        case StationHealth::State::suspect:
-            return "suspect";
-        case StationHealth::State::offline:
-            return "offline";
-    }
-    std::abort();
 }
 
 }  // namespace panelgate::arbiter

@@ -76,7 +76,7 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     Station& station = of(job.station);
     if (station.stranger()) station.on_wanted(now);
     if (!station.health().offline()) return false;
-    const bool may_wake = station.stranger() || !modbus::is_pure_read(job.pdu);
+    const bool may_wake = station.stranger() || !job.request.is_read();
     const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
     return !may_wake || !budget.allows(now) || !station.take_half_open(now);
 }

@@ -35,8 +35,8 @@ bool has_swapped_crc(ByteView heard) {
 void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
-    actions_.push_back(Note{
-        now, Note::Direction::received, modbus::encode_adu(station, attempt.reply()), "reply", {}});
+    actions_.push_back(
+        Note{now, FrameKind::reply, modbus::encode_adu(station, attempt.reply()), {}});
     StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
     counters.turnaround.observe(think);
@@ -81,9 +81,9 @@ void Ledger::count_damaged(const Attempt& attempt) {
     const Group& group = attempt.group();
     const ByteView bytes = attempt.damaged_bytes();
     Symptoms& symptoms = symptoms_of(group.station);
-    const auto expected = modbus::reply_length_from_request(group.pdu);
+    const auto expected = group.request.reply_length();
     const bool head = bytes.size() >= 2 && bytes[0] == group.station &&
-                      (bytes[1] & ~modbus::kExceptionBit) == group.pdu[0];
+                      (bytes[1] & ~modbus::kExceptionBit) == group.request.function();
     if (expected && bytes.size() == *expected) {
         ++symptoms.damaged_exact;
     } else if (expected && bytes.size() < *expected) {

@@ -29,7 +29,7 @@ void Arbiter::end_broadcast(TimePoint now) {
         if (job.deadline <= now) {  // nobody looked at the clock in between
             ledger_.finish(job, Fault::timeout);
         } else {
-            ledger_.finish(job, modbus::normal_write_reply(job.pdu));
+            ledger_.finish(job, modbus::normal_write_reply(job.request.pdu()));
         }
     }
 }
@@ -81,11 +81,11 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     if (attempt.came_damaged()) {
-        station.on_damaged_reply(now, group.pdu, sent);
+        station.on_damaged_reply(now, group.request.pdu(), sent);
     } else {
-        station.owe(now, group.pdu, sent);
+        station.owe(now, group.request.pdu(), sent);
     }
-    if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.pdu);
+    if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
     stations_.on_failed(now, group.station, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
@@ -136,7 +136,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     Attempt attempt = std::move(*active_);
     active_.reset();
     ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
-    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().pdu))
+    if (attempt.echoed() && echo_memory_.on_echo(attempt.group().request))
         ledger_.event(Kind::echo, attempt.group().station);
     // Where a reply may come before the request has left, early bytes tell nothing.
     const bool keeps_pace = settings_.paced || pace_.believed();

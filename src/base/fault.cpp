@@ -34,22 +34,27 @@ std::string_view label(Fault fault) {
     std::abort();
 }
 
-std::string_view outcome_label(Fault fault) {
+Outcome outcome_of(Fault fault) {
     switch (fault) {
         case Fault::denied:
         case Fault::malformed:
         case Fault::not_routed:
-            return "refused";
+            return Outcome::refused;
+        case Fault::busy:
+            return Outcome::busy;
+        case Fault::expired:
+            return Outcome::expired;
         case Fault::line_down:
         case Fault::line_lost:
-            return "line_down";
-        case Fault::busy:
-        case Fault::expired:
+            return Outcome::line_down;
         case Fault::timeout:
+            return Outcome::timeout;
         case Fault::damaged:
+            return Outcome::damaged;
         case Fault::offline:
+            return Outcome::offline;
         case Fault::cancelled:
-            return label(fault);
+            return Outcome::cancelled;
     }
     std::abort();
 }

@@ -1,8 +1,6 @@
 #include "panelgate/bus/bus.hpp"
 
-#include <atomic>
 #include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <utility>
 
 #include "client_shares.hpp"
@@ -10,61 +8,57 @@
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
+#include "panelgate/line/drive.hpp"
 #include "panelgate/modbus/exception.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
+#include "refusals.hpp"
 #include "request_counters.hpp"
 #include "station_events.hpp"
+#include "write_log.hpp"
 
 namespace panelgate::bus {
 
 namespace asio = boost::asio;
 
 namespace {
-constexpr auto kRefusalPause = 1ms;
+
+PriorityClass priority_of(const Request& request) {
+    if (request.poll) return PriorityClass::poll;
+    return request.request.is_read() ? PriorityClass::read : PriorityClass::write;
+}
+
 }  // namespace
 
-ClientId next_client_id() {
-    static std::atomic<ClientId> last{0};
-    return ++last;
-}
-
-arbiter::Host host_of(std::string_view address) {
-    constexpr std::string_view kMapped = "::ffff:";  // how a listener on [::] sees IPv4
-    if (address.starts_with(kMapped)) address.remove_prefix(kMapped.size());
-    const auto hash = static_cast<arbiter::Host>(std::hash<std::string_view>{}(address));
-    return hash == 0 ? 1 : hash;
-}
-
-/// Outlives the Bus for as long as a posted completion needs it.
-struct Bus::State final : public line::Line::Events,
-                          public std::enable_shared_from_this<Bus::State> {
+/// Also the host of the arbiter's drive.
+struct Bus::State final : public line::Line::Events {
     struct Pending {
         AnswerHandler handler;
         std::uint8_t station = 0;
         std::uint8_t function = 0;
         TimePoint arrived;
+        std::optional<Deed> deed{};
     };
 
-    State(const asio::any_io_executor& executor, Settings s, std::unique_ptr<line::Line> l)
-        : settings(std::move(s)),
+    State(asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
+        : executor(std::move(e)),
+          clock(c),
+          settings(std::move(s)),
           line(std::move(l)),
           arbiter(settings.arbiter),
+          rights(settings.stations),
           counters(settings.stations),
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
           doctor(settings),
-          alarm(executor),
-          refusal_alarm(executor) {}
+          refusals(executor, clock),
+          drive(clock, *line, arbiter, *this) {}
 
     void on_up() override;
     void on_down(const std::string& why) override;
     void on_bytes(ByteView bytes) override;
 
     void transact(Request request, AnswerHandler handler);
-    std::optional<modbus::ExceptionCode> guarded(const Request& request) const;
-    void refuse(Pending pending, Fault fault);
-    void pump();
+    void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -78,30 +72,30 @@ struct Bus::State final : public line::Line::Events,
         if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
     }
     void check_delivery(TimePoint now);
-    void arm();
-    void on_alarm();
+    void on_deadline(TimePoint now);
+    void settled(TimePoint now) {
+        if (up) doctor.look(now, arbiter, *line);
+    }
     void answer(Pending pending, Answer answer);
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
-    void answer_soon(std::function<void()> hand_over);
 
+    asio::any_io_executor executor;
+    rt::Clock& clock;
     Settings settings;
     std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
+    Rights rights;
     RequestCounters counters;
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
-    std::map<ClientId, std::string> client_names;
+    ClientNames client_names;
     mutable LoadMeter load;
-    asio::steady_timer alarm;
-    asio::steady_timer refusal_alarm;
-    std::vector<std::function<void()>>
-        refusals;  ///< at most one a request that clients may have open
-    std::optional<TimePoint> armed;
+    Refusals refusals;
+    line::Drive<arbiter::Arbiter, State> drive;
     std::map<arbiter::Ticket, Pending> pending;
-    bool pumping = false;
     bool up = false;
     std::string why_down = "not opened yet";
 };
@@ -109,86 +103,60 @@ struct Bus::State final : public line::Line::Events,
 void Bus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
-    observe({BusEvent::Kind::line, "up", {}, 0, 0, {}});
+    observe(LineEvent{true, {}});
     arbiter.set_lead(line->lead());
     arbiter.confirm_ends(line->unsent().has_value());
-    arbiter.on_line_up(rt::now());
-    doctor.begin(rt::now(), arbiter, *line);
-    pump();
+    drive.hear([this](TimePoint now) {
+        arbiter.on_line_up(now);
+        doctor.begin(now, arbiter, *line);
+    });
 }
 
 void Bus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe({BusEvent::Kind::line, "down", why, 0, 0, {}});
-    arbiter.on_line_down(rt::now());
-    pump();
+    observe(LineEvent{false, why});
+    drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
 }
 
 void Bus::State::on_bytes(ByteView bytes) {
-    const TimePoint now = rt::now();
-    confirm_end(now);
-    arbiter.on_rx(now, bytes);
-    pump();
+    drive.hear([this, bytes](TimePoint now) {
+        confirm_end(now);
+        arbiter.on_rx(now, bytes);
+    });
 }
 
 void Bus::State::transact(Request request, AnswerHandler handler) {
-    const std::uint8_t function = request.pdu.empty() ? std::uint8_t{0} : request.pdu[0];
-    Pending entry{std::move(handler), request.station, function, rt::now()};
-    const Result<void> legal = modbus::check_request(request.pdu, request.quantity);
-    if (!legal) return refuse(std::move(entry), legal.error());
+    const modbus::Request& what = request.request;
+    Pending entry{std::move(handler), request.station, what.function(), clock.now()};
+    entry.deed = deed_of(request, name_of(client_names, request.client));
     const bool broadcast = request.station == 0;
-    if (broadcast ? !modbus::is_broadcastable(function) : modbus::is_never_answered(request.pdu)) {
+    if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
     }
-    if (const auto code = guarded(request)) {
-        Answer refused;
-        refused.pdu = modbus::encode_exception(function, *code);
-        return answer(std::move(entry), std::move(refused));
+    if (auto refusal = rights.judge(request.station, what)) {
+        Result<Bytes> reply = answer_to(*refusal, what.function());
+        return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
-    line->poll_input();
-    arbiter::Job job;
-    job.station = request.station;
-    job.pdu = std::move(request.pdu);
-    job.client = request.client;
-    job.host = request.host;
-    job.priority = request.priority;
-    const bool read = modbus::is_pure_read(job.pdu);
-    if (job.priority == arbiter::PriorityClass::read && !read)
-        job.priority = arbiter::PriorityClass::write;
-    const Result<arbiter::Ticket> ticket = arbiter.submit(rt::now(), std::move(job));
-    if (!ticket) return refuse(std::move(entry), ticket.error());
-    pending.emplace(*ticket, std::move(entry));
-    pump();
+    const PriorityClass priority = priority_of(request);
+    arbiter::Job job{.station = request.station,
+                     .request = std::move(request.request),
+                     .client = request.client,
+                     .host = request.host,
+                     .priority = priority};
+    drive.tell([&](TimePoint now) {
+        const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
+        if (!ticket) return refuse(std::move(entry), ticket.error());
+        pending.emplace(*ticket, std::move(entry));
+    });
 }
 
-/// Why the panel's profile rules this request out, when its station is guarded.
-std::optional<modbus::ExceptionCode> Bus::State::guarded(const Request& request) const {
-    const auto guard = settings.guards.find(request.station);
-    if (guard == settings.guards.end()) return std::nullopt;
-    const auto code = guard->second(request.pdu);
-    if (!code) return std::nullopt;
-    return static_cast<modbus::ExceptionCode>(*code);
-}
-
-void Bus::State::refuse(Pending entry, Fault fault) {
+void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal> refusal) {
     Answer refused;
-    refused.pdu = fault;
+    refused.pdu = std::move(pdu);
+    refused.refusal = std::move(refusal);
     answer(std::move(entry), std::move(refused));
-}
-
-/// Acts on what the arbiter wants until it wants nothing. Acting can lead back here (a write that
-/// fails takes the line down): the outer loop then drains (house rule 14).
-void Bus::State::pump() {
-    if (pumping) return;
-    pumping = true;
-    while (auto action = arbiter.poll_action()) {
-        std::visit([this](auto& a) { act(a); }, *action);
-    }
-    pumping = false;
-    if (up) doctor.look(rt::now(), arbiter, *line);
-    arm();
 }
 
 void Bus::State::act(arbiter::Finish& finish) {
@@ -208,21 +176,17 @@ void Bus::State::act(arbiter::Finish& finish) {
 }
 
 void Bus::State::act(arbiter::Note& note) {
-    static constexpr TraceFrame::Direction kDirections[] = {TraceFrame::Direction::sent,
-                                                            TraceFrame::Direction::received,
-                                                            TraceFrame::Direction::discarded};
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "frame",
                 {{"line", settings.name},
-                 {"what", std::string(note.what)},
+                 {"what", std::string(label(note.kind))},
                  {"bytes", to_hex(note.bytes)},
                  {"why", note.why}});
     }
     TraceFrame frame;
     frame.at = note.at;
-    frame.direction = kDirections[static_cast<std::size_t>(note.direction)];
+    frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
-    frame.note = note.what;
     frame.why = std::move(note.why);
     recorder.add(std::move(frame));
 }
@@ -235,32 +199,14 @@ void Bus::State::act(arbiter::Decision& decision) {
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
-    observe({BusEvent::Kind::station, label(event.kind), {}, event.station, 0, {}});
+    observe(event);
     log_event(settings, event);
 }
 
-void Bus::State::arm() {
-    const auto next = arbiter.next_deadline();
-    if (next == armed) return;
-    armed = next;
-    if (!next) {
-        alarm.cancel();
-        return;
-    }
-    alarm.expires_at(*next);
-    alarm.async_wait([self = shared_from_this()](boost::system::error_code error) {
-        if (!error) self->on_alarm();
-    });
-}
-
-void Bus::State::on_alarm() {
-    armed.reset();
-    line->poll_input();  // what has arrived by now came before whatever is due now
-    const TimePoint now = rt::now();
+void Bus::State::on_deadline(TimePoint now) {
     confirm_end(now);
     check_delivery(now);
     arbiter.on_deadline(now);
-    pump();
 }
 
 /// A request that the far end has not even taken when its time is over must not be executed
@@ -272,10 +218,11 @@ void Bus::State::check_delivery(TimePoint now) {
 
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
-    const Duration took = rt::now() - entry.arrived;
-    const std::string outcome = outcome_of(result);
+    const Duration took = clock.now() - entry.arrived;
+    const Outcome outcome = outcome_of(result);
     counters.count(entry.station, entry.function, outcome, took);
-    observe({BusEvent::Kind::transaction, outcome, {}, entry.station, entry.function, took});
+    if (entry.deed) log_deed(settings, entry.station, *entry.deed, outcome);
+    observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
     const bool refused = !result.transmitted && result.source == Source::bus;
@@ -283,21 +230,10 @@ void Bus::State::answer(Pending entry, Answer result) {
         handler(std::move(result));
     };
     if (refused) {
-        answer_soon(std::move(hand_over));
+        refusals.add(std::move(hand_over));
     } else {
-        asio::post(alarm.get_executor(), std::move(hand_over));
+        asio::post(executor, std::move(hand_over));
     }
-}
-
-/// Refusals go out together, a millisecond apart: who asks again at once cannot keep the loop from
-/// the wire (P4, P9).
-void Bus::State::answer_soon(std::function<void()> hand_over) {
-    refusals.push_back(std::move(hand_over));
-    if (refusals.size() > 1) return;
-    refusal_alarm.expires_after(kRefusalPause);
-    refusal_alarm.async_wait([self = shared_from_this()](boost::system::error_code) {
-        for (const auto& hand : std::exchange(self->refusals, {})) hand();
-    });
 }
 
 namespace {
@@ -307,24 +243,12 @@ Settings explained(Settings settings) {
     return settings;
 }
 
-std::string_view label(arbiter::EchoMemory::State state) {
-    switch (state) {
-        case arbiter::EchoMemory::State::unknown:
-            return "unknown";
-        case arbiter::EchoMemory::State::absent:
-            return "absent";
-        case arbiter::EchoMemory::State::present:
-            return "present";
-        case arbiter::EchoMemory::State::unclear:
-            return "unclear";
-    }
-    std::abort();
-}
-
 }  // namespace
 
-Bus::Bus(asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line)
-    : state_(std::make_shared<State>(executor, explained(std::move(settings)), std::move(line))) {}
+Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
+         std::unique_ptr<line::Line> line)
+    : state_(std::make_unique<State>(std::move(executor), clock, explained(std::move(settings)),
+                                     std::move(line))) {}
 
 Bus::~Bus() { stop(); }
 
@@ -332,9 +256,8 @@ void Bus::start() { state_->line->start(*state_); }
 
 void Bus::stop() {
     state_->line->stop();
-    state_->arbiter.on_line_down(rt::now());
-    state_->pump();
-    state_->alarm.cancel();
+    state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
+    state_->drive.rest();
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {
@@ -343,8 +266,7 @@ void Bus::transact(Request request, AnswerHandler handler) {
 
 void Bus::cancel(ClientId client) {
     state_->client_names.erase(client);
-    state_->arbiter.cancel(rt::now(), client);
-    state_->pump();
+    state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); });
 }
 
 void Bus::name_client(ClientId client, std::string name) {
@@ -359,9 +281,9 @@ LineStatus Bus::status() const {
     status.up = state_->up;
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
-    status.load_percent = state_->load.update(rt::now(), state_->arbiter.counters().busy);
-    status.echo = label(state_->arbiter.echo());
-    if (state_->up) state_->doctor.glance(rt::now(), state_->arbiter, *state_->line);
+    status.load_percent = state_->load.update(state_->clock.now(), state_->arbiter.counters().busy);
+    status.echo = state_->arbiter.echo();
+    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
     status.findings = state_->doctor.findings();
     return status;
 }
@@ -373,9 +295,13 @@ std::vector<ClientShare> Bus::clients() const {
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
-    status.state = label(health.state());
-    if (const auto last = health.last_success()) status.last_success = rt::now() - *last;
+    status.state = health.state();
+    if (const auto last = health.last_success()) status.last_success = state_->clock.now() - *last;
     return status;
+}
+
+std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
+    return state_->rights.judge_write(station);
 }
 
 std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }

@@ -1,6 +1,5 @@
 #include "line_doctor.hpp"
 
-#include <cstdlib>
 #include <string>
 
 #include "panelgate/rt/log.hpp"
@@ -8,22 +7,10 @@
 namespace panelgate::bus {
 namespace {
 
-doctor::LineFacts::Echo echo_of(arbiter::EchoMode mode) {
-    switch (mode) {
-        case arbiter::EchoMode::automatic:
-            return doctor::LineFacts::Echo::automatic;
-        case arbiter::EchoMode::on:
-            return doctor::LineFacts::Echo::on;
-        case arbiter::EchoMode::off:
-            return doctor::LineFacts::Echo::off;
-    }
-    std::abort();
-}
-
 doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     doctor::LineFacts facts;
     facts.serial = settings.serial;
-    facts.echo = echo_of(settings.echo);
+    facts.echo = settings.echo;
     facts.over_tcp = settings.may_stall;
     facts.deadline = settings.queue.deadline;
     facts.response_timeout = settings.unlisted.response_timeout;
@@ -68,12 +55,8 @@ void LineDoctor::judge(TimePoint now, const arbiter::Arbiter& arbiter, line::Lin
 
 void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
     const std::string cause(code(finding.cause));
-    std::string station = "all";
-    if (finding.station) {
-        const auto named = settings_.stations.find(*finding.station);
-        station =
-            named == settings_.stations.end() ? std::to_string(*finding.station) : named->second;
-    }
+    const std::string station =
+        finding.station ? name_of(settings_.stations, *finding.station) : "all";
     if (is_new) {
         rt::log(rt::LogLevel::warn, "line finding",
                 {{"line", settings_.name},
@@ -87,8 +70,7 @@ void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
     }
     if (!settings_.observe) return;
     const std::string what = is_new ? "finding: " : "finding gone: ";
-    settings_.observe(
-        {BusEvent::Kind::line, "up", what + cause + ", station " + station, 0, 0, {}});
+    settings_.observe(LineEvent{true, what + cause + ", station " + station});
 }
 
 std::vector<LineFinding> LineDoctor::findings() const {

@@ -4,25 +4,19 @@
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::bus {
-namespace {
 
-std::string function_label(std::uint8_t function) {
-    return modbus::is_known(function) ? std::to_string(function) : "other";
+Outcome outcome_of(const Answer& answer) {
+    if (!answer.pdu) return outcome_of(answer.pdu.error());
+    if (modbus::exception_of(*answer.pdu))
+        return answer.transmitted ? Outcome::exception : Outcome::refused;
+    if (answer.source == Source::cache) return Outcome::cached;
+    return answer.shared ? Outcome::shared : Outcome::ok;
 }
 
-}  // namespace
-
-std::string outcome_of(const Answer& answer) {
-    if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
-    if (modbus::exception_of(*answer.pdu)) return answer.transmitted ? "exception" : "refused";
-    if (answer.source == Source::cache) return "cached";
-    return answer.shared ? "shared" : "ok";
-}
-
-RequestCounters::RequestCounters(const std::map<std::uint8_t, std::string>& stations) {
+RequestCounters::RequestCounters(const Stations& stations) {
     stations_[0].station = "other";
-    for (const auto& [id, name] : stations) {
-        stations_[id].station = name;
+    for (const auto& [id, station] : stations) {
+        stations_[id].station = station.name;
         stations_[id].configured = true;
     }
 }
@@ -32,10 +26,10 @@ StationReport& RequestCounters::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[0] : found->second;
 }
 
-void RequestCounters::count(std::uint8_t station, std::uint8_t function, const std::string& outcome,
+void RequestCounters::count(std::uint8_t station, std::uint8_t function, Outcome outcome,
                             Duration took) {
     StationReport& report = of(station);
-    ++report.requests[{function_label(function), outcome}];
+    ++report.requests[modbus::is_known(function) ? function : kOtherFunctions][outcome];
     report.request_duration.observe(took);
 }
 
@@ -50,8 +44,7 @@ std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbit
         const auto wire = arbiter.station_counters().find(id);
         if (wire != arbiter.station_counters().end()) report.wire = wire->second;
         const auto state = arbiter.health(id).state();
-        report.up = state == arbiter::StationHealth::State::online ||
-                    state == arbiter::StationHealth::State::suspect;
+        report.up = state == Health::online || state == Health::suspect;
         reports.push_back(std::move(report));
     }
     return reports;

@@ -7,20 +7,19 @@
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/bus/station_settings.hpp"
 
 namespace panelgate::bus {
 
-/// The word of {outcome} for an answer (contract 6).
-std::string outcome_of(const Answer& answer);
+Outcome outcome_of(const Answer& answer);
 
 /// Counts requests by station, function and outcome. Stations the configuration does not list share
-/// one entry, functions outside Table A one label: no client can add a series (P10).
+/// one entry, functions that nobody knows one label: no client can add a series (P10).
 class RequestCounters {
   public:
-    explicit RequestCounters(const std::map<std::uint8_t, std::string>& stations);
+    explicit RequestCounters(const Stations& stations);
 
-    void count(std::uint8_t station, std::uint8_t function, const std::string& outcome,
-               Duration took);
+    void count(std::uint8_t station, std::uint8_t function, Outcome outcome, Duration took);
     void succeeded(std::uint8_t station, double wall);
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;

@@ -1,36 +1,14 @@
 #include "station_events.hpp"
 
 #include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {
 
-std::string_view label(arbiter::StationEvent::Kind kind) {
-    switch (kind) {
-        case arbiter::StationEvent::Kind::offline:
-            return "offline";
-        case arbiter::StationEvent::Kind::online:
-            return "online";
-        case arbiter::StationEvent::Kind::late:
-            return "late";
-        case arbiter::StationEvent::Kind::drift:
-            return "drift";
-        case arbiter::StationEvent::Kind::collision:
-            return "collision";
-        case arbiter::StationEvent::Kind::echo:
-            return "echo";
-        case arbiter::StationEvent::Kind::trail:
-            return "trail";
-    }
-    std::abort();
-}
 void log_event(const Settings& settings, const arbiter::StationEvent& event) {
-    const auto named = settings.stations.find(event.station);
-    const std::string id = std::to_string(event.station);
-    const std::string station = named == settings.stations.end() ? id : named->second;
+    const std::string station = name_of(settings.stations, event.station);
     const std::string ms = std::to_string(std::lround(to_milliseconds(event.by)));
     const auto say = [&](rt::LogLevel level, const char* what, const std::string& hint) {
         if (hint.empty()) {
@@ -54,9 +32,9 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
             return say(rt::LogLevel::warn, "collision",
                        "the echo is not what was sent: is there another master, or no echo?");
         case arbiter::StationEvent::Kind::echo:
-            return say(settings.arbiter.echo == arbiter::EchoMode::off ? rt::LogLevel::warn
-                                                                       : rt::LogLevel::info,
-                       "line hears itself", "its echo is checked and taken out");
+            return say(
+                settings.arbiter.echo == EchoMode::off ? rt::LogLevel::warn : rt::LogLevel::info,
+                "line hears itself", "its echo is checked and taken out");
         case arbiter::StationEvent::Kind::trail:
             return say(rt::LogLevel::warn, "bytes behind its replies",
                        "the line now waits up to " + ms +

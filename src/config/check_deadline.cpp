@@ -51,7 +51,7 @@ struct Wait {
     Mark mark;
 };
 
-/// The longest wait of all stations. Where no key says so, the deadline itself is the odd one.
+/// The longest wait of all stations, and the key that sets it: the deadline's when none does.
 Wait longest_wait(const Node& node, const Line& line) {
     const arbiter::StationSettings& unlisted = line.arbiter.unlisted;
     const Mark common = timeout_mark(node, unlisted).value_or(deadline_mark(node));

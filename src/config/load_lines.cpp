@@ -125,10 +125,9 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
-arbiter::EchoMode load_echo(MapReader& in) {
+EchoMode load_echo(MapReader& in) {
     constexpr std::array<std::string_view, 3> kWords{"auto", "on", "off"};
-    constexpr std::array kModes{arbiter::EchoMode::automatic, arbiter::EchoMode::on,
-                                arbiter::EchoMode::off};
+    constexpr std::array kModes{EchoMode::automatic, EchoMode::on, EchoMode::off};
     return kModes[in.choice_index("echo", kWords).value_or(0)];
 }
 

@@ -12,13 +12,13 @@ using arbiter::Symptoms;
 
 void find_echo(Case& c) {
     const Bar bar{c, Cause::echo};
-    if (c.facts.echo == LineFacts::Echo::off && c.all.echoes >= bar.enough(3)) {
+    if (c.facts.echo == EchoMode::off && c.all.echoes >= bar.enough(3)) {
         c.add(
             Cause::echo, {}, "The adapter hears what it sends, and `echo: off` denies it.",
             "Set `echo: auto` or `echo: on`, or switch the adapter's receiver off while it sends.",
             std::to_string(c.all.echoes) + " requests came back as they were sent");
     }
-    if (c.facts.echo == LineFacts::Echo::on && c.all.echoes == 0 &&
+    if (c.facts.echo == EchoMode::on && c.all.echoes == 0 &&
         c.all.collided + c.all.silent >= bar.enough(5) && c.all.collided >= bar.enough(3)) {
         c.add(Cause::echo, {}, "No request comes back, although `echo: on` says so.",
               "Set `echo: auto` or `echo: off`.",
@@ -61,7 +61,7 @@ void find_no_answer(Case& c) {
         if (symptoms.attempts() == 0) continue;
         if (symptoms.mute_in_a_row < bar.enough(3)) return;
         if (symptoms.wrong * 2 >= symptoms.attempts()) return;  // not what was asked, yet a voice
-        // Who asks for addresses that nobody has, finds nobody: a scan.
+        // A scan of unlisted addresses finds nobody: that says nothing about the line.
         if (id == 0 && c.window.stations.size() > 1) continue;
         mute += symptoms.mute_in_a_row;
         ++stations;

@@ -10,9 +10,9 @@ using arbiter::Symptoms;
 
 namespace {
 
-/// The others would have had five damaged replies if the line damaged theirs as often (none by
-/// chance: 0.7 %), and have had a fifth of that at most. When only long replies are hit and nobody
-/// else has any, the line may be it nevertheless.
+/// If the line damaged everybody's replies as often as this one's, the others would have had at
+/// least five (0.7 % chance of none); they have had a fifth of what was to be expected, or less.
+/// Not when only long replies are hit and nobody else has any: that may be the line after all.
 bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     const std::uint64_t others_answered = c.all.answered - s.answered;
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();

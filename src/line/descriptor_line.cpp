@@ -8,17 +8,17 @@
 #include <cstring>
 #include <utility>
 
-#include "panelgate/rt/asio_clock.hpp"
-
 namespace panelgate::line {
 
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-DescriptorLine::DescriptorLine(const asio::any_io_executor& executor, Settings settings)
+DescriptorLine::DescriptorLine(const asio::any_io_executor& executor, rt::Clock& clock,
+                               Settings settings)
     : settings_(std::move(settings)),
       descriptor_(executor),
-      timer_(executor),
+      clock_(clock),
+      next_opening_(clock.make_alarm()),
       reopen_(settings_.reopen_min, settings_.reopen_max) {}
 
 void DescriptorLine::start(Events& events) {
@@ -30,7 +30,7 @@ void DescriptorLine::start(Events& events) {
 void DescriptorLine::stop() {
     if (alive_) *alive_ = false;
     events_ = nullptr;
-    timer_.cancel();
+    next_opening_->cancel();
     cancel_open();
     close();
 }
@@ -55,9 +55,9 @@ std::string DescriptorLine::adopt(int fd) {
     return error.message();
 }
 
-void DescriptorLine::wait_to_open() {
-    timer_.async_wait([this, alive = alive_](error_code error) {
-        if (!error && *alive && !descriptor_.is_open()) begin_open();
+void DescriptorLine::open_at(TimePoint when) {
+    next_opening_->arm(when, [this] {
+        if (!descriptor_.is_open()) begin_open();
     });
 }
 
@@ -99,8 +99,7 @@ void DescriptorLine::go_down(const std::string& why, bool look_at_once) {
 
 void DescriptorLine::retry_later() {
     waiting();
-    timer_.expires_after(reopen_.next_pause());
-    wait_to_open();
+    open_at(clock_.now() + reopen_.next_pause());
 }
 
 /// A device that comes changes its folder several times (node, owner, link): one attempt each
@@ -108,11 +107,10 @@ void DescriptorLine::retry_later() {
 void DescriptorLine::open_soon() {
     if (events_ == nullptr || descriptor_.is_open()) return;
     constexpr Duration kPause = 20ms;
-    const TimePoint now = rt::now();
+    const TimePoint now = clock_.now();
     const TimePoint when = std::max(now, next_try_);
     next_try_ = when + kPause;
-    timer_.expires_at(when);
-    wait_to_open();
+    open_at(when);
 }
 
 /// What should have left long ago is not to be sent when nobody waits for it any more.

@@ -3,7 +3,6 @@
 #include <sys/types.h>
 
 #include <boost/asio/posix/stream_descriptor.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +11,7 @@
 #include "panelgate/line/line.hpp"
 #include "panelgate/line/reopen.hpp"
 #include "panelgate/line/settings.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::line {
 
@@ -21,7 +21,8 @@ namespace panelgate::line {
 /// derived class's: begin_open() ends, at once or later, in opened() or open_failed().
 class DescriptorLine : public Line {
   public:
-    DescriptorLine(const boost::asio::any_io_executor& executor, Settings settings);
+    DescriptorLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
+                   Settings settings);
 
     void start(Events& events) final;
     void stop() final;
@@ -71,12 +72,12 @@ class DescriptorLine : public Line {
     bool is_open() const { return descriptor_.is_open(); }
     /// Completions outlive the line: they ask here first.
     std::shared_ptr<bool> alive() const { return alive_; }
-    boost::asio::any_io_executor executor() { return timer_.get_executor(); }
+    rt::Clock& clock() const { return clock_; }
 
   private:
     void go_down(const std::string& why, bool look_at_once);
     void retry_later();
-    void wait_to_open();
+    void open_at(TimePoint when);
     void close(bool discard = false);
     void wait_readable();
     void read_all();
@@ -84,7 +85,8 @@ class DescriptorLine : public Line {
 
     Settings settings_;
     boost::asio::posix::stream_descriptor descriptor_;
-    boost::asio::steady_timer timer_;
+    rt::Clock& clock_;
+    std::unique_ptr<rt::Alarm> next_opening_;
     Reopen reopen_;
     Events* events_ = nullptr;
     std::shared_ptr<bool> alive_;

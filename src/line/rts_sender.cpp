@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/rt/asio_clock.hpp"
 #include "rs485.hpp"
 
 namespace panelgate::line {
@@ -15,9 +14,12 @@ constexpr Duration kBlindMargin = 2ms;
 
 }  // namespace
 
-RtsSender::RtsSender(const boost::asio::any_io_executor& executor, const Settings& settings,
-                     Owner owner, PortOps& ops)
-    : timer_(executor), settings_(settings), owner_(std::move(owner)), ops_(ops) {}
+RtsSender::RtsSender(rt::Clock& clock, const Settings& settings, Owner owner, PortOps& ops)
+    : clock_(clock),
+      alarm_(clock.make_alarm()),
+      settings_(settings),
+      owner_(std::move(owner)),
+      ops_(ops) {}
 
 std::string RtsSender::opened(int fd, const Driver& driver) {
     closing();
@@ -29,7 +31,7 @@ std::string RtsSender::opened(int fd, const Driver& driver) {
 
 void RtsSender::closing() {
     if (alive_) *alive_ = false;
-    timer_.cancel();
+    alarm_->cancel();
     held_.clear();
     end_ = {};
 }
@@ -38,7 +40,7 @@ void RtsSender::write(ByteView bytes) {
     held_.insert(held_.end(), bytes.begin(), bytes.end());
     if (!switch_to(true)) return;
     if (settings_.rs485.delay_before_send > Duration::zero()) {
-        at(rt::now() + settings_.rs485.delay_before_send, &RtsSender::send_held);
+        at(clock_.now() + settings_.rs485.delay_before_send, &RtsSender::send_held);
     } else {
         send_held();
     }
@@ -49,7 +51,7 @@ void RtsSender::send_held() {
     const auto alive = alive_;
     owner_.send(bytes);
     if (!*alive) return;  // the write failed
-    end_ = std::max(end_, rt::now()) + wire_time(settings_.serial, bytes.size());
+    end_ = std::max(end_, clock_.now()) + wire_time(settings_.serial, bytes.size());
     const Duration margin = driver_.tells_empty ? Duration::zero() : kBlindMargin;
     at(end_ + margin + settings_.rs485.delay_after_send, &RtsSender::release);
 }
@@ -57,7 +59,7 @@ void RtsSender::send_held() {
 void RtsSender::release() {
     const Duration left = unsent_time(fd_, driver_, character_time(settings_.serial), ops_);
     if (left > Duration::zero()) {
-        at(rt::now() + left + settings_.rs485.delay_after_send, &RtsSender::release);
+        at(clock_.now() + left + settings_.rs485.delay_after_send, &RtsSender::release);
     } else {
         switch_to(false);
     }
@@ -70,10 +72,7 @@ bool RtsSender::switch_to(bool sending) {
 }
 
 void RtsSender::at(TimePoint when, void (RtsSender::*next)()) {
-    timer_.expires_at(when);
-    timer_.async_wait([this, next, alive = alive_](boost::system::error_code error) {
-        if (!error && *alive) (this->*next)();
-    });
+    alarm_->arm(when, [this, next] { (this->*next)(); });
 }
 
 }  // namespace panelgate::line

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <boost/asio/steady_timer.hpp>
 #include <functional>
 #include <memory>
 #include <string>
@@ -9,6 +8,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/line/port_ops.hpp"
 #include "panelgate/line/settings.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::line {
 
@@ -21,9 +21,8 @@ class RtsSender {
         std::function<void(ByteView)> send;              ///< to the device, now
         std::function<void(const std::string&)> failed;  ///< the device must be closed
     };
-    /// `settings` and `ops` outlive it.
-    RtsSender(const boost::asio::any_io_executor& executor, const Settings& settings, Owner owner,
-              PortOps& ops);
+    /// `clock`, `settings` and `ops` outlive it.
+    RtsSender(rt::Clock& clock, const Settings& settings, Owner owner, PortOps& ops);
 
     /// The device is open: RTS to receiving. Empty, or why that does not work.
     std::string opened(int fd, const Driver& driver);
@@ -37,7 +36,8 @@ class RtsSender {
     void release();
     bool switch_to(bool sending);
 
-    boost::asio::steady_timer timer_;
+    rt::Clock& clock_;
+    std::unique_ptr<rt::Alarm> alarm_;
     const Settings& settings_;
     Owner owner_;
     PortOps& ops_;

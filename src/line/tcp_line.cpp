@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "descriptor_line.hpp"
-#include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/keep_alive.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -28,30 +28,22 @@ constexpr Duration kConnectTimeout = 5s;
 /// How long the kernel goes on with bytes that the server does not acknowledge, or has no room for
 /// (TCP_USER_TIMEOUT). Its own patience, 15 minutes, would keep the line up without a server. Five
 /// retransmissions fit in (after 0.2, 0.6, 1.4, 3 and 6.2 s, the last one at the limit).
-constexpr int kPatience = 6;  // s
+constexpr std::chrono::seconds kPatience{6};
 
 /// Probes of an idle connection. The patience above ends them too, in place of their number: so the
 /// first has to be early enough for three of them. A server that has gone is noticed within it also
 /// while nobody asks.
-constexpr int kIdle = 3;        // s before the first probe
-constexpr int kProbePause = 1;  // s
-constexpr int kProbes = 3;
-static_assert(kIdle + kProbes * kProbePause <= kPatience);
+constexpr rt::KeepAlive kKeepAlive{3s, 1s, 3};
+static_assert(kKeepAlive.silence + kKeepAlive.probes * kKeepAlive.pause <= kPatience);
 
 /// A server may keep an acknowledgement back until there is something to send with it: Linux and
 /// Windows up to 200 ms. What it has had for a shorter time says nothing.
 constexpr Duration kDelayedAck = 200ms;
 
 void set_options(int fd) {
-    const auto set = [fd](int level, int name, int value) {
-        ::setsockopt(fd, level, name, &value, sizeof value);
-    };
-    set(IPPROTO_TCP, TCP_NODELAY, 1);
-    set(IPPROTO_TCP, TCP_USER_TIMEOUT, kPatience * 1000);
-    set(SOL_SOCKET, SO_KEEPALIVE, 1);
-    set(IPPROTO_TCP, TCP_KEEPIDLE, kIdle);
-    set(IPPROTO_TCP, TCP_KEEPINTVL, kProbePause);
-    set(IPPROTO_TCP, TCP_KEEPCNT, kProbes);
+    rt::set_up_socket(fd, kKeepAlive);
+    const int patience = static_cast<int>(std::chrono::milliseconds(kPatience).count());
+    ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof patience);
 }
 
 /// Nothing on a name. A number needs no resolver, which answers one line after the other: a name
@@ -67,12 +59,13 @@ std::optional<tcp::endpoint> numeric(const TcpEndpoint& endpoint) {
 
 class TcpLine final : public DescriptorLine {
   public:
-    TcpLine(const asio::any_io_executor& executor, Settings settings, TcpEndpoint endpoint)
-        : DescriptorLine(executor, std::move(settings)),
+    TcpLine(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
+            TcpEndpoint endpoint)
+        : DescriptorLine(executor, clock, std::move(settings)),
           endpoint_(std::move(endpoint)),
           resolver_(executor),
           socket_(executor),
-          patience_(executor) {}
+          patience_(clock.make_alarm()) {}
     ~TcpLine() override { stop(); }
 
     Duration latency() override;
@@ -104,7 +97,7 @@ class TcpLine final : public DescriptorLine {
     TcpEndpoint endpoint_;
     tcp::resolver resolver_;
     tcp::socket socket_;  ///< while it connects
-    asio::steady_timer patience_;
+    std::unique_ptr<rt::Alarm> patience_;
     std::uint64_t attempt_ = 0;
     TimePoint last_write_{};
     std::size_t last_size_ = 0;
@@ -113,10 +106,7 @@ class TcpLine final : public DescriptorLine {
 
 void TcpLine::begin_open() {
     ++attempt_;
-    patience_.expires_after(kConnectTimeout);
-    patience_.async_wait([this, current = current()](const error_code& error) {
-        if (!error && current()) failed("no answer within 5 s");
-    });
+    patience_->arm(clock().now() + kConnectTimeout, [this] { failed("no answer within 5 s"); });
     const auto address = numeric(endpoint_);
     if (!address) return resolve();
     connect(tcp::resolver::results_type::create(*address, endpoint_.host, endpoint_.port));
@@ -144,7 +134,7 @@ void TcpLine::connect(const tcp::resolver::results_type& addresses) {
 
 void TcpLine::connected() {
     ++attempt_;
-    patience_.cancel();
+    patience_->cancel();
     error_code ignored;
     socket_.non_blocking(true, ignored);
     set_options(socket_.native_handle());
@@ -159,7 +149,7 @@ void TcpLine::connected() {
 void TcpLine::cancel_open() {
     ++attempt_;
     resolver_.cancel();
-    patience_.cancel();
+    patience_->cancel();
     error_code ignored;
     socket_.close(ignored);
 }
@@ -176,7 +166,7 @@ Duration TcpLine::latency() {
 void TcpLine::write(ByteView bytes) {
     if (!is_open()) return;
     if (undelivered()) return reset(takes_nothing());  // what follows makes this frame the last one
-    const TimePoint now = rt::now();
+    const TimePoint now = clock().now();
     older_ = unacknowledged_since().value_or(now);
     last_write_ = now;
     last_size_ = bytes.size();
@@ -194,7 +184,7 @@ bool TcpLine::undelivered() {
     if (!is_open()) return false;
     if (DescriptorLine::undelivered()) return true;
     const auto since = unacknowledged_since();
-    return since && rt::now() - *since >= latency() + kDelayedAck;
+    return since && clock().now() - *since >= latency() + kDelayedAck;
 }
 
 /// Discarding needs a reset (RST): after a usual end the kernel goes on sending what it holds.
@@ -206,9 +196,10 @@ void TcpLine::close_device(bool discard) {
 
 }  // namespace
 
-std::unique_ptr<Line> make_tcp_line(asio::any_io_executor executor, Settings settings) {
+std::unique_ptr<Line> make_tcp_line(asio::any_io_executor executor, rt::Clock& clock,
+                                    Settings settings) {
     TcpEndpoint endpoint = parse_tcp_device(settings.device).value_or(TcpEndpoint{});
-    return std::make_unique<TcpLine>(executor, std::move(settings), std::move(endpoint));
+    return std::make_unique<TcpLine>(executor, clock, std::move(settings), std::move(endpoint));
 }
 
 }  // namespace panelgate::line

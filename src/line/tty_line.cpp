@@ -13,7 +13,6 @@
 #include "impatience.hpp"
 #include "open_error.hpp"
 #include "panelgate/line/termios_setup.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "rs485.hpp"
 #include "rts_sender.hpp"
@@ -29,11 +28,12 @@ constexpr Duration kCloseWait = 10ms;
 
 class TtyLine final : public DescriptorLine {
   public:
-    TtyLine(const boost::asio::any_io_executor& executor, const Settings& settings, PortOps& ops)
-        : DescriptorLine(executor, settings),
+    TtyLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
+            const Settings& settings, PortOps& ops)
+        : DescriptorLine(executor, clock, settings),
           ops_(ops),
           watch_(executor, settings.device, [this] { open_soon(); }),
-          rts_(executor, DescriptorLine::settings(),
+          rts_(clock, DescriptorLine::settings(),
                {[this](ByteView bytes) { DescriptorLine::write(bytes); },
                 [this](const std::string& why) { lost(why); }},
                ops) {}
@@ -98,7 +98,7 @@ std::string TtyLine::set_up() {
     if (!result.error.empty()) return result.error;
     warn_once(last_warning_, "device settings differ", result.warning);
     driver_ = look_at_driver(fd(), ops_);
-    gone_by_ = rt::now() + kTransferTime;
+    gone_by_ = clock().now() + kTransferTime;
     errors_.opened(fd(), ops_);
     warn_once(last_slow_, "slow adapter", ask_low_latency(fd(), settings().device, ops_));
     return set_up_sending();
@@ -144,7 +144,8 @@ void TtyLine::close_device(bool discard) {
 void TtyLine::write(ByteView bytes) {
     if (!is_open()) return;
     if (holds_nothing()) {
-        gone_by_ = rt::now() + lead() + wire_time(settings().serial, bytes.size()) + kTransferTime;
+        gone_by_ =
+            clock().now() + lead() + wire_time(settings().serial, bytes.size()) + kTransferTime;
     }
     if (settings().rs485.mode == Rs485::Mode::rts) return rts_.write(bytes);
     DescriptorLine::write(bytes);
@@ -153,7 +154,7 @@ void TtyLine::write(ByteView bytes) {
 bool TtyLine::undelivered() {
     if (!is_open()) return false;
     if (DescriptorLine::undelivered()) return true;
-    return rt::now() >= gone_by_ && !holds_nothing();
+    return clock().now() >= gone_by_ && !holds_nothing();
 }
 
 bool TtyLine::set_format(const SerialFormat& format) {
@@ -174,9 +175,9 @@ std::optional<Duration> TtyLine::unsent() {
 
 }  // namespace
 
-std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, Settings settings,
-                                    PortOps& ops) {
-    return std::make_unique<TtyLine>(executor, settings, ops);
+std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, rt::Clock& clock,
+                                    Settings settings, PortOps& ops) {
+    return std::make_unique<TtyLine>(executor, clock, settings, ops);
 }
 
 }  // namespace panelgate::line

@@ -3,13 +3,13 @@
 #include <prometheus/text_serializer.h>
 
 #include <array>
-#include <cstdlib>
-#include <map>
-#include <set>
 #include <utility>
 
 #include "families.hpp"
-#include "panelgate/base/fault.hpp"
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/outcome.hpp"
+#include "panelgate/base/priority.hpp"
+#include "panelgate/line/counters.hpp"
 #include "point_families.hpp"
 
 namespace panelgate::metrics {
@@ -36,26 +36,28 @@ void each_station(const Snapshot& snapshot, Add add) {
     }
 }
 
-/// All words of {outcome}: those of the faults and those of requests that were answered.
-std::set<std::string> all_outcomes() {
-    std::set<std::string> words{"ok", "exception", "cached", "shared"};
-    for (const Fault fault : kAllFaults) words.emplace(outcome_label(fault));
-    return words;
+/// Seen from the start with 0: what a station is asked and how that ends on any day.
+constexpr std::array<std::uint8_t, 8> kUsualFunctions{1, 2, 3, 4, 5, 6, 15, 16};
+constexpr std::array kUsualOutcomes{Outcome::ok, Outcome::exception, Outcome::timeout,
+                                    Outcome::damaged};
+
+std::string function_label(std::uint8_t function) {
+    return function == bus::kOtherFunctions ? "other" : std::to_string(function);
 }
 
-std::map<std::pair<std::string, std::string>, std::uint64_t> requests_from_start(
-    const StationReport& station) {
-    static const std::set<std::string> kOutcomes = all_outcomes();
-    auto requests = station.requests;
-    for (const char* function : {"1", "2", "3", "4", "5", "6", "15", "16"}) {
-        for (const char* outcome : {"ok", "exception", "timeout", "damaged"}) {
-            requests.try_emplace({function, outcome}, 0);
-        }
+void add_requests_of(Family& family, const StationReport& station, const Labels& labels) {
+    const auto add = [&](std::uint8_t function, Outcome outcome, std::uint64_t count) {
+        family.counter(with(with(labels, "function", function_label(function)), "outcome",
+                            std::string(label(outcome))),
+                       count);
+    };
+    for (const std::uint8_t function : kUsualFunctions) {
+        if (station.requests.contains(function)) continue;
+        for (const Outcome outcome : kUsualOutcomes) add(function, outcome, 0);
     }
-    for (const auto& [key, count] : station.requests) {
-        for (const std::string& outcome : kOutcomes) requests.try_emplace({key.first, outcome}, 0);
+    for (const auto& [function, counts] : station.requests) {
+        for (const Outcome outcome : kAllOutcomes) add(function, outcome, counts[outcome]);
     }
-    return requests;
 }
 
 void add_requests(Families& out, const Snapshot& snapshot) {
@@ -64,10 +66,7 @@ void add_requests(Families& out, const Snapshot& snapshot) {
     Family duration = make_histogram("panelgate_request_duration_seconds",
                                      "Time from the arrival of a request to its answer.");
     each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
-        for (const auto& [key, count] : requests_from_start(station)) {
-            Labels labels = with(of_station(line, station), "function", key.first);
-            requests.counter(with(std::move(labels), "outcome", key.second), count);
-        }
+        add_requests_of(requests, station, of_station(line, station));
         duration.histogram(of_station(line, station), station.request_duration);
     });
     out.push_back(requests.take());
@@ -134,20 +133,6 @@ void add_exceptions(Families& out, const Snapshot& snapshot) {
     out.push_back(family.take());
 }
 
-std::string label(arbiter::PriorityClass priority) {
-    switch (priority) {
-        case arbiter::PriorityClass::write:
-            return "write";
-        case arbiter::PriorityClass::read:
-            return "read";
-        case arbiter::PriorityClass::poll:
-            return "poll";
-        case arbiter::PriorityClass::probe:
-            return "probe";
-    }
-    std::abort();
-}
-
 void add_line_counters(Families& out, const Snapshot& snapshot) {
     Family broadcasts = make_counter("panelgate_broadcasts_total", "Broadcasts sent.");
     Family reopens = make_counter("panelgate_line_reopens_total",
@@ -204,8 +189,8 @@ void add_line_state(Families& out, const Snapshot& snapshot) {
     for (const LineReport& line : snapshot.lines) {
         up.gauge(of_line(line), line.up ? 1 : 0);
         depth.gauge(of_line(line), static_cast<double>(line.queue_depth));
-        for (std::size_t i = 0; i < arbiter::kPriorityClasses; ++i) {
-            const std::string name = label(static_cast<arbiter::PriorityClass>(i));
+        for (std::size_t i = 0; i < kPriorityClasses; ++i) {
+            const std::string name(label(static_cast<PriorityClass>(i)));
             wait.histogram(with(of_line(line), "class", name), line.wire.queue_wait[i]);
         }
     }
@@ -251,6 +236,11 @@ void add_process(Families& out, const Snapshot& snapshot) {
     Family build = make_gauge("panelgate_build_info", "1, with the version as a label.");
     build.gauge({{"version", snapshot.version}}, 1);
     out.push_back(build.take());
+
+    Family dropped = make_counter("panelgate_log_lines_dropped_total",
+                                  "Log lines lost because stderr's reader stood still.");
+    dropped.counter({}, snapshot.runtime.log_lines_dropped);
+    out.push_back(dropped.take());
 
     const ProcessFacts& process = snapshot.process;
     if (process.cpu_seconds) {

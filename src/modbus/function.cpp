@@ -1,5 +1,7 @@
 #include "panelgate/modbus/function.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 
 namespace panelgate::modbus {
@@ -62,49 +64,39 @@ bool is_broadcastable(std::uint8_t function) {
     }
 }
 
+namespace {
+
+struct NamedFunction {
+    Function code;
+    std::string_view name;
+};
+constexpr std::array kNamed = {
+    NamedFunction{kReadCoils, "read coils"},
+    NamedFunction{kReadDiscreteInputs, "read discrete inputs"},
+    NamedFunction{kReadHoldingRegisters, "read holding registers"},
+    NamedFunction{kReadInputRegisters, "read input registers"},
+    NamedFunction{kWriteSingleCoil, "write single coil"},
+    NamedFunction{kWriteSingleRegister, "write single register"},
+    NamedFunction{kReadExceptionStatus, "read exception status"},
+    NamedFunction{kDiagnostics, "diagnostics"},
+    NamedFunction{kGetCommEventCounter, "get comm event counter"},
+    NamedFunction{kGetCommEventLog, "get comm event log"},
+    NamedFunction{kWriteMultipleCoils, "write multiple coils"},
+    NamedFunction{kWriteMultipleRegisters, "write multiple registers"},
+    NamedFunction{kReportServerId, "report server id"},
+    NamedFunction{kReadFileRecord, "read file record"},
+    NamedFunction{kWriteFileRecord, "write file record"},
+    NamedFunction{kMaskWriteRegister, "mask write register"},
+    NamedFunction{kReadWriteMultipleRegisters, "read/write multiple registers"},
+    NamedFunction{kReadFifoQueue, "read fifo queue"},
+    NamedFunction{kEncapsulatedInterface, "encapsulated interface"},
+};
+
+}  // namespace
+
 std::string_view function_name(std::uint8_t function) {
-    switch (function) {
-        case kReadCoils:
-            return "read coils";
-        case kReadDiscreteInputs:
-            return "read discrete inputs";
-        case kReadHoldingRegisters:
-            return "read holding registers";
-        case kReadInputRegisters:
-            return "read input registers";
-        case kWriteSingleCoil:
-            return "write single coil";
-        case kWriteSingleRegister:
-            return "write single register";
-        case kReadExceptionStatus:
-            return "read exception status";
-        case kDiagnostics:
-            return "diagnostics";
-        case kGetCommEventCounter:
-            return "get comm event counter";
-        case kGetCommEventLog:
-            return "get comm event log";
-        case kWriteMultipleCoils:
-            return "write multiple coils";
-        case kWriteMultipleRegisters:
-            return "write multiple registers";
-        case kReportServerId:
-            return "report server id";
-        case kReadFileRecord:
-            return "read file record";
-        case kWriteFileRecord:
-            return "write file record";
-        case kMaskWriteRegister:
-            return "mask write register";
-        case kReadWriteMultipleRegisters:
-            return "read/write multiple registers";
-        case kReadFifoQueue:
-            return "read fifo queue";
-        case kEncapsulatedInterface:
-            return "encapsulated interface";
-        default:
-            return "";
-    }
+    const auto* const found = std::ranges::find(kNamed, function, &NamedFunction::code);
+    return found == kNamed.end() ? std::string_view() : found->name;
 }
 
 bool is_known(std::uint8_t function) { return !function_name(function).empty(); }

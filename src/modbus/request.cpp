@@ -2,6 +2,7 @@
 
 #include <cassert>
 #include <cstdlib>
+#include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 
@@ -59,7 +60,7 @@ bool is_encapsulated(ByteView pdu) {
     return pdu.size() >= 2 && (pdu[1] != kMeiDeviceIdentification || pdu.size() == 4);
 }
 
-/// Table A. Functions without a row have no rule.
+/// Lengths of requests (PDU-07). Functions without a row have no rule.
 bool length_matches(ByteView pdu) {
     switch (pdu[0]) {
         case kReadCoils:
@@ -187,6 +188,23 @@ bool is_pure_read(ByteView pdu) {
 
 bool is_never_answered(ByteView pdu) {
     return pdu.size() >= 3 && pdu[0] == kDiagnostics && field(pdu, 1) == kListenOnly;
+}
+
+Request::Request(Bytes pdu)
+    : pdu_(std::move(pdu)),
+      read_(is_pure_read(pdu_)),
+      span_(modbus::read_span(pdu_)),
+      reply_length_(reply_length_from_request(pdu_)) {}
+
+Result<Request> Request::make(Bytes pdu, QuantityCheck check) {
+    if (const auto legal = check_request(pdu, check); !legal) return legal.error();
+    return Request(std::move(pdu));
+}
+
+Request Request::read(const Span& span) {
+    Request request(encode_read(span));
+    assert(request.span_ == span);
+    return request;
 }
 
 std::size_t request_adu_length(ByteView heard) {

@@ -20,7 +20,7 @@ bool repeats(ByteView request, ByteView reply, std::size_t size) {
            std::equal(reply.begin(), reply.end(), request.begin());
 }
 
-/// As large as the request lets expect: address, PDU and CRC are Lq bytes.
+/// As large as the request lets expect (FRM-04).
 bool has_expected_size(ByteView request, ByteView reply) {
     return reply_length_from_request(request) == reply.size() + kAduOverhead;
 }

@@ -1,15 +1,10 @@
 #include "panelgate/points/poller.hpp"
 
 #include <algorithm>
-#include <boost/asio/steady_timer.hpp>
 #include <optional>
 #include <utility>
 
-#include "panelgate/rt/asio_clock.hpp"
-
 namespace panelgate::points {
-
-namespace asio = boost::asio;
 
 struct Poller::State : std::enable_shared_from_this<Poller::State> {
     struct Station {
@@ -18,22 +13,23 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
         StationPolls polls;
     };
 
-    State(const asio::any_io_executor& executor, bus::BusClient& b) : bus(b), timer(executor) {}
+    State(rt::Clock& c, bus::BusClient& b) : clock(c), bus(b), alarm(c.make_alarm()) {}
 
     void ask_all();
     void ask(std::size_t index, StationPolls::Due due);
     void on_answer(std::size_t index, std::size_t read, const bus::Answer& answer, TimePoint asked);
     void arm();
 
+    rt::Clock& clock;
     bus::BusClient& bus;
-    asio::steady_timer timer;
+    std::unique_ptr<rt::Alarm> alarm;
     std::vector<Station> stations;
     Update update;
     bool running = false;
 };
 
 void Poller::State::ask_all() {
-    const TimePoint now = rt::now();
+    const TimePoint now = clock.now();
     for (std::size_t i = 0; i < stations.size(); ++i) {
         for (StationPolls::Due& due : stations[i].polls.take_due(now)) ask(i, std::move(due));
     }
@@ -41,14 +37,12 @@ void Poller::State::ask_all() {
 }
 
 void Poller::State::ask(std::size_t index, StationPolls::Due due) {
-    bus::Request request;
-    request.station = stations[index].id;
-    request.pdu = std::move(due.pdu);
-    request.client = stations[index].client;
-    request.priority = arbiter::PriorityClass::poll;
-    request.quantity = modbus::QuantityCheck::wide;
+    bus::Request request{.station = stations[index].id,
+                         .request = std::move(due.request),
+                         .client = stations[index].client,
+                         .poll = true};
     bus.transact(std::move(request), [weak = weak_from_this(), index, read = due.read,
-                                      asked = rt::now()](const bus::Answer& answer) {
+                                      asked = clock.now()](const bus::Answer& answer) {
         const auto self = weak.lock();
         if (self && self->running) self->on_answer(index, read, answer, asked);
     });
@@ -57,7 +51,7 @@ void Poller::State::ask(std::size_t index, StationPolls::Due due) {
 void Poller::State::on_answer(std::size_t index, std::size_t read, const bus::Answer& answer,
                               TimePoint asked) {
     // Asked is the safe side: the value is at most as old as that.
-    const auto wants = stations[index].polls.on_answer(rt::now(), read, answer.pdu, asked);
+    const auto wants = stations[index].polls.on_answer(clock.now(), read, answer.pdu, asked);
     if (update && !wants.empty()) update(stations[index].id, wants);
     arm();
 }
@@ -68,21 +62,16 @@ void Poller::State::arm() {
         const auto due = station.polls.next_due();
         if (due && (!next || *due < *next)) next = due;
     }
-    if (!next) {
-        timer.cancel();
-        return;
+    if (next) {
+        alarm->arm(*next, [this] { ask_all(); });
+    } else {
+        alarm->cancel();
     }
-    timer.expires_at(*next);
-    timer.async_wait([weak = weak_from_this()](boost::system::error_code error) {
-        const auto self = weak.lock();
-        if (!error && self && self->running) self->ask_all();
-    });
 }
 
-Poller::Poller(asio::any_io_executor executor, bus::BusClient& bus,
-               std::vector<PolledStation> stations)
-    : state_(std::make_shared<State>(executor, bus)) {
-    const TimePoint now = rt::now();
+Poller::Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations)
+    : state_(std::make_shared<State>(clock, bus)) {
+    const TimePoint now = clock.now();
     for (PolledStation& station : stations) {
         state_->stations.push_back(
             {station.id, bus::next_client_id(),
@@ -104,7 +93,7 @@ void Poller::start() {
 
 void Poller::stop() {
     if (!std::exchange(state_->running, false)) return;
-    state_->timer.cancel();
+    state_->alarm->cancel();
     for (const State::Station& station : state_->stations) state_->bus.cancel(station.client);
 }
 

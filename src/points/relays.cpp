@@ -1,22 +1,18 @@
 #include "panelgate/points/relays.hpp"
 
-#include <boost/asio/steady_timer.hpp>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::points {
-
-namespace asio = boost::asio;
 
 namespace {
 
 /// Why an answer is none; empty when it is one.
 std::string failure_of(const bus::Answer& answer) {
-    if (!answer.pdu) return std::string(outcome_label(answer.pdu.error()));
+    if (!answer.pdu) return std::string(label(outcome_of(answer.pdu.error())));
     const auto code = modbus::exception_of(*answer.pdu);
     return code ? "exception " + std::to_string(*code) : std::string();
 }
@@ -39,17 +35,17 @@ Bytes write_of(const RelayRoute& route, ByteView reply) {
 
 struct Relays::State : std::enable_shared_from_this<Relays::State> {
     struct Entry {
-        Entry(const asio::any_io_executor& executor, RelayRoute r)
-            : route(std::move(r)), timer(executor) {
+        Entry(rt::Clock& clock, RelayRoute r) : route(std::move(r)), alarm(clock.make_alarm()) {
             status.name = route.relay.name();
         }
         RelayRoute route;
-        asio::steady_timer timer;
+        std::unique_ptr<rt::Alarm> alarm;
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
         Bytes written;  ///< the last write that was confirmed
     };
+    explicit State(rt::Clock& c) : clock(c) {}
     using Then = void (State::*)(Entry&, const bus::Answer&);
 
     void arm(Entry& entry);
@@ -57,9 +53,10 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void on_read(Entry& entry, const bus::Answer& answer);
     void on_written(Entry& entry, const bus::Answer& answer);
     void check_target(Entry& entry);
-    void ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then);
-    void set(Entry& entry, std::string state);
+    void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
+    void set(Entry& entry, RelayState state, std::string why = {});
 
+    rt::Clock& clock;
     std::vector<std::unique_ptr<Entry>> entries;
     Changed changed;
     bool running = false;
@@ -67,89 +64,82 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
 
 /// The next turn that is still to come: what a slow panel has missed is missed.
 void Relays::State::arm(Entry& entry) {
-    const TimePoint now = rt::now();
+    const TimePoint now = clock.now();
     const Duration every = entry.route.relay.every;
     while (entry.due <= now) entry.due += every * ((now - entry.due) / every + 1);
-    entry.timer.expires_at(entry.due);
-    entry.timer.async_wait([weak = weak_from_this(), &entry](boost::system::error_code error) {
-        const auto self = weak.lock();
-        if (!error && self && self->running) self->read(entry);
-    });
+    entry.alarm->arm(entry.due, [this, &entry] { read(entry); });
 }
 
-void Relays::State::ask(Entry& entry, bus::BusClient& bus, bus::Request request, Then then) {
-    request.client = entry.client;
-    request.priority = arbiter::PriorityClass::poll;
-    request.quantity = modbus::QuantityCheck::wide;
-    bus.transact(std::move(request),
-                 [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
-                     const auto self = weak.lock();
-                     if (self && self->running) (self.get()->*then)(entry, answer);
-                 });
+void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu,
+                        Then then) {
+    auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
+    if (!request) return (this->*then)(entry, bus::Answer{.pdu = request.error()});
+    bus.transact(
+        {.station = station, .request = std::move(*request), .client = entry.client, .poll = true},
+        [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
+            const auto self = weak.lock();
+            if (self && self->running) (self.get()->*then)(entry, answer);
+        });
 }
 
 void Relays::State::read(Entry& entry) {
     const Relay& relay = entry.route.relay;
-    bus::Request request;
-    request.station = entry.route.from_station;
-    request.pdu = modbus::encode_read(relay.from.table, relay.from.address,
-                                      static_cast<std::uint16_t>(relay.count));
-    ask(entry, *entry.route.from, std::move(request), &State::on_read);
+    ask(entry, *entry.route.from, entry.route.from_station,
+        modbus::encode_read({relay.from.table, relay.from.address, relay.count}), &State::on_read);
 }
 
 void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     if (const std::string why = failure_of(answer); !why.empty()) {
         ++entry.status.read_failures;
-        set(entry, "source failing: " + why);
+        set(entry, RelayState::source_failing, why);
         arm(entry);
         return;
     }
     ++entry.status.reads;
-    bus::Request request;
-    request.station = entry.route.to_station;
-    request.pdu = write_of(entry.route, *answer.pdu);
-    if (entry.route.relay.on_change && request.pdu == entry.written) {
+    Bytes write = write_of(entry.route, *answer.pdu);
+    if (entry.route.relay.on_change && write == entry.written) {
         check_target(entry);
         arm(entry);
         return;
     }
-    entry.written = request.pdu;
-    ask(entry, *entry.route.to, std::move(request), &State::on_written);
+    entry.written = write;
+    ask(entry, *entry.route.to, entry.route.to_station, std::move(write), &State::on_written);
 }
 
 /// Nothing has to be written; but a target that has gone may come back with something else.
 void Relays::State::check_target(Entry& entry) {
     const bool line_up = entry.route.to->status().up;
-    const bool offline =
-        line_up && entry.route.to->station_status(entry.route.to_station).state == "offline";
-    if (line_up && !offline) return set(entry, "ok");
+    const Health health = entry.route.to->station_status(entry.route.to_station).state;
+    if (line_up && health != Health::offline) return set(entry, RelayState::ok);
     entry.written.clear();
-    set(entry, std::string("target failing: ") + (line_up ? "offline" : "line_down"));
+    set(entry, RelayState::target_failing,
+        std::string(label(line_up ? Outcome::offline : Outcome::line_down)));
 }
 
 void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
     if (const std::string why = failure_of(answer); !why.empty()) {
         entry.written.clear();  // whatever the target holds now: it is written again
         ++entry.status.write_failures;
-        set(entry, "target failing: " + why);
+        set(entry, RelayState::target_failing, why);
     } else {
         ++entry.status.writes;
-        entry.status.last_write = rt::now();
-        set(entry, "ok");
+        entry.status.last_write = clock.now();
+        set(entry, RelayState::ok);
     }
     arm(entry);
 }
 
-void Relays::State::set(Entry& entry, std::string state) {
-    if (entry.status.state == state) return;
-    entry.status.state = std::move(state);
+void Relays::State::set(Entry& entry, RelayState state, std::string why) {
+    if (entry.status.state == state && entry.status.why == why) return;
+    entry.status.state = state;
+    entry.status.why = std::move(why);
     if (changed) changed(entry.status);
 }
 
-Relays::Relays(asio::any_io_executor executor, std::vector<RelayRoute> routes)
-    : state_(std::make_shared<State>()) {
+Relays::Relays(rt::Clock& clock, std::vector<RelayRoute> routes)
+    : state_(std::make_shared<State>(clock)) {
     for (RelayRoute& route : routes)
-        state_->entries.push_back(std::make_unique<State::Entry>(executor, std::move(route)));
+        state_->entries.push_back(std::make_unique<State::Entry>(clock, std::move(route)));
 }
 
 Relays::~Relays() { stop(); }
@@ -158,7 +148,7 @@ void Relays::on_state(Changed changed) { state_->changed = std::move(changed); }
 
 void Relays::start() {
     state_->running = true;
-    const TimePoint now = rt::now();
+    const TimePoint now = state_->clock.now();
     const auto count = static_cast<Duration::rep>(state_->entries.size());
     Duration::rep index = 0;
     for (const auto& entry : state_->entries) {
@@ -172,7 +162,7 @@ void Relays::start() {
 void Relays::stop() {
     if (!std::exchange(state_->running, false)) return;
     for (const auto& entry : state_->entries) {
-        entry->timer.cancel();
+        entry->alarm->cancel();
         entry->route.from->cancel(entry->client);
         entry->route.to->cancel(entry->client);
     }

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
-#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::points {
@@ -64,7 +63,7 @@ StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint
 std::vector<StationPolls::Due> StationPolls::take_due(TimePoint now) {
     std::vector<Due> due;
     for (const std::size_t read : schedule_.take_due(now)) {
-        due.push_back({read, modbus::encode_read(plan_[read].span)});
+        due.push_back({read, modbus::Request::read(plan_[read].span)});
     }
     return due;
 }

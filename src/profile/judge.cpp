@@ -30,14 +30,22 @@ const Area* find_readable(const PanelProfile& profile, const modbus::Span& span)
 
 Judgement judge(const PanelProfile& profile, ByteView pdu) {
     if (pdu.empty() || profile.find_function(pdu[0]) == nullptr) return Judgement::illegal_function;
-    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide)) return Judgement::illegal_value;
-    if (pdu[0] == modbus::kReadFifoQueue) return Judgement::fine;
-    const modbus::Access access = modbus::access_of(pdu);
-    if (!within(access.read, profile.max_count(pdu[0])) ||
-        !within(access.write, write_limit(profile, pdu[0]))) {
+    const auto request =
+        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
+    return request ? judge(profile, *request) : Judgement::illegal_value;
+}
+
+Judgement judge(const PanelProfile& profile, const modbus::Request& request) {
+    const std::uint8_t function = request.function();
+    if (profile.find_function(function) == nullptr) return Judgement::illegal_function;
+    if (function == modbus::kReadFifoQueue) return Judgement::fine;
+    const modbus::Access access = request.access();
+    if (!within(access.read, profile.max_count(function)) ||
+        !within(access.write, write_limit(profile, function))) {
         return Judgement::illegal_value;
     }
-    if (pdu[0] == modbus::kWriteSingleCoil && !is_coil_value(pdu)) return Judgement::illegal_value;
+    if (function == modbus::kWriteSingleCoil && !is_coil_value(request.pdu()))
+        return Judgement::illegal_value;
     if (access.read && find_readable(profile, *access.read) == nullptr)
         return Judgement::illegal_address;
     if (!access.write) return Judgement::fine;

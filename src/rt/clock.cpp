@@ -5,8 +5,6 @@
 
 namespace panelgate::rt {
 
-TimePoint now() { return std::chrono::steady_clock::now(); }
-
 double wall_seconds() {
     return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch())
         .count();

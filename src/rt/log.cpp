@@ -7,6 +7,8 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <memory>
 
@@ -82,6 +84,12 @@ spdlog::logger& logger() {
     return instance;
 }
 
+/// Of the LogTap that lives.
+std::shared_ptr<std::vector<std::string>> g_tapped;
+
+/// Who has said what lately.
+LogThrottle g_throttle;
+
 /// JSON string escapes; good for text too.
 std::string escaped(std::string_view text) {
     std::string out;
@@ -109,7 +117,7 @@ std::string field_of(std::string_view key, const std::string& value) {
                                        : fmt::format(" {}={}", key, text_value(value));
 }
 
-std::string line_of(LogLevel level, std::string_view event, LogFields fields) {
+std::string line_of(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     std::string line =
         g_format == LogFormat::json
             ? fmt::format("\"level\":\"{}\",\"event\":\"{}\"", word(level), escaped(event))
@@ -118,7 +126,7 @@ std::string line_of(LogLevel level, std::string_view event, LogFields fields) {
     return line;
 }
 
-std::string subject_of(LogFields fields) {
+std::string subject_of(std::span<const LogField> fields) {
     std::string subject;
     std::size_t taken = 0;
     for (const auto& [key, value] : fields) {
@@ -128,6 +136,14 @@ std::string subject_of(LogFields fields) {
         subject += '\0';
     }
     return subject;
+}
+
+void put(LogLevel level, std::string_view event, std::span<const LogField> fields,
+         std::uint64_t left_out) {
+    std::string line = line_of(level, event, fields);
+    if (left_out > 0) line += field_of("left_out", std::to_string(left_out));
+    if (g_tapped) return g_tapped->push_back(std::move(line));
+    logger().log(level_of(level), line);
 }
 
 }  // namespace
@@ -140,8 +156,8 @@ void set_up_log(const LogSettings& settings) {
         json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %v",
         spdlog::pattern_time_type::utc, "\n"));
     output().on_lost([](std::uint64_t lines) {
-        const std::string text =
-            line_of(LogLevel::warn, "log lines dropped", {{"count", std::to_string(lines)}});
+        const std::string text = line_of(LogLevel::warn, "log lines dropped",
+                                         {{LogField{"count", std::to_string(lines)}}});
         return sink()->formatted({"panelgate", spdlog::level::warn, text});
     });
 }
@@ -150,18 +166,28 @@ bool log_enabled(LogLevel level) { return logger().should_log(level_of(level)); 
 
 std::uint64_t log_lines_dropped() { return output().dropped(); }
 
-void log(LogLevel level, std::string_view event, LogFields fields) {
+void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields) {
+    log(level, event, std::span(fields.begin(), fields.size()));
+}
+
+void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
-    static LogThrottle throttle;
     std::uint64_t left_out = 0;
     if (level <= LogLevel::info) {
-        const auto passed = throttle.pass(now(), event, subject_of(fields));
+        const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event,
+                                            subject_of(fields), LogThrottle::kIncidents);
         if (!passed) return;
         left_out = *passed;
     }
-    std::string line = line_of(level, event, fields);
-    if (left_out > 0) line += field_of("left_out", std::to_string(left_out));
-    logger().log(level_of(level), line);
+    put(level, event, fields, left_out);
+}
+
+void log_deed(std::string_view event, std::string_view subject,
+              std::initializer_list<LogField> fields) {
+    if (!log_enabled(LogLevel::info)) return;
+    const auto passed =
+        g_throttle.pass(std::chrono::steady_clock::now(), event, subject, LogThrottle::kDeeds);
+    if (passed) put(LogLevel::info, event, std::span(fields.begin(), fields.size()), *passed);
 }
 
 struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
@@ -189,6 +215,18 @@ LogDrain::~LogDrain() {
     output().on_pending({});
     state_->alarm->cancel();
     output().flush();
+}
+
+LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) {
+    g_tapped = lines_;
+    g_throttle = {};
+}
+
+LogTap::~LogTap() { g_tapped.reset(); }
+
+std::size_t LogTap::count(std::string_view part) const {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        *lines_, [&](const std::string& line) { return line.find(part) != std::string::npos; }));
 }
 
 }  // namespace panelgate::rt

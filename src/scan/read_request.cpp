@@ -7,8 +7,9 @@ namespace panelgate::scan {
 
 std::optional<ReadRequest> ReadRequest::make(std::uint8_t station, ByteView pdu) {
     if (station == 0 || station > modbus::kMaxStation) return std::nullopt;
-    if (!modbus::is_pure_read(pdu)) return std::nullopt;
-    if (!modbus::check_request(pdu, modbus::QuantityCheck::wide)) return std::nullopt;
+    const auto request =
+        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
+    if (!request || !request->is_read()) return std::nullopt;
     return ReadRequest(modbus::encode_adu(station, pdu));
 }
 

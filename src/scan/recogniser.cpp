@@ -26,8 +26,13 @@ bool may_be(const PanelProfile& profile, std::uint8_t station,
     return !format || offers(profile, *format);
 }
 
+bool is_read(const Bytes& pdu) {
+    const auto request = modbus::Request::make(pdu, modbus::QuantityCheck::wide);
+    return request && request->is_read();
+}
+
 void add_probe(std::vector<Bytes>& probes, const Bytes& pdu) {
-    if (probes.size() == kMostProbes || !modbus::is_pure_read(pdu)) return;
+    if (probes.size() == kMostProbes || !is_read(pdu)) return;
     append_new(probes, pdu);
 }
 
@@ -169,7 +174,7 @@ std::optional<Bytes> Recogniser::confirmation() const {
         std::vector<Bytes> reads = identifications(*suspect.profile);
         std::ranges::move(boundaries(*suspect.profile), std::back_inserter(reads));
         for (const Bytes& read : reads) {
-            if (modbus::is_pure_read(read) && !is_asked(read)) return read;
+            if (is_read(read) && !is_asked(read)) return read;
         }
     }
     return std::nullopt;

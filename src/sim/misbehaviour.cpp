@@ -106,8 +106,8 @@ Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
     if (happens(faults.late)) spoken.delay += faults.late_by;
     if (happens(faults.foreign_id)) {
         const auto other = static_cast<std::uint8_t>(spoken.adu[0] == 247 ? 1 : spoken.adu[0] + 1);
-        spoken.adu =
-            modbus::encode_adu(other, ByteView(spoken.adu).subspan(1, spoken.adu.size() - 3));
+        spoken.adu = modbus::encode_adu(
+            other, ByteView(spoken.adu).subspan(1, spoken.adu.size() - modbus::kAduOverhead));
     }
     if (happens(faults.damage)) {
         std::uniform_int_distribution<std::size_t> place(0, spoken.adu.size() - 1);

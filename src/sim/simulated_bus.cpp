@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/posix/stream_descriptor.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <cerrno>
 #include <utility>
 
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/termios_setup.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::sim {
 
@@ -27,12 +25,13 @@ constexpr Duration kTick = 1ms;  // reply bytes are handed over at this grain, t
 }  // namespace
 
 struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
-    State(const asio::any_io_executor& executor, Settings s, std::vector<Station> all)
+    State(const asio::any_io_executor& executor, rt::Clock& c, Settings s, std::vector<Station> all)
         : settings(std::move(s)),
           stations(std::move(all)),
           pty(settings.serial),
           descriptor(executor),
-          timer(executor),
+          clock(c),
+          alarm(clock.make_alarm()),
           chance(settings.seed) {
         descriptor.assign(::dup(pty.master()));
     }
@@ -51,7 +50,8 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     std::vector<Station> stations;
     line::Pty pty;  ///< who opens it and sets nothing speaks as this line does
     asio::posix::stream_descriptor descriptor;
-    asio::steady_timer timer;
+    rt::Clock& clock;
+    std::unique_ptr<rt::Alarm> alarm;
     Bytes request;
     TimePoint request_end;        ///< wire time of its last bit
     Duration longest_pause{};     ///< inside it
@@ -76,7 +76,7 @@ void SimulatedBus::State::wait_readable() {
 void SimulatedBus::State::read_all() {
     std::array<std::uint8_t, 1024> buffer;
     const ssize_t n = ::read(descriptor.native_handle(), buffer.data(), buffer.size());
-    if (n > 0) hear(rt::now(), ByteView(buffer).first(static_cast<std::size_t>(n)));
+    if (n > 0) hear(clock.now(), ByteView(buffer).first(static_cast<std::size_t>(n)));
 }
 
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
@@ -91,10 +91,7 @@ void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
 }
 
 void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
-    timer.expires_at(when);
-    timer.async_wait([self = shared_from_this(), next](error_code error) {
-        if (!error && !self->stopped) (self.get()->*next)();
-    });
+    alarm->arm(when, [this, next] { (this->*next)(); });
 }
 
 void SimulatedBus::State::request_ended() {
@@ -130,7 +127,7 @@ TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
 Bytes SimulatedBus::State::reply_to(ByteView adu) {
     if (!modbus::crc_ok(adu)) return {};
     const ByteView pdu = adu.subspan(1, adu.size() - modbus::kAduOverhead);
-    const TimePoint now = rt::now();
+    const TimePoint now = clock.now();
     const std::int64_t wall = rt::local_wall_seconds();
     Bytes answer;
     for (Station& station : stations) {
@@ -147,7 +144,7 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
 /// Hands over the bytes whose time has come.
 void SimulatedBus::State::send_some() {
     std::size_t until = sent;
-    while (until < reply.size() && end_of(until) <= rt::now()) ++until;
+    while (until < reply.size() && end_of(until) <= clock.now()) ++until;
     if (until > sent) {
         const ssize_t n = ::write(descriptor.native_handle(), reply.data() + sent, until - sent);
         if (n < 0 && errno == EAGAIN) {  // nobody reads: a real line would not wait either
@@ -160,13 +157,13 @@ void SimulatedBus::State::send_some() {
         reply.clear();
         return;
     }
-    at(std::min(end_of(reply.size() - 1), std::max(rt::now() + kTick, end_of(sent))),
+    at(std::min(end_of(reply.size() - 1), std::max(clock.now() + kTick, end_of(sent))),
        &State::send_some);
 }
 
-SimulatedBus::SimulatedBus(asio::any_io_executor executor, Settings settings,
+SimulatedBus::SimulatedBus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
                            std::vector<Station> stations)
-    : state_(std::make_shared<State>(executor, settings, std::move(stations))) {}
+    : state_(std::make_shared<State>(executor, clock, settings, std::move(stations))) {}
 
 SimulatedBus::~SimulatedBus() { stop(); }
 
@@ -189,7 +186,7 @@ void SimulatedBus::start() { state_->wait_readable(); }
 
 void SimulatedBus::stop() {
     state_->stopped = true;
-    state_->timer.cancel();
+    state_->alarm->cancel();
     error_code ignored;
     state_->descriptor.close(ignored);
 }

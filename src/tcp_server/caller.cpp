@@ -2,23 +2,16 @@
 
 #include <utility>
 
-#include "panelgate/modbus/request.hpp"
-
 namespace panelgate::tcp_server {
 
-Caller::Caller(std::string name, arbiter::Host host) : name_(std::move(name)), host_(host) {}
+Caller::Caller(std::string name, bus::Host host) : name_(std::move(name)), host_(host) {}
 
-void Caller::transact(bus::BusClient* bus, std::uint8_t station, const modbus::Adu& adu,
+void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     if (used_.insert(bus).second) bus->name_client(client_, "modbus_tcp " + name_);
-    bus::Request request;
-    request.station = station;
-    request.pdu = adu.pdu;
-    request.client = client_;
-    request.host = host_;
-    request.priority = modbus::is_pure_read(adu.pdu) ? arbiter::PriorityClass::read
-                                                     : arbiter::PriorityClass::write;
-    bus->transact(std::move(request), std::move(handler));
+    bus->transact(
+        {.station = station, .request = std::move(request), .client = client_, .host = host_},
+        std::move(handler));
 }
 
 void Caller::withdraw() {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -13,18 +13,18 @@ namespace panelgate::tcp_server {
 class Caller {
   public:
     /// `name` is its address with the port; connections from one address share a host.
-    Caller(std::string name, arbiter::Host host);
+    Caller(std::string name, bus::Host host);
 
     const std::string& name() const { return name_; }
-    /// Hands the PDU to a bus, for one of its stations; 0: all of them.
-    void transact(bus::BusClient* bus, std::uint8_t station, const modbus::Adu& adu,
+    /// Hands the request to a bus, for one of its stations; 0: all of them.
+    void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
     /// Takes back what still waits on the buses; it is answered Fault::cancelled.
     void withdraw();
 
   private:
     std::string name_;
-    arbiter::Host host_;
+    bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();
     std::set<bus::BusClient*> used_;
 };

@@ -1,7 +1,5 @@
 #include "dispatch.hpp"
 
-#include <algorithm>
-
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -11,33 +9,40 @@ namespace {
 using modbus::ExceptionCode;
 
 Refuse refuse(Fault fault) { return Refuse{modbus::to_exception(fault)}; }
+Refuse refuse(const bus::Refusal& refusal) { return Refuse{refusal.code}; }
 
-Decision decide_broadcast(ByteView pdu, const Settings& settings, const UnitMap& units,
-                          std::vector<bus::BusClient*> lines) {
+Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request,
+                          const Settings& settings, std::vector<bus::BusClient*> lines) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied);
-    const auto read_only = [&](const bus::BusClient* line) { return units.holds_read_only(line); };
-    if (std::ranges::any_of(lines, read_only)) return refuse(Fault::denied);
-    if (!modbus::is_broadcastable(pdu[0])) return refuse(Fault::denied);
-    if (const auto checked = modbus::check_request(pdu); !checked) return refuse(checked.error());
-    return Broadcast{std::move(lines)};
+    for (const bus::BusClient* line : lines) {  // all of them before any is asked
+        if (const auto refusal = line->refusal_of_write(0)) return refuse(*refusal);
+    }
+    if (!modbus::is_broadcastable(function)) return refuse(Fault::denied);
+    if (!request) return refuse(request.error());
+    return Broadcast{std::move(lines), std::move(*request)};
 }
 
 }  // namespace
 
 Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units) {
     if (pdu.empty()) return refuse(Fault::malformed);
-    if (pdu[0] == 0 || pdu[0] >= modbus::kExceptionBit) return refuse(Fault::denied);
-    const bool writes = !modbus::is_pure_read(pdu);
+    auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
+    if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
+    const bool writes = request ? !request->is_read() : !modbus::is_read(pdu[0]);
     if (writes && settings.read_only) return refuse(Fault::denied);
     if (settings.diagnostics_unit == unit && !units.is_alias(unit)) return Diagnose{};
 
     std::vector<bus::BusClient*> lines = units.broadcast_lines(unit);
-    if (!lines.empty()) return decide_broadcast(pdu, settings, units, std::move(lines));
+    if (!lines.empty())
+        return decide_broadcast(pdu[0], std::move(request), settings, std::move(lines));
     const Result<Target> target = units.route(unit);
     if (!target) return refuse(target.error());
-    if (writes && target->read_only) return refuse(Fault::denied);
-    if (const auto checked = modbus::check_request(pdu); !checked) return refuse(checked.error());
-    return Forward{*target};
+    if (writes) {
+        if (const auto refusal = target->bus->refusal_of_write(target->station))
+            return refuse(*refusal);
+    }
+    if (!request) return refuse(request.error());
+    return Forward{*target, std::move(*request)};
 }
 
 }  // namespace panelgate::tcp_server

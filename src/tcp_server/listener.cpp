@@ -7,7 +7,6 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <set>
 #include <system_error>
 #include <utility>
@@ -15,7 +14,8 @@
 #include "access_list.hpp"
 #include "caller.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/acceptor.hpp"
+#include "panelgate/rt/keep_alive.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 
@@ -26,11 +26,8 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 // CON-07: a peer without power is gone after 60 s of silence and 3 probes 10 s apart.
-constexpr int kKeepaliveIdle = 60;
-constexpr int kKeepaliveInterval = 10;
-constexpr int kKeepaliveProbes = 3;
+constexpr rt::KeepAlive kKeepAlive{60s, 10s, 3};
 // What the kernel takes for a client that does not read: without a limit megabytes, and each reply
 // in there is older when it arrives than one that is asked for later.
 constexpr int kSendBuffer = 64 * 1024;
@@ -42,11 +39,7 @@ void set_option(tcp::socket& socket, int level, int name, int value) {
 
 /// What cannot be set is no reason to refuse a client.
 void set_up(tcp::socket& socket) {
-    set_option(socket, IPPROTO_TCP, TCP_NODELAY, 1);
-    set_option(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
-    set_option(socket, IPPROTO_TCP, TCP_KEEPIDLE, kKeepaliveIdle);
-    set_option(socket, IPPROTO_TCP, TCP_KEEPINTVL, kKeepaliveInterval);
-    set_option(socket, IPPROTO_TCP, TCP_KEEPCNT, kKeepaliveProbes);
+    rt::set_up_socket(socket.native_handle(), kKeepAlive);
     set_option(socket, SOL_SOCKET, SO_SNDBUF, kSendBuffer);
     set_option(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, kUnsentBytes);
 }
@@ -61,62 +54,44 @@ std::string text(const tcp::endpoint& peer) {
 
 class Listener::Core : public std::enable_shared_from_this<Core> {
   public:
-    Core(const asio::any_io_executor& executor, Settings settings, UnitMap units, Hooks hooks)
-        : shared_(std::make_shared<Shared>(
-              Shared{std::move(settings), std::move(units), std::move(hooks), {}, rt::now()})),
+    Core(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings, UnitMap units,
+         std::string version)
+        : shared_(std::make_shared<Shared>(Shared{
+              std::move(settings), std::move(units), std::move(version), clock, {}, clock.now()})),
           allowed_(shared_->settings.allow),
-          acceptor_(executor),
-          pause_(executor) {
+          acceptor_(
+              executor, [this](tcp::socket socket) { on_accepted(std::move(socket)); },
+              [this](const error_code& why) {
+                  shared_->log(rt::LogLevel::warn, "cannot accept", {{"reason", why.message()}});
+              }) {
         shared_->counters.listener = shared_->settings.name();
     }
 
     void start();
-    std::uint16_t port() const;
+    std::uint16_t port() const { return acceptor_.port(); }
     Counters counters() const;
     void stop(std::function<void()> done);
     void close_now();
 
   private:
-    void accept();
-    void on_accept(const error_code& error, tcp::socket socket);
+    void on_accepted(tcp::socket socket);
     void admit(tcp::socket socket, const tcp::endpoint& peer);
     bool has_room();
     void on_closed(const std::shared_ptr<Session>& session);
-    void close_acceptor();
     void tell_when_empty();
 
     std::shared_ptr<Shared> shared_;
     AccessList allowed_;
-    tcp::acceptor acceptor_;
-    asio::steady_timer pause_;
+    rt::Acceptor acceptor_;
     std::set<std::shared_ptr<Session>> sessions_;
     std::function<void()> done_;
-    bool full_ = false;     ///< told in the log
-    bool failing_ = false;  ///< accept() fails; told in the log
+    bool full_ = false;  ///< told in the log
 };
 
 void Listener::Core::start() {
     const Settings& settings = shared_->settings;
-    error_code error;
-    const asio::ip::address address = asio::ip::make_address(settings.address, error);
-    const tcp::endpoint endpoint(address, settings.port);
-    if (!error) acceptor_.open(endpoint.protocol(), error);
-    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(asio::socket_base::max_listen_connections, error);
-    if (error) {
-        error_code ignored;
-        acceptor_.close(ignored);
+    if (const error_code error = acceptor_.open(settings.address, settings.port))
         throw std::system_error(error, "cannot listen on " + settings.name());
-    }
-    shared_->log("listening", "", "port=" + std::to_string(port()));
-    accept();
-}
-
-std::uint16_t Listener::Core::port() const {
-    error_code error;
-    const tcp::endpoint endpoint = acceptor_.local_endpoint(error);
-    return error ? std::uint16_t{0} : endpoint.port();
 }
 
 Counters Listener::Core::counters() const {
@@ -125,43 +100,25 @@ Counters Listener::Core::counters() const {
     return counters;
 }
 
-void Listener::Core::accept() {
-    acceptor_.async_accept(
-        [self = shared_from_this()](const error_code& error, tcp::socket socket) {
-            self->on_accept(error, std::move(socket));
-        });
-}
-
-void Listener::Core::on_accept(const error_code& error, tcp::socket socket) {
-    if (!acceptor_.is_open()) return;
-    if (error && error != asio::error::connection_aborted) {
-        // Without descriptors the next try would fail at once, and the loop would do nothing else.
-        if (!std::exchange(failing_, true)) shared_->log("cannot accept", "", error.message());
-        pause_.expires_after(kAcceptPause);
-        pause_.async_wait([self = shared_from_this()](const error_code& stopped) {
-            if (!stopped && self->acceptor_.is_open()) self->accept();
-        });
-        return;
+void Listener::Core::on_accepted(tcp::socket socket) {
+    ++shared_->counters.connections_total;
+    error_code gone;
+    const tcp::endpoint peer = socket.remote_endpoint(gone);
+    if (gone) return;
+    if (!allowed_.allows(peer.address())) {
+        shared_->log(rt::LogLevel::info, "connection refused",
+                     {{"client", text(peer)}, {"reason", "not in the allow list"}});
+    } else if (has_room()) {
+        admit(std::move(socket), peer);
     }
-    if (!error) {
-        failing_ = false;
-        ++shared_->counters.connections_total;
-        error_code gone;
-        const tcp::endpoint peer = socket.remote_endpoint(gone);
-        if (!gone && !allowed_.allows(peer.address())) {
-            shared_->log("connection refused", text(peer), "reason=\"not in the allow list\"");
-        } else if (!gone && has_room()) {
-            admit(std::move(socket), peer);
-        }
-    }
-    accept();
 }
 
 bool Listener::Core::has_room() {
     const bool full = sessions_.size() >= shared_->settings.max_connections;
     if (full && !std::exchange(full_, true)) {
-        shared_->log("connections refused", "",
-                     "reason=\"max_connections reached\" open=" + std::to_string(sessions_.size()));
+        shared_->log(
+            rt::LogLevel::warn, "connections refused",
+            {{"reason", "max_connections reached"}, {"open", std::to_string(sessions_.size())}});
     }
     return !full;
 }
@@ -179,14 +136,8 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
 
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
     sessions_.erase(session);
-    if (std::exchange(full_, false)) shared_->log("connections accepted again", "");
+    if (std::exchange(full_, false)) shared_->log(rt::LogLevel::info, "connections accepted again");
     tell_when_empty();
-}
-
-void Listener::Core::close_acceptor() {
-    error_code ignored;
-    acceptor_.close(ignored);
-    pause_.cancel();
 }
 
 void Listener::Core::tell_when_empty() {
@@ -195,7 +146,7 @@ void Listener::Core::tell_when_empty() {
 }
 
 void Listener::Core::stop(std::function<void()> done) {
-    close_acceptor();
+    acceptor_.close();
     done_ = std::move(done);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // finish() may erase
     for (const auto& session : sessions) session->finish();
@@ -203,15 +154,15 @@ void Listener::Core::stop(std::function<void()> done) {
 }
 
 void Listener::Core::close_now() {
-    close_acceptor();
+    acceptor_.close();
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) session->close();
 }
 
-Listener::Listener(const asio::any_io_executor& executor, Settings settings, UnitMap units,
-                   Hooks hooks)
-    : core_(std::make_shared<Core>(executor, std::move(settings), std::move(units),
-                                   std::move(hooks))) {}
+Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
+                   UnitMap units, std::string version)
+    : core_(std::make_shared<Core>(executor, clock, std::move(settings), std::move(units),
+                                   std::move(version))) {}
 
 Listener::~Listener() { core_->close_now(); }
 

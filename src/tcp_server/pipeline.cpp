@@ -8,7 +8,6 @@
 #include "dispatch.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -34,8 +33,8 @@ Bytes reply_pdu(std::uint8_t function, const Result<Bytes>& pdu) {
 
 Bytes diagnose(ByteView request, const Shared& shared) {
     Diagnostics state;
-    state.uptime = rt::now() - shared.started;
-    state.version = shared.hooks.version;
+    state.uptime = shared.clock.now() - shared.started;
+    state.version = shared.version;
     for (const bus::BusClient* line : shared.units.lines()) {
         const bus::LineStatus status = line->status();
         state.lines.push_back({status.up, status.queue_depth, status.load_percent});
@@ -105,8 +104,8 @@ void Pipeline::serve(const modbus::Adu& adu) {
                        push(modbus::encode_exception(adu.pdu[0], refusal.code));
                    },
                    [&](const Diagnose&) { push(diagnose(adu.pdu, *shared_)); },
-                   [&](const Forward& forwarding) { forward(adu, forwarding.target); },
-                   [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting.lines); },
+                   [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
+                   [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting); },
                },
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units));
 }
@@ -115,22 +114,22 @@ void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
     replies_.push(adu.transaction, adu.unit, exception_reply(adu.pdu[0], fault));
 }
 
-void Pipeline::forward(const modbus::Adu& adu, const Target& target) {
+void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
     if (turning_away_) return refuse(adu, Fault::cancelled);
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     caller_.transact(
-        target.bus, target.station, adu,
+        forwarding.target.bus, forwarding.target.station, std::move(forwarding.request),
         [weak = weak_from_this(), ticket, function = adu.pdu[0]](const bus::Answer& answer) {
             const auto self = weak.lock();
             if (self) self->settle(ticket, reply_pdu(function, answer.pdu));
         });
 }
 
-void Pipeline::broadcast(const modbus::Adu& adu, const std::vector<bus::BusClient*>& lines) {
+void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) {
     if (turning_away_) return refuse(adu, Fault::cancelled);
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     const auto outcome = std::make_shared<BroadcastOutcome>();
-    outcome->open = lines.size();
+    outcome->open = broadcasting.lines.size();
     const auto on_answer = [weak = weak_from_this(), outcome, ticket,
                             function = adu.pdu[0]](bus::Answer answer) {
         outcome->add(std::move(answer));
@@ -138,7 +137,8 @@ void Pipeline::broadcast(const modbus::Adu& adu, const std::vector<bus::BusClien
         if (!self || outcome->open != 0) return;
         self->settle(ticket, outcome->reply(function, self->shared_->settings.broadcast));
     };
-    for (bus::BusClient* line : lines) caller_.transact(line, 0, adu, on_answer);
+    for (bus::BusClient* line : broadcasting.lines)
+        caller_.transact(line, 0, broadcasting.request, on_answer);
 }
 
 void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {

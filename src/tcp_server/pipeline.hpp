@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "caller.hpp"
+#include "dispatch.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/bus/bus_client.hpp"
@@ -48,8 +49,8 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
   private:
     void admit();
     void serve(const modbus::Adu& adu);
-    void forward(const modbus::Adu& adu, const Target& target);
-    void broadcast(const modbus::Adu& adu, const std::vector<bus::BusClient*>& lines);
+    void forward(const modbus::Adu& adu, Forward forwarding);
+    void broadcast(const modbus::Adu& adu, const Broadcast& broadcasting);
     void refuse(const modbus::Adu& adu, Fault fault);
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);

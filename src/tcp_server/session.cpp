@@ -6,7 +6,6 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/write.hpp>
-#include <chrono>
 #include <utility>
 #include <variant>
 
@@ -17,7 +16,6 @@ namespace {
 
 namespace asio = boost::asio;
 using boost::system::error_code;
-using std::chrono::steady_clock;
 
 }  // namespace
 
@@ -26,8 +24,8 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
     : socket_(std::move(socket)),
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
-      partial_timer_(socket_.get_executor()),
-      output_timer_(socket_.get_executor()) {}
+      partial_alarm_(shared_->clock.make_alarm()),
+      output_alarm_(shared_->clock.make_alarm()) {}
 
 void Session::start(Caller caller) {
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
@@ -51,15 +49,16 @@ void Session::close() {
     const std::shared_ptr<Session> self = shared_from_this();
     error_code ignored;
     socket_.close(ignored);
-    partial_timer_.cancel();
-    output_timer_.cancel();
+    partial_alarm_->cancel();
+    output_alarm_->cancel();
     pipeline_->close();
     if (const ClosedHandler handler = std::exchange(on_closed_, nullptr)) handler(self);
 }
 
 void Session::fail(std::string_view reason, bool protocol_error) {
     if (protocol_error) ++shared_->counters.protocol_errors;
-    shared_->log("connection closed", pipeline_->client(), reason);
+    shared_->log(rt::LogLevel::info, "connection closed",
+                 {{"client", pipeline_->client()}, {"reason", std::string(reason)}});
     close();
 }
 
@@ -101,7 +100,7 @@ void Session::take_adus() {
         if (!event) break;
         progress = true;
         if (std::holds_alternative<modbus::Broken>(*event)) {
-            return fail("reason=\"length outside 2..254\"", true);
+            return fail("length outside 2..254", true);
         }
         if (std::holds_alternative<modbus::SkippedProtocol>(*event)) {
             if (!skip_protocol()) return;
@@ -116,30 +115,25 @@ void Session::take_adus() {
 /// MBAP-06. Does the connection live on?
 bool Session::skip_protocol() {
     if (++bad_protocol_ids_ >= shared_->settings.bad_protocol_ids) {
-        fail("reason=\"protocol id is not 0\"", true);
+        fail("protocol id is not 0", true);
         return false;
     }
     ++shared_->counters.protocol_errors;
     return true;
 }
 
-/// An ADU has partial_adu_timeout from its first byte to its last (MBAP-07): the timer starts anew
-/// only when another ADU begins, or when the rest can be read again after a time without room.
+/// An ADU has partial_adu_timeout from its first byte to its last (MBAP-07): the alarm is armed
+/// anew only when another ADU begins, or when the rest can be read again after a time without room.
 void Session::guard_partial_adu(bool progress) {
     if (!pipeline_->has_room() || !framer_.partial()) return forget_partial_adu();
-    if (partial_watch_ != 0 && !progress) return;
-    partial_watch_ = ++partial_watches_;
-    partial_timer_.expires_after(
-        std::chrono::duration_cast<steady_clock::duration>(shared_->settings.partial_adu_timeout));
-    partial_timer_.async_wait(
-        [self = shared_from_this(), watch = partial_watch_](error_code error) {
-            if (error || self->closed_ || self->partial_watch_ != watch) return;
-            self->fail("reason=\"half-sent ADU\"", true);
-        });
+    if (watching_partial_ && !progress) return;
+    watching_partial_ = true;
+    partial_alarm_->arm(shared_->clock.now() + shared_->settings.partial_adu_timeout,
+                        [self = shared_from_this()] { self->fail("half-sent ADU", true); });
 }
 
 void Session::forget_partial_adu() {
-    if (std::exchange(partial_watch_, 0) != 0) partial_timer_.cancel();
+    if (std::exchange(watching_partial_, false)) partial_alarm_->cancel();
 }
 
 /// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
@@ -184,22 +178,19 @@ void Session::on_written(const error_code& error) {
     go_on();
 }
 
-/// Closes a client that takes nothing for output_timeout, or up to twice that: one timer a period,
+/// Closes a client that takes nothing for output_timeout, or up to twice that: one alarm a period,
 /// not one a reply. Slow is allowed: bytes that its system has acknowledged count as taken.
 void Session::watch_output() {
     if (std::exchange(watching_output_, true)) return;
-    output_timer_.expires_after(
-        std::chrono::duration_cast<steady_clock::duration>(shared_->settings.output_timeout));
-    output_timer_.async_wait(
-        [self = shared_from_this(), written = written_, held = not_taken()](error_code error) {
-            if (error || self->closed_) return;
-            self->watching_output_ = false;
-            if (!self->writing_) return;
-            if (self->written_ == written && self->not_taken() == held) {
-                return self->fail("reason=\"client does not read\"", false);
-            }
-            self->watch_output();
-        });
+    output_alarm_->arm(shared_->clock.now() + shared_->settings.output_timeout,
+                       [self = shared_from_this(), written = written_, held = not_taken()] {
+                           self->watching_output_ = false;
+                           if (!self->writing_) return;
+                           if (self->written_ == written && self->not_taken() == held) {
+                               return self->fail("client does not read", false);
+                           }
+                           self->watch_output();
+                       });
 }
 
 /// Bytes of replies that the client's system has not acknowledged.

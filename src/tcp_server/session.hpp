@@ -2,7 +2,6 @@
 
 #include <array>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +9,7 @@
 
 #include "caller.hpp"
 #include "panelgate/modbus/mbap.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "pipeline.hpp"
 #include "shared.hpp"
 
@@ -64,13 +64,12 @@ class Session : public std::enable_shared_from_this<Session> {
     bool reading_ = false;
     modbus::MbapFramer framer_;  ///< empty but for an unfinished ADU whenever a read starts
     int bad_protocol_ids_ = 0;   ///< in a row
-    boost::asio::steady_timer partial_timer_;
-    std::uint64_t partial_watch_ = 0;  ///< which ADU the timer is for; 0: none
-    std::uint64_t partial_watches_ = 0;
+    std::unique_ptr<rt::Alarm> partial_alarm_;
+    bool watching_partial_ = false;  ///< the alarm is armed
 
     bool writing_ = false;       ///< the pipeline's front()
     std::uint64_t written_ = 0;  ///< replies
-    boost::asio::steady_timer output_timer_;
+    std::unique_ptr<rt::Alarm> output_alarm_;
     bool watching_output_ = false;
     bool closed_ = false;
 };

@@ -1,16 +1,12 @@
 #include "shared.hpp"
 
-#include <string>
+#include <utility>
 
 namespace panelgate::tcp_server {
 
-void Shared::log(std::string_view event, std::string_view client, std::string_view more) const {
-    if (!hooks.log) return;
-    std::string line(event);
-    line.append(" listener=").append(counters.listener);
-    if (!client.empty()) line.append(" client=").append(client);
-    if (!more.empty()) line.append(" ").append(more);
-    hooks.log(line);
+void Shared::log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more) const {
+    more.insert(more.begin(), rt::LogField{"listener", counters.listener});
+    rt::log(level, event, more);
 }
 
 }  // namespace panelgate::tcp_server

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/log.hpp"
 #include "panelgate/tcp_server/counters.hpp"
-#include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
 
@@ -14,11 +17,13 @@ namespace panelgate::tcp_server {
 struct Shared {
     Settings settings;
     UnitMap units;
-    Hooks hooks;
+    std::string version;  ///< of the program, for the device identification
+    rt::Clock& clock;
     Counters counters;
     TimePoint started;
 
-    void log(std::string_view event, std::string_view client, std::string_view more = {}) const;
+    /// One line of this listener.
+    void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;
 };
 
 }  // namespace panelgate::tcp_server

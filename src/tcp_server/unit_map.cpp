@@ -14,10 +14,6 @@ const LineInfo& find_line(const std::vector<LineInfo>& lines, const std::string&
     return *at;
 }
 
-bool is_read_only(const LineInfo& line, std::uint8_t station) {
-    return std::ranges::find(line.read_only, station) != line.read_only.end();
-}
-
 std::vector<LineInfo> own_lines(const Settings& settings, const std::vector<LineInfo>& lines) {
     if (settings.lines.empty()) return lines;
     std::vector<LineInfo> own;
@@ -30,10 +26,7 @@ std::vector<LineInfo> own_lines(const Settings& settings, const std::vector<Line
 UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
     for (const auto& [unit, target] : settings.units) {
         const LineInfo& line = find_line(lines, target.line);
-        aliases_[unit] = Target{line.bus, target.station, is_read_only(line, target.station)};
-    }
-    for (const LineInfo& line : lines) {
-        if (!line.read_only.empty()) with_read_only_.insert(line.bus);
+        aliases_[unit] = Target{line.bus, target.station};
     }
     const std::vector<LineInfo> own = own_lines(settings, lines);
     for (const LineInfo& line : own) {
@@ -42,7 +35,7 @@ UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
     }
     if (own.size() != 1 || !own.front().pass_unlisted) return;
     for (std::uint8_t station = 1; station <= modbus::kMaxStation; ++station) {
-        if (!listed_[station]) direct_[station] = Target{own.front().bus, station, false};
+        if (!listed_[station]) direct_[station] = Target{own.front().bus, station};
     }
 }
 
@@ -52,8 +45,7 @@ void UnitMap::add_stations(const LineInfo& line) {
         // On two lines: nobody can say which one is meant, and a guess would be a wrong value.
         const bool ambiguous = listed_[station] && direct_[station].bus != line.bus;
         listed_[station] = true;
-        direct_[station] =
-            ambiguous ? Target{} : Target{line.bus, station, is_read_only(line, station)};
+        direct_[station] = ambiguous ? Target{} : Target{line.bus, station};
     }
 }
 

@@ -29,6 +29,7 @@ from collections import Counter, namedtuple
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
+import config  # noqa: E402
 import harness  # noqa: E402
 import zoo_line  # noqa: E402
 from harness import Output  # noqa: E402
@@ -100,12 +101,12 @@ def directly(_, ttys):
 @contextlib.contextmanager
 def by_ser2net(folder, ttys):
     ports = [free_port() for _ in ttys]
-    config = pathlib.Path(folder) / "ser2net.yaml"
-    config.write_text("%YAML 1.1\n---\n" + "".join(
+    file = pathlib.Path(folder) / "ser2net.yaml"
+    file.write_text("%YAML 1.1\n---\n" + "".join(
         f"connection: &line{port}\n  accepter: tcp,127.0.0.1,{port}\n"
         f"  connector: serialdev,{tty},{BAUD}n81,local\n" for port, tty in zip(ports, ttys)))
     # It says on stderr that it finds no mDNS.
-    with Helper(["ser2net", "-n", "-u", "-c", config], stderr=subprocess.DEVNULL):
+    with Helper(["ser2net", "-n", "-u", "-c", file], stderr=subprocess.DEVNULL):
         for port in ports:
             wait_for_listener(port)
         yield [f"127.0.0.1:{port}" for port in ports]
@@ -142,8 +143,8 @@ def line_of(slave, way, pace):
 def measure(slave, way, pace, phases, seconds):
     with line_of(slave, way, pace) as (ours, plain_end), contextlib.ExitStack() as stack:
         device = ours if ours.startswith("/") else f"tcp://{ours}"
-        text = zoo_line.configuration(device, BAUD, [UNIT])
-        program = stack.enter_context(harness.configured(text))
+        served = config.line("foreign", device, config.station_ids([UNIT]), baud=BAUD)
+        program = stack.enter_context(harness.configured(config.gateway(served)))
         program.log.wait_for("line up")
         gateway = stack.enter_context(Master("tcp", f"127.0.0.1:{program.modbus_port()}", UNIT))
         plain = stack.enter_context(Master("rtu", plain_end, BAUD, UNIT))
@@ -154,7 +155,7 @@ def measure(slave, way, pace, phases, seconds):
             plain_rate, wrong = plain.run(seconds)
             plain_failed += wrong
             pairs.append((rate, plain_rate))
-        found = program.get("/api/v1/lines/zoo")[1].get("findings", [])
+        found = program.get("/api/v1/lines/foreign")[1].get("findings", [])
     rates, plain_rates = zip(*pairs)
     ratio = statistics.median(a / b if b else float("inf") for a, b in pairs)
     return Seen(statistics.mean(plain_rates), statistics.mean(rates), ratio, dict(failed),

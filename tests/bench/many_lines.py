@@ -23,6 +23,7 @@ import time
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
+import config  # noqa: E402
 import wire  # noqa: E402
 from clients import percentile, with_clients  # noqa: E402
 from harness import PATIENCE, Program, read_registers  # noqa: E402
@@ -102,15 +103,13 @@ class Plant:
                                      text=True)
         self._bus.stdout.readline()
         self._noisy = NoisyLine(links[NOISY], piece)
-        config = pathlib.Path(f"{folder}/many-{id(self)}.yaml")
-        lines = "".join(
-            f"  - name: line{n}\n    device: {link}\n    serial: {{baud: {BAUD}, parity: even}}\n"
-            "    timing: {response_timeout: 100ms}\n"
-            "    offline: {probe_min: 100ms, probe_max: 200ms}\n"
-            f"    stations: [{{id: {n}}}]\n" for n, link in links.items())
-        config.write_text(f"lines:\n{lines}modbus_tcp: [{{listen: '127.0.0.1:0'}}]\n"
-                          "http: {listen: '127.0.0.1:0'}\n")
-        self.gateway = Program("run", "-c", str(config))
+        file = pathlib.Path(f"{folder}/many-{id(self)}.yaml")
+        file.write_text(config.gateway(*(
+            config.line(f"line{n}", link, config.station_ids([n]), baud=BAUD, parity="even",
+                        timing="{response_timeout: 100ms}",
+                        offline="{probe_min: 100ms, probe_max: 200ms}")
+            for n, link in links.items())))
+        self.gateway = Program("run", "-c", str(file))
 
     def __enter__(self):
         self.gateway.log.wait_for("line up", LINES)

@@ -47,8 +47,8 @@ Answers = namedtuple("Answers", "asked unanswered strays closed lateness kinds")
 def answers_under_faults(tools, folder, baud, seconds=4, deadline=1.5, clients=40, depth=4):
     """P3: every fault on, more requests than the line can take. `lateness`: of the latest answer,
     in seconds after its deadline; `strays`: answers that nobody waited for."""
-    settings = ("    timing: {response_timeout: 100ms}\n"
-                f"    queue: {{limit: 256, deadline: {round(deadline * 1000)}ms}}\n")
+    settings = {"timing": "{response_timeout: 100ms}",
+                "queue": f"{{limit: 256, deadline: {round(deadline * 1000)}ms}}"}
     dice = random.Random(1)
 
     def request():
@@ -83,8 +83,8 @@ def answers_under_faults(tools, folder, baud, seconds=4, deadline=1.5, clients=4
 def back_after(tools, folder, baud, busy):
     """P4: seconds from the moment a dead station could answer again to the end of its answer, at
     worst: it comes back just after a probe. `busy`: seven clients keep the line full meanwhile."""
-    settings = ("    timing: {response_timeout: 100ms}\n"
-                "    offline: {probe_min: 500ms, probe_max: 1s}\n")
+    settings = {"timing": "{response_timeout: 100ms}",
+                "offline": "{probe_min: 500ms, probe_max: 1s}"}
     with Bus(tools, folder, baud, ["8:drop=1"], settings, log=True) as bus:
         with bus.gateway.client() as client:
             client.ask(1, read_registers(0))
@@ -127,7 +127,7 @@ def gaps_behind_exceptions(tools, folder, baud, seconds=2):
 
 def gaps_behind_broadcasts(tools, folder, baud, seconds=2, turnaround=0.1):
     """P5: (Gaps behind broadcasts, bus statistics) while four readers and broadcasts wait."""
-    settings = f"    timing: {{broadcast_turnaround: {round(turnaround * 1000)}ms}}\n"
+    settings = {"timing": f"{{broadcast_turnaround: {round(turnaround * 1000)}ms}}"}
 
     async def ask(clients):
         end = time.monotonic() + seconds

@@ -19,6 +19,7 @@ import time
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
+import config  # noqa: E402
 from harness import Output, Program  # noqa: E402
 
 TOOLS = pathlib.Path(os.environ.get("PANELGATE_TOOLS", HERE.parents[3] / "shared/tools"))
@@ -48,9 +49,9 @@ def wire_limit(baud, registers=10):
 
 
 class Bus:
-    """rtubus with stations 1 to 8, and a gateway on it."""
+    """rtubus with stations 1 to 8, and a gateway on it; `settings`: more keys of its line."""
 
-    def __init__(self, tools, folder, baud, faults=(), settings="", log=False, echo=0):
+    def __init__(self, tools, folder, baud, faults=(), settings=None, log=False, echo=0):
         self.tools = tools
         link = f"{folder}/tty{baud}-{id(self)}"
         command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8",
@@ -65,13 +66,11 @@ class Bus:
         os.close(write)
         self.log = Output(os.fdopen(read))  # a line for every frame: START END BUS KIND hex...
         self.bus.stdout.readline()
-        stations = ", ".join(f"{{id: {i}}}" for i in range(1, 9))
-        config = pathlib.Path(f"{link}.yaml")
-        config.write_text(f"lines:\n  - name: wire\n    device: {link}\n"
-                          f"    serial: {{baud: {baud}, parity: even}}\n{settings}"
-                          f"    stations: [{stations}]\n"
-                          "modbus_tcp: [{listen: '127.0.0.1:0'}]\n")
-        self.gateway = Program("run", "-c", str(config))
+        line = config.line("wire", link, config.station_ids(range(1, 9)), baud=baud, parity="even",
+                           **(settings or {}))
+        file = pathlib.Path(f"{link}.yaml")
+        file.write_text(config.gateway(line, http=None))
+        self.gateway = Program("run", "-c", str(file))
 
     def __enter__(self):
         self.gateway.log.wait_for("line up")
@@ -117,7 +116,7 @@ def utilisation(tools, folder, baud, seconds=4, echo=0):
 def with_dead(tools, folder, baud, dead, seconds=8, timeout=0.5):
     """(share of the wire's limit for the healthy ones, p99 in ms of the answers for the dead ones)."""
     faults = [f"{i}:drop=1" for i in range(9 - dead, 9)]
-    settings = f"    timing: {{response_timeout: {round(timeout * 1000)}ms}}\n"
+    settings = {"timing": f"{{response_timeout: {round(timeout * 1000)}ms}}"}
     with Bus(tools, folder, baud, faults, settings) as bus:
         # The warm-up is long enough for three silent transactions of each dead one.
         seen, _ = bus.load("--conns", 8, "--units", "1-8", "--live", f"1-{8 - dead}",
@@ -140,7 +139,7 @@ FAULTS = ("1:delay=50,delayto=140,delayevery=3", "2:delay=60,delayto=180,delayev
 
 def under_faults(tools, folder, baud, seconds=10):
     """(good answers, wrong values, gap violations) with every fault of the bus on."""
-    settings = "    timing: {response_timeout: 100ms}\n    queue: {deadline: 4s}\n"
+    settings = {"timing": "{response_timeout: 100ms}", "queue": "{deadline: 4s}"}
     with Bus(tools, folder, baud, FAULTS, settings) as bus:
         seen, wire = bus.load("--conns", 16, "--units", "1-8", "--mix", "--time", seconds, "--warm", 0)
     return seen["all"]["ok"], wrong_values(seen), wire["gap_violations"]
@@ -152,8 +151,8 @@ QUICK_FAULTS = ("1:delay=5,delayto=14,delayevery=3", "2:delay=6,delayto=18,delay
 
 def many_under_faults(tools, folder, baud, transactions):
     """(transactions, good answers, wrong values) of one line with every fault on."""
-    settings = ("    timing: {response_timeout: 10ms}\n    queue: {deadline: 4s}\n"
-                "    offline: {probe_min: 10ms, probe_max: 20ms}\n")
+    settings = {"timing": "{response_timeout: 10ms}", "queue": "{deadline: 4s}",
+                "offline": "{probe_min: 10ms, probe_max: 20ms}"}
     sent = good = wrong = 0
     with Bus(tools, folder, baud, QUICK_FAULTS, settings) as bus:
         while sent < transactions:

@@ -19,6 +19,7 @@ import time
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
+import config  # noqa: E402
 import harness  # noqa: E402
 import zoo  # noqa: E402
 import zoo_line  # noqa: E402
@@ -40,12 +41,9 @@ class Mix:
             command += ["--bus", f"{'tcp:0' if tcp else f'{folder}/tty{n}'}={self.range_of(n)}"]
         self.zoo = zoo_line.Zoo(*command)
         devices = [f"tcp://{name}" if tcp else name for name in self.zoo.names]
-        self.text = "lines:\n" + "".join(
-            f"  - name: line{n}\n    device: {device}\n"
-            f"    serial: {{baud: {baud}, data_bits: 8, parity: none, stop_bits: 1}}\n"
-            f"    stations: [{', '.join(f'{{id: {u}}}' for u in self.units(n))}]\n"
-            for n, device in zip(self.lines, devices)) + (
-                "modbus_tcp: [{listen: '127.0.0.1:0'}]\nhttp: {listen: '127.0.0.1:0'}\n")
+        self.text = config.gateway(*(
+            config.line(f"line{n}", device, config.station_ids(self.units(n)), baud=baud)
+            for n, device in zip(self.lines, devices)))
 
     def units(self, line):
         return range(line * PANELS + 1, line * PANELS + PANELS + 1)

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <functional>
 #include <iostream>
 #include <map>
@@ -16,21 +15,13 @@
 
 #include "explorer.hpp"
 #include "support/bus_script.hpp"
+#include "support/environment.hpp"
 #include "worlds.hpp"
 
 namespace panelgate::explorer {
 namespace {
 
-std::size_t number_from(const char* variable, std::size_t fallback) {
-    const char* text = std::getenv(variable);
-    return text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
-}
-
-std::size_t wanted_states() {
-    const bool slow = number_from("PANELGATE_SANITIZED", 0) != 0;
-    const std::size_t all = number_from("PANELGATE_EXPLORER_STATES", 1'000'000);
-    return slow ? all / 10 : all;
-}
+std::size_t wanted_states() { return test::amount_from("PANELGATE_EXPLORER_STATES", 1'000'000); }
 
 class SmallWorld : public testing::TestWithParam<Rules> {};
 

@@ -8,6 +8,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::explorer {
 namespace {
@@ -81,14 +82,13 @@ void World::submit(const Wish& wish) {
     if (wish.write) open.value = ++writes_;
     Writer pdu;
     pdu.u8(wish.write ? 6 : 3).u16(wish.address).u16(wish.write ? open.value : wish.count);
-    arbiter::Job job;
-    job.station = wish.station;
-    job.pdu = pdu.take();
-    job.client = wish.client;
-    job.priority = wish.write ? arbiter::PriorityClass::write : arbiter::PriorityClass::read;
+    arbiter::Job job{.station = wish.station,
+                     .request = test::request_of(pdu.take()),
+                     .client = wish.client,
+                     .priority = wish.write ? PriorityClass::write : PriorityClass::read};
     note({.verb = test::BusStep::Verb::submit,
           .station = wish.station,
-          .bytes = job.pdu,
+          .bytes = job.request.pdu(),
           .client = wish.client,
           .priority = job.priority});
     const auto ticket = subject_.submit(now_, std::move(job));
@@ -159,7 +159,7 @@ bool World::is_the_answer(const Reply& reply) const {
 /// Somebody must have got it. While nobody knows whether the line hears itself, what may be the
 /// echo of a write confirms nothing.
 void World::check_answered(const Reply& reply, const Judge::Opens& before) {
-    const bool echo = subject_.arbiter().echo() != arbiter::EchoMemory::State::absent;
+    const bool echo = subject_.arbiter().echo() != EchoState::absent;
     if (reply.adu[1] != 3 && echo) return;
     bool asked = false;
     for (const Judge::Open& open : before) {
@@ -288,8 +288,8 @@ void World::act(const arbiter::Finish& finish) {
 }
 
 void World::act(const arbiter::Note& note) {
-    if (note.direction == arbiter::Note::Direction::sent)
-        probing_ = note.what == "probe" || note.what == "learn echo";
+    if (direction_of(note.kind) == FrameDirection::sent)
+        probing_ = note.kind == FrameKind::probe || note.kind == FrameKind::learn_echo;
 }
 
 }  // namespace panelgate::explorer

@@ -52,7 +52,7 @@ std::vector<Rules> small_worlds() {
     station.settings.quarantine = arbiter::Quarantine::station;
     worlds.push_back(station);
     Rules learning = world("EchoIsLearned", kNoise | kLine | bits({damaged}), 2);
-    learning.settings.echo = arbiter::EchoMode::automatic;
+    learning.settings.echo = EchoMode::automatic;
     worlds.push_back(learning);
     Rules joined = world("TouchingReads", kBadReplies | bits({line_blinks}), 2);
     joined.wishes = {kX, {.client = 2, .station = 1, .address = 11}, kWrite};

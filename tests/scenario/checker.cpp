@@ -44,18 +44,18 @@ void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::
     last_ticket_ = ticket;
     waiting_before_ = open_.size() >= settings_.queue.limit ? waiting() : 0;
     const bool joins = joins_attempt(now, job);
-    Open& open = open_[ticket];
-    open.job = job;
-    open.submitted = now;
-    open.served = truth_.served(job.station);
-    open.turn = frames_;
-    open.write = !modbus::is_pure_read(job.pdu);
-    open.sent = joins;
+    const Open open{.job = job,
+                    .submitted = now,
+                    .served = truth_.served(job.station),
+                    .turn = frames_,
+                    .write = !job.request.is_read(),
+                    .sent = joins};
+    open_.insert_or_assign(ticket, open);
     displaced_ = false;
     Client& client = clients_[job.client];
     ++client.accepted;
     ++client.open;
-    if (open.write) open_writes_[key_of(job.station, job.pdu)] = ticket;
+    if (open.write) open_writes_[key_of(job.station, job.request.pdu())] = ticket;
 }
 
 void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
@@ -64,13 +64,13 @@ void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
         fail("P4: a good station was refused as offline");
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");
-    const bool equal = client.open == 0 && modbus::is_pure_read(job.pdu) && settings_.share_reads &&
-                       job.station != kBroadcast &&
-                       std::ranges::any_of(open_, [&](const auto& entry) {
-                           const Open& o = entry.second;
-                           return !o.sent && !o.gone && o.job.station == job.station &&
-                                  o.job.pdu == job.pdu && o.job.priority == job.priority;
-                       });
+    const bool equal =
+        client.open == 0 && job.request.is_read() && settings_.share_reads &&
+        job.station != kBroadcast && std::ranges::any_of(open_, [&](const auto& entry) {
+            const Open& o = entry.second;
+            return !o.sent && !o.gone && o.job.station == job.station &&
+                   o.job.request.pdu() == job.request.pdu() && o.job.priority == job.priority;
+        });
     if (equal) fail("P6: a read was refused that one which waits would have answered");
 }
 
@@ -91,7 +91,7 @@ void Checker::on_client_gone(arbiter::Client client) {
     for (auto& [ticket, open] : open_) {
         if (open.job.client != client) continue;
         open.gone = true;
-        if (open.write) closed_writes_.insert(key_of(open.job.station, open.job.pdu));
+        if (open.write) closed_writes_.insert(key_of(open.job.station, open.job.request.pdu()));
     }
 }
 
@@ -109,7 +109,7 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     const Fault of_displaced = open.sent ? Fault::timeout : Fault::busy;
     displaced_ = displaced_ || (!finish.pdu && finish.pdu.error() == of_displaced);
     if (open.write) {
-        const std::string key = key_of(open.job.station, open.job.pdu);
+        const std::string key = key_of(open.job.station, open.job.request.pdu());
         closed_writes_.insert(key);
         open_writes_.erase(key);
         if (finish.transmitted != written_.contains(key))
@@ -151,7 +151,7 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
 void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish) {
     const Bytes& reply = *finish.pdu;
     if (modbus::exception_of(reply)) {
-        if (!truth_.refused(open.job.station, open.job.pdu, open.submitted))
+        if (!truth_.refused(open.job.station, open.job.request.pdu(), open.submitted))
             fail("P1: an exception that the station did not send to this request");
         return;
     }
@@ -163,7 +163,7 @@ void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish
 
 void Checker::check_write(TimePoint now, const Open& open) {
     if (open.job.station == kBroadcast) return;
-    const auto done = truth_.executed(open.job.station, open.job.pdu);
+    const auto done = truth_.executed(open.job.station, open.job.request.pdu());
     // The start of our own frame comes back, and its last byte is what somebody makes of a reply.
     if ((!done || *done > now) && is_luck()) return;
     if (!done || *done > now) return fail("P8: a write was confirmed that no station executed");
@@ -172,7 +172,7 @@ void Checker::check_write(TimePoint now, const Open& open) {
 
 void Checker::check_values(TimePoint now, const Open& open, const arbiter::Finish& finish) {
     const Bytes& reply = *finish.pdu;
-    const ByteView pdu = open.job.pdu;
+    const ByteView pdu = open.job.request.pdu();
     const std::uint16_t first = word(pdu, 1);
     const std::uint16_t count = word(pdu, 3);
     if (reply.size() != 2 + std::size_t{2} * count || reply[0] != pdu[0])

@@ -16,12 +16,13 @@
 #include "plan.hpp"
 #include "truth.hpp"
 #include "watch.hpp"
+#include "witness.hpp"
 
 namespace panelgate::scenario {
 
 /// Holds what an arbiter does against what it promises. Knows the truth (what the panels did and
 /// when) from the world and the claims (answers, frames) from the arbiter; shares no code with it.
-class Checker {
+class Checker : public Witness {
   public:
     explicit Checker(const Plan& plan);
     Checker(const Checker&) = delete;
@@ -31,7 +32,7 @@ class Checker {
     void on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::Job& job);
     void on_refused(TimePoint now, const arbiter::Job& job, Fault fault);
     /// `what`: the word of its note. `dead`: no panel can hear it.
-    void on_transmit(TimePoint now, const Bytes& adu, std::string_view what, bool dead);
+    void on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool dead);
     void on_finish(TimePoint now, const arbiter::Finish& finish);
     /// All that it had to say to a new request has been said.
     void on_settled();
@@ -41,18 +42,16 @@ class Checker {
     void on_heard(TimePoint now, std::size_t bytes);
     /// A good answer to the request on the wire was delivered to its last byte.
     void on_answered(TimePoint now);
-    void on_served(TimePoint now, std::uint8_t station) { truth_.on_served(now, station); }
-    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) {
+    void on_served(TimePoint now, std::uint8_t station) override { truth_.on_served(now, station); }
+    void on_executed(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_executed(now, station, pdu);
     }
-    void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) {
+    void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) override {
         truth_.on_exception(now, station, pdu);
     }
-    /// A second copy of an answer was delivered to its last byte.
-    void on_copy(TimePoint now, std::uint8_t station);
-    /// Bytes were delivered that nobody said.
-    void on_garbled(TimePoint now) { garbled_ = now; }
-    void on_collision(TimePoint now, std::uint8_t station);
+    void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_garbled(TimePoint now) override { garbled_ = now; }
+    void on_collision(TimePoint now, std::uint8_t station) override;
     void on_line_down(TimePoint now);
     void on_line_up(TimePoint now);
     void on_stall(TimePoint now) { watch_.on_upset(now); }
@@ -107,14 +106,14 @@ class Checker {
     void check_moment(TimePoint now);
     void check_idling(TimePoint now);
     void check_write_sent(std::uint8_t station, ByteView pdu);
-    void check_again(std::uint8_t station, ByteView pdu, std::string_view what);
+    void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
     std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
     Duration least_wait() const;
     TimePoint owed_until() const;
     // Who waits, and whose turn it is (checker_queue.cpp)
-    void mark_sent(std::uint8_t station, ByteView pdu, std::string_view what);
+    void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
     void check_turn(bool write);

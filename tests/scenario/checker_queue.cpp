@@ -17,17 +17,18 @@ constexpr std::uint8_t kBroadcast = 0;
 
 /// What goes with this frame: what it contains and may run, nothing older of its client waiting for
 /// that station, nor a broadcast. What was sent before and is not this frame waits again.
-void Checker::mark_sent(std::uint8_t station, ByteView pdu, std::string_view what) {
-    if (what != "request" && what != "broadcast") return;  // it answers nobody, or the same again
+void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
+    if (what != FrameKind::request && what != FrameKind::broadcast)
+        return;  // it answers nobody, or the same again
     const auto span = test::read_span(station, pdu);
     std::unordered_set<arbiter::Client> behind;  // those whose order lets no more go
     for (auto& [ticket, open] : open_) {
         const bool concerned = open.job.station == station || open.job.station == kBroadcast;
         if (open.gone || !concerned) continue;
-        const auto own = test::read_span(open.job.station, open.job.pdu);
-        const bool goes =
-            span && own ? span->contains(*own)
-                        : open.job.station == station && std::ranges::equal(open.job.pdu, pdu);
+        const auto own = test::read_span(open.job.station, open.job.request.pdu());
+        const bool goes = span && own ? span->contains(*own)
+                                      : open.job.station == station &&
+                                            std::ranges::equal(open.job.request.pdu(), pdu);
         if (goes && (open.sent || !behind.contains(open.job.client))) {
             open.sent = true;
         } else {
@@ -39,7 +40,7 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, std::string_view wha
 /// A read that comes while one which contains it is still leaving goes along with it, unless
 /// something older of its client waits for that station.
 bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
-    const auto own = test::read_span(job.station, job.pdu);
+    const auto own = test::read_span(job.station, job.request.pdu());
     const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
     if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
     return std::ranges::none_of(open_, [&](const auto& entry) {
@@ -57,7 +58,7 @@ std::size_t Checker::waiting() const {
     std::map<std::pair<unsigned, modbus::Table>, std::vector<arbiter::ReadSpan>> reads;
     for (const auto& [ticket, open] : open_) {
         if (open.sent || open.gone) continue;
-        const auto span = test::read_span(open.job.station, open.job.pdu);
+        const auto span = test::read_span(open.job.station, open.job.request.pdu());
         if (!span || !settings_.share_reads) {
             ++waiting;
         } else {
@@ -108,7 +109,7 @@ void Checker::check_turn(bool write) {
     const auto starves = std::ranges::find_if(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         const auto client = clients_.find(o.job.client);
-        return !o.sent && !o.gone && o.job.priority == arbiter::PriorityClass::read &&
+        return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
                o.turn + kWritesInARow < frames_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
                !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&

@@ -71,7 +71,7 @@ bool Checker::is_noisy(TimePoint now) const {
     return now >= noisy_since_ + wire_time(settings_.serial, kLongestAdu);
 }
 
-void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what, bool dead) {
+void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool dead) {
     check_moment(now);
     close_attempt(now);
     check_idling(now);
@@ -81,14 +81,14 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     check_again(station, pdu, what);
     // A retry belongs to the silence that it follows, whoever was asked between.
     bool& was_silent = silent_before_[station];
-    if (what != "retry") was_silent = watch_.is_silent(station);
-    if (what == "retry") {
+    if (what != FrameKind::retry) was_silent = watch_.is_silent(station);
+    if (what == FrameKind::retry) {
         retried_.insert(station);
     } else {
         retried_.erase(station);
     }
     attempt_.was_silent = was_silent;
-    attempt_.trusted = what == "request" && watch_.is_trusted(now, station);
+    attempt_.trusted = what == FrameKind::request && watch_.is_trusted(now, station);
     const auto [asked, first] = last_asked_.try_emplace(station, now);
     if (!first) {
         longest_unasked_[station] = std::max(longest_unasked_[station], now - asked->second);
@@ -101,7 +101,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, std::string_view what
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
     attempt_.span = test::read_span(station, pdu);
-    attempt_.again = what == "retry";
+    attempt_.again = what == FrameKind::retry;
     attempt_.owed = now < watch_.rests_until(station);
     constexpr std::size_t kRemembered = 8;
     last_turns_.push_back(now);
@@ -217,8 +217,8 @@ void Checker::check_write_sent(std::uint8_t station, ByteView pdu) {
 }
 
 /// Retries are for those who are there, and not for the silent.
-void Checker::check_again(std::uint8_t station, ByteView pdu, std::string_view what) {
-    if (what != "retry") return;
+void Checker::check_again(std::uint8_t station, ByteView pdu, FrameKind what) {
+    if (what != FrameKind::retry) return;
     const auto before = silent_before_.find(station);
     const bool was_silent = before != silent_before_.end() && before->second;
     if (was_silent && watch_.only_dies(station) && calm_)
@@ -227,8 +227,8 @@ void Checker::check_again(std::uint8_t station, ByteView pdu, std::string_view w
     const bool wanted = std::ranges::any_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         if (o.gone || o.job.station != station) return false;
-        const auto own = test::read_span(station, o.job.pdu);
-        return span && own ? span->contains(*own) : std::ranges::equal(o.job.pdu, pdu);
+        const auto own = test::read_span(station, o.job.request.pdu());
+        return span && own ? span->contains(*own) : std::ranges::equal(o.job.request.pdu(), pdu);
     });
     if (!wanted) fail("P4: a request went out again for nobody");
 }

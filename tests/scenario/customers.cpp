@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "panelgate/modbus/request.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::scenario {
 
@@ -72,7 +73,7 @@ void Customers::submit(std::size_t index) {
     }
     agenda_.tell("request " + std::to_string(*ticket) + " of client " + std::to_string(job.client) +
                      " to station " + std::to_string(job.station),
-                 job.pdu);
+                 job.request.pdu());
     checker_.on_accepted(agenda_.now(), *ticket, job);
     asked_by_[*ticket] = index;
 }
@@ -91,22 +92,22 @@ void Customers::on_finish(arbiter::Ticket ticket) {
 
 arbiter::Job Customers::draw_job(Customer& customer) {
     const ClientPlan& plan = customer.plan;
-    arbiter::Job job;
-    job.client = customer.id;
-    job.host = plan.host;
+    arbiter::Job job{.request = modbus::Request::read({modbus::Table::holding_registers, 0, 1}),
+                     .client = customer.id,
+                     .host = plan.host};
     if (plan.scans) {
         job.station = static_cast<std::uint8_t>(customer.scanned++ % 247 + 1);
-        job.pdu = modbus::encode_read(modbus::Table::holding_registers, 0, 1);
     } else if (random_.chance(plan.broadcasts)) {
         job.station = 0;
-        job.pdu = draw_write();
+        job.request = test::request_of(draw_write());
     } else {
         job.station = plan.stations[random_.below(static_cast<unsigned>(plan.stations.size()))];
-        job.pdu = random_.chance(plan.writes) ? draw_write() : draw_read(customer);
+        job.request =
+            test::request_of(random_.chance(plan.writes) ? draw_write() : draw_read(customer));
     }
-    job.priority = !modbus::is_pure_read(job.pdu) ? arbiter::PriorityClass::write
-                   : plan.polls                   ? arbiter::PriorityClass::poll
-                                                  : arbiter::PriorityClass::read;
+    job.priority = !job.request.is_read() ? PriorityClass::write
+                   : plan.polls           ? PriorityClass::poll
+                                          : PriorityClass::read;
     return job;
 }
 

@@ -52,7 +52,7 @@ TEST(Field, P1AQuickPanelBesideSlowOnesIsNotTooEarly) {
     Plan plan = quiet_line(115200, 3);
     plan.panels[1].think = 300us;
     plan.panels[1].eager = true;
-    plan.settings.echo = arbiter::EchoMode::automatic;
+    plan.settings.echo = EchoMode::automatic;
     add_client(plan, {1, 2, 3}, 0.3);
     EXPECT_EQ(broken(plan), "");
     plan.settings.paced = true;
@@ -81,7 +81,7 @@ TEST(Field, P6ReadsThatWereJoinedOnFaithAreSplitHoweverThePanelRefuses) {
 
 TEST(Field, P8OneByteBehindEachReplyLeavesWritesConfirmed) {
     Plan plan = quiet_line(19200, 2);
-    plan.settings.echo = arbiter::EchoMode::automatic;
+    plan.settings.echo = EchoMode::automatic;
     plan.panels[0].glitch_behind = 1;
     add_client(plan, {1, 2}, 0.5);
     EXPECT_EQ(broken(plan), "");
@@ -102,7 +102,7 @@ TEST(Field, P7APauseInsideAReplyIsPartOfIt) {
 
 TEST(Field, P8AnEchoThatLacksItsLastByteOrHasABitErrorCostsNothingButItself) {
     Plan plan = quiet_line(38400, 2);
-    plan.settings.echo = arbiter::EchoMode::automatic;
+    plan.settings.echo = EchoMode::automatic;
     plan.line.echo = true;
     plan.line.cut_echo = 1;
     add_client(plan, {1, 2}, 0.3);
@@ -114,7 +114,7 @@ TEST(Field, P8AnEchoThatLacksItsLastByteOrHasABitErrorCostsNothingButItself) {
 
 TEST(Field, P8TheFirstByteOfAnEchoDoesNotMakeQuickWritesOld) {
     Plan plan = quiet_line(38400, 2, 300us);
-    plan.settings.echo = arbiter::EchoMode::automatic;
+    plan.settings.echo = EchoMode::automatic;
     for (PanelPlan& panel : plan.panels) panel.eager = true;
     add_client(plan, {1, 2}, 0.3);
     EXPECT_EQ(broken(plan), "");

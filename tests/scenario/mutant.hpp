@@ -26,7 +26,7 @@ class Tampered : public Subject {
 
     Result<arbiter::Ticket> submit(TimePoint now, Job job) override {
         auto ticket = Subject::submit(now, job);
-        if (ticket) jobs_[*ticket] = std::move(job);
+        if (ticket) jobs_.insert_or_assign(*ticket, std::move(job));
         return ticket;
     }
     std::optional<Action> poll_action(TimePoint now) override {
@@ -61,7 +61,7 @@ class Tampered : public Subject {
     static bool is_good(const Finish& finish) {
         return finish.pdu && !modbus::exception_of(*finish.pdu);
     }
-    bool is_read(const Finish& finish) const { return modbus::is_pure_read(job_of(finish).pdu); }
+    bool is_read(const Finish& finish) const { return job_of(finish).request.is_read(); }
 
     std::vector<Action> extra_;
     std::map<arbiter::Ticket, Job> jobs_;

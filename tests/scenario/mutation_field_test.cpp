@@ -93,8 +93,7 @@ struct CountsEqualReads : Tampered {
 struct TakesReadersForPolls : Subject {
     using Subject::Subject;
     Result<arbiter::Ticket> submit(TimePoint now, Job job) override {
-        if (job.priority == arbiter::PriorityClass::read)
-            job.priority = arbiter::PriorityClass::poll;
+        if (job.priority == PriorityClass::read) job.priority = PriorityClass::poll;
         return Subject::submit(now, std::move(job));
     }
 };

@@ -55,9 +55,9 @@ struct GivesAnOldValue : Tampered {
     bool tamper(TimePoint, Finish& finish) override {
         if (!is_good(finish) || !is_read(finish)) return true;
         const Job& job = job_of(finish);
-        const bool of_memory = job.pdu[1] * 256 + job.pdu[2] >= kMemory;
+        const bool of_memory = job.request.pdu()[1] * 256 + job.request.pdu()[2] >= kMemory;
         if (of_memory != wants_memory_) return true;
-        Bytes& known = known_[{job.station, job.pdu}];
+        Bytes& known = known_[{job.station, job.request.pdu()}];
         if (known.empty()) known = *finish.pdu;
         finish.pdu = std::exchange(known, *finish.pdu);
         return true;
@@ -91,7 +91,7 @@ struct InventsAnException : Tampered {
 struct ConfirmsWhatTimedOut : Tampered {
     using Tampered::Tampered;
     bool tamper(TimePoint, Finish& finish) override {
-        const Bytes& pdu = job_of(finish).pdu;
+        const Bytes& pdu = job_of(finish).request.pdu();
         if (!finish.pdu && finish.pdu.error() == Fault::timeout && !is_read(finish))
             finish.pdu = Bytes(pdu.begin(), pdu.begin() + 5);
         return true;
@@ -109,7 +109,7 @@ struct LiesAboutTransmission : Tampered {
 struct StarvesPolls : Tampered {
     using Tampered::Tampered;
     bool tamper(TimePoint, Finish& finish) override {
-        if (job_of(finish).priority == arbiter::PriorityClass::poll) finish.pdu = Fault::expired;
+        if (job_of(finish).priority == PriorityClass::poll) finish.pdu = Fault::expired;
         return true;
     }
 };
@@ -194,7 +194,7 @@ const Mutant kMutants[] = {
      }),
      late_panels},
     {"BelievesAnEcho", "P8: a write was confirmed", Kind::echo, misled([](arbiter::Settings& s) {
-         s.echo = arbiter::EchoMode::off;
+         s.echo = EchoMode::off;
          s.paced = false;
      }),
      only_writes},
@@ -221,9 +221,9 @@ TEST(Checker, CatchesDeadStationsThatTakeTooMuch) {
     checker.on_line_up(now);
     for (int second = 0; second < 600; ++second) {
         now += 900ms;
-        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x0A}, "probe", true);
+        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x0A}, FrameKind::probe, true);
         now += 100ms;
-        checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x39}, "request", false);
+        checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x39}, FrameKind::request, false);
         checker.on_answered(now + 50ms);
     }
     EXPECT_FALSE(checker.failed()) << checker.violation();

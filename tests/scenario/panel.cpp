@@ -15,13 +15,13 @@ std::uint16_t word(ByteView bytes, std::size_t at) {
 }  // namespace
 
 Panel::Panel(const PanelPlan& plan, const Plan& all, Agenda& agenda, Wire& wire, Random& random,
-             Checker& checker)
+             Witness& witness)
     : plan_(plan),
       line_(all.settings),
       agenda_(agenda),
       wire_(wire),
       random_(random),
-      checker_(checker),
+      witness_(witness),
       voice_(plan, line_, random) {}
 
 void Panel::start() {
@@ -140,7 +140,7 @@ void Panel::say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t 
 }
 
 Bytes Panel::refuse(ByteView pdu, unsigned code) {
-    checker_.on_exception(agenda_.now(), plan_.id, pdu);
+    witness_.on_exception(agenda_.now(), plan_.id, pdu);
     return {static_cast<std::uint8_t>(pdu[0] | 0x80), static_cast<std::uint8_t>(code)};
 }
 
@@ -153,7 +153,7 @@ Bytes Panel::serve(ByteView pdu) {
         return {pdu.begin(), pdu.begin() + 5};
     }
     if (word(pdu, 3) > plan_.max_registers) return refuse(pdu, plan_.refusal);
-    checker_.on_served(agenda_.now(), plan_.id);
+    witness_.on_served(agenda_.now(), plan_.id);
     ++served_;
     return read(pdu);
 }
@@ -170,7 +170,7 @@ Bytes Panel::read(ByteView pdu) const {
 }
 
 void Panel::write(ByteView pdu) {
-    checker_.on_executed(agenda_.now(), plan_.id, pdu);
+    witness_.on_executed(agenda_.now(), plan_.id, pdu);
     if (pdu[0] == 5) return;
     const unsigned count = pdu[0] == 16 ? word(pdu, 3) : 1;
     for (unsigned i = 0; i < count; ++i)

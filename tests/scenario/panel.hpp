@@ -5,20 +5,21 @@
 #include <vector>
 
 #include "agenda.hpp"
-#include "checker.hpp"
 #include "plan.hpp"
 #include "random.hpp"
+#include "truth.hpp"
 #include "voice.hpp"
 #include "wire.hpp"
+#include "witness.hpp"
 
 namespace panelgate::scenario {
 
 /// One simulated panel in virtual time: serves one request after another, each at its own pace.
-/// Tells the checker what it really did.
+/// Tells a witness what it really did.
 class Panel {
   public:
     Panel(const PanelPlan& plan, const Plan& all, Agenda& agenda, Wire& wire, Random& random,
-          Checker& checker);
+          Witness& witness);
     Panel(const Panel&) = delete;
     Panel& operator=(const Panel&) = delete;
 
@@ -54,7 +55,7 @@ class Panel {
     Agenda& agenda_;
     Wire& wire_;
     Random& random_;
-    Checker& checker_;
+    Witness& witness_;
     Voice voice_;
     std::uint64_t served_ = 0;
     std::array<std::uint16_t, kMemoryCells + 2> cells_{};

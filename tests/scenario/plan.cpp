@@ -93,8 +93,7 @@ void draw_echo(Random& random, Plan& plan) {
     arbiter::Settings& s = plan.settings;
     plan.line.echo = random.chance(0.8);
     plan.line.damaged_echo = random.chance(0.5) ? 0.05 : 0;
-    s.echo =
-        plan.line.echo && random.chance(0.3) ? arbiter::EchoMode::on : arbiter::EchoMode::automatic;
+    s.echo = plan.line.echo && random.chance(0.3) ? EchoMode::on : EchoMode::automatic;
     for (ClientPlan& client : plan.clients) client.writes = std::max(client.writes, 0.3);
 }
 
@@ -110,7 +109,7 @@ void draw_everything(Random& random, Plan& plan) {
     draw_retried_writes(random, plan);
     draw_unlisted(random, plan);
     if (random.chance(0.3)) draw_stalls(random, plan);
-    plan.settings.echo = arbiter::EchoMode::automatic;
+    plan.settings.echo = EchoMode::automatic;
 }
 
 /// Panels whose answers are all there: what goes wrong is somebody else's.
@@ -149,7 +148,7 @@ void draw_sound(Random& random, Plan& plan, Kind kind) {
     }
     // A line with an echo that is said to have none confirms writes by themselves: no plan.
     const bool learns = kind == Kind::receiver || random.chance(0.7);
-    s.echo = learns ? arbiter::EchoMode::automatic : arbiter::EchoMode::off;
+    s.echo = learns ? EchoMode::automatic : EchoMode::off;
     if (kind == Kind::voices && random.chance(0.2)) draw_extreme_rate(random, plan);
     s.unlisted.late_window = s.unlisted.response_timeout * 5 / 2 + 300ms;
     each_station(plan, [&](auto& station) { station.late_window = s.unlisted.late_window; });

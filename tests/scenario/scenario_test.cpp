@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <string>
 #include <vector>
@@ -18,20 +17,14 @@
 #include "open.hpp"
 #include "plan.hpp"
 #include "play.hpp"
+#include "support/environment.hpp"
 
 namespace panelgate::scenario {
 namespace {
 
-std::uint64_t number_from(const char* variable, std::uint64_t fallback) {
-    const char* text = std::getenv(variable);
-    return text == nullptr ? fallback : std::strtoull(text, nullptr, 10);
-}
+using test::number_from;
 
-std::uint64_t wanted_frames() {
-    const bool slow = number_from("PANELGATE_SANITIZED", 0) != 0;
-    const std::uint64_t all = number_from("PANELGATE_SCENARIO_FRAMES", 1'000'000);
-    return slow ? all / 10 : all;
-}
+std::uint64_t wanted_frames() { return test::amount_from("PANELGATE_SCENARIO_FRAMES", 1'000'000); }
 
 std::string replay(std::string_view name, std::uint64_t seed) {
     return "\n  replay: PANELGATE_SCENARIO_SEED=" + std::to_string(seed) +

@@ -27,8 +27,8 @@ Wire::FramePtr Wire::put(Said said) {
     for (const FramePtr& other : air_) {
         if (!other->garbled_from) other->garbled_from = now;
         frame->garbled_from = now;
-        checker_.on_collision(now, other->station);
-        checker_.on_collision(now, frame->station);
+        witness_.on_collision(now, other->station);
+        witness_.on_collision(now, frame->station);
     }
     air_.push_back(frame);
     return frame;
@@ -82,7 +82,7 @@ void Wire::echo(const FramePtr& frame) {
         const auto size = static_cast<unsigned>(heard->bytes.size());
         if (damaged) heard->bytes[random_.below(size)] ^= 0x10;
         if (cut) heard->bytes.pop_back();
-        checker_.on_collision(agenda_.now(), frame->station);
+        witness_.on_collision(agenda_.now(), frame->station);
         return deliver_in_chunks(heard);
     }
     if (!random_.chance(line.partial_echo)) return;
@@ -126,7 +126,7 @@ void Wire::deliver(const FramePtr& frame, std::size_t from, std::size_t to) {
 
 /// Something else than what was said; never a good frame by chance: that is the CRC's affair.
 void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
-    checker_.on_garbled(agenda_.now());
+    witness_.on_garbled(agenda_.now());
     for (std::size_t i = from; i < to; ++i) {
         if (frame.end_of(i, *this) > *frame.garbled_from)
             frame.bytes[i] = static_cast<std::uint8_t>(random_.next());
@@ -146,7 +146,7 @@ void Wire::arrive(Held held) {
         return;
     }
     if (held.copy_of != 0) agenda_.tell("next ends the copy of what was said before");
-    if (held.copy_of != 0) checker_.on_copy(agenda_.now(), held.copy_of);
+    if (held.copy_of != 0) witness_.on_copy(agenda_.now(), held.copy_of);
     hear_(held.bytes, held.answered);
 }
 

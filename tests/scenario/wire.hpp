@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "agenda.hpp"
-#include "checker.hpp"
 #include "plan.hpp"
 #include "random.hpp"
+#include "witness.hpp"
 
 namespace panelgate::scenario {
 
@@ -36,8 +36,8 @@ class Wire {
     /// A request has left undamaged, on this connection.
     using Ask = std::function<void(ByteView adu, std::uint64_t connection)>;
 
-    Wire(const Plan& plan, Agenda& agenda, Random& random, Checker& checker)
-        : plan_(plan), agenda_(agenda), random_(random), checker_(checker) {}
+    Wire(const Plan& plan, Agenda& agenda, Random& random, Witness& witness)
+        : plan_(plan), agenda_(agenda), random_(random), witness_(witness) {}
     void connect(Hear hear, Ask ask) {
         hear_ = std::move(hear);
         ask_ = std::move(ask);
@@ -90,7 +90,7 @@ class Wire {
     const Plan& plan_;
     Agenda& agenda_;
     Random& random_;
-    Checker& checker_;
+    Witness& witness_;
     Hear hear_;
     Ask ask_;
     std::list<FramePtr> air_;

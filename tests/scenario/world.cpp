@@ -76,11 +76,11 @@ void World::reach(std::function<void()> call) {
 }
 
 void World::act(const arbiter::Note& note) {
-    if (note.direction == arbiter::Note::Direction::sent) what_next_ = note.what;
+    if (direction_of(note.kind) == FrameDirection::sent) what_next_ = note.kind;
 }
 
 void World::act(const arbiter::Transmit& transmit) {
-    agenda_.tell("sent, " + std::string(what_next_), transmit.adu);
+    agenda_.tell("sent, " + std::string(label(what_next_)), transmit.adu);
     checker_.on_transmit(now(), transmit.adu, what_next_, is_dead(transmit.adu[0]));
     wire_.send(transmit.adu);
 }

@@ -70,8 +70,8 @@ class World {
     std::list<Panel> panels_;
     Customers customers_;
     Trouble trouble_;
-    std::string_view what_next_;  ///< the note of the frame that is transmitted next
-    bool asleep_ = false;         ///< nobody calls the arbiter
+    FrameKind what_next_ = FrameKind::request;  ///< the note of the frame that is transmitted next
+    bool asleep_ = false;                       ///< nobody calls the arbiter
     TimePoint asleep_from_{};
     Bytes unread_;  ///< what has come meanwhile
     std::vector<std::function<void()>> uncalled_;

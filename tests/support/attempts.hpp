@@ -6,25 +6,19 @@
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::test {
 
 /// One job alone, sent `attempts` times with this one.
-inline arbiter::Group group_of(std::uint8_t station, Bytes pdu, int attempts = 1) {
-    arbiter::Job job;
-    job.ticket = 1;
-    job.client = 1;
-    job.station = station;
-    job.pdu = pdu;
-    arbiter::Group group;
-    group.station = station;
-    group.span = modbus::read_span(pdu);
-    group.pdu = std::move(pdu);
-    group.attempts = attempts;
-    group.jobs.push_back(std::move(job));
-    return group;
+inline arbiter::Group group_of(std::uint8_t station, const Bytes& pdu, int attempts = 1) {
+    const modbus::Request request = request_of(pdu);
+    return {.jobs = {{.ticket = 1, .station = station, .request = request, .client = 1}},
+            .station = station,
+            .request = request,
+            .span = request.span(),
+            .attempts = attempts};
 }
 
 /// An attempt that began in time to have left at `sent`, and was answered at `now`.

@@ -15,6 +15,7 @@
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_step.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::test {
 
@@ -33,7 +34,7 @@ class BusScript {
     struct Sent {
         TimePoint at;
         Bytes adu;
-        std::string_view what;  ///< "request", "retry", "probe"…
+        FrameKind kind = FrameKind::request;
     };
     struct Answer {
         TimePoint at;
@@ -42,26 +43,22 @@ class BusScript {
     };
 
     arbiter::Ticket submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
-                           arbiter::PriorityClass priority = arbiter::PriorityClass::read) {
+                           PriorityClass priority = PriorityClass::read) {
         const Result<arbiter::Ticket> ticket =
             try_submit(station, std::move(pdu), client, priority);
         EXPECT_TRUE(ticket.has_value());
         return ticket ? *ticket : 0;
     }
-    Result<arbiter::Ticket> try_submit(
-        std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
-        arbiter::PriorityClass priority = arbiter::PriorityClass::read) {
-        arbiter::Job job;
-        job.station = station;
-        job.pdu = std::move(pdu);
-        job.client = client;
-        job.priority = priority;
+    Result<arbiter::Ticket> try_submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
+                                       PriorityClass priority = PriorityClass::read) {
+        const arbiter::Job job{
+            .station = station, .request = request_of(pdu), .client = client, .priority = priority};
         record({.verb = BusStep::Verb::submit,
                 .station = station,
-                .bytes = job.pdu,
+                .bytes = std::move(pdu),
                 .client = client,
                 .priority = priority});
-        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, std::move(job));
+        const Result<arbiter::Ticket> ticket = arbiter_.submit(now_, job);
         if (ticket) accepted.push_back(*ticket);
         drain();
         return ticket;
@@ -192,7 +189,7 @@ class BusScript {
     void act(const arbiter::Transmit& transmit) {
         EXPECT_GE(now_ - std::max(sent_until_, heard_until_), silent_interval(settings_.serial))
             << "sent within the gap";
-        sent.push_back({now_, transmit.adu, what_});
+        sent.push_back({now_, transmit.adu, kind_});
         sent_until_ = now_ + wire_time(settings_.serial, transmit.adu.size());
     }
     void act(const arbiter::Finish& finish) {
@@ -201,7 +198,7 @@ class BusScript {
     }
     void act(const arbiter::Note& note) {
         notes.push_back(note);
-        if (note.direction == arbiter::Note::Direction::sent) what_ = note.what;
+        if (direction_of(note.kind) == FrameDirection::sent) kind_ = note.kind;
     }
     void act(const arbiter::Decision& decision) { decisions.push_back(decision); }
     void act(const arbiter::StationEvent& event) { events.push_back(event); }
@@ -212,7 +209,7 @@ class BusScript {
     TimePoint now_{1h};
     TimePoint sent_until_{};
     TimePoint heard_until_{};
-    std::string_view what_;  ///< the frame that leaves now is
+    FrameKind kind_ = FrameKind::request;  ///< of the frame that leaves now
 };
 
 }  // namespace panelgate::test

@@ -37,8 +37,8 @@ inline void expect_rest(BusScript& bus) {
     EXPECT_EQ(bus.answers.size(), bus.accepted.size()) << "answers that nobody asked for";
     EXPECT_TRUE(bus.arbiter().idle());
     for (const BusScript::Sent& sent : bus.sent) {
-        EXPECT_TRUE(sent.at <= last || sent.what == "probe")
-            << "sent after all was answered: " << sent.what << " " << to_hex(sent.adu);
+        EXPECT_TRUE(sent.at <= last || sent.kind == FrameKind::probe)
+            << "sent after all was answered: " << label(sent.kind) << " " << to_hex(sent.adu);
     }
     const auto next = bus.arbiter().next_deadline();
     EXPECT_TRUE(!next || *next > bus.now()) << "a deadline that has passed";

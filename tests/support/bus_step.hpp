@@ -16,7 +16,7 @@ struct BusStep {
     std::uint8_t station = 0;  ///< submit
     Bytes bytes{};             ///< submit: the PDU; hear: what arrives
     arbiter::Client client = 0;
-    arbiter::PriorityClass priority = arbiter::PriorityClass::read;
+    PriorityClass priority = PriorityClass::read;
     Duration span{};  ///< run_for
 };
 

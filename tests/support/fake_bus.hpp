@@ -54,7 +54,10 @@ class FakeBus : public bus::BusClient {
     bus::LineStatus status() const override { return line; }
     bus::StationStatus station_status(std::uint8_t station) const override {
         const auto found = stations.find(station);
-        return found == stations.end() ? bus::StationStatus{"unknown", {}} : found->second;
+        return found == stations.end() ? bus::StationStatus{} : found->second;
+    }
+    std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
+        return rights.judge_write(station);
     }
     std::vector<bus::TraceFrame> trace(std::size_t last) const override {
         const auto skip = frames.size() - std::min(last, frames.size());
@@ -78,7 +81,8 @@ class FakeBus : public bus::BusClient {
     Script script;
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
-    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, "absent"};
+    bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, EchoState::absent};
+    bus::Rights rights;  ///< to everything, at first
     std::vector<bus::ClientShare> shares;
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;

@@ -8,6 +8,7 @@
 
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::test {
 
@@ -15,7 +16,6 @@ using arbiter::Client;
 using arbiter::Host;
 using arbiter::Job;
 using arbiter::JobQueue;
-using arbiter::PriorityClass;
 using arbiter::QueueSettings;
 using arbiter::Ticket;
 
@@ -25,16 +25,14 @@ inline bool any(const Job& /*job*/) { return true; }
 class QueueFixture : public testing::Test {
   protected:
     Job job(Host host, Client client, std::uint8_t station, PriorityClass priority) {
-        Job made;
-        made.ticket = ++ticket_;
-        made.host = host;
-        made.client = client;
-        made.station = station;
-        made.priority = priority;
-        const unsigned address = 2 * static_cast<unsigned>(ticket_ % 30000);
-        made.pdu = priority == PriorityClass::write ? Writer().u8(6).u16(address).u16(1).take()
-                                                    : Writer().u8(3).u16(address).u16(1).take();
-        return made;
+        const unsigned address = 2 * static_cast<unsigned>(++ticket_ % 30000);
+        const unsigned function = priority == PriorityClass::write ? 6 : 3;
+        return {.ticket = ticket_,
+                .station = station,
+                .request = request_of(Writer().u8(function).u16(address).u16(1).take()),
+                .client = client,
+                .host = host,
+                .priority = priority};
     }
     Job read(Client client, std::uint8_t station, Host host = 0) {
         return job(host, client, station, PriorityClass::read);
@@ -47,7 +45,7 @@ class QueueFixture : public testing::Test {
     }
     Job read_of(Client client, const Bytes& pdu) {
         Job made = read(client, 1);
-        made.pdu = pdu;
+        made.request = request_of(pdu);
         return made;
     }
     Ticket add(Job job) {

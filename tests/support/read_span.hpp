@@ -8,7 +8,7 @@
 
 namespace panelgate::test {
 
-/// What this PDU asks this station for, when it is a read of a table.
+/// What is asked of this station, when it is a read of a table.
 inline std::optional<arbiter::ReadSpan> read_span(std::uint8_t station, ByteView pdu) {
     const auto items = modbus::read_span(pdu);
     if (!items) return std::nullopt;

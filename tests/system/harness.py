@@ -20,15 +20,6 @@ import urllib.request
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PANELGATE = os.environ.get("PANELGATE", str(ROOT / "build/release/panelgate"))
 SANITIZED = os.environ.get("PANELGATE_SANITIZED") == "1"
-# The end of a configuration: one more line, which nothing disturbs, and the servers.
-STEADY_LINE = """\
-  - name: steady
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations: [{id: 31, name: press, profile: autonics-gplp-s}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
 PATIENCE = 30  # seconds: a limit for what should happen at once, never a pause
 
 

@@ -4,18 +4,11 @@ import tempfile
 import termios
 import unittest
 
+import config
 import harness
 from harness import read_registers
 from rtu_bus import RtuBus, echo_address
 
-CONFIG = """
-lines:
-  - name: tested
-    device: %s
-    serial: {baud: %d, data_bits: 8, parity: %s, stop_bits: %d}
-    rs485: {mode: %s}
-    stations: [{id: 1, name: one}]
-""" + harness.STEADY_LINE
 DOWN = b"\x83\x0a"
 VALUE = bytes.fromhex("03020005")
 
@@ -27,7 +20,9 @@ class Adapters(unittest.TestCase):
         self.link = pathlib.Path(folder.name) / "tty"
 
     def config(self, baud=38400, parity="none", stop_bits=1, rs485="off"):
-        return CONFIG % (self.link, baud, parity, stop_bits, rs485)
+        tested = config.line("tested", self.link, "{id: 1, name: one}", baud=baud, parity=parity,
+                             stop_bits=stop_bits, rs485=f"{{mode: {rs485}}}")
+        return config.gateway(tested, config.STEADY_LINE)
 
     def assert_raw(self, settings, baud, two_stop_bits):
         iflag, oflag, cflag, lflag, characters, speed = settings

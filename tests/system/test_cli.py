@@ -5,22 +5,16 @@ import socket
 import tempfile
 import unittest
 
+import config
 import harness
 from harness import ROOT, run
 
 USAGE, NO_INPUT, UNAVAILABLE, BAD_CONFIG = 64, 66, 69, 78
-GOOD = """\
-lines:
-  - name: floor1
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations:
-      - {id: 31, name: press, profile: autonics-gplp-s}
-modbus_tcp:
-  - listen: 127.0.0.1:%d
-http:
-  listen: 127.0.0.1:%d
-"""
+
+
+def good(modbus_port=0, http_port=0):
+    return config.gateway(config.line(), modbus=f"listen: 127.0.0.1:{modbus_port}",
+                          http=f"listen: 127.0.0.1:{http_port}")
 
 
 class CommandLine(unittest.TestCase):
@@ -76,7 +70,7 @@ class Files(unittest.TestCase):
             self.assertRegex(ended.stderr, rf"^[^\n]*{self.file.name}[^\n]*\n$")
 
     def test_an_unknown_key_points_at_itself_and_names_the_nearest(self):
-        text = GOOD % (0, 0)
+        text = good()
         for command in ("run", "check"):
             errors = self.errors(text.replace("device: sim", "devise: sim"), command=command)
             self.assertIn(f"{self.file}:3:5: ", errors)
@@ -93,23 +87,22 @@ class Files(unittest.TestCase):
 
     def test_the_same_station_on_two_lines_of_a_listener_asks_for_units(self):
         errors = self.errors(
-            "lines:\n"
-            "  - {name: a, device: sim, stations: [{id: 1, name: x, profile: generic}]}\n"
-            "  - {name: b, device: sim, stations: [{id: 1, name: y, profile: generic}]}\n"
-            "modbus_tcp:\n  - listen: 127.0.0.1:0\n")
+            config.gateway(config.line("a", stations="{id: 1, name: x, profile: generic}"),
+                           config.line("b", stations="{id: 1, name: y, profile: generic}"),
+                           http=None))
         self.assertIn("units", errors)
 
     def test_a_port_in_use_ends_with_69_and_names_the_address(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
             for ports in ((port, 0), (0, port)):
-                errors = self.errors(GOOD % ports, UNAVAILABLE, "run")
+                errors = self.errors(good(*ports), UNAVAILABLE, "run")
                 self.assertIn(f"127.0.0.1:{port}", errors)
                 told = [line for line in errors.splitlines() if line.startswith("panelgate: ")]
                 self.assertEqual(len(told), 1, errors)
 
     def test_check_prints_the_plan_as_text_and_json(self):
-        self.file.write_text(GOOD % (0, 0))
+        self.file.write_text(good())
         text = run("check", "-c", str(self.file)).stdout
         self.assertIn("floor1", text)
         self.assertIn("press", text)

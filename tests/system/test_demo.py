@@ -8,6 +8,7 @@ import unittest
 
 from pymodbus.client import ModbusTcpClient
 
+import config
 import harness
 import vectors
 
@@ -26,20 +27,10 @@ NOTATIONS = [
 ]
 # The manuals' GP/LP examples use two station numbers; these are the ones that the demo gives to
 # another panel.
-OTHER_STATIONS = """
-lines:
-  - name: floor1
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations:
-      - {id: 5, name: lp, profile: autonics-gplp-s}
-      - {id: 31, name: gp, profile: autonics-gp-2005}
-modbus_tcp:
-  - listen: 127.0.0.1:0
-http:
-  listen: 127.0.0.1:0
-  anonymous: operator
-"""
+OTHER_STATIONS = config.gateway(
+    config.line(stations="{id: 5, name: lp, profile: autonics-gplp-s}, "
+                         "{id: 31, name: gp, profile: autonics-gp-2005}"),
+    http=config.OPERATOR)
 # Replies that no Modbus/TCP reply can hold; REST may ask for them.
 TOO_LARGE_FOR_TCP = {"gt_fc01_gr20_2040bits", "gt_fc03_gdt108_127words"}
 # 2047 coils need 256 data bytes, which a byte count cannot say: refused, never on the wire.

@@ -11,22 +11,11 @@ import threading
 import time
 import unittest
 
+import config
 import harness
 from harness import read_registers
 from rtu_bus import Raw, RtuBus, echo_address
 
-CONFIG = """
-lines:
-  - name: floor1
-    device: %s
-    serial: {baud: 115200, data_bits: 8, parity: even, stop_bits: 1}
-    timing: {response_timeout: 60ms}
-    retries: 1
-    echo: %s
-    stations: [{id: 1, name: press}, {id: 2, name: oven}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
 PATH = "/api/v1/lines/floor1"
 NEEDED_GAP = 0.020  # seconds of silence that a slow panel needs before a request
 
@@ -69,12 +58,18 @@ class Line:
         return findings
 
 
+def configuration(link, mode):
+    return config.gateway(config.line(
+        device=link, stations="{id: 1, name: press}, {id: 2, name: oven}", baud=115200,
+        parity="even", timing="{response_timeout: 60ms}", retries=1, echo=mode))
+
+
 @contextlib.contextmanager
 def line(panels, mode="auto", **options):
     with tempfile.TemporaryDirectory() as folder:
         link = pathlib.Path(folder) / "tty"
         with RtuBus(link, panels, **options) as bus, \
-                harness.configured(CONFIG % (link, mode)) as program:
+                harness.configured(configuration(link, mode)) as program:
             program.log.wait_for("line up")
             with program.client() as client:
                 yield Line(program, bus, client)

@@ -6,22 +6,11 @@ import struct
 import tempfile
 import unittest
 
+import config
 import harness
 from harness import read_registers, write_register
 from rtu_bus import RtuBus, echo_address
 
-CONFIG = """
-lines:
-  - name: floor1
-    device: %s
-    serial: {baud: 115200, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 60ms}
-    retries: 1
-    echo: %s
-    stations: [{id: 1, name: good}, {id: 2, name: absent}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0", anonymous: operator}
-"""
 ECHOES = {
     "none": lambda frame: b"",
     "full": lambda frame: frame,
@@ -35,12 +24,18 @@ def holding(*values):
     return struct.pack(f">BB{len(values)}H", 3, 2 * len(values), *values)
 
 
+def configuration(link, mode):
+    return config.gateway(config.line(
+        device=link, stations="{id: 1, name: good}, {id: 2, name: absent}", baud=115200,
+        timing="{response_timeout: 60ms}", retries=1, echo=mode), http=config.OPERATOR)
+
+
 @contextlib.contextmanager
 def line(mode, echo, glued):
     with tempfile.TemporaryDirectory() as folder:
         link = pathlib.Path(folder) / "tty"
         with RtuBus(link, {1: echo_address}, ECHOES[echo], glued) as bus, \
-                harness.configured(CONFIG % (link, mode)) as program:
+                harness.configured(configuration(link, mode)) as program:
             program.log.wait_for("line up")
             with program.client() as client:
                 yield client, bus, program

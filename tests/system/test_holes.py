@@ -11,6 +11,7 @@ import tempfile
 import unittest
 from collections import namedtuple
 
+import config
 import harness
 from harness import rtu
 from rtu_bus import Pieces, RtuBus
@@ -23,17 +24,6 @@ HOLE = 0.015  # seconds, the longest that is asked for
 TOO_LATE = 0.0185
 ATTEMPTS = 5
 BAUD = 115200
-LINE = """
-  - name: line%d
-    device: %s
-    serial: {baud: %d, data_bits: 8, parity: none, stop_bits: 1}
-    echo: "off"
-    stations: [{id: %d}]
-"""
-SERVERS = """
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
 TROUBLE = ("retries", "late_frames", "foreign_frames", "damaged_frames", "echo_mismatch",
            "discarded_bytes")
 
@@ -179,12 +169,13 @@ class Holes(unittest.TestCase):
     def run_lines(self, lines):
         """Asks everything: (wrong answers, trouble in the metrics, the longest hole)."""
         with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
-            text = "lines:"
-            for number, line in enumerate(lines):
+            configured = []
+            for line in lines:
                 link = pathlib.Path(folder) / line.name
                 stack.enter_context(RtuBus(link, {line.station: line.panel}))
-                text += LINE % (number, link, BAUD, line.station)
-            program = stack.enter_context(harness.configured(text + SERVERS))
+                configured.append(config.line(line.name, link, config.station_ids([line.station]),
+                                              baud=BAUD, echo='"off"'))
+            program = stack.enter_context(harness.configured(config.gateway(*configured)))
             program.log.wait_for("line up", len(lines))
             pool = stack.enter_context(concurrent.futures.ThreadPoolExecutor(len(lines)))
             port = program.modbus_port()

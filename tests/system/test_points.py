@@ -7,33 +7,22 @@ import tempfile
 import threading
 import unittest
 
+import config
 import harness
 from harness import read_registers
 from rtu_bus import RtuBus, echo_address
 
-PRESS = """
-lines:
-  - name: floor1
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 100ms}
-    offline: {probe_min: 100ms, probe_max: 200ms}
-    stations:
-      - id: 31
-        name: press
-        profile: autonics-gplp-s
-        guard: true
-        max_age: 10s
-        points:
-          - {name: level, at: UW100, type: i16, scale: 0.1, unit: celsius, writable: true, max: 400, every: 20ms}
-          - {name: total, at: UW102, type: u32, word_order: CDAB, writable: true, every: 20ms}
-          - {name: running, at: UB1632, writable: true, every: 20ms}
-          - {name: mode, at: UW105, labels: {0: stopped, 1: running}, writable: true, every: 20ms}
-        poll:
-          - {read: UW0, count: 5, every: 20ms}
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0", anonymous: operator}
-"""
+PRESS_LINE = config.line(
+    timing="{response_timeout: 100ms}", offline="{probe_min: 100ms, probe_max: 200ms}", stations="""
+      {id: 31, name: press, profile: autonics-gplp-s, guard: true, max_age: 10s,
+       points: [
+         {name: level, at: UW100, type: i16, scale: 0.1, unit: celsius, writable: true, max: 400,
+          every: 20ms},
+         {name: total, at: UW102, type: u32, word_order: CDAB, writable: true, every: 20ms},
+         {name: running, at: UB1632, writable: true, every: 20ms},
+         {name: mode, at: UW105, labels: {0: stopped, 1: running}, writable: true, every: 20ms}],
+       poll: [{read: UW0, count: 5, every: 20ms}]}""")
+PRESS = config.gateway(PRESS_LINE, http=config.OPERATOR)
 POINT = "/api/v1/stations/press/points/"
 
 
@@ -134,22 +123,16 @@ class Points(unittest.TestCase):
             self.assertEqual(shown["u32", "ABCD"], [str(0x03040102)])
 
 
-OVEN_LINE = """
-  - name: floor2
-    device: %s
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 100ms}
-    stations: [{id: 20, name: oven, profile: panasonic-gt}]
-relays:
-  - {from: press/UW100, count: 8, to: oven/GDT200, every: 20ms, on_change: true}
-"""
+RELAY = "{from: press/UW100, count: 8, to: oven/GDT200, every: 20ms, on_change: true}"
 
 
 class Relay(unittest.TestCase):
     def test_a_relay_over_two_lines_with_one_unplugged_meanwhile(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            text = PRESS.replace("modbus_tcp:", OVEN_LINE.strip("\n") % link + "\nmodbus_tcp:")
+            oven_line = config.line("floor2", link, "{id: 20, name: oven, profile: panasonic-gt}",
+                                    timing="{response_timeout: 100ms}")
+            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.OPERATOR)
             with contextlib.ExitStack() as stack:
                 oven = RtuBus(link, {20: echo_address})
                 program = stack.enter_context(harness.configured(text))

@@ -8,20 +8,19 @@ import tempfile
 import time
 import unittest
 
+import config
 import harness
 from harness import read_registers
 from rtu_bus import RtuBus, echo_address
 
 ROUNDS = 20 if harness.SANITIZED else 100
-CONFIG = """
-lines:
-  - name: shaky
-    device: %s
-    serial: {baud: 115200, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 200ms}
-    stations: [{id: 1, name: one}]
-""" + harness.STEADY_LINE
 DOWN = b"\x83\x0a"
+
+
+def shaky_line(link):
+    """A configuration with a line that comes and goes."""
+    return config.gateway(config.line("shaky", link, "{id: 1, name: one}", baud=115200,
+                                      timing="{response_timeout: 200ms}"), config.STEADY_LINE)
 
 
 def descriptors(pid):
@@ -37,7 +36,7 @@ class Replug(unittest.TestCase):
     def test_P7_a_hundred_replugs_under_load(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with harness.configured(CONFIG % link) as program, program.client() as client, \
+            with harness.configured(shaky_line(link)) as program, program.client() as client, \
                     program.client() as other:
                 pid = program.process.pid
                 steady = other.ask(31, read_registers(0))
@@ -73,7 +72,7 @@ class Replug(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as bus:
             link = pathlib.Path(folder) / "tty"
             bus.enter_context(RtuBus(link, {1: panel(0)}))
-            with harness.configured(CONFIG % link) as program, program.client() as client:
+            with harness.configured(shaky_line(link)) as program, program.client() as client:
                 program.log.wait_for("line up.*line=shaky")
                 returns = []
                 for value in range(ROUNDS // 4):
@@ -94,7 +93,7 @@ class Replug(unittest.TestCase):
     def test_P7_a_missing_device_costs_next_to_nothing(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with harness.configured(CONFIG % link) as program, program.client() as client:
+            with harness.configured(shaky_line(link)) as program, program.client() as client:
                 before, start = cpu_seconds(program.process.pid), time.monotonic()
                 # The steady line measures the time: a few hundred transactions.
                 while time.monotonic() - start < 2:

@@ -7,22 +7,11 @@ import struct
 import time
 import unittest
 
+import config
 import harness
 from harness import adu, read_registers
 
-PATIENT = """
-lines:
-  - name: floor1
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    queue: {limit: 1000, deadline: 60s}
-    stations:
-      - {id: 31, name: press, profile: autonics-gplp-s}
-modbus_tcp:
-  - listen: 127.0.0.1:0
-http:
-  listen: 127.0.0.1:0
-"""
+PATIENT = config.gateway(config.line(queue="{limit: 1000, deadline: 60s}"))
 FIVE_WORDS = bytes.fromhex("030A000A0014001E00280032")  # UW0..UW4 of the manual's example
 CONNECTIONS = 300
 MEMORY_LIMIT = 40 * 1024  # KiB

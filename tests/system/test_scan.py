@@ -14,42 +14,29 @@ import time
 import tty
 import unittest
 
+import config
 import harness
 from harness import PATIENCE, read_registers, rtu
 from test_sixth_panel import PANEL
 
 SIX = """
-  - name: %s
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations:
-      - {id: 31, profile: autonics-gplp-s}
-      - {id: 5, profile: autonics-gp-2005}
-      - {id: 17, profile: autonics-arm}
-      - {id: 20, profile: panasonic-gt}
-      - {id: 1, profile: omron-cp2e}
-      - {id: 7, profile: autonics-gplp-s, simulate: {duplicate: 1}}
-"""
-ODD = """
-  - name: odd
-    device: sim
-    serial: {baud: 9600, data_bits: 8, parity: odd, stop_bits: 1}
-    stations: [{id: 20, profile: panasonic-gt}]
-"""
-ACME = """
-profiles_dir: %s
-lines:
-  - name: hall
-    device: sim
-    serial: {baud: 19200, parity: even}
-    stations: [{id: 9, profile: acme-ax-7}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-"""
+      {id: 31, profile: autonics-gplp-s}, {id: 5, profile: autonics-gp-2005},
+      {id: 17, profile: autonics-arm}, {id: 20, profile: panasonic-gt},
+      {id: 1, profile: omron-cp2e},
+      {id: 7, profile: autonics-gplp-s, simulate: {duplicate: 1}}"""
 FOUND = {1: "omron-cp2e", 5: "autonics-gp-2005", 7: "autonics-gplp-s", 17: "autonics-arm",
          20: "panasonic-gt", 31: "autonics-gplp-s"}
 LIMIT = 60  # seconds: what a person at the panel waits for
-PORTS = 'modbus_tcp: [{listen: "127.0.0.1:0", lines: [%s]}]\n'
 COLUMNS = 64
+
+
+def six(name):
+    return config.line(name, stations=SIX)
+
+
+def only_first_served(*lines):
+    first = re.search(r"name: (\S+)", lines[0]).group(1)
+    return config.gateway(*lines, modbus=f"{config.FREE_PORT}, lines: [{first}]", http=None)
 
 
 @contextlib.contextmanager
@@ -58,7 +45,7 @@ def simulated(*lines):
     names = [re.search(r"name: (\S+)", line).group(1) for line in lines]
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "lines.yaml"
-        file.write_text("lines:" + "".join(lines) + PORTS % names[0])
+        file.write_text(only_first_served(*lines))
         links = {name: f"{folder}/{name}" for name in names}
         arguments = [a for name in names for a in ("--line", f"{name}={links[name]}")]
         with harness.Program("simulate", "-c", str(file), *arguments) as program:
@@ -117,7 +104,7 @@ def terminal():
 
 class Scan(unittest.TestCase):
     def test_six_addresses_one_of_them_doubled(self):
-        with simulated(SIX % "a", SIX % "b") as links, terminal() as (ours, theirs):
+        with simulated(six("a"), six("b")) as links, terminal() as (ours, theirs):
             begun = time.monotonic()
             shown = start(links["a"], stderr=theirs)
             piped = start(links["b"], "--yaml")
@@ -164,7 +151,9 @@ class Scan(unittest.TestCase):
                     self.assertEqual(client.ask(5, read_registers(30))[2:], b"\x00\x0a")
 
     def test_another_format_is_found_and_only_that_is_understood(self):
-        with simulated(ODD) as links:
+        odd = config.line("odd", stations="{id: 20, profile: panasonic-gt}", baud=9600,
+                          parity="odd")
+        with simulated(odd) as links:
             code, out, err = scan(links["odd"], "--stations", "19,20")
             self.assertEqual((code, err), (0, ""))
             self.assertEqual(out.splitlines()[0], f"{links['odd']}: 9600 8O1, 1 station")
@@ -180,7 +169,9 @@ class Scan(unittest.TestCase):
             panels.mkdir()
             (panels / "acme-ax-7.yaml").write_text(PANEL)
             file = pathlib.Path(folder) / "hall.yaml"
-            file.write_text(ACME % panels)
+            hall = config.line("hall", stations="{id: 9, profile: acme-ax-7}", baud=19200,
+                               parity="even")
+            file.write_text(config.gateway(hall, http=None, profiles_dir=panels))
             with harness.Program("simulate", "-c", str(file), "--line", f"hall={link}"):
                 wait_until(link.exists)
                 limits = ("--stations", "9", "--baud", "19200")
@@ -199,7 +190,7 @@ class Scan(unittest.TestCase):
     def test_a_device_server_needs_no_format(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "far.yaml"
-            file.write_text("lines:" + SIX % "far" + PORTS % "far")
+            file.write_text(only_first_served(six("far")))
             with harness.Program("simulate", "-c", str(file), "--line",
                                  "far=tcp://127.0.0.1:0") as program:
                 port = program.log.wait_for(r"rtu_over_tcp=127\.0\.0\.1:(\d+)").group(1)
@@ -223,7 +214,7 @@ class Scan(unittest.TestCase):
             self.assertEqual(select.select([ours], [], [], 0)[0], [], "not a byte was sent")
 
     def test_an_interrupted_scan_tells_what_it_has(self):
-        with simulated(SIX % "a") as links, terminal() as (ours, theirs):
+        with simulated(six("a")) as links, terminal() as (ours, theirs):
             process = start(links["a"], stderr=theirs)
             seen = ""
             while not re.search(r"[1-9] found", seen) and process.poll() is None:
@@ -241,7 +232,7 @@ class Scan(unittest.TestCase):
         self.assertEqual((code, out), (69, ""))
         self.assertEqual(err,
                          "panelgate: cannot open /dev/not-there: No such file or directory\n")
-        with simulated(SIX % "a") as links, open(links["a"], "rb") as held:
+        with simulated(six("a")) as links, open(links["a"], "rb") as held:
             fcntl.flock(held, fcntl.LOCK_EX)
             code, out, err = scan(links["a"])
             self.assertEqual((code, out), (69, ""))

@@ -9,28 +9,12 @@ import threading
 import time
 import unittest
 
+import config
 import harness
 from harness import read_registers, write_register
 from rtu_bus import Raw, RtuBus, echo_address, scripted
 
-TIMEOUT, RETRIES, TURNAROUND = 0.2, 2, 0.3  # seconds, as in CONFIG
-CONFIG = """
-lines:
-  - name: floor1
-    device: %s
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 200ms, broadcast_turnaround: 300ms}
-    retries: 2
-    queue: {deadline: 5s}
-    %s
-    stations:
-      - {id: 1, name: good, profile: generic}
-      - {id: 2, name: bad, profile: generic}
-modbus_tcp:
-  - listen: 127.0.0.1:0
-http:
-  listen: 127.0.0.1:0
-"""
+TIMEOUT, RETRIES, TURNAROUND = 0.2, 2, 0.3  # seconds, as configured below
 BUSY, NO_PATH, NO_REPLY = 6, 10, 11
 
 
@@ -42,11 +26,19 @@ def holding(*values):
     return struct.pack(f">BB{len(values)}H", 3, 2 * len(values), *values)
 
 
+def configuration(link, response_timeout="200ms", **more):
+    return config.gateway(config.line(
+        device=link, retries=2, queue="{deadline: 5s}", **more,
+        timing=f"{{response_timeout: {response_timeout}, broadcast_turnaround: 300ms}}",
+        stations="{id: 1, name: good, profile: generic}, {id: 2, name: bad, profile: generic}"))
+
+
 @contextlib.contextmanager
-def gateway_and_bus(panels, more=""):
+def gateway_and_bus(panels, **more):
     with tempfile.TemporaryDirectory() as folder:
         link = pathlib.Path(folder) / "tty"
-        with RtuBus(link, panels) as bus, harness.configured(CONFIG % (link, more)) as program:
+        with RtuBus(link, panels) as bus, \
+                harness.configured(configuration(link, **more)) as program:
             program.log.wait_for("line up")
             # A line that has carried a read before anything else happens.
             with program.client() as client:
@@ -95,7 +87,7 @@ class SilentStation(unittest.TestCase):
             self.assertGreaterEqual(frames[1].at - frames[0].at, TIMEOUT * 5 / 6)
 
     def test_P1_where_the_line_rests_all_wait_until_no_late_reply_can_come(self):
-        with gateway_and_bus({1: echo_address}, "quarantine: line") as (program, bus):
+        with gateway_and_bus({1: echo_address}, quarantine="line") as (program, bus):
             frames = self.ask_beside_a_silent_one(program, bus)
             self.assertEqual([f.bytes[0] for f in frames], [2] * (RETRIES + 1) + [1] * self.OTHERS)
             last_attempt, first_other = frames[RETRIES:RETRIES + 2]
@@ -190,7 +182,7 @@ class Device(unittest.TestCase):
     def test_P7_one_that_is_missing_at_start_may_come_later(self):
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with harness.configured(CONFIG % (link, "")) as program, program.client() as client:
+            with harness.configured(configuration(link)) as program, program.client() as client:
                 self.assertEqual(program.get("/readyz")[0], 200)
                 self.assertEqual(client.ask(1, read_registers(5)), fault(3, NO_PATH))
                 with RtuBus(link, {1: echo_address}):
@@ -203,7 +195,7 @@ class Device(unittest.TestCase):
             with contextlib.ExitStack() as stack:
                 first = contextlib.ExitStack()
                 first.enter_context(RtuBus(link, {1: echo_address}))
-                program = stack.enter_context(harness.configured(CONFIG % (link, "")))
+                program = stack.enter_context(harness.configured(configuration(link)))
                 client = stack.enter_context(program.client())
                 program.log.wait_for("line up")
                 self.assertEqual(client.ask(1, read_registers(5)), holding(5))
@@ -223,10 +215,10 @@ class Ending(unittest.TestCase):
 
         def slow(frame):
             return echo_address(frame) if may_answer.wait(harness.PATIENCE) else None
-        text = CONFIG.replace("200ms", "4s")
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
-            with RtuBus(link, {1: slow}) as bus, harness.configured(text % (link, "")) as program:
+            with RtuBus(link, {1: slow}) as bus, \
+                    harness.configured(configuration(link, "4s")) as program:
                 program.log.wait_for("line up")
                 with program.client() as client:
                     client.send(1, read_registers(5))

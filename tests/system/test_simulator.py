@@ -1,6 +1,7 @@
 """Simulated panels that misbehave on demand."""
 import unittest
 
+import config
 import harness
 
 PRESS = "/api/v1/simulator/press"
@@ -32,18 +33,13 @@ class Simulator(unittest.TestCase):
                 self.assertEqual(program.values(UW0), [10], fault)
 
     def test_the_configuration_can_say_so_too(self):
-        text = """
-lines:
-  - name: floor1
-    device: /dev/never-opened
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {response_timeout: 60ms}
-    simulate: {echo: true}
-    stations:
-      - {id: 31, name: press, profile: autonics-gplp-s, simulate: {slow: 5ms, late: 0.5, late_by: 10ms}}
-      - {id: 20, name: oven, profile: panasonic-gt, simulate: {dead: true}}
-http: {listen: "127.0.0.1:0", anonymous: operator}
-"""
+        text = config.gateway(
+            config.line(device="/dev/never-opened", timing="{response_timeout: 60ms}",
+                        simulate="{echo: true}", stations="""
+      {id: 31, name: press, profile: autonics-gplp-s,
+       simulate: {slow: 5ms, late: 0.5, late_by: 10ms}},
+      {id: 20, name: oven, profile: panasonic-gt, simulate: {dead: true}}"""),
+            modbus=None, http=config.OPERATOR)
         with harness.configured(text, "--simulate") as program:
             self.assertEqual(program.values(UW0), [10])
             self.assertEqual(program.get("/api/v1/stations/oven/devices/GDT0")[0], 504)

@@ -3,6 +3,7 @@ import pathlib
 import tempfile
 import unittest
 
+import config
 import harness
 from harness import read_registers
 from test_points import until
@@ -40,30 +41,23 @@ simulation:
   memory: [{area: V, address: 0, values: [7, 8, 9]}]
   motion: [{area: V, address: 20, kind: ramp, low: 0, high: 1000, period: 10s}]
 """
-CONFIG = """
-profiles_dir: %s
-lines:
-  - name: hall
-    device: sim
-    serial: {baud: 19200, parity: even}
-    stations:
-      - id: 9
-        name: acme
-        profile: acme-ax-7
-        guard: true
-        points:
-          - {name: setpoint, at: V101, type: i32, word_order: CDAB, writable: true, every: 20ms}
-          - {name: alarm, at: VB1003, writable: true, every: 20ms}
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0", anonymous: operator}
-"""
+STATION = """
+      {id: 9, name: acme, profile: acme-ax-7, guard: true,
+       points: [
+         {name: setpoint, at: V101, type: i32, word_order: CDAB, writable: true, every: 20ms},
+         {name: alarm, at: VB1003, writable: true, every: 20ms}]}"""
+
+
+def configuration(folder):
+    return config.gateway(config.line("hall", stations=STATION, baud=19200, parity="even"),
+                          profiles_dir=folder, http=config.OPERATOR)
 
 
 class SixthPanel(unittest.TestCase):
     def test_a_file_is_all_that_a_new_panel_needs(self):
         with tempfile.TemporaryDirectory() as folder:
             (pathlib.Path(folder) / "acme-ax-7.yaml").write_text(PANEL)
-            with harness.configured(CONFIG % folder) as program, program.client() as client:
+            with harness.configured(configuration(folder)) as program, program.client() as client:
                 self.assertEqual(program.values("/api/v1/stations/acme/devices/V1?count=3"), [7, 8, 9])
                 self.assertEqual(client.ask(9, read_registers(0, 3))[2:], b"\0\7\0\x08\0\x09")
                 point = "/api/v1/stations/acme/points/"
@@ -84,9 +78,9 @@ class SixthPanel(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "acme-ax-7.yaml"
             file.write_text(PANEL.replace("writable: [100, 499]", "writable: [100, 500]"))
-            config = pathlib.Path(folder) / "config.yml"
-            config.write_text(CONFIG % folder)
-            ended = harness.run("check", "-c", str(config))
+            whole = pathlib.Path(folder) / "config.yml"
+            whole.write_text(configuration(folder))
+            ended = harness.run("check", "-c", str(whole))
             self.assertEqual(ended.returncode, 78)
             self.assertRegex(ended.stderr, r"acme-ax-7\.yaml:17:\d+: writable must lie inside readable")
 

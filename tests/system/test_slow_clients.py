@@ -7,20 +7,11 @@ import tempfile
 import threading
 import unittest
 
+import config
 import harness
 from harness import adu, read_registers, rtu, write_register
 from rtu_bus import Pieces, RtuBus, echo_address
 
-CONFIG = """
-lines:
-  - name: floor1
-    device: %s
-    serial: {baud: 921600, data_bits: 8, parity: none, stop_bits: 1}
-    timing: {frame_gap: 100us}
-    stations: [{id: 1, profile: generic}, {id: 2, profile: generic}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
 ACCEPTED = 80  # of one connection: 16 in flight and 64 that wait
 MANY = 2000  # replies of 209 bytes: more than any socket buffer in here holds
 THINKING = 0.01  # seconds
@@ -43,7 +34,9 @@ class SlowClients(unittest.TestCase):
     def started(self, panel):
         """(bus, program), both until the end of the test; stations 1 and 2 are such panels."""
         bus = self.enterContext(RtuBus(self.link, {1: panel, 2: panel}))
-        program = self.enterContext(harness.configured(CONFIG % self.link))
+        program = self.enterContext(harness.configured(config.gateway(config.line(
+            device=self.link, stations=config.station_ids((1, 2), ", profile: generic"),
+            baud=921600, timing="{frame_gap: 100us}"))))
         program.log.wait_for("line up")
         return bus, program
 

@@ -5,26 +5,11 @@ import re
 import tempfile
 import unittest
 
+import config
 import harness
 from harness import read_registers
 
-FAR = """
-lines:
-  - name: far
-    device: sim
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations: [{id: 31, name: press, profile: autonics-gplp-s}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-"""
-NEAR = """
-lines:
-  - name: near
-    device: tcp://127.0.0.1:%d
-    serial: {baud: 38400, data_bits: 8, parity: none, stop_bits: 1}
-    stations: [{id: 31, name: press, profile: autonics-gplp-s}]
-modbus_tcp: [{listen: "127.0.0.1:0"}]
-http: {listen: "127.0.0.1:0"}
-"""
+FAR = config.gateway(config.line("far"), http=None)
 
 
 @contextlib.contextmanager
@@ -43,7 +28,8 @@ class TcpLine(unittest.TestCase):
     def test_P7_a_device_server_that_goes_and_comes_back(self):
         with contextlib.ExitStack() as near:
             with device_server() as (_, port):
-                program = near.enter_context(harness.configured(NEAR % port))
+                program = near.enter_context(harness.configured(
+                    config.gateway(config.line("near", f"tcp://127.0.0.1:{port}"))))
                 program.log.wait_for("line up")
                 client = near.enter_context(program.client())
                 self.assertEqual(client.ask(31, read_registers(0))[2:], b"\x00\x0a")

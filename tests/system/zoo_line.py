@@ -14,6 +14,7 @@ import time
 from collections import namedtuple
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+import config  # noqa: E402
 import harness  # noqa: E402
 from clients import Client, percentile, with_clients  # noqa: E402,F401
 from harness import read_registers, write_register  # noqa: E402
@@ -77,19 +78,10 @@ class Zoo:
                 for at, unit, pdu in json.loads(self.ask("writes"))]
 
 
-def configuration(device, baud, units, line="", stations=""):
-    """All defaults but the serial format, and what a test needs besides."""
-    listed = ", ".join(f"{{id: {unit}{stations}}}" for unit in units)
-    return (f"lines:\n  - name: zoo\n    device: {device}\n"
-            f"    serial: {{baud: {baud}, data_bits: 8, parity: none, stop_bits: 1}}\n{line}"
-            f"    stations: [{listed}]\n"
-            "modbus_tcp: [{listen: '127.0.0.1:0'}]\nhttp: {listen: '127.0.0.1:0'}\n")
-
-
 @contextlib.contextmanager
-def odd_line(baud, units=range(1, 6), habits=None, tcp=False, line="", zoo=(), wire_baud=None):
-    """Panels and a gateway; `habits`: {unit or "all": names}; `line`: YAML of the line; `zoo`: more
-    options of zoo_bus; `wire_baud`: where it is not what the gateway thinks, 0: unpaced."""
+def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=None):
+    """Panels and a gateway; `habits`: {unit or "all": names}; `zoo`: more options of zoo_bus;
+    `wire_baud`: where it is not what the gateway thinks, 0: unpaced."""
     with tempfile.TemporaryDirectory() as folder:
         numbers = ",".join(map(str, units))
         far_end = "tcp:0" if tcp else f"{folder}/tty"
@@ -99,8 +91,8 @@ def odd_line(baud, units=range(1, 6), habits=None, tcp=False, line="", zoo=(), w
             options += ["--set", f"{unit}={names}"]
         with Zoo(*options) as panels:
             device = f"tcp://{panels.names[0]}" if tcp else panels.names[0]
-            text = configuration(device, baud, units, line)
-            with harness.configured(text) as program:
+            listed = config.line("zoo", device, config.station_ids(units), baud=baud)
+            with harness.configured(config.gateway(listed)) as program:
                 program.log.wait_for("line up")
                 yield Line(panels, program)
 

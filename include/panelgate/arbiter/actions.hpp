@@ -9,6 +9,7 @@
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {
@@ -28,12 +29,10 @@ struct Finish {
 };
 /// Something was seen on the wire, for the trace.
 struct Note {
-    enum class Direction : std::uint8_t { sent, received, discarded };
     TimePoint at;  ///< first bit out, or last byte in
-    Direction direction = Direction::sent;
+    FrameKind kind = FrameKind::request;
     Bytes bytes;
-    std::string_view what;  ///< a literal: "request", "reply", "foreign"…
-    std::string why;        ///< of a sent frame, with Settings::explain: why this one now
+    std::string why;  ///< of a sent frame, with Settings::explain: why this one now
 };
 /// With Settings::explain: why something is not done now, or not at all. One line.
 struct Decision {
@@ -55,6 +54,7 @@ struct StationEvent {
     std::uint8_t station = 0;
     Duration by{};
 };
+std::string_view label(StationEvent::Kind kind);
 /// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
 /// more: then on_line_down and on_line_up.
 struct Reset {

@@ -101,7 +101,7 @@ class Arbiter {
     /// How long the next request to this station would wait for its reply to begin.
     Duration response_timeout(std::uint8_t id) const { return stations_.response_timeout(id); }
     const BusShares& shares() const { return ledger_.shares(); }
-    EchoMemory::State echo() const { return echo_memory_.state(); }
+    EchoState echo() const { return echo_memory_.state(); }
     /// Aborts when what must always hold does not. For tests.
     void check_invariants() const;
 

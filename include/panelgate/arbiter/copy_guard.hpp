@@ -53,8 +53,7 @@ class CopyGuard {
         slots_[last_index()].second = true;
         if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last().at);
     }
-    /// A reply of the last moments that stands, as a good frame, amid bytes that are none; nothing:
-    /// none does.
+    /// A recent reply that stands once more, as a good frame, amid bytes that are none; or nullptr.
     const Bytes* copy_in(TimePoint now, std::uint8_t station, ByteView bytes) const {
         for (const Slot& slot : slots_) {
             if (!slot.is_recent(now)) continue;
@@ -63,13 +62,13 @@ class CopyGuard {
         }
         return nullptr;
     }
-    /// This repeats one, or is a reply that was owed and has the same values: nobody knows.
+    /// This is a recent reply once more, or one that was owed and has the same values: nobody can
+    /// tell.
     void on_either(TimePoint now, ByteView reply) {
         const TimePoint said = said_at(now, reply);
         if (said != TimePoint{}) on_doubt((now - said) * 3 / 2);
     }
-    /// A second reply may follow the next one, as it may have followed the last: so long that is
-    /// waited for. If none comes, that was all.
+    /// Behind the next reply the station rests for so long, once: its copy may follow.
     void on_doubt(Duration wait) { doubt_ = std::max(doubt_, wait); }
     /// It has spoken twice lately.
     bool known() const { return hold() > Duration::zero(); }

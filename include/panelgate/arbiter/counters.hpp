@@ -6,6 +6,7 @@
 #include <map>
 
 #include "panelgate/base/histogram.hpp"
+#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {
@@ -54,10 +55,10 @@ struct Symptoms {
     friend bool operator==(const Symptoms&, const Symptoms&) = default;
 };
 
-/// What happened on the wire, by station. Counted by the arbiter, read by metrics/ (contract 6).
+/// What happened on the wire, by station. Counted by the arbiter, read by metrics/.
 struct StationCounters {
     std::uint64_t retries = 0;
-    std::uint64_t late_frames = 0;     ///< good frames that answer a request already closed
+    std::uint64_t late_frames = 0;     ///< replies that were owed: their request was given up
     std::uint64_t foreign_frames = 0;  ///< good frames of another station, or nobody's reply
     std::uint64_t damaged_frames = 0;  ///< bytes that never became a good frame
     std::uint64_t discarded_bytes = 0;
@@ -67,9 +68,6 @@ struct StationCounters {
     Histogram turnaround;                              ///< the panel's own think time
     Symptoms symptoms;
 };
-
-enum class PriorityClass : std::uint8_t { write, read, poll, probe };
-inline constexpr std::size_t kPriorityClasses = 4;
 
 struct LineCounters {
     std::uint64_t broadcasts = 0;

@@ -3,8 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/echo_state.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -47,7 +48,7 @@ class EchoFilter {
 };
 
 /// The reply to this request can never be the request itself: it shows whether there is an echo.
-bool teaches_echo(ByteView request);
+bool teaches_echo(const modbus::Request& request);
 
 /// Two bytes or more of `heard` stand like this in our own frame: a part of its echo.
 bool holds_fragment(ByteView heard, ByteView frame);
@@ -56,39 +57,32 @@ bool holds_fragment(ByteView heard, ByteView frame);
 /// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
 class EchoMemory {
   public:
-    enum class State : std::uint8_t {
-        unknown,
-        absent,
-        present,
-        unclear,  ///< a part of a read came back in front of its answer: whole echoes may come
-    };
-
     explicit EchoMemory(EchoMode mode);
 
-    State state() const { return state_; }
+    EchoState state() const { return state_; }
     /// The device was opened again: it may be another one.
     void forget();
-    EchoFilter::Expect expect(ByteView request) const;
+    EchoFilter::Expect expect(const modbus::Request& request) const;
     /// This request could be confirmed by its own echo, and nobody knows whether there is one.
     /// `tried`: a read was sent for it already; where that did not tell, it goes all the same.
-    bool must_be_learned_before(ByteView request, bool tried) const;
+    bool must_be_learned_before(const modbus::Request& request, bool tried) const;
 
     /// The whole echo of this request came back. True when that is news.
-    bool on_echo(ByteView request);
+    bool on_echo(const modbus::Request& request);
     /// A good reply to this request came; `fragment`: with a part of the request in front of it.
     /// Other bytes in front, and whatever stands behind, tell nothing about an echo (FRM-07).
-    void on_reply_without_echo(ByteView request, bool fragment);
+    void on_reply_without_echo(const modbus::Request& request, bool fragment);
     /// The read that was to tell did not.
     void on_unclear();
     /// Its own echo was heard and no answer: where it could be its own answer, that may be what it
     /// was, because the line has no echo any more.
-    void on_unanswered(ByteView request);
+    void on_unanswered(const modbus::Request& request);
     /// The echo differed: learn again, unless the configuration knows.
     void on_mismatch();
 
   private:
     EchoMode mode_;
-    State state_;
+    EchoState state_;
 };
 
 }  // namespace panelgate::arbiter

@@ -7,17 +7,18 @@
 #include <vector>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
 
 /// Jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
 struct Group {
-    std::vector<Job> jobs;
+    std::vector<Job> jobs{};
     std::uint8_t station = 0;
-    Bytes pdu;
-    std::optional<modbus::Span> span;  ///< of a read that can be shared
+    modbus::Request request;
+    std::optional<modbus::Span> span{};  ///< of a read that can be shared
     int attempts = 0;
     TimePoint started{};      ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
@@ -29,7 +30,7 @@ struct Group {
     /// It asks for more than any of its jobs.
     bool joined() const {
         return !jobs.empty() &&
-               std::ranges::none_of(jobs, [&](const Job& job) { return job.pdu == pdu; });
+               std::ranges::none_of(jobs, [&](const Job& job) { return job.request == request; });
     }
     bool has(Client client, std::uint8_t to) const {
         return (station == to || station == 0) &&

@@ -2,10 +2,10 @@
 
 #include <cstdint>
 
-#include "panelgate/arbiter/counters.hpp"
-#include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -15,20 +15,20 @@ using Client = std::uint64_t;
 /// Where a client comes from: all connections from one address have the same.
 using Host = std::uint64_t;
 
-/// One request on its way. The PDU has passed modbus::check_request.
+/// One request on its way.
 struct Job {
     Ticket ticket = 0;         ///< given by the arbiter
     std::uint8_t station = 0;  ///< 0: broadcast
-    Bytes pdu;
+    modbus::Request request;
     Client client = 0;
     Host host = 0;  ///< 0: the client is its own
     PriorityClass priority = PriorityClass::read;
-    TimePoint arrived;
-    TimePoint deadline;
-    TimePoint start_by;  ///< the last moment at which starting it makes sense
-    int attempts = 0;    ///< transmissions so far
-    bool alone = false;  ///< a shared transaction for it was refused: ask for just this
-    bool gone = false;   ///< its client has left while it was on the wire: no further attempt
+    TimePoint arrived{};
+    TimePoint deadline{};
+    TimePoint start_by{};  ///< the last moment at which starting it makes sense
+    int attempts = 0;      ///< transmissions so far
+    bool alone = false;    ///< a shared transaction for it was refused: ask for just this
+    bool gone = false;     ///< its client has left while it was on the wire: no further attempt
 };
 
 }  // namespace panelgate::arbiter

@@ -9,6 +9,7 @@
 #include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -30,7 +31,7 @@ class ReadCache {
     std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
     /// This request may change what the station holds (0: all stations), answered or not. Other
     /// tables may show the same memory (Autonics UB and UW), so of these nothing is kept.
-    void on_write(TimePoint now, std::uint8_t station, ByteView request);
+    void on_write(TimePoint now, std::uint8_t station, const modbus::Request& request);
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }
 

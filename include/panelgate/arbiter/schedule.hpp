@@ -39,12 +39,11 @@ class Schedule {
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// The same request goes again, and may be waited for so long; others go in between where only
-    /// its station rests: one, or, when it may cost them much, one request to each station that
-    /// something waits for.
+    /// The same request goes again and is waited for `patience` long. While only its station rests,
+    /// others go first: one request, or, when the retry is dear, one to each station that waits.
     void retry(Group group, Duration patience);
-    /// What was asked for together goes again, each for itself. Gives those whose client has left:
-    /// for them nothing goes.
+    /// The parts of a joined read go again, each by itself. Returns those whose client has left:
+    /// they do not.
     std::vector<Job> give_back(Group& group);
 
   private:

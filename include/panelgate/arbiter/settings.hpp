@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "panelgate/arbiter/station_health.hpp"
+#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {
 
-/// How one station is asked. The defaults are those of the line (contract 3).
+/// How one station is asked. The defaults are those of the line.
 struct StationSettings {
     std::uint8_t id = 1;  ///< 1..247
     /// From the end of the request on the wire to the start of the reply.
@@ -48,13 +49,6 @@ enum class Quarantine : std::uint8_t {
     automatic,  ///< the silent station; everybody where its replies have been late before
     line,       ///< everybody
     station,    ///< the silent station; others may be asked, at the risk of a collision
-};
-
-/// Whether the adapter hears what it sends (P8).
-enum class EchoMode : std::uint8_t {
-    automatic,  ///< learned from reads, before the first write
-    on,
-    off,
 };
 
 struct Settings {

@@ -18,6 +18,7 @@
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -51,7 +52,7 @@ class Station {
     /// When its next probe may go: as a rule it is the request that is owed.
     TimePoint probe_due() const {
         const TimePoint next = health_.next_probe();
-        return owes() && probe_pdu() == owed_pdu_ ? next : std::max(next, not_before_);
+        return owes() && probe().pdu() == owed_pdu_ ? next : std::max(next, not_before_);
     }
     bool may_ask(TimePoint now, const Bytes& pdu) const {
         const bool again = (owes() && pdu == owed_pdu_) || pdu == damaged_pdu_;
@@ -109,7 +110,7 @@ class Station {
     bool may_be_copy(TimePoint now, const Attempt& attempt) const {
         return repeats_itself(now, attempt) ||
                (!attempt.was_held() &&
-                copies_.suspicious(now, attempt.group().pdu, attempt.reply()));
+                copies_.suspicious(now, attempt.group().request.pdu(), attempt.reply()));
     }
     /// ... and copies come from this station.
     bool repeats_itself(TimePoint now, const Attempt& attempt) const {
@@ -157,7 +158,7 @@ class Station {
     /// ... and not more than that, but for what a receiver holds back.
     Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }
-    Bytes probe_pdu() const;
+    modbus::Request probe() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {
         return longest_read_[static_cast<std::size_t>(table)];
@@ -215,8 +216,8 @@ class Station {
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};
-    Bytes cheapest_read_;  ///< that it has answered
-    Bytes last_read_;      ///< what to probe with before it has answered any
+    std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
+    std::optional<modbus::Request> last_read_;  ///< what to probe with before it has answered any
     std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
     Slowest slowest_;  ///< from request to first sign of the reply
     TimePoint failed_{};

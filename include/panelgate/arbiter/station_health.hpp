@@ -2,9 +2,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <string_view>
 
-#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/health.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::arbiter {
@@ -19,12 +18,10 @@ struct OfflineSettings {
 /// damaged or an exception, is a sign of life; only silence counts towards offline (P4).
 class StationHealth {
   public:
-    enum class State : std::uint8_t { unknown, online, suspect, offline };
-
     explicit StationHealth(OfflineSettings settings = {}) : settings_(settings) {}
 
-    State state() const { return state_; }
-    bool offline() const { return state_ == State::offline; }
+    Health state() const { return state_; }
+    bool offline() const { return state_ == Health::offline; }
     std::optional<TimePoint> last_success() const { return last_success_; }
     int silent_in_a_row() const { return silent_; }
 
@@ -43,14 +40,12 @@ class StationHealth {
 
   private:
     OfflineSettings settings_;
-    State state_ = State::unknown;
+    Health state_ = Health::unknown;
     int silent_ = 0;
     Duration pause_{};
     TimePoint next_probe_{};
     TimePoint next_half_open_{};
     std::optional<TimePoint> last_success_;
 };
-
-std::string_view label(StationHealth::State state);
 
 }  // namespace panelgate::arbiter

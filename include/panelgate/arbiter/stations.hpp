@@ -37,8 +37,8 @@ class Stations {
     void on_proved(TimePoint now, TimePoint sent) {
         for (auto& [id, station] : stations_) station.on_proved(now, sent);
     }
-    /// One was offline and answers again, or the line is open again: what ailed it may have ailed
-    /// others, which are asked at once.
+    /// A station is back, or the line is open again: others may be back for the same reason and are
+    /// asked at once.
     void on_back() { probes_.clear(); }
     /// `waited` from request to first sign; nothing: that cannot be told.
     void on_reply(TimePoint now, std::optional<Duration> waited) {
@@ -52,8 +52,8 @@ class Stations {
     bool refuses(TimePoint now, const Job& job);
     /// How long the next attempt waits for its reply to begin.
     Duration patience(TimePoint now, const Group& group);
-    /// It fails so often that others, who want the line too, are not to pay for it: no silence of
-    /// it is a surprise.
+    /// It fails so often that its silence surprises nobody: others who want the line do not pay for
+    /// it.
     bool spent(TimePoint now, const Station& station) const {
         return station.flaky() && has_company(now, station);
     }
@@ -61,9 +61,9 @@ class Stations {
     bool affords_retry(TimePoint now, const Station& station) const {
         return !spent(now, station) && (station.may_spend(now) || !has_company(now, station));
     }
-    /// The budgets of those that do not answer let this one be asked. A station that has only just
-    /// fallen silent, that keeps failing, or that nobody knows, is to wait for them only while
-    /// others want the line.
+    /// The budgets for stations that do not answer allow asking this one. One that has just fallen
+    /// silent, that keeps failing, or that nobody knows waits for them only while others want the
+    /// line.
     bool may_spend(TimePoint now, std::uint8_t id) const;
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost);
@@ -78,9 +78,9 @@ class Stations {
   private:
     bool anyone_online() const;
     bool is_stranger(std::uint8_t id) const;
-    /// Another one has answered just now, and since this one was in vain: it is not the line.
+    /// Another station has answered lately, and after this one failed: the line is well.
     bool has_company(TimePoint now, const Station& station) const;
-    /// What the silence of one that nobody could foresee costs, with its share to save for it.
+    /// How long a failing station's share of the bus has to add up to pay for one full silence.
     Duration surprise() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * unlisted_.response_timeout;
     }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include "panelgate/base/outcome.hpp"
+
 namespace panelgate {
 
 /// Why a request has no reply from its station. A station's own exception is not a fault: it is an
@@ -28,8 +30,8 @@ inline constexpr Fault kAllFaults[] = {Fault::denied,    Fault::malformed, Fault
 
 /// The word for logs and REST: "line_down".
 std::string_view label(Fault fault);
-/// The word for panelgate_requests_total{outcome} (contract 6): several faults share "refused".
-std::string_view outcome_label(Fault fault);
+/// How a request with this fault has ended: several faults are the same to a client.
+Outcome outcome_of(Fault fault);
 
 template <class T>
 using Result = boost::system::result<T, Fault>;

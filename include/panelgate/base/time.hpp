@@ -6,7 +6,8 @@ namespace panelgate {
 
 using namespace std::chrono_literals;
 
-/// Monotonic time. Pure code is given a TimePoint; only rt/asio_clock.cpp asks the machine for one.
+/// Monotonic time. Pure code is given a TimePoint; shells ask an rt::Clock for one, and only
+/// rt/asio_clock.cpp asks the machine.
 using TimePoint = std::chrono::steady_clock::time_point;
 using Duration = std::chrono::nanoseconds;
 

@@ -2,40 +2,42 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <functional>
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
+#include <variant>
 
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/bus/station_settings.hpp"
 #include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::bus {
 
-/// The exception code that a request is answered with instead of being transmitted, or nothing.
-using Guard = std::function<std::optional<std::uint8_t>(ByteView pdu)>;
-
-/// Something happened that others may want to know.
-struct BusEvent {
-    enum class Kind : std::uint8_t { line, station, transaction };
-    Kind kind = Kind::line;
-    std::string_view what;  ///< "up", "down"; "online", "late"…; the outcome of a transaction
-    std::string why;        ///< of a line that is down, or that has a finding or lost one
+/// The line came or went, or has a finding or lost one.
+struct LineEvent {
+    bool up = false;
+    std::string why;  ///< of a line that is down; or the finding
+};
+/// A request was answered.
+struct TransactionEvent {
     std::uint8_t station = 0;
     std::uint8_t function = 0;
+    Outcome outcome = Outcome::ok;
     Duration took{};  ///< arrival to answer
 };
+/// Something happened that others may want to know.
+using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent>;
 
 struct Settings {
     std::string name;    ///< of the line
     std::string device;  ///< as configured
     arbiter::Settings arbiter;
-    std::map<std::uint8_t, std::string> stations;  ///< names of those the configuration lists
-    std::map<std::uint8_t, Guard> guards;          ///< of stations with `guard: true`
+    Stations stations;                             ///< those that the configuration lists
     std::function<void(const BusEvent&)> observe;  ///< may be empty; called from inside the bus
     std::size_t trace_frames = 2000;
     std::size_t trace_decisions = 500;
@@ -45,7 +47,9 @@ struct Settings {
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.
 class Bus final : public BusClient {
   public:
-    Bus(boost::asio::any_io_executor executor, Settings settings, std::unique_ptr<line::Line> line);
+    /// Answers are posted to the executor; it and the clock outlive the bus.
+    Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
+        std::unique_ptr<line::Line> line);
     /// Answers what is still open with Fault::cancelled.
     ~Bus() override;
 
@@ -58,6 +62,7 @@ class Bus final : public BusClient {
     LineStatus status() const override;
     std::vector<ClientShare> clients() const override;
     StationStatus station_status(std::uint8_t station) const override;
+    std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
     std::vector<TraceDecision> decisions(std::size_t last) const override;
     void name_client(ClientId client, std::string name) override;
@@ -68,7 +73,7 @@ class Bus final : public BusClient {
 
   private:
     struct State;
-    std::shared_ptr<State> state_;  ///< shared with completions that are still under way
+    std::unique_ptr<State> state_;
 };
 
 }  // namespace panelgate::bus

@@ -7,11 +7,15 @@
 #include <string_view>
 #include <vector>
 
-#include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/frame_kind.hpp"
+#include "panelgate/base/health.hpp"
+#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/bus/rights.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
@@ -19,17 +23,18 @@ namespace panelgate::bus {
 /// Who asks: one number a TCP connection, HTTP session or internal task. 0 is nobody's.
 using ClientId = std::uint64_t;
 ClientId next_client_id();
-/// The same for all clients of one address ("10.0.0.7", without the port); never 0.
-arbiter::Host host_of(std::string_view address);
+/// The same for all clients of one address; 0: the client is its own.
+using Host = arbiter::Host;
+/// Of an address without its port ("10.0.0.7"); never 0.
+Host host_of(std::string_view address);
 
 /// One request to one station; station 0 is a broadcast.
 struct Request {
     std::uint8_t station = 0;  ///< 0..247
-    Bytes pdu;
+    modbus::Request request;
     ClientId client = 0;
-    arbiter::Host host = 0;  ///< the client's address (host_of()); 0: it is its own
-    arbiter::PriorityClass priority = arbiter::PriorityClass::read;
-    modbus::QuantityCheck quantity = modbus::QuantityCheck::fit;
+    Host host = 0;      ///< the client's address (host_of()); 0: it is its own
+    bool poll = false;  ///< of the lowest class: clients' own requests go first
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -42,18 +47,18 @@ struct Answer {
     Source source = Source::bus;
     Duration age{};       ///< of the value, when source is cache
     bool shared = false;  ///< another request's transaction answered this one, too
+    /// The rights forbid it: `pdu` is Fault::denied, or of a guard the exception.
+    std::optional<Refusal> refusal{};
 };
 using AnswerHandler = std::function<void(Answer)>;
 
 /// A frame on the wire, for traces.
 struct TraceFrame {
-    enum class Direction : std::uint8_t { sent, received, discarded };
     std::uint64_t sequence = 0;  ///< counts from 1 a line
     TimePoint at;                ///< first bit out; last byte in
-    Direction direction = Direction::sent;
+    FrameKind kind = FrameKind::request;
     Bytes bytes;
-    std::string note;  ///< "reply", "late", "damaged", "broadcast"…; never empty
-    std::string why;   ///< of a sent frame: why this one at this time
+    std::string why;  ///< of a sent frame: why this one at this time
 };
 
 /// Why something was not done, or not at once; one line.
@@ -86,13 +91,13 @@ struct LineStatus {
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;              ///< busy share of the last seconds
-    std::string echo;                     ///< "unknown", "absent", "present", "unclear"
+    double load_percent = 0;  ///< busy share of the last seconds
+    EchoState echo = EchoState::unknown;
     std::vector<LineFinding> findings{};  ///< the likeliest first; none on a healthy line
 };
 
 struct StationStatus {
-    std::string state;  ///< "unknown" before the first try, "online", "suspect", "offline"
+    Health state = Health::unknown;
     std::optional<Duration> last_success;  ///< how long ago
 };
 
@@ -103,9 +108,16 @@ class BusClient {
     virtual ~BusClient() = default;
 
     /// Hands in a request. The handler is called exactly once, never from inside transact(), at the
-    /// latest at the deadline of the line's queue settings. Checks the PDU (Fault::malformed,
-    /// Fault::denied) and the queue (Fault::busy) itself.
+    /// latest at the deadline of the line's queue settings. Refuses what cannot be answered at this
+    /// address (Fault::denied), what the rights forbid (Answer::refusal), and what has no place in
+    /// the queue (Fault::busy).
     virtual void transact(Request request, AnswerHandler handler) = 0;
+    /// Why transact() would refuse every write to this station (0: every broadcast), if it would.
+    /// For those who have to say so before they know the write, or before they ask other lines.
+    virtual std::optional<Refusal> refusal_of_write(std::uint8_t station) const {
+        static_cast<void>(station);
+        return std::nullopt;
+    }
     /// Forgets a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// one on the wire is completed and then answered normally.
     virtual void cancel(ClientId client) = 0;

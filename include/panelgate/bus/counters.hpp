@@ -3,20 +3,22 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/histogram.hpp"
+#include "panelgate/base/outcome.hpp"
 #include "panelgate/line/counters.hpp"
 
 namespace panelgate::bus {
 
+inline constexpr std::uint8_t kOtherFunctions = 0;
+
 /// Counters of one station as clients see it.
 struct StationReport {
     std::string station;  ///< its name; "other" for all that the configuration does not list
-    /// By function label ("3"; "other" for codes outside Table A) and outcome.
-    std::map<std::pair<std::string, std::string>, std::uint64_t> requests;
+    /// By function code; kOtherFunctions: all that modbus::is_known() does not know.
+    std::map<std::uint8_t, OutcomeCounts> requests;
     Histogram request_duration;
     arbiter::StationCounters wire;
     bool configured = false;

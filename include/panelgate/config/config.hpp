@@ -40,7 +40,7 @@ struct Line {
     std::vector<Station> stations;
 };
 
-/// A valid configuration (contract 3): every default filled in, every reference resolved.
+/// A valid configuration (README, Configuration): defaults filled in, references resolved.
 struct Config {
     std::shared_ptr<const profile::Catalogue> profiles;
     std::vector<Line> lines;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/line/counters.hpp"
@@ -13,10 +14,8 @@ namespace panelgate::doctor {
 
 /// What the configuration says, as far as advice depends on it.
 struct LineFacts {
-    enum class Echo : std::uint8_t { automatic, on, off };
-
     SerialFormat serial;
-    Echo echo = Echo::automatic;
+    EchoMode echo = EchoMode::automatic;
     /// RTU over TCP: the wire is behind a server, which nobody here can see or set.
     bool over_tcp = false;
     Duration deadline = 2s;  ///< of a request: no reply later than this is ever waited for

@@ -7,6 +7,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
+#include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 
 namespace panelgate::metrics {
@@ -19,15 +20,16 @@ struct Snapshot {
     std::vector<points::RelaySample> relays;
     std::string version;
     ProcessFacts process;
+    rt::Counters runtime;
 };
 
 /// The Content-Type that goes with exposition().
 inline constexpr std::string_view kContentType = "text/plain; version=0.0.4; charset=utf-8";
 
-/// The text of /metrics: contract 6. Series exist from the start with 0, so that a rate() sees the
-/// first event: for requests functions 1-6, 15 and 16 with the outcomes ok, exception, timeout and
-/// damaged, and every outcome of a function that was used; for exceptions codes 1-4. A station's
-/// last success is absent while there was none.
+/// The text of /metrics (README, Metrics). Series exist from the start with 0, so that a rate()
+/// sees the first event: for requests functions 1-6, 15 and 16 with the outcomes ok, exception,
+/// timeout and damaged, and every outcome of a function that was used; for exceptions codes 1-4. A
+/// station's last success is absent while there was none.
 std::string exposition(const Snapshot& snapshot);
 
 }  // namespace panelgate::metrics

@@ -45,7 +45,7 @@ inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
 inline constexpr std::array kTables = {Table::coils, Table::discrete_inputs, Table::input_registers,
                                        Table::holding_registers};
-/// "holding-registers", the word of the REST path (contract 5).
+/// "holding-registers", the word of the REST path.
 std::string_view label(Table table);
 inline constexpr bool is_bit_table(Table table) {
     return table == Table::coils || table == Table::discrete_inputs;

@@ -25,7 +25,7 @@ enum class QuantityCheck {
 };
 
 /// Is this PDU one that may be transmitted? Function 0 or 128..255: Fault::denied. A length that
-/// contradicts the function (PDU-07, Table A) or a reply that cannot fit: Fault::malformed.
+/// contradicts the function (PDU-07) or a reply that cannot fit: Fault::malformed.
 /// Unknown functions have no length rule and pass. An empty PDU is malformed.
 Result<void> check_request(ByteView pdu, QuantityCheck check = QuantityCheck::fit);
 
@@ -39,11 +39,44 @@ bool is_pure_read(ByteView pdu);
 /// 08/0004 Force Listen Only Mode: a unicast request that is never answered (DIA-01).
 bool is_never_answered(ByteView pdu);
 
+/// A request that may be transmitted, as check_request() says. What it is is found out once, when
+/// it is made, and there is no other way to make one: whoever is handed one need not check it. A
+/// value; of one that was moved from nothing may be asked.
+class Request {
+  public:
+    static Result<Request> make(Bytes pdu, QuantityCheck check);
+    /// Of at least one item, none beyond the end of the table, no more than a wide reply holds.
+    static Request read(const Span& span);
+
+    const Bytes& pdu() const { return pdu_; }
+    std::uint8_t function() const { return pdu_[0]; }
+    /// Repeating it cannot change anything (RTY-02).
+    bool is_read() const { return read_; }
+    bool is_broadcastable() const { return modbus::is_broadcastable(function()); }
+    /// A unicast request that is never answered (DIA-01).
+    bool is_never_answered() const { return modbus::is_never_answered(pdu_); }
+    /// What read_span() says: nothing unless it is a read of one table.
+    const std::optional<Span>& span() const { return span_; }
+    /// Which items it reads and writes.
+    Access access() const { return access_of(pdu_); }
+    /// Lq: as reply_length_from_request() says.
+    std::optional<std::size_t> reply_length() const { return reply_length_; }
+    friend bool operator==(const Request& a, const Request& b) { return a.pdu_ == b.pdu_; }
+
+  private:
+    explicit Request(Bytes pdu);
+
+    Bytes pdu_;
+    bool read_;
+    std::optional<Span> span_;
+    std::optional<std::size_t> reply_length_;
+};
+
 /// Length of the request ADU (address to CRC) that begins here, where its function and byte count
 /// tell it: 01 to 06, 0F and 10. 0: nothing tells, or too little is there to tell.
 std::size_t request_adu_length(ByteView heard);
 
-/// Lq of Table B: length of the normal RTU reply (address to CRC) when the request tells it;
+/// Length of the normal RTU reply (address to CRC) when the request tells it;
 /// 0 for 08/0004; nothing when only the reply tells.
 std::optional<std::size_t> reply_length_from_request(ByteView pdu);
 

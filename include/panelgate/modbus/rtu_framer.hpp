@@ -10,7 +10,7 @@
 
 namespace panelgate::modbus {
 
-/// How long an RTU reply is, as far as its own first bytes tell (Lr of Table B).
+/// How long an RTU reply is, as far as its own first bytes tell.
 struct ReplyLength {
     enum class Kind : std::uint8_t {
         known,      ///< `length` bytes, address to CRC
@@ -37,11 +37,11 @@ struct Unused {
 };
 
 /// Finds the reply to one request in what is heard after it. Lives for one attempt. The length
-/// comes from the function and the header, the CRC is the judge, and silence only ends waiting
-/// (pains 5, 16): bytes may come in any pieces with any pauses. Noise before the reply and good
-/// frames of other stations are stepped over; a frame is accepted only if station, function, byte
-/// count and echoed fields answer the request (FRM-04, P1). Work is linear in the bytes heard,
-/// memory bounded.
+/// comes from the function and the header, the CRC is the judge, and silence only ends waiting:
+/// bytes may come in any pieces, and adapters and busy machines put pauses anywhere. Noise before
+/// the reply and good frames of other stations are stepped over; a frame is accepted only if
+/// station, function, byte count and echoed fields answer the request (FRM-04, P1). Work is linear
+/// in the bytes heard, memory bounded.
 class ReplyFramer {
   public:
     /// Heard bytes that are kept at most; older ones become Unused.
@@ -100,7 +100,7 @@ class ReplyFramer {
 
     std::uint8_t station_;
     Bytes request_;
-    std::optional<std::size_t> expected_;  ///< Lq
+    std::optional<std::size_t> expected_;  ///< from the request (FRM-04)
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
     std::deque<std::size_t> starts_;  ///< offsets with the right address and function, unjudged

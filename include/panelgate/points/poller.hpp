@@ -1,6 +1,5 @@
 #pragma once
 
-#include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -9,6 +8,7 @@
 
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/points/station_polls.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::points {
 
@@ -20,14 +20,13 @@ struct PolledStation {
 };
 
 /// Runs the polls of one line through its bus, as requests of the class `poll`: one under way a
-/// station. One thread; the bus outlives it.
+/// station. One thread; clock and bus outlive it.
 class Poller {
   public:
     /// Called after each answer, with the station's id and its wants that were read or failed.
     using Update = std::function<void(std::uint8_t station, const std::vector<std::size_t>& wants)>;
 
-    Poller(boost::asio::any_io_executor executor, bus::BusClient& bus,
-           std::vector<PolledStation> stations);
+    Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations);
     ~Poller();
     Poller(const Poller&) = delete;
     Poller& operator=(const Poller&) = delete;

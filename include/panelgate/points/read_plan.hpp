@@ -59,8 +59,8 @@ struct PlannedRead {
     bool refused = false;
 };
 
-/// How long a read of `count` items keeps the line from everybody else (contract 9): request, gap,
-/// think time, reply, gap.
+/// How long a read of `count` items keeps the line from everybody else: request, gap, think time,
+/// reply, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
 
 /// Few reads that serve every want, sorted by table and address. Where all intervals are the same

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <boost/asio/any_io_executor.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,6 +9,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/points/settings.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::points {
 
@@ -25,12 +25,12 @@ struct RelayRoute {
 
 /// Copies blocks between stations, over lines too. One request of each relay is open at a time, of
 /// the class `poll`: a relay whose panel is silent keeps nobody waiting. It writes only what it has
-/// read just before. One thread.
+/// read just before. One thread; the clock outlives it.
 class Relays {
   public:
     using Changed = std::function<void(const RelayStatus&)>;
 
-    Relays(boost::asio::any_io_executor executor, std::vector<RelayRoute> routes);
+    Relays(rt::Clock& clock, std::vector<RelayRoute> routes);
     ~Relays();
     Relays(const Relays&) = delete;
     Relays& operator=(const Relays&) = delete;

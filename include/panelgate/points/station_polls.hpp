@@ -8,6 +8,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/points/poll_schedule.hpp"
 #include "panelgate/points/read_plan.hpp"
 
@@ -36,7 +37,7 @@ class StationPolls {
   public:
     struct Due {
         std::size_t read = 0;  ///< to be given to on_answer(), once
-        Bytes pdu;
+        modbus::Request request;
     };
 
     /// Wants that the panel cannot serve are never read and stay bad.

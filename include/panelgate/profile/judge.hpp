@@ -19,6 +19,7 @@ enum class Judgement : std::uint8_t {
 };
 
 Judgement judge(const PanelProfile& profile, ByteView pdu);
+Judgement judge(const PanelProfile& profile, const modbus::Request& request);
 
 /// The one area that holds the whole span, or nullptr.
 const Area* find_readable(const PanelProfile& profile, const modbus::Span& span);

@@ -29,8 +29,6 @@ class Clock {
     virtual std::unique_ptr<Alarm> make_alarm() = 0;
 };
 
-/// The machine's monotonic clock, for those who are not given a Clock.
-TimePoint now();
 /// Wall clock: seconds since 1970, for log lines, metrics and panels' clocks; never for timing.
 double wall_seconds();
 /// The same as local time, as if it were UTC: what a clock on the wall shows.

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "panelgate/rt/settings.hpp"
 
@@ -13,7 +16,7 @@ namespace panelgate::rt {
 
 class Clock;
 
-using LogFields = std::initializer_list<std::pair<std::string_view, std::string>>;
+using LogField = std::pair<std::string_view, std::string>;
 
 /// To stderr, whose reader may be slow, stopped or gone: nobody waits for it. Lines that it does
 /// not take wait (LogOutput); then they are lost and counted.
@@ -38,6 +41,29 @@ class LogDrain {
 /// it is about: from error to info, the same event of the same subject is soon left out
 /// (LogThrottle), and what follows tells how often in the field `left_out`. Of a field `client` the
 /// port does not count.
-void log(LogLevel level, std::string_view event, LogFields fields = {});
+void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
+void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
+/// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
+/// times at once, then once a minute.
+void log_deed(std::string_view event, std::string_view subject,
+              std::initializer_list<LogField> fields);
+
+/// For tests: while it lives, lines go to it, without their time, instead of to stderr, and nothing
+/// that was said before makes it leave one out. One at a time.
+class LogTap {
+  public:
+    LogTap();
+    ~LogTap();
+    LogTap(const LogTap&) = delete;
+    LogTap& operator=(const LogTap&) = delete;
+
+    /// "warn cannot accept listener=127.0.0.1:502 reason=..."
+    const std::vector<std::string>& lines() const { return *lines_; }
+    /// How many of them hold this.
+    std::size_t count(std::string_view part) const;
+
+  private:
+    std::shared_ptr<std::vector<std::string>> lines_;
+};
 
 }  // namespace panelgate::rt

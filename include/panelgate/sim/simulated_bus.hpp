@@ -9,6 +9,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/sim/misbehaviour.hpp"
 #include "panelgate/sim/station.hpp"
 
@@ -20,8 +21,9 @@ namespace panelgate::sim {
 /// sent while a reply is under way collides and is lost, as on a real line.
 class SimulatedBus {
   public:
-    /// Throws std::system_error when there is no pty left. The stations' profiles must outlive it.
-    SimulatedBus(boost::asio::any_io_executor executor, Settings settings,
+    /// Throws std::system_error when there is no pty left. The clock and the stations' profiles
+    /// must outlive it.
+    SimulatedBus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
                  std::vector<Station> stations);
     ~SimulatedBus();
 

@@ -4,8 +4,8 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 
+#include "panelgate/rt/clock.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -16,20 +16,15 @@ class any_io_executor;
 
 namespace panelgate::tcp_server {
 
-/// What a listener takes from its surroundings.
-struct Hooks {
-    /// Life-cycle lines, "event key=value ..."; may be empty.
-    std::function<void(std::string_view)> log;
-    std::string version;  ///< of the program, for the device identification
-};
-
-/// One Modbus/TCP port and its connections (contract 4). One thread: everything runs on the
-/// executor given. The buses in the map outlive it; answers that come after its end are dropped.
+/// One Modbus/TCP port and its connections (README, Modbus/TCP). One thread: everything runs on the
+/// executor given. The clock and the buses in the map outlive it; answers that come after its end
+/// are dropped.
 class Listener {
   public:
-    /// Throws std::invalid_argument for an allow list that cannot be read.
-    Listener(const boost::asio::any_io_executor& executor, Settings settings, UnitMap units,
-             Hooks hooks);
+    /// `version`: of the program, for the device identification. Throws std::invalid_argument for
+    /// an allow list that cannot be read.
+    Listener(const boost::asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
+             UnitMap units, std::string version);
     ~Listener();  ///< as close_now()
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;

@@ -11,7 +11,7 @@
 
 namespace panelgate::tcp_server {
 
-/// What happens to unit 0 with a write (contract 4).
+/// What happens to unit 0 with a write.
 enum class BroadcastMode : std::uint8_t { reply, silent, deny };
 
 /// A network in CIDR form; a bare address is /32 or /128.

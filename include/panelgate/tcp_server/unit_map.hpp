@@ -3,7 +3,6 @@
 #include <array>
 #include <cstdint>
 #include <map>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -17,8 +16,7 @@ namespace panelgate::tcp_server {
 struct LineInfo {
     std::string name;
     bus::BusClient* bus = nullptr;
-    std::vector<std::uint8_t> stations;   ///< ids that the configuration lists
-    std::vector<std::uint8_t> read_only;  ///< those of them that may not be written
+    std::vector<std::uint8_t> stations;  ///< ids that the configuration lists
     bool pass_unlisted = true;
 };
 
@@ -26,7 +24,6 @@ struct LineInfo {
 struct Target {
     bus::BusClient* bus = nullptr;
     std::uint8_t station = 0;
-    bool read_only = false;
 };
 
 /// A client's unit id -> line and station, for one listener. Built once, never changes. Pure.
@@ -44,10 +41,6 @@ class UnitMap {
     /// Where a request to this unit is broadcast: all lines of the listener for unit 0 without an
     /// alias, the one line of an alias to station 0; nowhere for any other unit.
     std::vector<bus::BusClient*> broadcast_lines(std::uint8_t unit) const;
-    /// A broadcast on this line would write to a station that may not be written.
-    bool holds_read_only(const bus::BusClient* line) const {
-        return with_read_only_.contains(line);
-    }
     bool is_alias(std::uint8_t unit) const { return aliases_.contains(unit); }
     /// The listener's own lines, in the order of the settings.
     const std::vector<bus::BusClient*>& lines() const { return lines_; }
@@ -59,7 +52,6 @@ class UnitMap {
     std::array<Target, 256> direct_{};  ///< bus is null where nothing is routed
     std::array<bool, 256> listed_{};
     std::vector<bus::BusClient*> lines_;
-    std::set<const bus::BusClient*> with_read_only_;
 };
 
 }  // namespace panelgate::tcp_server

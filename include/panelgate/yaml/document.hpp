@@ -19,7 +19,7 @@ struct Problem {
     Mark mark;
     std::string message;
 };
-/// "FILE:LINE:COLUMN: message" (contract 2).
+/// "FILE:LINE:COLUMN: message" (HR-17).
 std::string format(const Problem& problem);
 
 /// Collects every problem of one file, and of the files it names, in the order found.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
+#include "refusal.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -101,8 +102,13 @@ Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& pro
     return made;
 }
 
+Problem problem_of(const bus::Answer& answer) {
+    if (answer.refusal) return problem_of(*answer.refusal);
+    return problem_of(answer.pdu.error(), answer.transmitted);
+}
+
 std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile) {
-    if (!answer.pdu) return problem_of(answer.pdu.error(), answer.transmitted);
+    if (!answer.pdu) return problem_of(answer);
     const auto code = modbus::exception_of(*answer.pdu);
     if (code) return problem_of_exception(*code, profile);
     return std::nullopt;

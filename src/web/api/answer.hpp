@@ -18,11 +18,13 @@ namespace panelgate::web {
 
 HttpResponse json_response(unsigned status, const boost::json::value& body);
 
-/// A bus that gave no reply (contract 5: 502 line down or damaged, 503 busy, 504 no reply in time).
+/// A bus that gave no reply (502 line down or damaged, 503 busy, 504 no reply in time).
 Problem problem_of(Fault fault, bool transmitted);
 /// A panel's exception reply, with its manual's word: 422 for codes 1-4, 502 above.
 Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile);
-/// What is wrong with an answer: a fault, or an exception. Nothing when it carries what was asked.
+/// Of an answer without a reply: what the rights forbid, or a fault.
+Problem problem_of(const bus::Answer& answer);
+/// What is wrong with an answer: that, or an exception. Nothing when it carries what was asked.
 std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile);
 
 /// What a client is told of its write.

@@ -3,9 +3,11 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "refusal.hpp"
 #include "station_path.hpp"
 #include "write_plan.hpp"
 
@@ -27,16 +29,6 @@ std::uint8_t broadcast_function(const Directory& directory, const LineEntry& lin
     return *std::ranges::max_element(functions, {}, takers);
 }
 
-/// A broadcast reaches every station: one that must not be written forbids it.
-Parsed<void> check_nobody_is_read_only(const Directory& directory, const LineEntry& line) {
-    for (const StationEntry& station : directory.stations) {
-        if (station.line != line.name || !station.read_only) continue;
-        return problem(
-            403, "a broadcast would write to station '" + station.name + "', which is read-only");
-    }
-    return {};
-}
-
 Parsed<void> check_no_verify(const json::object& body) {
     const json::value* verify = body.if_contains("verify");
     if (verify == nullptr || (verify->is_bool() && !verify->get_bool())) return {};
@@ -56,8 +48,8 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
     if (!address) return address.error();
     const auto cells = values_member(body, *table);
     if (!cells) return cells.error();
-    const auto open = check_nobody_is_read_only(directory, line);
-    if (!open) return open.error();
+    const auto allowed = check_may_write(*line.bus, 0);
+    if (!allowed) return allowed.error();
 
     const auto functions = write_functions(*table, cells->size());
     const std::uint8_t function = broadcast_function(directory, line, functions);
@@ -66,23 +58,17 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
         return problem(422, "at most " + std::to_string(limit) +
                                 " values in one broadcast, up to address 65535");
     }
-    bus::Request made;
-    made.pdu = encode_write(function, static_cast<std::uint16_t>(*address), *cells);
-    made.priority = arbiter::PriorityClass::write;
-    return made;
+    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
 }
 
-Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line,
-                               const bus::Request& made) {
-    const bool reads = modbus::is_pure_read(made.pdu);
-    if (made.station == 0) return check_nobody_is_read_only(directory, line);
-    const std::string name = line.name + ":" + std::to_string(made.station);
+Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
+                               bool reads) {
+    if (id == 0) return check_may_write(*line.bus, 0);
+    const std::string name = line.name + ":" + std::to_string(id);
     const auto station = directory.find_station(name);
     if (!station) return problem(404, "there is no station '" + name + "'");
-    if (station->read_only && !reads) {
-        return problem(403, "station '" + station->name + "' is read-only");
-    }
-    return {};
+    if (reads) return {};
+    return check_may_write(*line.bus, id);
 }
 
 Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
@@ -95,19 +81,17 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     if (!pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) {
         return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
     }
-    bus::Request made;
-    made.station = static_cast<std::uint8_t>(*station);
-    made.pdu = std::move(*pdu);
-    made.quantity = modbus::QuantityCheck::wide;
-    made.priority = modbus::is_pure_read(made.pdu) ? arbiter::PriorityClass::read
-                                                   : arbiter::PriorityClass::write;
-    const auto allowed = check_raw_station(directory, line, made);
+    const auto id = static_cast<std::uint8_t>(*station);
+    const std::uint8_t function = pdu->front();
+    auto made = request_to(id, std::move(*pdu));
+    const bool reads = made ? made->request.is_read() : modbus::is_read(function);
+    const auto allowed = check_raw_station(directory, line, id, reads);
     if (!allowed) return allowed.error();
     return made;
 }
 
 HttpResponse broadcast_answer(const bus::Answer& answer) {
-    if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
+    if (!answer.pdu) return to_response(problem_of(answer));
     json::object body;
     body["transmitted"] = true;
     body["confirmed"] = false;
@@ -115,7 +99,7 @@ HttpResponse broadcast_answer(const bus::Answer& answer) {
 }
 
 HttpResponse raw_answer(const bus::Answer& answer) {
-    if (!answer.pdu) return to_response(problem_of(answer.pdu.error(), answer.transmitted));
+    if (!answer.pdu) return to_response(problem_of(answer));
     json::object body;
     body["pdu"] = upper_hex(*answer.pdu, "");
     if (const auto code = modbus::exception_of(*answer.pdu)) body["exception"] = *code;

@@ -1,19 +1,17 @@
 #include "panelgate/web/api/directory.hpp"
 
 #include <algorithm>
-#include <charconv>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 namespace {
 
 std::optional<std::uint8_t> parse_id(std::string_view text) {
-    unsigned id = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    if (id < 1 || id > modbus::kMaxStation) return std::nullopt;
-    return static_cast<std::uint8_t>(id);
+    const auto id = to_number(text);
+    if (!id || *id < 1 || *id > modbus::kMaxStation) return std::nullopt;
+    return static_cast<std::uint8_t>(*id);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include <boost/json/array.hpp>
 #include <cmath>
-#include <cstdlib>
 
 #include "answer.hpp"
 #include "handlers.hpp"
@@ -23,7 +22,7 @@ json::object describe(const LineEntry& line, const bus::LineStatus& status) {
     object["up"] = status.up;
     object["load_percent"] = std::round(status.load_percent * 10) / 10;
     object["queue_depth"] = status.queue_depth;
-    object["echo"] = status.echo;
+    object["echo"] = label(status.echo);
     json::array causes;
     for (const bus::LineFinding& finding : status.findings) causes.emplace_back(finding.cause);
     object["findings"] = std::move(causes);
@@ -45,27 +44,15 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
     return list;
 }
 
-std::string_view label(bus::TraceFrame::Direction direction) {
-    switch (direction) {
-        case bus::TraceFrame::Direction::sent:
-            return "sent";
-        case bus::TraceFrame::Direction::received:
-            return "received";
-        case bus::TraceFrame::Direction::discarded:
-            return "discarded";
-    }
-    std::abort();
-}
-
 json::object describe(const bus::TraceFrame& frame) {
     json::object object;
     object["sequence"] = frame.sequence;
     object["at"] = to_seconds(frame.at.time_since_epoch());
-    object["direction"] = label(frame.direction);
+    object["direction"] = label(direction_of(frame.kind));
     object["station"] = nullptr;
     if (!frame.bytes.empty()) object["station"] = frame.bytes.front();
     object["bytes"] = upper_hex(frame.bytes);
-    object["note"] = frame.note;
+    object["note"] = label(frame.kind);
     if (!frame.why.empty()) object["why"] = frame.why;
     return object;
 }

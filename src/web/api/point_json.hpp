@@ -6,7 +6,7 @@
 
 namespace panelgate::web {
 
-/// {"name","value","label","unit","quality","age_ms"} (contract 5).
+/// {"name","value","label","unit","quality","age_ms"} (README, REST).
 boost::json::object point_json(const points::Point& point, const points::PointReading& reading);
 
 }  // namespace panelgate::web

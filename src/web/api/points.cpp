@@ -3,11 +3,13 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "point_json.hpp"
+#include "refusal.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -42,18 +44,13 @@ Parsed<Found> find_point(const HttpRequest& request, const Directory& directory)
 }
 
 Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
-    if (found.station.read_only)
-        return problem(403, "station '" + found.station.name + "' is read-only");
+    const auto allowed = check_may_write(*found.station.bus, found.station.id);
+    if (!allowed) return allowed.error();
     const auto value = value_of(body);
     if (!value) return value.error();
     auto pdu = points::write_request(*found.station.profile, *found.point, *value);
     if (!pdu) return problem(422, pdu.error().message);
-    bus::Request made;
-    made.station = found.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(found.station.id, std::move(*pdu));
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -108,9 +105,7 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
-    bus::Request made;
-    made.station = items->station.id;
-    made.pdu = modbus::encode_read(items->span);
+    bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
     const auto failed = problem_of(answer, *items->station.profile);
     if (failed) co_return to_response(*failed);
@@ -129,7 +124,7 @@ Handling get_relays(HttpRequest, const Api* api) {
     for (const points::RelayStatus& relay : api->providers.relays()) {
         json::object object;
         object["name"] = relay.name;
-        object["state"] = relay.state;
+        object["state"] = text_of(relay);
         object["reads"] = relay.reads;
         object["writes"] = relay.writes;
         object["read_failures"] = relay.read_failures;

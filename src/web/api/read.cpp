@@ -7,6 +7,7 @@
 
 #include "answer.hpp"
 #include "ask.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -78,15 +79,6 @@ json::object describe(const Items& items, Reading reading) {
     return body;
 }
 
-bus::Request read_request(const Items& part) {
-    bus::Request request;
-    request.station = part.station.id;
-    request.pdu = modbus::encode_read(part.span);
-    request.priority = arbiter::PriorityClass::read;
-    request.quantity = modbus::QuantityCheck::wide;
-    return request;
-}
-
 std::optional<Problem> take_answer(Reading& reading, const bus::Answer& answer, const Items& part,
                                    ValueType type) {
     if (auto failed = problem_of(answer, *part.station.profile)) return failed;
@@ -113,7 +105,9 @@ Handling read_items(HttpRequest request, Parsed<Items> items) {
         Items part = *items;
         part.span.first = items->span.first + done;
         part.span.count = std::min(limit, items->span.count - done);
-        bus::Request made = read_request(part);
+        auto planned = request_to(part.station.id, modbus::encode_read(part.span));
+        if (!planned) co_return to_response(planned.error());
+        bus::Request made = std::move(*planned);
         bus::Answer answer = co_await ask(request.caller, part.station.bus, std::move(made));
         const auto failed = take_answer(reading, answer, part, *type);
         if (failed) co_return to_response(*failed);

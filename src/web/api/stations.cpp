@@ -19,7 +19,7 @@ json::object describe(const StationEntry& station) {
     if (!station.unknown_panel) object["profile"] = station.profile->name;
     object["unit"] = nullptr;
     if (station.unit) object["unit"] = *station.unit;
-    object["state"] = status.state;
+    object["state"] = label(status.state);
     object["read_only"] = station.read_only;
     object["last_success_ms"] = nullptr;
     if (status.last_success) {

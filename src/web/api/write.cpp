@@ -6,7 +6,9 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
+#include "bus_request.hpp"
 #include "handlers.hpp"
+#include "refusal.hpp"
 #include "station_path.hpp"
 #include "write_plan.hpp"
 
@@ -21,20 +23,14 @@ Problem not_writable(modbus::Table table) {
 
 /// The request that writes the body's values, or why there is none.
 Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
-    if (items.station.read_only) {
-        return problem(403, "station '" + items.station.name + "' is read-only");
-    }
+    const auto allowed = check_may_write(*items.station.bus, items.station.id);
+    if (!allowed) return allowed.error();
     if (!is_writable(items.span.table)) return not_writable(items.span.table);
     const auto cells = cells_of(body, items.span.table);
     if (!cells) return cells.error();
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();
-    bus::Request made;
-    made.station = items.station.id;
-    made.pdu = std::move(*pdu);
-    made.priority = arbiter::PriorityClass::write;
-    made.quantity = modbus::QuantityCheck::wide;
-    return made;
+    return request_to(items.station.id, std::move(*pdu));
 }
 
 Handling write_items(HttpRequest request, Parsed<Items> items) {

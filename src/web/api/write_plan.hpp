@@ -19,8 +19,8 @@ inline bool is_writable(modbus::Table table) {
 /// below that the panel has; or why the panel cannot take them. Writes are never split.
 Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& cells);
 
-/// Functions that can write `count` cells of a table, the preferred one first (contract 5: one
-/// value by 05/06, several by one 0F/10). The table must be coils or holding registers.
+/// Functions that can write `count` cells of a table, the preferred one first (one value by 05/06,
+/// several by one 0F/10). The table must be coils or holding registers.
 std::vector<std::uint8_t> write_functions(modbus::Table table, std::size_t count);
 
 /// The PDU that writes these cells, each 16 bits wide (bits: 0 or 1), with this function: 05, 06,

@@ -2,9 +2,6 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/ip/address.hpp>
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/use_awaitable.hpp>
 #include <exception>
 #include <string_view>
 #include <utility>
@@ -17,8 +14,6 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 namespace {
-
-constexpr Duration kPauseAfterFailedAccept = 100ms;  ///< mostly: out of file descriptors
 
 /// As much as goes without waiting; the connection is closed whatever comes of it.
 void refuse(tcp::socket socket) {
@@ -33,49 +28,19 @@ void refuse(tcp::socket socket) {
 }  // namespace
 
 HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const Site> site)
-    : site_(std::move(site)), acceptor_(executor), pause_(executor) {}
+    : site_(std::move(site)),
+      acceptor_(
+          executor, [this](tcp::socket socket) { take(std::move(socket)); },
+          [this](const error_code& why) {
+              rt::log(rt::LogLevel::warn, "cannot accept",
+                      {{"listener", site_->settings.name()}, {"reason", why.message()}});
+          }) {}
 
 error_code HttpListener::open() {
-    error_code error;
-    const auto address = asio::ip::make_address(site_->settings.address, error);
-    if (error) return error;
-    const tcp::endpoint endpoint(address, site_->settings.port);
-    acceptor_.open(endpoint.protocol(), error);
-    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
-    if (!error) acceptor_.bind(endpoint, error);
-    if (!error) acceptor_.listen(tcp::acceptor::max_listen_connections, error);
-    if (error) {
-        error_code ignored;
-        acceptor_.close(ignored);
-        return error;
-    }
-    asio::co_spawn(acceptor_.get_executor(), accept_loop(shared_from_this()),
-                   [](std::exception_ptr failed) {
-                       if (failed) rt::log(rt::LogLevel::error, "http listener failed");
-                   });
-    return {};
+    return acceptor_.open(site_->settings.address, site_->settings.port);
 }
 
-std::uint16_t HttpListener::port() const {
-    error_code error;
-    const tcp::endpoint endpoint = acceptor_.local_endpoint(error);
-    return error ? std::uint16_t{0} : endpoint.port();
-}
-
-asio::awaitable<void> HttpListener::accept_loop(std::shared_ptr<HttpListener> self) {
-    while (self->acceptor_.is_open()) {
-        error_code error;
-        tcp::socket socket =
-            co_await self->acceptor_.async_accept(asio::redirect_error(asio::use_awaitable, error));
-        if (!self->acceptor_.is_open()) break;
-        if (!error) {
-            self->take(std::move(socket));
-            continue;
-        }
-        self->pause_.expires_after(kPauseAfterFailedAccept);
-        co_await self->pause_.async_wait(asio::redirect_error(asio::use_awaitable, error));
-    }
-}
+std::uint16_t HttpListener::port() const { return acceptor_.port(); }
 
 void HttpListener::take(tcp::socket socket) {
     if (sessions_.size() >= site_->settings.max_connections) {
@@ -93,9 +58,7 @@ void HttpListener::take(tcp::socket socket) {
 }
 
 void HttpListener::stop() {
-    error_code ignored;
-    acceptor_.close(ignored);
-    pause_.cancel();
+    acceptor_.close();
     const auto sessions = sessions_;
     for (const auto& session : sessions) session->stop();
 }

@@ -6,6 +6,7 @@
 
 #include "panelgate/tcp_server/settings.hpp"
 #include "support/fake_bus.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -100,7 +101,8 @@ TEST_F(PlantTest, ListenersSeeItsLines) {
 
 TEST_F(PlantTest, ASimulatedLineHasNoDevice) {
     EXPECT_EQ(plant.lines()[0].device, "/dev/floor1");
-    sim::SimulatedBus played(io.get_executor(), {}, {});
+    test::ManualClock clock;
+    sim::SimulatedBus played(io.get_executor(), clock, {}, {});
     const config::Line played_line = line("played", {station(1, "filler")});
     plant.add(played_line, bus1, &played);
     EXPECT_EQ(plant.lines().back().device, "sim");

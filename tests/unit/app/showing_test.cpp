@@ -109,10 +109,9 @@ TEST_F(ShowingTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
 
 TEST_F(ShowingTest, TellsOfStationsByTheirNames) {
     const auto listener = hub.listen({});
-    bus::BusEvent event;
-    event.kind = bus::BusEvent::Kind::station;
-    event.what = "offline";
     for (const int id : {31, 9}) {
+        arbiter::StationEvent event;
+        event.kind = arbiter::StationEvent::Kind::offline;
         event.station = static_cast<std::uint8_t>(id);
         publish(hub, plant, "floor1", event);
     }

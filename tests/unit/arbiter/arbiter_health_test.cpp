@@ -22,7 +22,7 @@ TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
         bus.run_for(3s);
         EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::timeout);
     }
-    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::offline);
+    EXPECT_EQ(bus.arbiter().health(17).state(), Health::offline);
     const std::size_t frames = bus.sent.size();
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
     EXPECT_EQ(bus.sent.size(), frames);
@@ -49,7 +49,7 @@ TEST_F(ArbiterTest, P4ProbesOfASilentStationStayBelowTheirShareAndOneReplyBrings
     ASSERT_TRUE(bus.next_sent());
     bus.run_to_end_of_request();
     bus.hear_reply(17, kReply);
-    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+    EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
     const Ticket ticket = bus.submit(17, kRead);
     ASSERT_TRUE(bus.next_sent(1s));
     bus.run_to_end_of_request();
@@ -87,7 +87,7 @@ TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     bus.run_for(3ms);
     bus.hear_reply(17, kWrite);
     EXPECT_EQ(bus.answer(write).pdu.value(), kWrite);
-    EXPECT_EQ(bus.arbiter().health(17).state(), StationHealth::State::online);
+    EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
 }
 
 TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {

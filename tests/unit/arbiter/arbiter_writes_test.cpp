@@ -6,6 +6,7 @@
 
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -48,10 +49,8 @@ TEST_F(ArbiterTest, P3ABroadcastIsNotConfirmedBehindItsDeadlineWhenTheProcessSto
     Arbiter arbiter(settings);
     const TimePoint start{1h};
     arbiter.on_line_up(start);
-    Job job;
-    job.pdu = kWrite;
-    job.client = 1;
-    job.priority = PriorityClass::write;
+    const Job job{
+        .request = test::request_of(kWrite), .client = 1, .priority = PriorityClass::write};
     const TimePoint free = start + 1s;
     arbiter.on_deadline(free);
     ASSERT_TRUE(arbiter.submit(free, job));

@@ -23,10 +23,8 @@ class BacklogTest : public test::QueueFixture {
     }
     /// Was sent, and goes again.
     void retry(std::vector<Job> jobs) {
-        Group group;
-        group.station = jobs.front().station;
-        group.pdu = jobs.front().pdu;
-        group.attempts = 1;
+        Group group{
+            .station = jobs.front().station, .request = jobs.front().request, .attempts = 1};
         group.jobs = std::move(jobs);
         backlog_.retry(std::move(group));
     }

@@ -230,7 +230,7 @@ TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
         for (const std::uint8_t id : kHealthy) bus.submit(id, kRead, id);
         const std::size_t first = bus.sent.size();
         std::vector<std::uint8_t> order;
-        while (bus.sent.back().what != "retry") {
+        while (bus.sent.back().kind != FrameKind::retry) {
             ASSERT_TRUE(bus.next_sent(2s));
             order.push_back(bus.sent.back().adu[0]);
             if (order.back() != kOdd)

@@ -5,6 +5,7 @@
 #include "panelgate/modbus/exception.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -61,15 +62,16 @@ TEST(EchoFilter, GivesBackWhatNeverBecameTheEcho) {
 
 TEST(EchoMemory, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
     EchoMemory memory(EchoMode::automatic);
-    EXPECT_FALSE(memory.on_echo(kWriteRegister));
-    EXPECT_EQ(memory.state(), EchoMemory::State::unknown);
-    EXPECT_FALSE(memory.on_echo("01 03 00 00 18"_hex)) << "24 coils: its reply has 8 bytes, too";
-    EXPECT_EQ(memory.state(), EchoMemory::State::unknown);
-    EXPECT_TRUE(memory.on_echo(kRead));
-    EXPECT_FALSE(memory.on_echo(kRead)) << "no news";
-    EXPECT_EQ(memory.expect(kWriteRegister), Expect::certainly);
+    EXPECT_FALSE(memory.on_echo(test::request_of(kWriteRegister)));
+    EXPECT_EQ(memory.state(), EchoState::unknown);
+    EXPECT_FALSE(memory.on_echo(test::request_of("01 03 00 00 18"_hex)))
+        << "24 coils: its reply has 8 bytes, too";
+    EXPECT_EQ(memory.state(), EchoState::unknown);
+    EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
+    EXPECT_FALSE(memory.on_echo(test::request_of(kRead))) << "no news";
+    EXPECT_EQ(memory.expect(test::request_of(kWriteRegister)), Expect::certainly);
     memory.forget();
-    EXPECT_TRUE(memory.must_be_learned_before(kWriteRegister, false));
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
 }
 
 class Echo : public testing::Test {
@@ -157,7 +159,7 @@ TEST_F(Echo, P8AnExceptionTeachesAsWellAsAValue) {
     bus.submit(17, kWriteCoil);
     hear_echo(bus);
     reply(bus, "83 02"_hex);
-    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::present);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
     EXPECT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
 }
 
@@ -165,14 +167,14 @@ TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
     EchoMemory memory(EchoMode::automatic);
     const Bytes read = "03 00 00 00 03"_hex;
     const Bytes write = "06 00 00 00 03"_hex;
-    ASSERT_TRUE(memory.on_echo(read));
-    memory.on_unanswered(read);
-    EXPECT_EQ(memory.state(), EchoMemory::State::present) << "no read is answered by itself";
-    memory.on_unanswered(write);
-    EXPECT_EQ(memory.state(), EchoMemory::State::unclear);
-    EXPECT_TRUE(memory.must_be_learned_before(write, false));
-    memory.on_reply_without_echo(read, false);
-    EXPECT_EQ(memory.state(), EchoMemory::State::absent);
+    ASSERT_TRUE(memory.on_echo(test::request_of(read)));
+    memory.on_unanswered(test::request_of(read));
+    EXPECT_EQ(memory.state(), EchoState::present) << "no read is answered by itself";
+    memory.on_unanswered(test::request_of(write));
+    EXPECT_EQ(memory.state(), EchoState::unclear);
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(write), false));
+    memory.on_reply_without_echo(test::request_of(read), false);
+    EXPECT_EQ(memory.state(), EchoState::absent);
 }
 
 TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
@@ -192,7 +194,7 @@ TEST_F(Echo, P8ALineWhereAReadDidNotTellConfirmsNothingByOneFrame) {
     bus.hear(tail);  // half an echo
     bus.run_to_end_of_request();
     reply(bus, "03 02 00 07"_hex);
-    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::unclear);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::unclear);
     ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil)) << "one read is enough";
     hear_echo(bus);
     bus.run_for(2s);
@@ -213,9 +215,9 @@ TEST_F(Echo, P8AnEchoThatDiffersIsACollision) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply) << "which the panel gave all the same";
     EXPECT_EQ(bus.arbiter().station_counters().at(17).echo_mismatches, 1u);
     EXPECT_EQ(bus.events.back().kind, StationEvent::Kind::collision);
-    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::unclear);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::unclear);
     read_once(bus, true);  // and is learned again
-    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::present);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
 }
 
 TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
@@ -227,7 +229,7 @@ TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
     bus.run_for(1s);
     EXPECT_EQ(bus.answer(lost).pdu.value(), kReply);
     read_once(bus, false);
-    EXPECT_EQ(bus.arbiter().echo(), EchoMemory::State::absent);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
 }
 
 TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {

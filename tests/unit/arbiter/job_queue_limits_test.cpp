@@ -200,13 +200,14 @@ void plays_beside_a_flood(Host flood, Host polite, PriorityClass priority) {
     Ticket ticket = 0;
     std::map<Client, int> open;
     const auto ask = [&](Host host, Client client, PriorityClass as) {
-        Job job;
-        job.ticket = ++ticket;
-        job.host = host;
-        job.client = client;
-        job.station = static_cast<std::uint8_t>(1 + ticket % 5);
-        job.priority = as;
-        job.pdu = Writer().u8(3).u16(static_cast<unsigned>(ticket * 7 % 60000)).u16(1).take();
+        ++ticket;
+        const auto address = static_cast<unsigned>(ticket * 7 % 60000);
+        Job job{.ticket = ticket,
+                .station = static_cast<std::uint8_t>(1 + ticket % 5),
+                .request = test::request_of(Writer().u8(3).u16(address).u16(1).take()),
+                .client = client,
+                .host = host,
+                .priority = as};
         auto admission = queue.push(std::move(job));
         for (const Job& shed : admission.shed) {
             EXPECT_NE(shed.client, 1000u);

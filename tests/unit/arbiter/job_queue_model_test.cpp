@@ -14,6 +14,7 @@
 
 #include "panelgate/arbiter/job_queue.hpp"
 #include "support/read_span.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -99,7 +100,7 @@ class Model {
     }
     static std::optional<ReadSpan> span_of(const Job& job) {
         if (job.alone || job.station == 0) return std::nullopt;
-        return test::read_span(job.station, job.pdu);
+        return test::read_span(job.station, job.request.pdu());
     }
     static Host own(const Job& job) { return job.host == 0 ? 1000 + job.client : job.host; }
 
@@ -152,16 +153,19 @@ class JobQueueModel : public testing::Test {
     unsigned below(unsigned limit) { return static_cast<unsigned>(random_() % limit); }
 
     Job any_job(unsigned clients, unsigned stations, unsigned spans) {
-        Job job;
-        job.ticket = ++ticket_;
-        job.client = 1 + below(clients);
+        Job job{.ticket = ++ticket_,
+                .request = modbus::Request::read({}),
+                .client = 1 + below(clients)};
         job.host = job.client % 4;  // 0: its own
         job.station = static_cast<std::uint8_t>(below(broadcasts_) == 0 ? 0 : 1 + below(stations));
         job.priority = static_cast<PriorityClass>(below(3));
         if (job.station == 0) job.priority = PriorityClass::write;
         const bool write = job.priority == PriorityClass::write;
         const unsigned function = write ? 6 : 3 + below(2);
-        job.pdu = Writer().u8(function).u16(below(spans)).u16(1 + below(1 + spans / 2)).take();
+        constexpr unsigned kMostRegisters = 125;
+        const unsigned address = below(spans);
+        const unsigned count = 1 + below(1 + spans / 2) % kMostRegisters;
+        job.request = test::request_of(Writer().u8(function).u16(address).u16(count).take());
         job.alone = below(10) == 0;
         job.start_by = TimePoint{Duration(below(1000))};
         return job;

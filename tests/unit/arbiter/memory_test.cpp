@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "panelgate/arbiter/read_cache.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
-#include "support/read_span.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -12,50 +10,6 @@ using test::BusScript;
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
-
-TEST(ReadCache, AnswersWhatItHoldsWhileItIsYoungEnough) {
-    ReadCache cache;
-    const TimePoint start{1h};
-    cache.store(*test::read_span(17, kRead), kReply, start);
-    const auto part = *test::read_span(17, "03 00 6C 00 01"_hex);
-    const auto hit = cache.find(part, start + 1s, 1s);
-    ASSERT_TRUE(hit);
-    EXPECT_EQ(hit->pdu, "03 02 00 00"_hex);
-    EXPECT_EQ(hit->age, Duration(1s));
-    EXPECT_FALSE(cache.find(part, start + 1001ms, 1s));
-    EXPECT_FALSE(cache.find(*test::read_span(18, kRead), start, 1s));
-    EXPECT_FALSE(cache.find(*test::read_span(17, "04 00 6B 00 03"_hex), start, 1s));
-    EXPECT_FALSE(cache.find(*test::read_span(17, "03 00 6B 00 04"_hex), start, 1s));
-}
-
-TEST(ReadCache, P6AWriteForgetsWhatItMayChange) {
-    struct Case {
-        std::uint8_t station;
-        Bytes request;
-        bool kept;
-    };
-    for (const Case& c :
-         {Case{17, "06 00 6B 00 01"_hex, false}, Case{17, "06 00 6E 00 01"_hex, true},
-          Case{17, "10 00 69 00 02 04 00 00 00 00"_hex, true},
-          Case{17, "10 00 69 00 03 06 00 00 00 00 00 00"_hex, false},
-          Case{17, "17 00 00 00 01 00 6D 00 01 02 00 00"_hex, false},
-          Case{18, "06 00 6B 00 01"_hex, true}, Case{0, "06 00 6B 00 01"_hex, false},
-          Case{17, "05 04 00 FF 00"_hex, false}, Case{17, "41 01"_hex, false}}) {
-        ReadCache cache;
-        cache.store(*test::read_span(17, kRead), kReply, TimePoint{});
-        cache.on_write(TimePoint{1h}, c.station, c.request);
-        EXPECT_EQ(cache.size(), c.kept ? 1u : 0u) << to_hex(c.request);
-    }
-}
-
-TEST(ReadCache, IsBounded) {
-    ReadCache cache;
-    for (unsigned i = 0; i < 3 * ReadCache::kEntries; ++i) {
-        const Bytes read = Writer().u8(3).u16(10 * i).u16(1).take();
-        cache.store(*test::read_span(17, read), "03 02 00 00"_hex, TimePoint{});
-    }
-    EXPECT_EQ(cache.size(), ReadCache::kEntries);
-}
 
 Settings settings_with(Duration max_age) {
     Settings settings;

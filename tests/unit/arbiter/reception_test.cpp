@@ -6,6 +6,7 @@
 
 #include "support/hex.hpp"
 #include "support/read_span.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -20,16 +21,13 @@ Settings at(int baud) {
     return settings;
 }
 
-Job job_of(Bytes pdu, std::uint8_t station = 17) {
-    Job job;
-    job.station = station;
-    job.pdu = std::move(pdu);
-    return job;
+Job job_of(const Bytes& pdu, std::uint8_t station = 17) {
+    return {.station = station, .request = test::request_of(pdu)};
 }
 
-Job stamped(const Settings& settings, Bytes pdu, std::uint8_t station = 17) {
+Job stamped(const Settings& settings, const Bytes& pdu, std::uint8_t station = 17) {
     Reception reception(settings);
-    Job job = job_of(std::move(pdu), station);
+    Job job = job_of(pdu, station);
     reception.stamp(kNow, job);
     return job;
 }

@@ -42,7 +42,7 @@ TEST_F(SharingTest, P6ContainedReadsComeAlongWhateverIsKnownOfTheStation) {
     wait(registers(10, 10));
     const Group group = gather(registers(10, 10), station_that_takes(0));
     EXPECT_EQ(group.jobs.size(), 3u);
-    EXPECT_EQ(group.pdu, registers(10, 10));
+    EXPECT_EQ(group.request.pdu(), registers(10, 10));
     EXPECT_FALSE(group.joined());
     EXPECT_TRUE(queue_.empty());
 }
@@ -52,7 +52,7 @@ TEST_F(SharingTest, P6ReadsThatTouchAreJoinedAlsoByOneThatLiesBetween) {
     wait(registers(12, 2));
     const Group group = gather(registers(10, 2));
     EXPECT_EQ(group.jobs.size(), 3u);
-    EXPECT_EQ(group.pdu, registers(10, 6));
+    EXPECT_EQ(group.request.pdu(), registers(10, 6));
     EXPECT_TRUE(group.joined());
 }
 
@@ -62,7 +62,7 @@ TEST_F(SharingTest, P6NothingIsReadThatNobodyAskedFor) {
     wait("06 00 0A 00 01"_hex);
     const Group group = gather(registers(10, 2));
     EXPECT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.pdu, registers(10, 2));
+    EXPECT_EQ(group.request.pdu(), registers(10, 2));
     EXPECT_EQ(queue_.waiting(), 3u);
 }
 
@@ -109,7 +109,7 @@ TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
     const std::vector<Job> parts = sharing_.split(group);
     EXPECT_EQ(parts.size(), 2u);
     ASSERT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.jobs[0].pdu, registers(10, 4));
+    EXPECT_EQ(group.jobs[0].request.pdu(), registers(10, 4));
     wait(registers(14, 2));
     EXPECT_TRUE(gather(registers(10, 4)).joined()) << "no join was refused";
 }
@@ -131,7 +131,7 @@ TEST_F(SharingTest, OnALineThatDoesNotShareEachGoesAlone) {
     wait(registers(10, 2));
     const Group group = gather(registers(10, 2));
     EXPECT_EQ(group.jobs.size(), 1u);
-    EXPECT_EQ(group.pdu, registers(10, 2));
+    EXPECT_EQ(group.request.pdu(), registers(10, 2));
 }
 
 TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {

@@ -19,15 +19,15 @@ TEST(Fault, UsesOnlyTheOutcomesOfTheMetric) {
     const std::set<std::string_view> outcomes = {"timeout", "damaged", "refused",   "busy",
                                                  "expired", "offline", "cancelled", "line_down"};
     std::set<std::string_view> used;
-    for (const Fault fault : kAllFaults) used.insert(outcome_label(fault));
+    for (const Fault fault : kAllFaults) used.insert(label(outcome_of(fault)));
     EXPECT_EQ(used, outcomes);
 }
 
 TEST(Fault, CallsRefusedWhatNeverHadAWay) {
-    EXPECT_EQ(outcome_label(Fault::denied), "refused");
-    EXPECT_EQ(outcome_label(Fault::malformed), "refused");
-    EXPECT_EQ(outcome_label(Fault::not_routed), "refused");
-    EXPECT_EQ(outcome_label(Fault::line_lost), "line_down");
+    EXPECT_EQ(outcome_of(Fault::denied), Outcome::refused);
+    EXPECT_EQ(outcome_of(Fault::malformed), Outcome::refused);
+    EXPECT_EQ(outcome_of(Fault::not_routed), Outcome::refused);
+    EXPECT_EQ(outcome_of(Fault::line_lost), Outcome::line_down);
 }
 
 TEST(Fault, ThrowsWhenAValueIsAskedForThatIsNotThere) {

@@ -3,11 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/post.hpp>
+#include <functional>
+#include <optional>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
+#include "support/memory_line.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::bus {
 namespace {
@@ -16,53 +20,9 @@ const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kWrite = "06 00 01 00 03"_hex;
 
-/// A line in memory: every frame written is answered as the test says, from the loop.
-class MemoryLine final : public line::Line {
-  public:
-    explicit MemoryLine(boost::asio::io_context& io) : io_(io) {}
-
-    void start(Events& events) override {
-        events_ = &events;
-        if (up_at_start) events.on_up();
-    }
-    void stop() override { events_ = nullptr; }
-    void poll_input() override {}
-    void write(ByteView bytes) override {
-        written.emplace_back(bytes.begin(), bytes.end());
-        if (fail_writes) {
-            events_->on_down("unplugged");
-            return;
-        }
-        if (reply.empty() || bytes[0] == 0) return;
-        boost::asio::post(io_, [this, adu = modbus::encode_adu(bytes[0], reply)] {
-            if (events_ != nullptr) events_->on_bytes(adu);
-        });
-    }
-    const line::Counters& counters() override { return counters_; }
-    std::optional<Duration> unsent() override {
-        if (!tells_unsent) return std::nullopt;
-        ++asked_for_unsent;
-        return Duration::zero();
-    }
-    Events* events() { return events_; }
-
-    std::vector<Bytes> written;
-    Bytes reply = kReply;
-    bool up_at_start = true;
-    bool fail_writes = false;
-    bool tells_unsent = false;
-    int asked_for_unsent = 0;
-
-  private:
-    boost::asio::io_context& io_;
-    Events* events_ = nullptr;
-    line::Counters counters_;
-};
-
 class BusTest : public testing::Test {
   protected:
     BusTest() {
-        Settings settings;
         settings.name = "floor1";
         settings.device = "memory";
         settings.arbiter.serial = {1000000, 8, Parity::none, 1};
@@ -71,35 +31,40 @@ class BusTest : public testing::Test {
         settings.arbiter.offline.after = 5;
         settings.arbiter.stations = {settings.arbiter.unlisted};
         settings.arbiter.stations[0].id = 17;
-        settings.stations[17] = "press";
-        settings.guards[18] = [](ByteView pdu) {
-            return pdu[0] == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
+        settings.stations[17].name = "press";
+        settings.stations[18].name = "oven";
+        settings.stations[18].guard = [](const modbus::Request& request) {
+            return request.function() == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
-            if (event.kind == BusEvent::Kind::line && !event.why.empty()) seen.push_back(event.why);
+            const auto* told = std::get_if<LineEvent>(&event);
+            if (told != nullptr && !told->why.empty()) seen.push_back(told->why);
         };
-        auto memory = std::make_unique<MemoryLine>(io);
-        line = memory.get();
-        bus = std::make_unique<Bus>(io.get_executor(), settings, std::move(memory));
+        make_bus();
     }
+    void make_bus() {
+        auto memory = std::make_unique<test::MemoryLine>(clock);
+        line = memory.get();
+        line->reply = kReply;
+        bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
+    }
+    bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
     /// Asks and runs the loop until answered.
-    Answer ask(std::uint8_t station, Bytes pdu, ClientId client = 1) {
+    Answer ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1, bool poll = false) {
         std::optional<Answer> got;
-        Request request;
-        request.station = station;
-        request.pdu = std::move(pdu);
-        request.client = client;
-        bus->transact(std::move(request), [&](Answer answer) { got = std::move(answer); });
+        bus->transact(
+            {.station = station, .request = test::request_of(pdu), .client = client, .poll = poll},
+            [&](Answer answer) { got = std::move(answer); });
         EXPECT_FALSE(got) << "answered from inside transact()";
-        io.restart();
-        while (!got && io.run_one() > 0) {
-        }
+        EXPECT_TRUE(run_until([&] { return got.has_value(); })) << "it is never answered";
         return got.value_or(Answer{});
     }
 
     boost::asio::io_context io{1};
-    MemoryLine* line = nullptr;
+    test::ManualClock clock;
+    Settings settings;
+    test::MemoryLine* line = nullptr;
     std::vector<std::string> seen;  ///< why the line's state is not just that
     std::unique_ptr<Bus> bus;
 };
@@ -110,8 +75,40 @@ TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     EXPECT_EQ(refused.pdu.value(), (Bytes{0x86, 2}));
     EXPECT_FALSE(refused.transmitted);
     EXPECT_TRUE(line->written.empty());
-    EXPECT_EQ(bus->report().stations.front().requests.at({"6", "refused"}), 1u);
+    EXPECT_EQ(bus->report().stations.back().requests.at(6)[Outcome::refused], 1u);
+    const Refusal guarded{Refusal::Rule::guard, "oven",
+                          modbus::ExceptionCode::illegal_data_address};
+    EXPECT_EQ(refused.refusal, guarded);
     EXPECT_TRUE(ask(18, kRead).pdu.has_value());
+}
+
+TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
+    settings.stations[17].access = Access::read_only;
+    make_bus();
+    bus->start();
+    const Answer write = ask(17, kWrite);
+    EXPECT_EQ(write.pdu.error(), Fault::denied);
+    EXPECT_FALSE(write.transmitted);
+    ASSERT_TRUE(write.refusal);
+    EXPECT_EQ(write.refusal->rule, Refusal::Rule::read_only);
+    EXPECT_EQ(write.refusal->station, "press");
+    const Answer broadcast = ask(0, kWrite);
+    EXPECT_EQ(broadcast.pdu.error(), Fault::denied);
+    EXPECT_EQ(broadcast.refusal.value().rule, Refusal::Rule::broadcast_over_read_only);
+    EXPECT_TRUE(line->written.empty());
+    EXPECT_EQ(bus->report().stations[1].requests.at(6)[Outcome::refused], 1u);
+    EXPECT_TRUE(ask(17, kRead).pdu.has_value());
+    EXPECT_FALSE(ask(17, kRead).refusal);
+}
+
+TEST_F(BusTest, SaysEarlyWhatItWouldRefuse) {
+    EXPECT_EQ(bus->refusal_of_write(17), std::nullopt);
+    settings.stations[17].access = Access::read_only;
+    make_bus();
+    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Refusal::Rule::read_only);
+    EXPECT_EQ(bus->refusal_of_write(18), std::nullopt) << "its guard wants to see the write";
+    EXPECT_EQ(bus->refusal_of_write(0).value().station, "press");
+    EXPECT_TRUE(bus->idle());
 }
 
 TEST_F(BusTest, AsksALineThatCanTellWhetherTheRequestHasLeft) {
@@ -180,9 +177,9 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_EQ(line->written[0], "11 03 00 6B 00 03 76 87"_hex);
     const auto trace = bus->trace(10);
     ASSERT_EQ(trace.size(), 2u);
-    EXPECT_EQ(trace[0].direction, TraceFrame::Direction::sent);
+    EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
-    EXPECT_EQ(bus->station_status(17).state, "online");
+    EXPECT_EQ(bus->station_status(17).state, Health::online);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
@@ -193,11 +190,23 @@ TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
     EXPECT_FALSE(answer.transmitted);
 }
 
+TEST_F(BusTest, GivesPollsReadsAndWritesTheirClass) {
+    bus->start();
+    ask(17, kRead);
+    ask(17, kWrite);
+    ask(17, "41 00"_hex);
+    ask(17, kRead, 1, true);
+    ask(17, kWrite, 1, true);
+    std::vector<std::string> classes;
+    for (const TraceFrame& frame : bus->trace(100)) {
+        if (frame.kind == FrameKind::request)
+            classes.push_back(frame.why.substr(0, frame.why.find(' ')));
+    }
+    EXPECT_EQ(classes, (std::vector<std::string>{"read", "write", "write", "poll", "poll"}));
+}
+
 TEST_F(BusTest, RefusesWhatMayNotBeTransmitted) {
     bus->start();
-    EXPECT_EQ(ask(17, "03 00 6B"_hex).pdu.error(), Fault::malformed);
-    EXPECT_EQ(ask(17, "83 00"_hex).pdu.error(), Fault::denied);
-    EXPECT_EQ(ask(17, {}).pdu.error(), Fault::malformed);
     EXPECT_EQ(ask(0, kRead).pdu.error(), Fault::denied);
     EXPECT_EQ(ask(17, "08 00 04 00 00"_hex).pdu.error(), Fault::denied);
     EXPECT_TRUE(line->written.empty());
@@ -210,7 +219,7 @@ TEST_F(BusTest, ASilentStationIsATimeoutAndSaysSoInTheStatus) {
     EXPECT_EQ(answer.pdu.error(), Fault::timeout);
     EXPECT_TRUE(answer.transmitted);
     EXPECT_EQ(line->written.size(), 1u);
-    EXPECT_EQ(bus->station_status(17).state, "suspect");
+    EXPECT_EQ(bus->station_status(17).state, Health::suspect);
 }
 
 TEST_F(BusTest, ABroadcastIsAnsweredWithoutAReply) {
@@ -234,18 +243,68 @@ TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
     bus->start();
     int answers = 0;
     std::function<void()> again = [&] {
-        Request request;
-        request.station = 17;
-        request.pdu = kRead;
-        bus->transact(std::move(request), [&](const Answer& answer) {
-            EXPECT_TRUE(answer.pdu.has_value());
-            if (++answers < 20) again();
-        });
+        bus->transact({.station = 17, .request = test::request_of(kRead)},
+                      [&](const Answer& answer) {
+                          EXPECT_TRUE(answer.pdu.has_value());
+                          if (++answers < 20) again();
+                      });
     };
     again();
-    while (answers < 20 && io.run_one() > 0) {
-    }
-    EXPECT_EQ(answers, 20);
+    EXPECT_TRUE(run_until([&] { return answers == 20; }));
+}
+
+/// The loop was busy while the reply came, and its time is over when the alarm rings.
+TEST_F(BusTest, P1AReplyThatLiesInTheDeviceWhenItsTimeIsOverIsNoTimeout) {
+    line->reply.clear();
+    bus->start();
+    std::optional<Answer> got;
+    bus->transact({.station = 17, .request = test::request_of(kWrite)},
+                  [&](Answer answer) { got = std::move(answer); });
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
+    clock.advance(1ms);
+    line->come(modbus::encode_adu(17, kWrite));
+    clock.pass(50ms);
+    ASSERT_TRUE(run_until([&] { return got.has_value(); }));
+    EXPECT_EQ(got->pdu.value(), kWrite);
+    EXPECT_EQ(bus->station_status(17).state, Health::online);
+}
+
+/// They came before the request: they hold it up for the gap, and are nobody's reply.
+TEST_F(BusTest, P1StaleBytesAreReadBeforeARequestIsSent) {
+    bus->start();
+    clock.advance(1s);
+    line->come(modbus::encode_adu(17, "03 06 0B AD 0B AD 0B AD"_hex));
+    std::optional<Answer> got;
+    const TimePoint asked = clock.now();
+    bus->transact({.station = 17, .request = test::request_of(kRead)},
+                  [&](Answer answer) { got = std::move(answer); });
+    EXPECT_TRUE(line->written.empty()) << "the wire is not quiet yet";
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
+    EXPECT_GE(clock.now() - asked, silent_interval({1000000, 8, Parity::none, 1}));
+    ASSERT_TRUE(run_until([&] { return got.has_value(); }));
+    EXPECT_EQ(got->pdu.value(), kReply);
+    EXPECT_EQ(bus->trace(1).front().bytes, modbus::encode_adu(17, kReply));
+    EXPECT_EQ(direction_of(bus->trace(10).front().kind), FrameDirection::discarded);
+}
+
+TEST_F(BusTest, RefusalsAreHandedOutAMillisecondApart) {
+    bus->start();
+    int refused = 0;
+    const auto ask_wrongly = [&] {
+        bus->transact({.station = 0, .request = test::request_of(kRead)},
+                      [&](const Answer&) { ++refused; });
+    };
+    ask_wrongly();
+    ask_wrongly();
+    io.poll();
+    EXPECT_EQ(refused, 0);
+    clock.advance(1ms);
+    EXPECT_EQ(refused, 2);
+    ask_wrongly();
+    clock.advance(1ms - 1ns);
+    EXPECT_EQ(refused, 2);
+    clock.advance(1ns);
+    EXPECT_EQ(refused, 3);
 }
 
 TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
@@ -253,13 +312,10 @@ TEST_F(BusTest, StoppingAnswersWhatIsOpen) {
     bus->start();
     std::vector<Fault> faults;
     for (const char* pdu : {"03 00 00 00 01", "03 00 10 00 01", "03 00 20 00 01"}) {
-        Request request;
-        request.station = 17;
-        request.pdu = from_hex(pdu).value();
-        bus->transact(std::move(request),
+        bus->transact({.station = 17, .request = test::request_of(from_hex(pdu).value())},
                       [&](const Answer& a) { faults.push_back(a.pdu.error()); });
     }
-    while (line->written.empty()) io.run_one();
+    ASSERT_TRUE(run_until([&] { return !line->written.empty(); }));
     bus.reset();
     io.restart();
     io.run();
@@ -272,13 +328,12 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
     ask(99, kRead);
     ask(98, "41 00"_hex);
     const LineReport report = bus->report();
-    ASSERT_EQ(report.stations.size(), 2u);
-    const std::pair<std::string, std::string> read_ok{"3", "ok"};
+    ASSERT_EQ(report.stations.size(), 3u);
     EXPECT_EQ(report.stations[0].station, "other");
-    EXPECT_EQ(report.stations[0].requests.at(read_ok), 1u);
-    EXPECT_EQ(report.stations[0].requests.count({"other", "damaged"}), 1u);
+    EXPECT_EQ(report.stations[0].requests.at(3)[Outcome::ok], 1u);
+    EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::damaged], 1u);
     EXPECT_EQ(report.stations[1].station, "press");
-    EXPECT_EQ(report.stations[1].requests.at(read_ok), 1u);
+    EXPECT_EQ(report.stations[1].requests.at(3)[Outcome::ok], 1u);
     EXPECT_TRUE(report.stations[1].up);
 }
 

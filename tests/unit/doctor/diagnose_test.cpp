@@ -229,10 +229,10 @@ TEST_F(Diagnose, FramesOfStationsThatNobodyAskedAreAnotherMasterToo) {
 TEST_F(Diagnose, AnEchoThatTheConfigurationDeniesOrInvents) {
     const Symptoms heard = Mix().answered(50).with(&Symptoms::echoes, 3);
     EXPECT_THAT(causes({{1, heard}}), IsEmpty());
-    facts.echo = LineFacts::Echo::off;
+    facts.echo = EchoMode::off;
     EXPECT_THAT(causes({{1, heard}}), ElementsAre("echo"));
     EXPECT_THAT(causes({{1, Mix().answered(50).with(&Symptoms::echoes, 2)}}), IsEmpty());
-    facts.echo = LineFacts::Echo::on;
+    facts.echo = EchoMode::on;
     EXPECT_THAT(causes({{1, heard}}), IsEmpty());
     EXPECT_THAT(causes({{1, Mix().with(&Symptoms::collided, 6)}}), ElementsAre("echo"));
     EXPECT_THAT(
@@ -241,7 +241,7 @@ TEST_F(Diagnose, AnEchoThatTheConfigurationDeniesOrInvents) {
 }
 
 TEST_F(Diagnose, EveryFindingSaysWhatToDoAndWhy) {
-    facts.echo = LineFacts::Echo::off;
+    facts.echo = EchoMode::off;
     uart = line::UartErrors{0, 0, 9, 9};
     std::vector<Finding> all = findings({{1, Mix().silent(9)}});
     const auto more = [&](Stations stations) {

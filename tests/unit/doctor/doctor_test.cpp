@@ -118,30 +118,5 @@ TEST_F(DoctorTest, TheLikeliestAndWidestCauseIsFirst) {
     EXPECT_EQ(causes(doctor.findings()), (std::vector{Cause::other_master, Cause::station_silent}));
 }
 
-TEST(Sample, ADifferenceCountsWhatCameBetweenAndKeepsWhatIsNow) {
-    Sample before, after;
-    before.stations[1] = Mix().answered(10, 0).silent(3).late(2, 50ms);
-    after.stations[1] = Mix().answered(15, 0).silent(7).late(3, 60ms);
-    after.stations[2] = Mix().damaged(4);
-    after.uart = line::UartErrors{9, 8, 7, 6};
-    before.broadcasts = 4;
-    after.broadcasts = 6;
-    const Sample window = difference(after, before);
-    const Symptoms& one = window.stations.at(1);
-    EXPECT_EQ(one.answered, 5u);
-    EXPECT_EQ(one.answered_after[0], 5u);
-    EXPECT_EQ(one.silent, 4u);
-    EXPECT_EQ(one.late, 1u);
-    EXPECT_EQ(one.mute_in_a_row, 7u);
-    EXPECT_EQ(one.worst_lateness, Duration(60ms));
-    EXPECT_EQ(window.stations.at(2).damaged(), 4u);
-    EXPECT_EQ(window.attempts(), 13u);
-    EXPECT_EQ(window.broadcasts, 2u);
-    EXPECT_EQ(window.uart, (line::UartErrors{9, 8, 7, 6}));
-    EXPECT_EQ(difference(after, after).attempts(), 0u);
-    EXPECT_EQ(difference(after, after).uart, (line::UartErrors{}));
-    EXPECT_EQ(window.total().worst_lateness, Duration(60ms));
-}
-
 }  // namespace
 }  // namespace panelgate::doctor

@@ -9,15 +9,16 @@
 
 #include "descriptor_line.hpp"
 #include "panelgate/line/pty.hpp"
+#include "panelgate/rt/clock.hpp"
 
 namespace panelgate::line {
 
 /// Opens at once; reading and writing end as a test says.
 class FailingLine final : public DescriptorLine {
   public:
-    FailingLine(const boost::asio::any_io_executor& executor, const Settings& settings,
-                const Pty& pty)
-        : DescriptorLine(executor, settings), pty_(pty) {}
+    FailingLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
+                const Settings& settings, const Pty& pty)
+        : DescriptorLine(executor, clock, settings), pty_(pty) {}
     ~FailingLine() override { stop(); }
     /// The device says that it has gone.
     void lose() { lost("hang-up"); }

@@ -10,6 +10,7 @@
 #include "failing_line.hpp"
 #include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -17,10 +18,11 @@ namespace {
 class LostDevice : public testing::TestWithParam<int> {
   protected:
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     Settings settings{"/dev/ttyUSB0", {}, {}, 1ms, 1ms};
     Pty pty;
     Heard heard;
-    FailingLine line{io.get_executor(), settings, pty};
+    FailingLine line{io.get_executor(), clock, settings, pty};
 };
 
 TEST_P(LostDevice, P7IsNoticedByReadingAndOpenedAgain) {
@@ -32,7 +34,7 @@ TEST_P(LostDevice, P7IsNoticedByReadingAndOpenedAgain) {
     ASSERT_EQ(heard.downs.size(), 1u);
     EXPECT_EQ(heard.downs[0], std::string("/dev/ttyUSB0 is gone: ") + std::strerror(GetParam()));
     line.read_error = EAGAIN;
-    while (heard.ups < 2) io.run_one();
+    ASSERT_TRUE(test::run_until(io, clock, [&] { return heard.ups == 2; }));
     EXPECT_EQ(line.counters().reopens, 1u);
     EXPECT_TRUE(heard.bytes.empty());
 }

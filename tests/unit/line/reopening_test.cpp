@@ -8,7 +8,7 @@
 #include "failing_line.hpp"
 #include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
-#include "panelgate/rt/asio_clock.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -19,9 +19,9 @@ class Reopening : public testing::Test {
     /// From the line's going down to its being up again.
     Duration pause() {
         const int ups = heard.ups;
-        const TimePoint begin = rt::now();
-        while (heard.ups == ups) io.run_one();
-        return rt::now() - begin;
+        const TimePoint begin = clock.now();
+        EXPECT_TRUE(test::run_until(io, clock, [&] { return heard.ups != ups; }));
+        return clock.now() - begin;
     }
     Duration pause_after_reset() {
         line.reset("not taken");
@@ -29,35 +29,34 @@ class Reopening : public testing::Test {
     }
 
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     Settings settings{"/dev/ttyUSB0", {}, {}, 10ms, 80ms};
     Pty pty;
     Heard heard;
-    FailingLine line{io.get_executor(), settings, pty};
+    FailingLine line{io.get_executor(), clock, settings, pty};
 };
 
 TEST_F(Reopening, P7WaitsLongerAfterEachResetThatFollowsAnOpeningWithoutAByte) {
-    EXPECT_GE(pause_after_reset(), settings.reopen_min);
-    EXPECT_GE(pause_after_reset(), 2 * settings.reopen_min);
-    EXPECT_GE(pause_after_reset(), 4 * settings.reopen_min);
-    EXPECT_GE(pause_after_reset(), settings.reopen_max);
-    EXPECT_GE(pause_after_reset(), settings.reopen_max);
+    EXPECT_EQ(pause_after_reset(), settings.reopen_min);
+    EXPECT_EQ(pause_after_reset(), 2 * settings.reopen_min);
+    EXPECT_EQ(pause_after_reset(), 4 * settings.reopen_min);
+    EXPECT_EQ(pause_after_reset(), settings.reopen_max);
+    EXPECT_EQ(pause_after_reset(), settings.reopen_max);
 }
 
 TEST_F(Reopening, StartsAnewWhenAByteHasCome) {
     settings.reopen_max = 10s;
-    FailingLine patient{io.get_executor(), settings, pty};
+    FailingLine patient{io.get_executor(), clock, settings, pty};
     patient.start(heard);
-    Duration grown{};
-    for (int i = 0; i < 5; ++i) {
+    const auto pause_of_patient = [&] {
         patient.reset("not taken");
-        grown = pause();
-    }
+        return pause();
+    };
+    for (int i = 0; i < 4; ++i) pause_of_patient();
+    EXPECT_EQ(pause_of_patient(), 16 * settings.reopen_min);
     patient.bring();
-    patient.reset("not taken");
-    const Duration useful = pause();
-    EXPECT_LT(useful, grown / 2);  // at once
-    patient.reset("not taken");
-    EXPECT_LT(pause(), grown / 2);  // the shortest pause again
+    EXPECT_EQ(pause_of_patient(), Duration::zero()) << "at once";
+    EXPECT_EQ(pause_of_patient(), 2 * settings.reopen_min) << "short pauses again";
 }
 
 TEST_F(Reopening, P7AServerThatAcceptsAndHangsUpIsNotAskedInATightLoop) {
@@ -66,7 +65,7 @@ TEST_F(Reopening, P7AServerThatAcceptsAndHangsUpIsNotAskedInATightLoop) {
         line.lose();
         all += pause();
     }
-    EXPECT_GE(all, 7 * settings.reopen_min);
+    EXPECT_EQ(all, 7 * settings.reopen_min);
 }
 
 TEST_F(Reopening, AResetSaysWhatAndWhyAndDiscards) {

@@ -10,6 +10,7 @@
 
 #include "line_events.hpp"
 #include "panelgate/line/tcp_line.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 
 namespace {
 
@@ -31,22 +32,23 @@ namespace {
 
 using boost::asio::ip::tcp;
 
-std::unique_ptr<Line> make(boost::asio::io_context& io, const std::string& host,
+std::unique_ptr<Line> make(boost::asio::io_context& io, rt::Clock& clock, const std::string& host,
                            const tcp::acceptor& acceptor) {
     Settings settings;
     settings.device = "tcp://" + host + ":" + std::to_string(acceptor.local_endpoint().port());
-    return make_tcp_line(io.get_executor(), settings);
+    return make_tcp_line(io.get_executor(), clock, settings);
 }
 
 TEST(Resolver, P7ALineWithANumericAddressDoesNotWaitForADeadNameServer) {
     asked = 0;
     silent = true;
     boost::asio::io_context io{1};
+    rt::AsioClock clock(io.get_executor());
     tcp::acceptor acceptor(io, {boost::asio::ip::address_v4::loopback(), 0});
     Heard by_name;
     Heard by_number;
-    const auto name = make(io, "moxa.invalid", acceptor);
-    const auto number = make(io, "127.0.0.1", acceptor);
+    const auto name = make(io, clock, "moxa.invalid", acceptor);
+    const auto number = make(io, clock, "127.0.0.1", acceptor);
     name->start(by_name);
     asked.wait(0);  // all further questions would wait behind this one
     number->start(by_number);
@@ -62,6 +64,7 @@ TEST(Resolver, P7ALineWithANumericAddressDoesNotWaitForADeadNameServer) {
 
 TEST(Resolver, ANumberInBracketsNeedsNoneEither) {
     boost::asio::io_context io{1};
+    rt::AsioClock clock(io.get_executor());
     boost::system::error_code no_ipv6;
     tcp::acceptor six(io);
     six.open(tcp::v6(), no_ipv6);
@@ -70,7 +73,7 @@ TEST(Resolver, ANumberInBracketsNeedsNoneEither) {
     six.listen();
     Heard heard;
     const int before = asked;
-    const auto line = make(io, "[::1]", six);
+    const auto line = make(io, clock, "[::1]", six);
     line->start(heard);
     while (heard.ups == 0) io.run_one();
     EXPECT_EQ(asked, before);

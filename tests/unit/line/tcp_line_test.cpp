@@ -10,6 +10,7 @@
 #include <functional>
 #include <optional>
 
+#include "panelgate/rt/asio_clock.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::line {
@@ -50,7 +51,7 @@ class TcpLineTest : public testing::Test, public Line::Events {
         Settings settings;
         settings.device = "tcp://127.0.0.1:" + std::to_string(port);
         settings.reopen_min = 1ms;
-        return make_tcp_line(io.get_executor(), settings);
+        return make_tcp_line(io.get_executor(), clock, settings);
     }
     void accept() {
         peer.emplace(io);
@@ -58,6 +59,7 @@ class TcpLineTest : public testing::Test, public Line::Events {
     }
 
     boost::asio::io_context io{1};
+    rt::AsioClock clock{io.get_executor()};
     tcp::acceptor acceptor{io, {boost::asio::ip::address_v4::loopback(), 0}};
     std::optional<tcp::socket> peer;
     bool accepted = false;

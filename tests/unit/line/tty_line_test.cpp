@@ -15,6 +15,7 @@
 #include "line_events.hpp"
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/reopen.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "support/temp_dir.hpp"
 
 namespace panelgate::line {
@@ -48,6 +49,7 @@ class TtyLineTest : public testing::Test {
     }
 
     boost::asio::io_context io{1};
+    rt::AsioClock clock{io.get_executor()};
     const test::TempDir folder;
     const std::filesystem::path& dir = folder.path();
     Settings settings;
@@ -57,7 +59,7 @@ class TtyLineTest : public testing::Test {
 TEST_F(TtyLineTest, PassesEveryByteValueBothWays) {
     Pty pty;
     plug(pty);
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     ASSERT_EQ(heard.ups, 1);
     Bytes all;
@@ -70,7 +72,7 @@ TEST_F(TtyLineTest, PassesEveryByteValueBothWays) {
 }
 
 TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndSaysOnceWhatIsMissing) {
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     ASSERT_EQ(heard.downs.size(), 1u);
     EXPECT_EQ(heard.downs[0], "cannot open " + settings.device + ": No such file or directory");
@@ -83,7 +85,7 @@ TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndSaysOnceWhatIsMissing) {
 
 TEST_F(TtyLineTest, P7OpensADeviceWhenItIsPluggedInNotAtTheEndOfAPause) {
     settings.reopen_min = settings.reopen_max = 1h;
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     for (int round = 1; round <= 3; ++round) {
         Pty pty;
@@ -98,7 +100,7 @@ TEST_F(TtyLineTest, P7FindsADeviceWhoseFolderComesWithIt) {
     settings.reopen_min = settings.reopen_max = 1h;
     const std::filesystem::path folder = dir / "by-id" / "deep";
     settings.device = folder / "usb-adapter";
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     // The folder is watched as it comes: each step is a change that leads to an attempt.
     std::filesystem::create_directory(dir / "by-id");
@@ -111,7 +113,7 @@ TEST_F(TtyLineTest, P7FindsADeviceWhoseFolderComesWithIt) {
 }
 
 TEST_F(TtyLineTest, P7NoticesAnUnpluggedDeviceAndOpensItsSuccessor) {
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     {
         Pty pty;
         plug(pty);
@@ -129,7 +131,7 @@ TEST_F(TtyLineTest, P7NoticesAnUnpluggedDeviceAndOpensItsSuccessor) {
 }
 
 TEST_F(TtyLineTest, P7AWriteToAnUnpluggedDeviceTakesTheLineDown) {
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     std::optional<Pty> pty(std::in_place);
     plug(*pty);
     line->start(heard);
@@ -141,7 +143,7 @@ TEST_F(TtyLineTest, P7AWriteToAnUnpluggedDeviceTakesTheLineDown) {
 
 TEST_F(TtyLineTest, RefusesAFileThatIsNoSerialDevice) {
     settings.device = "/dev/null";
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     ASSERT_EQ(heard.downs.size(), 1u);
     EXPECT_NE(heard.downs[0].find("not a serial device"), std::string::npos) << heard.downs[0];
@@ -150,10 +152,10 @@ TEST_F(TtyLineTest, RefusesAFileThatIsNoSerialDevice) {
 TEST_F(TtyLineTest, ASecondUserIsTurnedAway) {
     Pty pty;
     plug(pty);
-    auto first = make_tty_line(io.get_executor(), settings);
+    auto first = make_tty_line(io.get_executor(), clock, settings);
     first->start(heard);
     Heard other;
-    auto second = make_tty_line(io.get_executor(), settings);
+    auto second = make_tty_line(io.get_executor(), clock, settings);
     second->start(other);
     ASSERT_EQ(other.downs.size(), 1u);
     const std::string process = "process " + std::to_string(getpid());
@@ -166,7 +168,7 @@ TEST_F(TtyLineTest, TakesAnyIntegerRate) {
     Pty pty;
     plug(pty);
     settings.serial.baud = 250001;
-    auto line = make_tty_line(io.get_executor(), settings);
+    auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     EXPECT_EQ(heard.ups, 1);
 }

@@ -38,7 +38,7 @@ class UndeliveredTcp : public testing::Test {
         Settings settings;
         settings.device = "tcp://127.0.0.1:" + std::to_string(acceptor.local_endpoint().port());
         settings.reopen_min = 1ms;
-        line = make_tcp_line(io.get_executor(), settings);
+        line = make_tcp_line(io.get_executor(), clock, settings);
         connect([this] { line->start(heard); });
     }
     void run_until(const std::function<bool()>& so) {
@@ -69,6 +69,7 @@ class UndeliveredTcp : public testing::Test {
 
     static constexpr std::size_t kMuch = 20'000;
     boost::asio::io_context io{1};
+    rt::AsioClock clock{io.get_executor()};
     tcp::acceptor acceptor{io};
     std::optional<tcp::socket> peer;
     std::unique_ptr<Line> line;
@@ -81,8 +82,8 @@ TEST_F(UndeliveredTcp, WhatTheServersSystemHasTakenIsDelivered) {
     run_until([&] { return peer->available() == 8; });
     EXPECT_FALSE(line->undelivered());
     // Also when a delayed acknowledgement is over, and nobody has read it.
-    const TimePoint over = rt::now() + kDelayedAck + line->latency();
-    run_until([&] { return rt::now() > over; });
+    const TimePoint over = clock.now() + kDelayedAck + line->latency();
+    run_until([&] { return clock.now() > over; });
     EXPECT_FALSE(line->undelivered());
     EXPECT_TRUE(heard.downs.empty());
 }
@@ -90,13 +91,13 @@ TEST_F(UndeliveredTcp, WhatTheServersSystemHasTakenIsDelivered) {
 TEST_F(UndeliveredTcp, FramesThatAreEachAcknowledgedInTimeAreDelivered) {
     got.assign(kMuch, 0);
     boost::asio::async_read(*peer, boost::asio::buffer(got), [](error_code, std::size_t) {});
-    const TimePoint end = rt::now() + 2 * kDelayedAck;
+    const TimePoint end = clock.now() + 2 * kDelayedAck;
     TimePoint next{};
     run_until([&] {
         EXPECT_FALSE(line->undelivered());
-        if (rt::now() < next) return false;
+        if (clock.now() < next) return false;
         line->write("01 03 00 00 00 01 84 0A"_hex);
-        next = rt::now() + 15ms;  // more often than Linux acknowledges
+        next = clock.now() + 15ms;  // more often than Linux acknowledges
         return next > end;
     });
     EXPECT_TRUE(heard.downs.empty());
@@ -104,10 +105,10 @@ TEST_F(UndeliveredTcp, FramesThatAreEachAcknowledgedInTimeAreDelivered) {
 
 TEST_F(UndeliveredTcp, AServerThatReadsNothingDoesNotDeliverAndSeesTheReset) {
     EXPECT_FALSE(line->undelivered());
-    const TimePoint begin = rt::now();
+    const TimePoint begin = clock.now();
     write_into_the_window();
     run_until([&] { return line->undelivered(); });
-    EXPECT_GE(rt::now() - begin, kDelayedAck);  // until then it may be on its way
+    EXPECT_GE(clock.now() - begin, kDelayedAck);  // until then it may be on its way
     EXPECT_TRUE(heard.downs.empty());
     line->reset("the request was not taken");
     ASSERT_EQ(heard.downs.size(), 1u);

@@ -16,8 +16,8 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/tty_line.hpp"
-#include "panelgate/rt/asio_clock.hpp"
 #include "scripted_ops.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::line {
 namespace {
@@ -38,7 +38,7 @@ class UndeliveredTty : public testing::Test {
         };
     }
     std::unique_ptr<Line> start() {
-        auto line = make_tty_line(io.get_executor(), settings, ops);
+        auto line = make_tty_line(io.get_executor(), clock, settings, ops);
         line->start(heard);
         flushed.clear();
         return line;
@@ -52,10 +52,14 @@ class UndeliveredTty : public testing::Test {
         };
     }
     void run_until(const std::function<bool()>& so) {
-        while (!so()) io.run_one_for(1ms);  // some of it comes with time, without an event
+        while (!so()) {
+            io.restart();
+            if (io.poll_one() == 0) clock.advance(1ms);  // some of it comes with time alone
+        }
     }
 
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     Pty pty;
     ScriptedOps ops;
     Settings settings;
@@ -102,11 +106,11 @@ TEST_F(UndeliveredTty, AQueueThatDoesNotEmptyIsUndelivered) {
     tell_the_queue();
     auto line = start();
     EXPECT_FALSE(line->undelivered());
-    const TimePoint begin = rt::now();
+    const TimePoint begin = clock.now();
     line->write(Bytes(8, 0x55));
     queue = 8;
     run_until([&] { return line->undelivered(); });
-    EXPECT_GE(rt::now() - begin, wire_time(settings.serial, 8));
+    EXPECT_GE(clock.now() - begin, wire_time(settings.serial, 8));
     EXPECT_TRUE(heard.downs.empty());
     line->write(Bytes(8, 0x55));
     ASSERT_EQ(heard.downs.size(), 1u);

@@ -19,8 +19,8 @@ bus::StationReport press() {
     station.configured = true;
     station.up = true;
     station.last_success_unix = 1700000000.5;
-    station.requests[{"3", "ok"}] = 7;
-    station.requests[{"43", "shared"}] = 2;
+    station.requests[3][Outcome::ok] = 7;
+    station.requests[43][Outcome::shared] = 2;
     station.wire.retries = 3;
     station.wire.late_frames = 4;
     station.wire.foreign_frames = 5;

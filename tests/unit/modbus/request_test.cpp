@@ -47,7 +47,7 @@ TEST(CheckRequest, DeniesFunctionZeroAndTheReplyRangeWhateverFollows) {
     EXPECT_EQ(fault_of(Bytes(300, 0)), Fault::denied);
 }
 
-/// Every row of Table A with one length: one byte less or more contradicts the function.
+/// Functions whose requests have one length (PDU-07): a byte less or more contradicts them.
 TEST(CheckRequest, WantsTheLengthOfTheFunction) {
     const Bytes requests[] = {"01 00 13 00 13"_hex,
                               "02 00 C4 00 16"_hex,
@@ -170,6 +170,39 @@ TEST(ReplyLengthFromRequest, DoesNotGuess) {
                              "2B 0D 00"_hex, "41 00"_hex}) {
         EXPECT_FALSE(reply_length_from_request(pdu)) << to_hex(pdu);
     }
+}
+
+TEST(Request, IsMadeOfWhatMayBeTransmittedOnly) {
+    const Bytes most = "03 00 00 00 7E"_hex;  // 126 registers
+    EXPECT_EQ(Request::make({}, QuantityCheck::fit).error(), Fault::malformed);
+    EXPECT_EQ(Request::make("03 00 6B"_hex, QuantityCheck::wide).error(), Fault::malformed);
+    EXPECT_EQ(Request::make("83 00"_hex, QuantityCheck::wide).error(), Fault::denied);
+    EXPECT_EQ(Request::make(most, QuantityCheck::fit).error(), Fault::malformed);
+    EXPECT_EQ(Request::make(most, QuantityCheck::wide)->pdu(), most);
+}
+
+TEST(Request, KnowsWhatItIs) {
+    for (const Bytes& pdu :
+         {"03 00 6B 00 03"_hex, "01 00 00 00 00"_hex, "02 FF FF 00 02"_hex, "06 00 01 00 03"_hex,
+          write_coils(10), read_write(2, 1), read_file(3), "07"_hex, "08 00 04 00 00"_hex,
+          "18 04 DE"_hex, "2B 0E 01 00"_hex, "2B 0D 01"_hex, "5A 01 02"_hex}) {
+        const Request request = Request::make(pdu, QuantityCheck::fit).value();
+        EXPECT_EQ(request.pdu(), pdu);
+        EXPECT_EQ(request.function(), pdu[0]);
+        EXPECT_EQ(request.is_read(), is_pure_read(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.is_broadcastable(), is_broadcastable(pdu[0])) << to_hex(pdu);
+        EXPECT_EQ(request.is_never_answered(), is_never_answered(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.span(), read_span(pdu)) << to_hex(pdu);
+        EXPECT_EQ(request.access().read, access_of(pdu).read) << to_hex(pdu);
+        EXPECT_EQ(request.access().write, access_of(pdu).write) << to_hex(pdu);
+        EXPECT_EQ(request.reply_length(), reply_length_from_request(pdu)) << to_hex(pdu);
+    }
+}
+
+TEST(Request, OfASpanReadsIt) {
+    const Span span{Table::input_registers, 0x102, 127};
+    EXPECT_EQ(Request::read(span).pdu(), "04 01 02 00 7F"_hex);
+    EXPECT_EQ(Request::read(span).span(), span);
 }
 
 TEST(AccessOf, SaysWhatIsReadAndWritten) {

@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 
 #include "support/fake_bus.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::points {
 namespace {
@@ -22,7 +23,7 @@ class PollerTest : public testing::Test {
         std::vector<PolledStation> stations(2);
         stations[0] = {5, {{{Table::holding_registers, 100, 1}, 1ms}}, limits()};
         stations[1] = {9, {{{Table::holding_registers, 7, 1}, 1ms}}, limits()};
-        poller = std::make_unique<Poller>(io.get_executor(), bus, std::move(stations));
+        poller = std::make_unique<Poller>(clock, bus, std::move(stations));
         poller->on_update([this](std::uint8_t station, const std::vector<std::size_t>& wants) {
             updates[station] += wants.size();
         });
@@ -31,7 +32,10 @@ class PollerTest : public testing::Test {
         return make_plan_limits(profile::PanelProfile(), SerialFormat{}, 2ms);
     }
 
+    bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
+
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     test::FakeBus bus{io.get_executor()};
     std::unique_ptr<Poller> poller;
     std::map<std::uint8_t, std::size_t> updates;  ///< wants, by station
@@ -39,22 +43,21 @@ class PollerTest : public testing::Test {
 
 TEST_F(PollerTest, AsksAsPollsAndKeepsWhatComes) {
     poller->start();
-    while (updates[5] < 3 || updates[9] < 3) io.run_one();
+    ASSERT_TRUE(run_until([&] { return updates[5] >= 3 && updates[9] >= 3; }));
     EXPECT_EQ(poller->find(5)->reading(0).values, std::vector<std::uint16_t>{42});
     EXPECT_TRUE(poller->find(9)->reading(0).failing);
     EXPECT_EQ(poller->find(7), nullptr);
-    for (const bus::Request& request : bus.requests)
-        EXPECT_EQ(request.priority, arbiter::PriorityClass::poll);
+    for (const bus::Request& request : bus.requests) EXPECT_TRUE(request.poll);
     EXPECT_NE(bus.requests[0].client, bus.requests[1].client);
 }
 
 TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {
     bus.script = [](const bus::Request&) { return std::nullopt; };
     poller->start();
-    while (bus.open() < 2) io.run_one();
+    ASSERT_TRUE(run_until([&] { return bus.open() == 2; }));
     poller->stop();
     EXPECT_EQ(bus.cancelled.size(), 2u);
-    io.run();
+    EXPECT_FALSE(run_until([] { return false; })) << "something goes on";
     EXPECT_EQ(updates[5] + updates[9], 0u);
 }
 

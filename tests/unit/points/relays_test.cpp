@@ -6,17 +6,18 @@
 
 #include "support/fake_bus.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::points {
 namespace {
 
 class RelaysTest : public testing::Test {
   protected:
-    void make(bool on_change) {
+    void make(bool on_change, std::uint32_t count = 2) {
         RelayRoute route;
         route.relay.from = {"press", "UW100", modbus::Table::holding_registers, 100};
         route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, 200};
-        route.relay.count = 2;
+        route.relay.count = count;
         route.relay.every = 1ms;
         route.relay.on_change = on_change;
         route.from = &from;
@@ -25,16 +26,17 @@ class RelaysTest : public testing::Test {
         route.to_station = 20;
         from.script = [this](const bus::Request&) { return source; };
         to.script = [this](const bus::Request&) { return target; };
-        relays = std::make_unique<Relays>(io.get_executor(), std::vector{route});
-        relays->on_state([this](const RelayStatus& status) { states.push_back(status.state); });
+        relays = std::make_unique<Relays>(clock, std::vector{route});
+        relays->on_state([this](const RelayStatus& status) { states.push_back(text_of(status)); });
         relays->start();
     }
     void run_until(const std::function<bool()>& done) {
-        while (!done()) io.run_one();
+        ASSERT_TRUE(test::run_until(io, clock, done)) << "nothing is left to happen";
     }
     RelayStatus status() { return relays->status().at(0); }
 
     boost::asio::io_context io{1};
+    test::ManualClock clock;
     test::FakeBus from{io.get_executor()};
     test::FakeBus to{io.get_executor()};
     std::optional<bus::Answer> source = test::FakeBus::reply("03 04 00 01 00 02"_hex);
@@ -46,12 +48,19 @@ class RelaysTest : public testing::Test {
 TEST_F(RelaysTest, WritesWhatItHasJustRead) {
     make(false);
     run_until([&] { return status().writes >= 3; });
-    EXPECT_EQ(from.requests[0].pdu, "03 00 64 00 02"_hex);
-    EXPECT_EQ(to.requests[0].pdu, "10 00 C8 00 02 04 00 01 00 02"_hex);
+    EXPECT_EQ(from.requests[0].request.pdu(), "03 00 64 00 02"_hex);
+    EXPECT_EQ(to.requests[0].request.pdu(), "10 00 C8 00 02 04 00 01 00 02"_hex);
     EXPECT_EQ(to.requests[0].station, 20);
-    EXPECT_EQ(to.requests[0].priority, arbiter::PriorityClass::poll);
+    EXPECT_TRUE(to.requests[0].poll);
     EXPECT_EQ(states, std::vector<std::string>{"ok"});
     EXPECT_EQ(status().name, "press/UW100 to oven/GDT200");
+}
+
+TEST_F(RelaysTest, ABlockThatNoReplyHoldsIsNotAskedForAndTheSourceFails) {
+    make(false, 200);
+    run_until([&] { return status().read_failures >= 3; });
+    EXPECT_TRUE(from.requests.empty());
+    EXPECT_EQ(states, std::vector<std::string>{"source failing: refused"});
 }
 
 TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
@@ -60,7 +69,7 @@ TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
     EXPECT_EQ(to.requests.size(), 1u);
     source = test::FakeBus::reply("03 04 00 01 00 03"_hex);
     run_until([&] { return to.requests.size() == 2; });
-    EXPECT_EQ(to.requests[1].pdu, "10 00 C8 00 02 04 00 01 00 03"_hex);
+    EXPECT_EQ(to.requests[1].request.pdu(), "10 00 C8 00 02 04 00 01 00 03"_hex);
 }
 
 TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItIsBack) {
@@ -72,7 +81,7 @@ TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItI
     to.line.up = true;
     run_until([&] { return status().writes >= 2; });
     run_until([&] { return states.back() == "ok"; });
-    to.stations[20] = {"offline", {}};
+    to.stations[20] = {Health::offline, {}};
     run_until([&] { return states.back() == "target failing: offline"; });
 }
 
@@ -94,7 +103,7 @@ TEST_F(RelaysTest, AWriteThatFailedIsTriedAgainThoughNothingChanged) {
     EXPECT_EQ(states, std::vector<std::string>{"target failing: offline"});
     target = test::FakeBus::reply("10 00 C8 00 02"_hex);
     run_until([&] { return status().writes == 1; });
-    EXPECT_EQ(status().state, "ok");
+    EXPECT_EQ(status().state, RelayState::ok);
 }
 
 TEST_F(RelaysTest, StopsWithWhatItHasOpen) {
@@ -103,7 +112,7 @@ TEST_F(RelaysTest, StopsWithWhatItHasOpen) {
     run_until([&] { return from.open() == 1; });
     relays->stop();
     EXPECT_EQ(from.cancelled.size(), 1u);
-    io.run();
+    EXPECT_FALSE(test::run_until(io, clock, [] { return false; })) << "something goes on";
     EXPECT_TRUE(to.requests.empty());
 }
 

@@ -37,8 +37,9 @@ TEST(StationPoints, ShowsValuesWithQualityAndAge) {
         for (int i = 0; i < 2; ++i) {
             now = std::max(now, *polls.next_due());
             for (const auto& due : polls.take_due(now)) {
-                Bytes reply = due.pdu[2] == 100 ? Writer().u8(3).u8(4).u16(215).u16(state).take()
-                                                : Writer().u8(3).u8(16).raw(Bytes(16)).take();
+                Bytes reply = due.request.pdu()[2] == 100
+                                  ? Writer().u8(3).u8(4).u16(215).u16(state).take()
+                                  : Writer().u8(3).u8(16).raw(Bytes(16)).take();
                 polls.on_answer(now, due.read, Result<Bytes>(std::move(reply)), now);
             }
         }

@@ -38,8 +38,8 @@ std::vector<Bytes> play(StationPolls& polls, TimePoint from, Duration span, cons
         now = std::max(now, *next);
         if (now >= from + span) break;
         for (const auto& due : polls.take_due(now)) {
-            asked.push_back(due.pdu);
-            polls.on_answer(now + 5ms, due.read, answer(due.pdu), now);
+            asked.push_back(due.request.pdu());
+            polls.on_answer(now + 5ms, due.read, answer(due.request.pdu()), now);
         }
     }
     return asked;

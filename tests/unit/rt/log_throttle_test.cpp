@@ -23,17 +23,17 @@ TEST(LogThrottle, WhatRepeatsForAnHourIsAtMostTenLines) {
 
 TEST(LogThrottle, EachSubjectAndEachEventIsItsOwn) {
     LogThrottle throttle;
-    EXPECT_EQ(passed(throttle, kStart, 1min, "floor1 31"), LogThrottle::kBurst);
-    EXPECT_EQ(passed(throttle, kStart, 1min, "floor1 5"), LogThrottle::kBurst);
+    EXPECT_EQ(passed(throttle, kStart, 1min, "floor1 31"), LogThrottle::kIncidents.burst);
+    EXPECT_EQ(passed(throttle, kStart, 1min, "floor1 5"), LogThrottle::kIncidents.burst);
     EXPECT_TRUE(throttle.pass(kStart, "collision", "floor1 31"));
 }
 
 TEST(LogThrottle, TheNextOneThatPassesTellsHowManyWereLeftOut) {
     LogThrottle throttle;
-    for (int i = 0; i < LogThrottle::kBurst; ++i)
+    for (int i = 0; i < LogThrottle::kIncidents.burst; ++i)
         EXPECT_EQ(throttle.pass(kStart, "late", "1"), std::optional<std::uint64_t>(0));
     for (int i = 0; i < 7; ++i) EXPECT_FALSE(throttle.pass(kStart + 1s, "late", "1"));
-    const TimePoint later = kStart + LogThrottle::kInterval;
+    const TimePoint later = kStart + LogThrottle::kIncidents.interval;
     EXPECT_EQ(throttle.pass(later, "late", "1"), std::optional<std::uint64_t>(7));
     EXPECT_FALSE(throttle.pass(later, "late", "1"));
 }

@@ -87,16 +87,5 @@ TEST(Attempt, GivesFramesOfOthersAndOfOtherRequests) {
     EXPECT_EQ(outcome.strays[1].pdu.size(), 6u);
 }
 
-TEST(TakeApart, FindsRequestsAndRepliesBetweenNoise) {
-    const Bytes request = modbus::encode_adu(3, "04 00 10 00 02"_hex);
-    const Bytes write = modbus::encode_adu(0, "10 00 01 00 01 02 00 05"_hex);
-    const Heard heard = take_apart(joined({"AB"_hex, request, kReply, "CD EF"_hex, write}));
-    ASSERT_EQ(heard.frames.size(), 3u);
-    EXPECT_EQ(heard.damaged, 3u);
-    EXPECT_EQ(heard.frames[0].pdu, "04 00 10 00 02"_hex);
-    EXPECT_EQ(heard.frames[2].station, 0);
-    EXPECT_TRUE(take_apart({}).frames.empty());
-}
-
 }  // namespace
 }  // namespace panelgate::scan

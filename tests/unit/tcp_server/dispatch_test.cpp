@@ -21,10 +21,10 @@ const Bytes kTooMuch = "03 00 00 00 7E"_hex;  // 126 registers
 /// A listener of two lines: stations 1 and 2 on "a", 2 of them only to be read; 3 on "b".
 class DispatchTest : public ::testing::Test {
   protected:
+    DispatchTest() { bus_a.protect(2); }
     /// "to a/1", "to everybody on a, b", "itself", or the exception code as "refused 01".
     std::string decided(std::uint8_t unit, const Bytes& pdu) {
-        const UnitMap units(settings,
-                            {{"a", &bus_a, {1, 2}, {2}, false}, {"b", &bus_b, {3}, {}, false}});
+        const UnitMap units(settings, {{"a", &bus_a, {1, 2}, false}, {"b", &bus_b, {3}, false}});
         const Decision decision = decide(unit, pdu, settings, units);
         if (const auto* refuse = std::get_if<Refuse>(&decision))
             return "refused " + to_hex(Bytes{static_cast<std::uint8_t>(refuse->code)});
@@ -78,6 +78,15 @@ TEST_F(DispatchTest, AStationOnlyForReadsRefusesEverythingElse) {
     EXPECT_EQ(decided(2, "41 01"_hex), "refused 01");
     settings.units[102] = {"a", 2};
     EXPECT_EQ(decided(102, kWrite), "refused 01") << "by another name, too";
+}
+
+TEST_F(DispatchTest, WhatIsNotAllowedIsToldBeforeTheRequestIsLookedAt) {
+    EXPECT_EQ(decided(1, "06 00"_hex), "refused 03");
+    EXPECT_EQ(decided(2, "06 00"_hex), "refused 01");
+    EXPECT_EQ(decided(0, "06 00"_hex), "refused 01") << "station 2 is among them";
+    bus_a.rights = {};
+    EXPECT_EQ(decided(2, "06 00"_hex), "refused 03");
+    EXPECT_EQ(decided(0, "06 00"_hex), "refused 03");
 }
 
 TEST_F(DispatchTest, AUnitThatNobodyHasIsToldBeforeTheRequestIsLookedAt) {

@@ -47,6 +47,13 @@ class HeldBus : public bus::BusClient {
     }
     bus::LineStatus status() const override { return line; }
     bus::StationStatus station_status(std::uint8_t) const override { return {}; }
+    std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
+        return rights.judge_write(station);
+    }
+    /// From now on this station may only be read.
+    void protect(std::uint8_t station) {
+        rights = bus::Rights({{station, {"protected", bus::Access::read_only, {}}}});
+    }
     std::vector<bus::TraceFrame> trace(std::size_t) const override { return {}; }
 
     /// Answers the held request at `index`.
@@ -65,6 +72,7 @@ class HeldBus : public bus::BusClient {
     std::map<bus::ClientId, std::string> names;
     std::optional<Bytes> instant;  ///< the reply to everything, without being held
     bus::LineStatus line;
+    bus::Rights rights;  ///< to everything, at first
 
   private:
     boost::asio::io_context& context_;

@@ -15,8 +15,10 @@
 
 #include "held_bus.hpp"
 #include "panelgate/modbus/mbap.hpp"
+#include "panelgate/rt/log.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -143,7 +145,8 @@ class Loopback : public ::testing::Test {
     Loopback() {
         settings.port = 0;
         settings.lines = {"floor1"};
-        lines = {{"floor1", &bus1, {1, 2}, {2}, true}, {"floor2", &bus2, {11, 12}, {}, true}};
+        lines = {{"floor1", &bus1, {1, 2}, true}, {"floor2", &bus2, {11, 12}, true}};
+        bus1.protect(2);
     }
     ~Loopback() override {
         listener.reset();
@@ -152,16 +155,17 @@ class Loopback : public ::testing::Test {
     }
 
     void start() {
-        Hooks hooks;
-        hooks.log = [this](std::string_view line) { log.emplace_back(line); };
-        hooks.version = "1.2.3";
-        listener = std::make_unique<Listener>(context.get_executor(), settings,
-                                              UnitMap(settings, lines), std::move(hooks));
+        listener = std::make_unique<Listener>(context.get_executor(), clock, settings,
+                                              UnitMap(settings, lines), "1.2.3");
         listener->start();
     }
     Client connect() { return Client(context, listener->port()); }
     bool run_until(const std::function<bool()>& reached) {
         return tcp_server::run_until(context, reached);
+    }
+    /// An alarm is armed: what has come so far starts the time that the rest may take.
+    bool run_until_armed(std::size_t count = 1) {
+        return run_until([&] { return clock.armed() == count; });
     }
     bool run_until_held(std::size_t count) {
         return run_until([&] { return bus1.held.size() == count; });
@@ -175,18 +179,13 @@ class Loopback : public ::testing::Test {
         const auto reply = client.receive();
         return reply ? reply->pdu : Bytes{};
     }
-    std::size_t logged(std::string_view word) const {
-        std::size_t n = 0;
-        for (const std::string& line : log) n += line.find(word) != std::string::npos ? 1 : 0;
-        return n;
-    }
-
     asio::io_context context;
+    test::ManualClock clock;  ///< stands still but for a test that moves it
     HeldBus bus1{context};
     HeldBus bus2{context};
     Settings settings;
     std::vector<LineInfo> lines;
-    std::vector<std::string> log;
+    rt::LogTap log;
     std::unique_ptr<Listener> listener;
 };
 

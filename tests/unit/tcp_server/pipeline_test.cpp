@@ -10,6 +10,7 @@
 #include "held_bus.hpp"
 #include "shared.hpp"
 #include "support/hex.hpp"
+#include "support/manual_clock.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -32,11 +33,12 @@ class SmallPipeline : public ::testing::Test {
     }
 
     boost::asio::io_context context;
+    test::ManualClock clock;
     HeldBus bus{context};
     std::uint16_t taken = 0;
     int told = 0;
     std::shared_ptr<Shared> shared = std::make_shared<Shared>(
-        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, {}, true}}), {}, {}, {}});
+        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, true}}), {}, clock, {}, {}});
     std::shared_ptr<Pipeline> pipeline = std::make_shared<Pipeline>(
         shared, Caller("10.0.0.7:5000", bus::host_of("10.0.0.7")), [this] { ++told; });
 };

@@ -7,7 +7,7 @@ namespace {
 // TBC-02 to TBC-06.
 class SessionBroadcast : public Loopback {
   protected:
-    SessionBroadcast() { lines[0].read_only.clear(); }
+    SessionBroadcast() { bus1.rights = {}; }
 };
 
 const Bytes kWrite = "10 0064 0001 02 00ff"_hex;
@@ -19,7 +19,7 @@ TEST_F(SessionBroadcast, AnswersABroadcastAsSoonAsItHasLeft) {
     client.request(1, 0, kWrite);
     ASSERT_TRUE(run_until_held(1));
     EXPECT_EQ(bus1.held[0].request.station, 0);
-    EXPECT_EQ(bus1.held[0].request.priority, arbiter::PriorityClass::write);
+    EXPECT_FALSE(bus1.held[0].request.request.is_read());
     bus1.answer(0, kWritten);
     EXPECT_EQ(client.receive(), (modbus::Adu{1, 0, kWritten}));
     EXPECT_TRUE(bus2.seen.empty()) << "a line of another listener";
@@ -103,7 +103,8 @@ TEST_F(SessionBroadcast, DeniesBroadcastsWhenItIsAskedTo) {
 TEST_F(SessionBroadcast, NeverWritesToAReadOnlyStationByBroadcast) {
     Settings wide = settings;
     wide.lines = {"a", "b"};
-    const std::vector<LineInfo> lines{{"a", &bus1, {1}, {}, true}, {"b", &bus2, {2}, {2}, true}};
+    const std::vector<LineInfo> lines{{"a", &bus1, {1}, true}, {"b", &bus2, {2}, true}};
+    bus2.protect(2);
     const Decision both = decide(0, kWrite, wide, UnitMap(wide, lines));
     ASSERT_TRUE(std::holds_alternative<Refuse>(both));
     EXPECT_EQ(std::get<Refuse>(both).code, modbus::ExceptionCode::illegal_function);

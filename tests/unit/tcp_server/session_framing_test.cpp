@@ -1,5 +1,3 @@
-#include <boost/asio/steady_timer.hpp>
-
 #include "loopback.hpp"
 
 namespace panelgate::tcp_server {
@@ -45,16 +43,19 @@ TEST_F(SessionFraming, TakesTheShortestAndTheLongestLength) {
     Client client = connect();
     EXPECT_EQ(client.ask(1, "07"_hex), "07 00"_hex);
     EXPECT_EQ(client.ask(1, "41"_hex + Bytes(252, 1)), "07 00"_hex);
-    EXPECT_EQ(bus1.seen.back().pdu.size(), 253U);
+    EXPECT_EQ(bus1.seen.back().request.pdu().size(), 253U);
 }
 
 TEST_F(SessionFraming, ClosesAConnectionThatSendsHalfAnAdu) {
-    settings.partial_adu_timeout = 30ms;
     bus1.instant = reply_to_read(1);
     start();
     Client idle = connect();
     Client client = connect();
     client.send("0001 0000"_hex);
+    ASSERT_TRUE(run_until_armed());
+    clock.advance(settings.partial_adu_timeout - 1ns);
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+    clock.advance(1ns);
     EXPECT_TRUE(client.sees_close());
     EXPECT_EQ(listener->counters().protocol_errors, 1U);
     EXPECT_EQ(idle.ask(1, read_pdu(1)), reply_to_read(1)) << "silence alone is no fault";
@@ -65,22 +66,34 @@ TEST_F(SessionFraming, DoesNotLetDribblingBytesStretchTheTime) {
     start();
     Client client = connect();
     client.send("0001 0000 00fe 01"_hex);
+    ASSERT_TRUE(run_until_armed());
+    const auto end = clock.next();
     // The rest of the 260 bytes would take far longer than the time that an ADU has.
-    asio::steady_timer pace(context);
-    const Bytes byte = {0x41};
-    const std::function<void()> dribble = [&] {
-        pace.expires_after(std::chrono::milliseconds(5));
-        pace.async_wait([&](const error_code& error) {
-            if (!error && client.try_send(byte)) dribble();
-        });
-    };
-    dribble();
-    EXPECT_TRUE(run_until([&] { return listener->counters().protocol_errors == 1; }));
+    for (int i = 0; i < 9; ++i) {
+        client.send("41"_hex);
+        context.restart();
+        context.poll();
+        clock.advance(5ms);
+        ASSERT_EQ(clock.next(), end);
+    }
+    clock.advance(5ms);
+    EXPECT_EQ(listener->counters().protocol_errors, 1U);
     EXPECT_TRUE(client.sees_close());
     EXPECT_TRUE(bus1.seen.empty());
-    pace.cancel();
-    context.restart();
-    context.poll();
+}
+
+TEST_F(SessionFraming, TheNextAduHasATimeOfItsOwn) {
+    bus1.instant = reply_to_read(1);
+    start();
+    Client client = connect();
+    client.send("0001 0000"_hex);
+    ASSERT_TRUE(run_until_armed());
+    const auto first = clock.next();
+    clock.advance(1ms);
+    client.send("0006 01 03 0000 0001 0002"_hex);  // its rest, and the next one's beginning
+    EXPECT_EQ(client.receive()->pdu, reply_to_read(1));
+    ASSERT_TRUE(clock.next());
+    EXPECT_EQ(*clock.next() - *first, 1ms);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ class SessionPipeline : public Loopback {
         for (std::uint16_t i = first; i < end; ++i) {
             ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
             ASSERT_LE(bus1.held.size(), settings.in_flight);
-            ASSERT_EQ(bus1.held[0].request.pdu, read_pdu(i));
+            ASSERT_EQ(bus1.held[0].request.request.pdu(), read_pdu(i));
             bus1.answer(0, reply_to_read(i));
             ASSERT_EQ(client.receive(), (modbus::Adu{i, 1, reply_to_read(i)}));
         }
@@ -120,7 +120,7 @@ TEST_F(SessionPipeline, ASlowPanelHoldsUpNoOtherUntilEightyAnswersAreMissing) {
     client.send(reads(8));
     for (std::uint16_t i = 1; i < 5; ++i) {
         ASSERT_TRUE(run_until_held(2));
-        ASSERT_EQ(bus1.held[1].request.pdu, read_pdu(i));
+        ASSERT_EQ(bus1.held[1].request.request.pdu(), read_pdu(i));
         bus1.answer(1, reply_to_read(i));
     }
     do_all_that_is_due();
@@ -157,7 +157,7 @@ TEST_F(SessionPipeline, RefusalsAndItsOwnRegistersKeepTheirPlaces) {
 TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
     settings.lines = {"floor1", "floor2"};
     settings.in_flight = 2;
-    lines[0].read_only.clear();
+    bus1.rights = {};
     start();
     Client client = connect();
     client.send(reads(2) + modbus::encode_mbap(2, 0, "06 0000 0001"_hex) +
@@ -179,7 +179,6 @@ TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
 }
 
 TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
-    settings.partial_adu_timeout = 30ms;
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
@@ -189,6 +188,8 @@ TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
     ASSERT_TRUE(run_until_held(2));
     Client bystander = connect();
     bystander.send(half);
+    ASSERT_TRUE(run_until_armed());
+    clock.advance(settings.partial_adu_timeout);
     EXPECT_TRUE(bystander.sees_close()) << "it has begun later, and its time is over";
     client.send(read_pdu(5));
     expect_values(client, 0, 6);
@@ -196,13 +197,16 @@ TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
 }
 
 TEST_F(SessionPipeline, LimitsTheTimeOfAHalfSentAduOnceItReadsAgain) {
-    settings.partial_adu_timeout = 30ms;
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Client client = connect();
     client.send(reads(5) + "0005 0000 0006 01"_hex);
+    ASSERT_TRUE(run_until_held(2));
+    EXPECT_EQ(clock.next(), std::nullopt) << "nobody reads it";
     expect_values(client, 0, 5);
+    ASSERT_TRUE(run_until_armed(2)) << "the half-sent ADU, and replies that may not be taken";
+    clock.advance(settings.partial_adu_timeout);
     EXPECT_TRUE(client.sees_close());
     EXPECT_EQ(listener->counters().protocol_errors, 1U);
 }

@@ -15,7 +15,7 @@ TEST_F(Session, EchoesTransactionAndUnit) {
     client.request(0xBEEF, 101, read_pdu(5));
     ASSERT_TRUE(run_until_held(1));
     EXPECT_EQ(bus1.held[0].request.station, 1);
-    EXPECT_EQ(bus1.held[0].request.pdu, read_pdu(5));
+    EXPECT_EQ(bus1.held[0].request.request.pdu(), read_pdu(5));
     EXPECT_NE(bus1.held[0].request.client, 0U);
     bus1.answer(0, reply_to_read(42));
     EXPECT_EQ(client.receive(), (modbus::Adu{0xBEEF, 101, reply_to_read(42)}));
@@ -169,15 +169,16 @@ TEST_F(Session, NeverSendsAReplyThatNoFrameCanCarry) {
     EXPECT_EQ(ask_bus(client, 1, "41"_hex, Bytes{}), "c1 03"_hex);
 }
 
-TEST_F(Session, GivesWritesTheirOwnClass) {
+TEST_F(Session, HandsReadsAndWritesOverAsTheyAreAndNeverAsPolls) {
     bus1.instant = "00"_hex;
     start();
     Client client = connect();
     for (const Bytes& pdu : {read_pdu(0), "06 0000 0001"_hex, "41 00"_hex}) client.ask(1, pdu);
     ASSERT_EQ(bus1.seen.size(), 3U);
-    EXPECT_EQ(bus1.seen[0].priority, arbiter::PriorityClass::read);
-    EXPECT_EQ(bus1.seen[1].priority, arbiter::PriorityClass::write);
-    EXPECT_EQ(bus1.seen[2].priority, arbiter::PriorityClass::write);
+    EXPECT_TRUE(bus1.seen[0].request.is_read());
+    EXPECT_FALSE(bus1.seen[1].request.is_read());
+    EXPECT_FALSE(bus1.seen[2].request.is_read());
+    for (const bus::Request& seen : bus1.seen) EXPECT_FALSE(seen.poll);
 }
 
 TEST_F(Session, LetsNobodyWriteThroughAReadOnlyListener) {

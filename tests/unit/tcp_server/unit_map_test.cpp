@@ -15,9 +15,7 @@ using ::testing::IsEmpty;
 
 class UnitMapTest : public ::testing::Test {
   protected:
-    UnitMapTest() {
-        lines = {{"floor1", &bus1, {1, 2}, {2}, true}, {"floor2", &bus2, {2, 11}, {}, true}};
-    }
+    UnitMapTest() { lines = {{"floor1", &bus1, {1, 2}, true}, {"floor2", &bus2, {2, 11}, true}}; }
     UnitMap map() const { return UnitMap(settings, lines); }
 
     boost::asio::io_context context;
@@ -64,15 +62,6 @@ TEST_F(UnitMapTest, RoutesNothingAbove247UnlessItIsAnAlias) {
     }
     EXPECT_EQ(units.route(250)->bus, &bus2) << "an alias may leave the listener's lines";
     EXPECT_TRUE(units.is_alias(250));
-}
-
-TEST_F(UnitMapTest, KnowsWhatMayNotBeWritten) {
-    settings.lines = {"floor1"};
-    settings.units[100] = {"floor1", 2};
-    const UnitMap units = map();
-    EXPECT_FALSE(units.route(1)->read_only);
-    EXPECT_TRUE(units.route(2)->read_only);
-    EXPECT_TRUE(units.route(100)->read_only);
 }
 
 TEST_F(UnitMapTest, BroadcastsUnitZeroToEveryLineUnlessItIsMapped) {

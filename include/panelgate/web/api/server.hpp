@@ -30,8 +30,8 @@ struct Providers {
     EventHub* events = nullptr;  ///< never null; outlives the server
 };
 
-/// HTTP/1.1: probes, metrics and the REST API of contract section 5. Lives in the one thread that
-/// runs the executor; the directory and what it points to outlive the server.
+/// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor; the
+/// directory and what it points to outlive the server.
 class Server {
   public:
     Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,

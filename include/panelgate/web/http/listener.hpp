@@ -1,15 +1,14 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
-#include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <set>
 
+#include "panelgate/rt/acceptor.hpp"
 #include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
@@ -32,12 +31,10 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     std::size_t connections() const { return sessions_.size(); }
 
   private:
-    static boost::asio::awaitable<void> accept_loop(std::shared_ptr<HttpListener> self);
     void take(boost::asio::ip::tcp::socket socket);
 
     std::shared_ptr<const Site> site_;
-    boost::asio::ip::tcp::acceptor acceptor_;
-    boost::asio::steady_timer pause_;  ///< after a failed accept
+    rt::Acceptor acceptor_;
     std::set<std::shared_ptr<HttpSession>> sessions_;
 };
 

@@ -46,6 +46,25 @@ TEST(Answer, BlamesTheRequestForExceptionsOneToFourOnly) {
     EXPECT_EQ(problem_of_exception(5, {}).status, 502u);
 }
 
+TEST(Answer, TellsWhatTheRightsForbid) {
+    bus::Answer refused = test::FakeBus::fault(Fault::denied, false);
+    refused.refusal = bus::Refusal{bus::Refusal::Rule::read_only, "meter"};
+    const Problem problem = problem_of(refused);
+    EXPECT_EQ(problem.status, 403u);
+    EXPECT_EQ(problem.detail, "station 'meter' is read-only");
+    EXPECT_EQ(problem_of(refused, {}).value().detail, problem.detail);
+    refused.refusal->rule = bus::Refusal::Rule::broadcast_over_read_only;
+    EXPECT_EQ(problem_of(refused).detail,
+              "a broadcast would write to station 'meter', which is read-only");
+}
+
+TEST(Answer, OfAGuardedStationIsTheExceptionOfItsPanel) {
+    bus::Answer guarded = test::FakeBus::reply({0x86, 2});
+    guarded.transmitted = false;
+    guarded.refusal = bus::Refusal{bus::Refusal::Rule::guard, "oven"};
+    EXPECT_EQ(problem_of(guarded, {}).value().status, 422u);
+}
+
 TEST(Answer, OfAWriteSaysWhatIsSure) {
     const auto confirmed = write_answer(test::FakeBus::reply({6, 0, 1, 0, 2}), {});
     EXPECT_EQ(confirmed.status, 200u);

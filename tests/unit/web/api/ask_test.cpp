@@ -20,9 +20,9 @@ class Ask : public ::testing::Test {
         bus.script = [](const bus::Request&) { return std::nullopt; };
     }
     void ask_once() {
-        bus::Request request;
-        request.station = 5;
-        request.pdu = {3, 0, 0, 0, 1};
+        bus::Request request{
+            .station = 5,
+            .request = modbus::Request::read({modbus::Table::holding_registers, 0, 1})};
         boost::asio::co_spawn(io, ask(caller, &bus, std::move(request)),
                               [this](std::exception_ptr failed, bus::Answer answer) {
                                   ++ended;

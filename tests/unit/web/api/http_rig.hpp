@@ -82,6 +82,7 @@ class HttpRig : public ::testing::Test {
         meter.profile = directory.generic;
         meter.unknown_panel = true;
         meter.read_only = true;
+        bus.rights = bus::Rights({{5, {"meter", bus::Access::read_only, {}}}});
         directory.stations.push_back(std::move(meter));
     }
     Server& start() {
@@ -106,11 +107,11 @@ class HttpRig : public ::testing::Test {
         return connect().ask(method, target, body, headers);
     }
     Reply get(const std::string& target) { return ask("GET", target); }
-    std::string last_pdu() const { return to_hex(bus.requests.back().pdu); }
+    std::string last_pdu() const { return to_hex(bus.requests.back().request.pdu()); }
 
     /// Register n holds n, bit n is set when n is odd; writes are confirmed.
     static bus::Answer answer_from_addresses(const bus::Request& request) {
-        Reader in(request.pdu);
+        Reader in(request.request.pdu());
         const std::uint8_t function = in.u8();
         const std::uint16_t address = in.u16();
         const std::uint16_t count = in.u16();

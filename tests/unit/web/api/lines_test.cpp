@@ -39,7 +39,7 @@ TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
 
 TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
     add_meter();
-    bus.stations[31] = {"online", 1500ms};
+    bus.stations[31] = {Health::online, 1500ms};
     const auto stations = get("/api/v1/stations").at("stations").as_array();
     ASSERT_EQ(stations.size(), 2u);
     EXPECT_EQ(stations[0],
@@ -53,15 +53,13 @@ TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
 }
 
 TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
-    using Direction = bus::TraceFrame::Direction;
-    bus.frames.push_back({1, TimePoint(1s), Direction::sent, {5, 3}, "request", {}});
+    bus.frames.push_back({1, TimePoint(1s), FrameKind::request, {5, 3}, {}});
     bus.frames.push_back({2,
                           TimePoint(2500ms),
-                          Direction::sent,
+                          FrameKind::request,
                           {0x1F, 0x01, 0x01, 0x20, 0x00, 0x05, 0xFF, 0x81},
-                          "request",
                           "next in turn"});
-    bus.frames.push_back({3, TimePoint(3s), Direction::discarded, {}, "damaged", {}});
+    bus.frames.push_back({3, TimePoint(3s), FrameKind::damaged, {}, {}});
     bus.made.push_back({7, TimePoint(2s), "refused"});
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
         {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
@@ -131,7 +129,7 @@ TEST_F(ApiLines, PassesARawRequestAndItsReply) {
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(), json_of(R"({"pdu":"030400640065"})"));
     EXPECT_EQ(bus.requests[0].station, 5);
-    EXPECT_EQ(bus.requests[0].priority, arbiter::PriorityClass::read);
+    EXPECT_FALSE(bus.requests[0].poll);
 }
 
 TEST_F(ApiLines, GivesAPanelsExceptionToARawRequestAsAnAnswer) {
@@ -151,10 +149,13 @@ TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {
     EXPECT_EQ(status(R"({"station":5,"pdu":""})"), 400u);
     EXPECT_EQ(status(R"({"station":5,"pdu":7})"), 400u);
     EXPECT_EQ(status(R"({"station":5,"pdu":")" + std::string(508, '0') + "\"}"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"030001"})"), 400u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"0300010080"})"), 400u) << "more than a reply holds";
     EXPECT_EQ(status(R"({"station":5,"pdu":"0600010002"})"), 403u);
     EXPECT_EQ(status(R"({"station":9,"pdu":"0300010001"})", "floor2"), 404u);
     EXPECT_TRUE(bus.requests.empty());
     EXPECT_EQ(status(R"({"station":5,"pdu":"0300010001"})"), 200u);
+    EXPECT_EQ(status(R"({"station":5,"pdu":"030001007f"})"), 200u) << "a GT's larger frames";
 }
 
 }  // namespace

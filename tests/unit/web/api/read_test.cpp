@@ -14,8 +14,7 @@ TEST_F(ApiRead, GivesRegistersWithWhereTheyCameFrom) {
         "notation":"UW100","values":[100,101],"age_ms":0,"source":"bus"})"));
     EXPECT_EQ(last_pdu(), "03 00 64 00 02");
     EXPECT_EQ(bus.requests[0].station, 31);
-    EXPECT_EQ(bus.requests[0].priority, arbiter::PriorityClass::read);
-    EXPECT_EQ(bus.requests[0].quantity, modbus::QuantityCheck::wide);
+    EXPECT_FALSE(bus.requests[0].poll);
     EXPECT_NE(bus.requests[0].client, 0u);
 }
 
@@ -64,9 +63,9 @@ TEST_F(ApiRead, SplitsWhatThePanelCannotGiveAtOnceAndSaysSo) {
     ASSERT_EQ(values.size(), 70u);
     for (unsigned i = 0; i < 70; ++i) EXPECT_EQ(values[i], 10 + i);
     ASSERT_EQ(bus.requests.size(), 3u);
-    EXPECT_EQ(to_hex(bus.requests[0].pdu), "03 00 0a 00 20");
-    EXPECT_EQ(to_hex(bus.requests[1].pdu), "03 00 2a 00 20");
-    EXPECT_EQ(to_hex(bus.requests[2].pdu), "03 00 4a 00 06");
+    EXPECT_EQ(to_hex(bus.requests[0].request.pdu()), "03 00 0a 00 20");
+    EXPECT_EQ(to_hex(bus.requests[1].request.pdu()), "03 00 2a 00 20");
+    EXPECT_EQ(to_hex(bus.requests[2].request.pdu()), "03 00 4a 00 06");
     EXPECT_EQ(bus.requests[2].client, bus.requests[0].client);
 }
 
@@ -80,7 +79,7 @@ TEST_F(ApiRead, UsesTheStandardsLimitsWithoutAProfile) {
 
 TEST_F(ApiRead, P1AFailedPartFailsTheWholeRead) {
     bus.script = [](const bus::Request& request) {
-        if (request.pdu[2] == 0) return answer_from_addresses(request);
+        if (request.request.pdu()[2] == 0) return answer_from_addresses(request);
         return test::FakeBus::fault(Fault::timeout, true);
     };
     EXPECT_EQ(get("/api/v1/stations/press/holding-registers/0?count=40").status(), 504u);

@@ -17,7 +17,7 @@ TEST_F(ApiWrite, WritesOneRegisterByFunction06) {
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(), json_of(R"({"transmitted":true,"confirmed":true})"));
     EXPECT_EQ(last_pdu(), "06 00 64 01 02");
-    EXPECT_EQ(bus.requests[0].priority, arbiter::PriorityClass::write);
+    EXPECT_FALSE(bus.requests[0].poll);
 }
 
 TEST_F(ApiWrite, WritesSeveralRegistersByOneFunction16) {

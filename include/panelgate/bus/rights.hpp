@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/bus/station_settings.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+
+namespace panelgate::bus {
+
+/// Why nobody is asked: what may be done to a station does not include this request.
+struct Refusal {
+    enum class Rule : std::uint8_t {
+        read_only,                 ///< a write to a station that may only be read
+        broadcast_over_read_only,  ///< it would write to such a station, too
+        guard,                     ///< its panel's profile rules the request out
+    };
+    Rule rule = Rule::read_only;
+    std::string station;  ///< the name of the one that the rule protects
+    modbus::ExceptionCode code = modbus::ExceptionCode::illegal_function;  ///< for Modbus clients
+
+    friend bool operator==(const Refusal&, const Refusal&) = default;
+};
+
+/// What is answered to the function that is refused: Fault::denied, but of a guard the exception
+/// that its panel would have answered.
+Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function);
+
+/// The one place that says who may do what on a line. Pure.
+class Rights {
+  public:
+    Rights() = default;
+    explicit Rights(Stations stations) : stations_(std::move(stations)) {}
+
+    /// Station 0 is a broadcast.
+    std::optional<Refusal> judge(std::uint8_t station, const modbus::Request& request) const;
+    /// What judge() says to every write to this station, whatever it writes.
+    std::optional<Refusal> judge_write(std::uint8_t station) const;
+
+  private:
+    std::optional<Refusal> judge_broadcast() const;
+
+    Stations stations_;
+};
+
+}  // namespace panelgate::bus

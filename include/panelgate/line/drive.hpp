@@ -1,0 +1,79 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/line/line.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::line {
+
+/// Drives a pure machine over a line, always in this order: all that the device holds, then the
+/// clock, then the verbs, then the actions, then the alarm. So bytes that came before something was
+/// due or asked are never taken for what came behind it.
+///
+/// Machine: `poll_action()` gives an optional variant, `next_deadline()` an optional TimePoint.
+/// Host acts for it: `act(action)` for each alternative, `on_deadline(now)` when the machine's
+/// deadline has come, `settled(now)` when it wants nothing more for now.
+///
+/// All of them outlive it. Verbs and acting may lead to further verbs (a write that fails takes the
+/// line down): the outermost loop then drains, nothing recurses (HR-14).
+template <class Machine, class Host>
+class Drive {
+  public:
+    Drive(rt::Clock& clock, Line& line, Machine& machine, Host& host)
+        : clock_(clock), line_(line), machine_(machine), host_(host), alarm_(clock.make_alarm()) {}
+
+    /// What the line itself says: `verb(now)`. It may be in the midst of handing over its input.
+    template <class Verb>
+    void hear(Verb verb) {
+        verb(clock_.now());
+        drain();
+    }
+    /// What anybody else wants: `verb(now)`.
+    template <class Verb>
+    void tell(Verb verb) {
+        line_.poll_input();
+        hear(std::move(verb));
+    }
+    /// The alarm rings no more, until the next verb.
+    void rest() {
+        armed_.reset();
+        alarm_->cancel();
+    }
+
+  private:
+    void drain() {
+        if (draining_) return;
+        draining_ = true;
+        while (auto action = machine_.poll_action()) {
+            std::visit([this](auto& one) { host_.act(one); }, *action);
+        }
+        draining_ = false;
+        host_.settled(clock_.now());
+        arm();
+    }
+    void arm() {
+        const std::optional<TimePoint> next = machine_.next_deadline();
+        if (next == armed_) return;
+        if (!next) return rest();
+        armed_ = next;
+        alarm_->arm(*next, [this] {
+            armed_.reset();
+            tell([this](TimePoint now) { host_.on_deadline(now); });
+        });
+    }
+
+    rt::Clock& clock_;
+    Line& line_;
+    Machine& machine_;
+    Host& host_;
+    std::unique_ptr<rt::Alarm> alarm_;
+    std::optional<TimePoint> armed_;
+    bool draining_ = false;
+};
+
+}  // namespace panelgate::line

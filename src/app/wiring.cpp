@@ -1,0 +1,83 @@
+#include "wiring.hpp"
+
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/profile/judge.hpp"
+
+namespace panelgate::app {
+namespace {
+
+/// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
+bus::Guard guard_of(const profile::PanelProfile& profile) {
+    return [&profile](const modbus::Request& request) -> std::optional<std::uint8_t> {
+        switch (profile::judge(profile, request)) {
+            case profile::Judgement::fine:
+                return std::nullopt;
+            case profile::Judgement::illegal_function:
+                return std::uint8_t{1};
+            case profile::Judgement::illegal_address:
+            case profile::Judgement::write_protected:
+                return std::uint8_t{2};
+            case profile::Judgement::illegal_value:
+                return std::uint8_t{3};
+        }
+        std::abort();
+    };
+}
+
+Duration frame_gap(const config::Line& line, std::uint8_t station) {
+    std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
+    for (const arbiter::StationSettings& settings : line.arbiter.stations) {
+        if (settings.id == station) gap = settings.frame_gap;
+    }
+    return gap.value_or(silent_interval(line.device.serial));
+}
+
+}  // namespace
+
+bus::Settings bus_settings(const config::Line& line) {
+    bus::Settings settings;
+    settings.name = line.name;
+    settings.device = line.device.device;
+    settings.arbiter = line.arbiter;
+    for (const config::Station& station : line.stations) {
+        bus::StationSettings& made = settings.stations[station.id];
+        made.name = station.name;
+        made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
+        if (station.guard) made.guard = guard_of(*station.profile);
+    }
+    return settings;
+}
+
+std::vector<points::PolledStation> polled_stations(const config::Line& line) {
+    std::vector<points::PolledStation> polled;
+    for (const config::Station& station : line.stations) {
+        if (station.points.empty() && station.polls.empty()) continue;
+        points::PolledStation& entry = polled.emplace_back();
+        entry.id = station.id;
+        entry.wants = points::wants_of(station.points, station.polls);
+        entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
+                                                frame_gap(line, station.id));
+    }
+    return polled;
+}
+
+points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
+    const Station& from = *plant.find(relay.from.station);
+    const Station& to = *plant.find(relay.to.station);
+    const auto multiple = modbus::is_bit_table(relay.to.table) ? modbus::kWriteMultipleCoils
+                                                               : modbus::kWriteMultipleRegisters;
+    points::RelayRoute route;
+    route.relay = relay;
+    route.from = from.bus;
+    route.from_station = from.id;
+    route.to = to.bus;
+    route.to_station = to.id;
+    route.to_has_multiple = to.configured->profile->has_function(multiple);
+    return route;
+}
+
+}  // namespace panelgate::app

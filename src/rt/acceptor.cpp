@@ -1,0 +1,93 @@
+#include "panelgate/rt/acceptor.hpp"
+
+#include <boost/asio/error.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <utility>
+
+namespace panelgate::rt {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+namespace {
+constexpr auto kPause = std::chrono::milliseconds(100);
+}  // namespace
+
+struct Acceptor::State : std::enable_shared_from_this<Acceptor::State> {
+    State(const asio::any_io_executor& executor, Accepted a, Failing f)
+        : acceptor(executor), pause(executor), accepted(std::move(a)), failing(std::move(f)) {}
+
+    void accept();
+    void on_accept(const error_code& error, tcp::socket socket);
+
+    tcp::acceptor acceptor;
+    asio::steady_timer pause;
+    Accepted accepted;
+    Failing failing;
+    bool fails = false;
+};
+
+void Acceptor::State::accept() {
+    acceptor.async_accept([self = shared_from_this()](const error_code& error, tcp::socket socket) {
+        self->on_accept(error, std::move(socket));
+    });
+}
+
+void Acceptor::State::on_accept(const error_code& error, tcp::socket socket) {
+    if (!acceptor.is_open()) return;
+    if (error && error != asio::error::connection_aborted) {
+        // Without descriptors the next try would fail at once, and the loop would do nothing else.
+        if (!std::exchange(fails, true)) failing(error);
+        pause.expires_after(kPause);
+        pause.async_wait([self = shared_from_this()](const error_code& stopped) {
+            if (!stopped && self->acceptor.is_open()) self->accept();
+        });
+        return;
+    }
+    if (!error) {
+        fails = false;
+        accepted(std::move(socket));
+        if (!acceptor.is_open()) return;
+    }
+    accept();
+}
+
+Acceptor::Acceptor(const asio::any_io_executor& executor, Accepted accepted, Failing failing)
+    : state_(std::make_shared<State>(executor, std::move(accepted), std::move(failing))) {}
+
+Acceptor::~Acceptor() { close(); }
+
+error_code Acceptor::open(const std::string& address, std::uint16_t port) {
+    tcp::acceptor& acceptor = state_->acceptor;
+    error_code error;
+    const tcp::endpoint endpoint(asio::ip::make_address(address, error), port);
+    if (!error) acceptor.open(endpoint.protocol(), error);
+    if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor.bind(endpoint, error);
+    if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
+    if (error) {
+        close();
+    } else {
+        state_->accept();
+    }
+    return error;
+}
+
+std::uint16_t Acceptor::port() const {
+    error_code closed;
+    const tcp::endpoint endpoint = state_->acceptor.local_endpoint(closed);
+    return closed ? std::uint16_t{0} : endpoint.port();
+}
+
+asio::any_io_executor Acceptor::get_executor() const { return state_->acceptor.get_executor(); }
+
+void Acceptor::close() {
+    error_code ignored;
+    state_->acceptor.close(ignored);
+    state_->pause.cancel();
+}
+
+}  // namespace panelgate::rt

@@ -1,0 +1,168 @@
+#include "house_seam.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::scenario {
+namespace {
+
+std::uint16_t word(ByteView bytes, std::size_t at) {
+    return static_cast<std::uint16_t>(bytes[at] * 256 + bytes[at + 1]);
+}
+
+/// Refusals are handed out a millisecond apart.
+constexpr Duration kSlack = 2ms;
+
+}  // namespace
+
+void HouseJudge::on_executed(TimePoint now, std::uint8_t station, ByteView pdu) {
+    truth_.on_executed(now, station, pdu);
+    if (never_sent_.contains(scenario::key_of(station, pdu)))
+        fail("P2: a write was executed that was answered as never sent");
+}
+
+std::optional<Duration> HouseJudge::max_age(std::uint8_t station) const {
+    for (const arbiter::StationSettings& s : plan_.line.settings.stations) {
+        if (s.id == station && s.max_age > Duration::zero()) return s.max_age;
+    }
+    return std::nullopt;
+}
+
+bool HouseJudge::in_time(TimePoint deadline) const {
+    const TimePoint now = agenda_.now();
+    if (now <= deadline + kSlack) return true;
+    return std::ranges::any_of(pauses_, [&](const auto& pause) {
+        return pause.first <= deadline + kSlack && now <= pause.second + kSlack;
+    });
+}
+
+void HouseJudge::check(const Truth::Read& read, std::uint16_t address, std::uint16_t value) {
+    if (const char* wrong = truth_.fault_of(read, address, value)) fail(wrong);
+}
+
+void HouseJudge::judge_exception(const Question& question) {
+    if (!truth_.refused(question.station, question.pdu, question.at))
+        fail("P1: an exception that the station did not send to this request");
+}
+
+void HouseJudge::judge(const Question& question, const Bytes& reply,
+                       std::optional<TimePoint> oldest) {
+    if (question.pdu[0] <= 4) return judge_read(question, reply, oldest);
+    ++good;
+    const auto done = truth_.executed(question.station, question.pdu);
+    if (question.station != 0 && (!done || *done < question.at))
+        fail("P2: a write is confirmed that was not executed");
+}
+
+void HouseJudge::judge_read(const Question& question, const Bytes& reply,
+                            std::optional<TimePoint> oldest) {
+    const std::size_t count = word(question.pdu, 3);
+    if (reply[0] != question.pdu[0] || reply.size() != 2 + 2 * count)
+        return fail("P1: a reply of another shape");
+    Truth::Read read{question.station, question.pdu[0], agenda_.now(),
+                     question.at,      question.served, std::nullopt};
+    if (oldest) {
+        read.since = *oldest;
+        read.age = agenda_.now() - *oldest;
+    }
+    for (std::size_t i = 0; i < count; ++i)
+        check(read, static_cast<std::uint16_t>(word(question.pdu, 1) + i), word(reply, 2 + 2 * i));
+    ++good;
+}
+
+void HouseJudge::judge_values(std::uint8_t station, std::uint16_t address,
+                              const std::vector<std::uint16_t>& values, TimePoint sampled) {
+    const TimePoint now = agenda_.now();
+    const Truth::Read read{station, 3, now, sampled, 0, now - sampled};
+    for (std::size_t i = 0; i < values.size(); ++i)
+        check(read, static_cast<std::uint16_t>(address + i), values[i]);
+}
+
+void HouseSeam::transact(bus::Request request, bus::AnswerHandler handler) {
+    Open open{judge_.ask(request.station, request.request.pdu()), request.client, request.poll,
+              polls_};
+    if (open.poll) judge_relay(open);
+    const std::uint64_t id = ++last_;
+    open_[id] = open;
+    if (flaw_ == Flaw::polls_first && open.poll) request.poll = false;
+    if (flaw_ == Flaw::answers_at_once && id % 50 == 0) {
+        inside_ = true;
+        hand_over(open, {}, handler, id);
+        inside_ = false;
+        return;
+    }
+    inside_ = true;
+    bus_.transact(std::move(request), [this, id, open, handler](bus::Answer answer) {
+        hand_over(open, std::move(answer), handler, id);
+    });
+    inside_ = false;
+}
+
+/// What a relay writes it has read just before.
+void HouseSeam::judge_relay(const Open& open) {
+    const Bytes& pdu = open.question.pdu;
+    if (pdu[0] == 3 && word(pdu, 1) == kRelayFrom) relay_asked_ = agenda_.now();
+    if (pdu[0] != 16) return;
+    ++relayed_;
+    const std::vector<std::uint16_t> values{word(pdu, 6), word(pdu, 8)};
+    judge_.judge_values(plan_.line.panels.front().id, kRelayFrom, values, relay_asked_);
+}
+
+void HouseSeam::hand_over(const Open& open, bus::Answer answer, const bus::AnswerHandler& handler,
+                          std::uint64_t id) {
+    const bool read = open.question.pdu[0] <= 4 && answer.pdu.has_value();
+    if (flaw_ == Flaw::answers_never && id % 50 == 0) return;
+    if (flaw_ == Flaw::answers_the_other && read && id % 20 == 0 && last_read_) {
+        answer = *std::exchange(last_read_, std::nullopt);
+    } else if (read) {
+        last_read_ = answer;
+    }
+    if (flaw_ == Flaw::remembers && read && !open.poll) {
+        const std::string key = key_of(open.question.station, open.question.pdu);
+        answer = remembered_.try_emplace(key, answer).first->second;
+    }
+    const int times = flaw_ == Flaw::answers_twice && id % 50 == 0 ? 2 : 1;
+    for (int i = 0; i < times; ++i) {
+        on_answer(id, answer);
+        handler(answer);
+    }
+}
+
+void HouseSeam::on_answer(std::uint64_t id, const bus::Answer& answer) {
+    if (inside_) judge_.fail("answered from inside transact()");
+    const auto found = open_.find(id);
+    if (found == open_.end()) return judge_.fail("a request was answered twice");
+    const Open open = std::move(found->second);
+    open_.erase(found);
+    ++answers_;
+    judge(open, answer);
+    if (open.poll && answer.transmitted && !answer.shared) ++polls_;
+}
+
+void HouseSeam::judge(const Open& open, const bus::Answer& answer) {
+    const bool cached = answer.source == bus::Source::cache;
+    if (!judge_.in_time(open.question.at + plan_.line.settings.queue.deadline))
+        judge_.fail("P3: answered after its deadline");
+    if (cached && open.poll) judge_.fail("P6: a poll was answered by the memory");
+    if (cached && answer.age > judge_.max_age(open.question.station).value_or(Duration::zero()))
+        judge_.fail("P6: a value older than max_age");
+    if (!answer.pdu) {
+        if (!answer.transmitted && open.question.pdu[0] > 4) judge_.on_never_sent(open.question);
+        // A poll may find no turn: the client has one whenever it wants it.
+        if (plan_.calm && !open.poll && answer.pdu.error() != Fault::cancelled)
+            judge_.fail("P4: a sound panel's request failed: " +
+                        std::string(label(answer.pdu.error())));
+        return;
+    }
+    if (modbus::exception_of(*answer.pdu)) return judge_.judge_exception(open.question);
+    judge_.judge(open.question, *answer.pdu,
+                 cached ? std::optional(agenda_.now() - answer.age) : std::nullopt);
+    if (plan_.calm && !open.poll && polls_ - open.polls > 2)
+        judge_.fail("P9: polls went before a client's request");
+}
+
+}  // namespace panelgate::scenario

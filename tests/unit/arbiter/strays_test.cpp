@@ -1,0 +1,146 @@
+#include "panelgate/arbiter/strays.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <variant>
+
+#include "panelgate/base/frame_kind.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+const Bytes kRead = "03 00 6B 00 01"_hex;
+const Bytes kReply = "03 02 02 2B"_hex;
+
+Settings one_station() {
+    Settings settings;
+    settings.serial = {38400, 8, Parity::none, 1};
+    settings.stations = {settings.unlisted};
+    settings.stations[0].id = 17;
+    return settings;
+}
+
+/// A line with station 17, which was asked for kRead.
+class StraysTest : public testing::Test {
+  protected:
+    StraysTest() {
+        strays.on_sent(modbus::encode_adu(17, kRead));
+        quiet.on_sent(now, 17);
+        stations.of(17);
+    }
+    /// What this is taken for, as the trace says it; with a blank between two.
+    std::string heard(const Bytes& bytes, bool idle = false) {
+        now += 1s;
+        quiet.on_noise(now);
+        strays.hear(bytes);
+        strays.note(now, strays.take(17), idle, stations, quiet, ledger);
+        EXPECT_FALSE(strays.pending());
+        std::string words;
+        while (const auto action = ledger.poll()) {
+            const auto* note = std::get_if<Note>(&*action);
+            if (note == nullptr) continue;
+            EXPECT_EQ(direction_of(note->kind), FrameDirection::discarded);
+            words += (words.empty() ? "" : " ") + std::string(label(note->kind));
+        }
+        return words;
+    }
+    const StationCounters& counters() const { return ledger.stations().at(17); }
+
+    Settings settings = one_station();
+    Strays strays{settings.serial};
+    Stations stations{settings};
+    Quiet quiet{1s, 2ms};
+    Ledger ledger{settings};
+    TimePoint now{1h};
+};
+
+TEST_F(StraysTest, TheFrameSentLastIsItsEcho) {
+    EXPECT_EQ(heard(modbus::encode_adu(17, kRead)), "echo");
+    EXPECT_EQ(counters().symptoms.echoes, 1u);
+    EXPECT_EQ(counters().foreign_frames, 0u);
+}
+
+TEST_F(StraysTest, ARequestThatIsNotOursIsAnotherMasters) {
+    EXPECT_EQ(heard(modbus::encode_adu(18, kRead)), "foreign request");
+    EXPECT_EQ(counters().symptoms.requests, 1u);
+    EXPECT_EQ(counters().foreign_frames, 1u);
+}
+
+TEST_F(StraysTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
+    const TimePoint before = quiet.free_at(2ms);
+    heard(modbus::encode_adu(18, kRead));
+    EXPECT_GE(quiet.free_at(2ms), now + 20ms) << "a panel may think as long";
+    EXPECT_LE(quiet.free_at(2ms), now + 200ms);
+    EXPECT_LT(before, now);
+}
+
+TEST_F(StraysTest, WhatNobodyAnswersOrHasAlreadyAnsweredNeedsNoRest) {
+    heard(modbus::encode_adu(0, "10 00 01 00 01 02 00 05"_hex));
+    EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "a broadcast";
+    Bytes both = modbus::encode_adu(18, kRead);
+    const Bytes reply = modbus::encode_adu(18, kReply);
+    both.insert(both.end(), reply.begin(), reply.end());
+    heard(both);
+    EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "its reply was heard with it";
+}
+
+TEST_F(StraysTest, AGoodFrameOfAPanelThatNobodyAskedIsForeign) {
+    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign");
+    EXPECT_EQ(heard(modbus::encode_adu(99, kReply)), "foreign");
+    EXPECT_EQ(counters().symptoms.unasked, 2u);
+    EXPECT_EQ(counters().foreign_frames, 2u);
+}
+
+TEST_F(StraysTest, AReplyThatIsOwedIsLateAndTellsHowMuch) {
+    stations.of(17).owe(now, kRead, now - 500ms);
+    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "late");
+    EXPECT_EQ(counters().late_frames, 1u);
+    EXPECT_EQ(counters().foreign_frames, 0u);
+    EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign") << "it was owed once only";
+}
+
+TEST_F(StraysTest, BytesThatAreNoFrameAreDamagedAndCounted) {
+    EXPECT_EQ(heard("FF 00 FF"_hex), "damaged");
+    EXPECT_EQ(counters().symptoms.strays, 1u);
+    EXPECT_EQ(counters().discarded_bytes, 3u);
+    Bytes mixed = modbus::encode_adu(99, kReply);
+    mixed.push_back(0xFF);
+    EXPECT_EQ(heard(mixed), "foreign damaged");
+}
+
+TEST_F(StraysTest, WhatIsAWrongReplyIsNeitherEchoNorRequestNorOwed) {
+    EXPECT_TRUE(strays.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations));
+    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, kRead), stations)) << "echo";
+    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, "03 00 00 00 01"_hex), stations))
+        << "a request";
+    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(99, kReply), stations)) << "nobody";
+    stations.of(17).owe(now, kRead, now - 500ms);
+    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations)) << "owed";
+}
+
+TEST_F(StraysTest, GathersNoMoreThanAnyFrameHas) {
+    EXPECT_FALSE(strays.pending());
+    strays.hear(Bytes(modbus::ReplyFramer::kMaxHeard, 0xFF));
+    EXPECT_TRUE(strays.pending());
+    EXPECT_FALSE(strays.full());
+    strays.hear("FF"_hex);
+    EXPECT_TRUE(strays.full());
+    strays.forget();
+    EXPECT_FALSE(strays.pending());
+}
+
+TEST_F(StraysTest, TheTrailIsOfWhoAnsweredWhatWasSentBefore) {
+    EXPECT_EQ(strays.replied_before(), 0);
+    strays.on_replied(17);
+    EXPECT_EQ(strays.replied_before(), 0) << "it answered what is on the wire";
+    strays.on_sent(modbus::encode_adu(18, kRead));
+    EXPECT_EQ(strays.replied_before(), 17);
+    strays.on_sent(modbus::encode_adu(18, kRead));
+    EXPECT_EQ(strays.replied_before(), 0) << "the one between was not answered";
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter

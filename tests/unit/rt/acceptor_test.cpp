@@ -1,0 +1,58 @@
+#include "panelgate/rt/acceptor.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <vector>
+
+namespace panelgate::rt {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+class AcceptorTest : public ::testing::Test {
+  protected:
+    tcp::socket connect(std::uint16_t port) {
+        tcp::socket client(io);
+        client.connect({asio::ip::make_address("127.0.0.1"), port});
+        return client;
+    }
+
+    asio::io_context io{1};
+    std::vector<tcp::socket> accepted;
+    Acceptor acceptor{io.get_executor(),
+                      [this](tcp::socket socket) { accepted.push_back(std::move(socket)); },
+                      [](const error_code& why) { FAIL() << why.message(); }};
+};
+
+TEST_F(AcceptorTest, HandsOverWhoeverComes) {
+    ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
+    const tcp::socket first = connect(acceptor.port());
+    const tcp::socket second = connect(acceptor.port());
+    while (accepted.size() < 2) io.run_one();
+    EXPECT_EQ(accepted[0].remote_endpoint(), first.local_endpoint());
+    EXPECT_EQ(accepted[1].remote_endpoint(), second.local_endpoint());
+}
+
+TEST_F(AcceptorTest, SaysWhatIsWrongAndStaysClosed) {
+    ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
+    Acceptor second(io.get_executor(), [](tcp::socket) {}, [](const error_code&) {});
+    EXPECT_EQ(second.open("127.0.0.1", acceptor.port()), asio::error::address_in_use);
+    EXPECT_EQ(second.port(), 0);
+    EXPECT_EQ(second.open("no address", 0), asio::error::invalid_argument);
+}
+
+TEST_F(AcceptorTest, HandsOverNobodyOnceItIsClosed) {
+    ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
+    const tcp::socket client = connect(acceptor.port());
+    acceptor.close();
+    EXPECT_EQ(acceptor.port(), 0);
+    io.run();
+    EXPECT_TRUE(accepted.empty());
+}
+
+}  // namespace
+}  // namespace panelgate::rt

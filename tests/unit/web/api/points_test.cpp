@@ -1,0 +1,114 @@
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "http_rig.hpp"
+#include "panelgate/points/station_polls.hpp"
+
+namespace panelgate::web {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kOil = "/api/v1/stations/press/points/oil";
+
+/// press has a point oil (UW7, writable, 0 to 100) and a point serial that only reads.
+class ApiPoints : public HttpRig {
+  protected:
+    ApiPoints() {
+        points.resize(2);
+        points[0].name = "oil";
+        points[0].at = "UW7";
+        points[0].address = 7;
+        points[0].unit = "bar";
+        points[0].writable = true;
+        points[0].min = 0;
+        points[0].max = 100;
+        points[1].name = "serial";
+        points[1].at = "UW8";
+        points[1].address = 8;
+        polls = std::make_unique<points::StationPolls>(
+            points::wants_of(points, {}), points::make_plan_limits(panel, SerialFormat{}, 2ms),
+            now);
+        shown = std::make_unique<points::StationPoints>(points, blocks, *polls);
+        directory.stations[0].points = shown.get();
+    }
+    /// Each point's register holds this.
+    void poll(std::uint16_t value) {
+        now = std::max(now, *polls->next_due());
+        for (const auto& due : polls->take_due(now)) {
+            Writer reply;
+            const unsigned count = polls->plan()[due.read].span.count;
+            reply.u8(3).u8(2 * count);
+            for (unsigned i = 0; i < count; ++i) reply.u16(value);
+            polls->on_answer(now, due.read, Result<Bytes>(reply.take()), now);
+        }
+    }
+    Reply put(const std::string& body) { return ask("PUT", kOil, body); }
+
+    std::vector<points::Point> points;
+    std::vector<points::Poll> blocks;
+    std::unique_ptr<points::StationPolls> polls;
+    std::unique_ptr<points::StationPoints> shown;
+};
+
+TEST_F(ApiPoints, P10ShowsNothingForWhatWasNeverRead) {
+    EXPECT_EQ(get(kOil).json(),
+              json_of(R"({"name":"oil","value":null,"unit":"bar","quality":"bad","age_ms":null,)"
+                      R"("at":"UW7","type":"u16","writable":true})"));
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiPoints, ShowsWhatPollsHaveBroughtWithoutTouchingTheBus) {
+    poll(21);
+    EXPECT_EQ(get(kOil).at("value"), 21);
+    EXPECT_EQ(get(kOil).at("quality"), "good");
+    EXPECT_EQ(get("/api/v1/stations/press/points").at("points").as_array().size(), 2u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiPoints, WritesAValueByOneRequest) {
+    EXPECT_EQ(put(R"({"value":42})").json(), json_of(R"({"transmitted":true,"confirmed":true})"));
+    ASSERT_EQ(bus.requests.size(), 1u);
+    EXPECT_EQ(last_pdu(), "06 00 07 00 2a");
+    EXPECT_EQ(bus.requests[0].station, 31u);
+}
+
+TEST_F(ApiPoints, RefusesAValueThatThePointCannotTake) {
+    EXPECT_EQ(put(R"({"value":101})").status(), 422u);
+    EXPECT_EQ(put(R"({"value":"much"})").status(), 422u);
+    EXPECT_EQ(put(R"({"value":null})").status(), 400u);
+    EXPECT_EQ(put(R"({"values":[1]})").status(), 400u);
+    EXPECT_EQ(ask("PUT", "/api/v1/stations/press/points/serial", R"({"value":1})").status(), 422u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiPoints, KnowsNoOtherPoints) {
+    const Reply reply = get("/api/v1/stations/press/points/water");
+    EXPECT_EQ(reply.status(), 404u);
+    EXPECT_THAT(reply.body(), HasSubstr("station 'press' has no point 'water'"));
+    EXPECT_EQ(get("/api/v1/stations/floor1:7/points/oil").status(), 404u);
+    EXPECT_EQ(get("/api/v1/stations/floor1:7/points").json(), json_of(R"({"points":[]})"));
+}
+
+TEST_F(ApiPoints, GivesAPanelsExceptionToAWrite) {
+    bus.script = [](const bus::Request&) { return test::FakeBus::reply({0x86, 2}); };
+    const Reply reply = put(R"({"value":42})");
+    EXPECT_EQ(reply.status(), 422u);
+    EXPECT_THAT(reply.body(), HasSubstr("Address is outside the range"));
+}
+
+TEST_F(ApiPoints, InterpretsAFewRegisters) {
+    const Reply reply = get("/api/v1/stations/press/holding-registers/7/interpretations?count=2");
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(reply.at("raw"), json_of("[7,8]"));
+    EXPECT_EQ(last_pdu(), "03 00 07 00 02");
+    const char* const too_many =
+        "/api/v1/stations/press/holding-registers/7/interpretations?count=17";
+    EXPECT_EQ(get(too_many).status(), 422u);
+    EXPECT_EQ(get("/api/v1/stations/press/coils/7/interpretations").status(), 422u);
+    EXPECT_EQ(bus.requests.size(), 1u);
+}
+
+}  // namespace
+}  // namespace panelgate::web
