@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "check_doors.hpp"
 #include "loader.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
@@ -74,6 +75,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     if (is_empty && root.child("http") == nullptr)
         loading.problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
     root.finish();
+    if (loading.problems.empty()) warn_of_doors(loading, tree);
 }
 
 /// All of `unset`, and of `found` what does not only follow from it, at the same place. What many

@@ -9,14 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/config/settings.hpp"
+
 namespace panelgate::config {
 namespace {
 
 using yaml::Entry;
 using yaml::Node;
-
-/// Values that all stations together may get: a short file must not become a large memory.
-constexpr std::size_t kMostValues = 500'000;
 
 Node* find(Node& map, std::string_view key) {
     const auto found = std::ranges::find(map.entries, key, &Entry::key);
@@ -31,11 +30,26 @@ std::optional<Node> take(Node& map, std::string_view key) {
     return value;
 }
 
-std::size_t values_in(const Node& node) {
-    std::size_t count = 1;
-    for (const Node& item : node.items) count += values_in(item);
-    for (const Entry& entry : node.entries) count += values_in(entry.value);
-    return count;
+struct Size {
+    std::size_t values = 0;
+    std::size_t text = 0;
+
+    bool fits() const { return values <= kMaxTemplateValues && text <= kMaxTemplateText; }
+    Size& operator+=(const Size& other) {
+        values += other.values;
+        text += other.text;
+        return *this;
+    }
+};
+
+Size size_of(const Node& node) {
+    Size size{1, node.scalar.size()};
+    for (const Node& item : node.items) size += size_of(item);
+    for (const Entry& entry : node.entries) {
+        size.text += entry.key.size();
+        size += size_of(entry.value);
+    }
+    return size;
 }
 
 /// Adds what `map` does not say itself.
@@ -53,7 +67,7 @@ void add_missing(Node& map, const Node& from) {
 struct Template {
     yaml::Mark mark;
     Node body;
-    std::size_t values = 0;
+    Size size;
     bool used = false;
 };
 
@@ -83,13 +97,15 @@ class Templates {
             return;
         }
         found->second.used = true;
-        const bool had_room = given_ <= kMostValues;
-        given_ += found->second.values;
-        if (given_ <= kMostValues) {
+        const bool had_room = given_.fits();
+        given_ += found->second.size;
+        if (given_.fits()) {
             add_missing(station, found->second.body);
         } else if (had_room) {
-            loading_.problems.add(named->mark, "templates give more than " +
-                                                   std::to_string(kMostValues) + " values in all");
+            loading_.problems.add(named->mark,
+                                  "templates give more than " + std::to_string(kMaxTemplateValues) +
+                                      " values, or " + std::to_string(kMaxTemplateText >> 20U) +
+                                      " MiB of text, to all stations together");
         }
     }
 
@@ -119,8 +135,8 @@ class Templates {
                                                  "template");
             body.entries.erase(key);
         }
-        const std::size_t values = values_in(body);
-        templates_[entry.key] = {entry.mark, std::move(body), values, false};
+        const Size size = size_of(body);
+        templates_[entry.key] = {entry.mark, std::move(body), size, false};
     }
 
     std::string unknown(const std::string& typed) const {
@@ -135,7 +151,7 @@ class Templates {
 
     Loading& loading_;
     std::map<std::string, Template> templates_;
-    std::size_t given_ = 0;
+    Size given_;
 };
 
 }  // namespace

@@ -60,6 +60,8 @@ struct Files {
     virtual std::optional<std::string> read(const std::string& path) const = 0;
     /// Paths of the *.yaml files in a directory, sorted; nothing when it cannot be listed.
     virtual std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const = 0;
+    /// By everybody on the machine.
+    virtual bool is_readable_by_all(const std::string&) const { return false; }
 };
 
 /// Text -> Config. Nothing is returned when `problems` got any entry. `environment` gives the

@@ -52,7 +52,9 @@ std::optional<std::string> environment(const std::string& name) {
 
 /// What the user reads: the problems, or the warnings of a valid file.
 std::string told(const std::string& configuration) {
-    const MemoryFiles files({{"/run/secrets/ops", "  secret \n"},
+    const MemoryFiles files({{"/run/secrets/ops", "  secret-0123456789 \n"},
+                             {"/run/secrets/short", "secret\n"},
+                             {"/public/ops", "secret-0123456789\n"},
                              {"/run/secrets/empty", " \n"},
                              {"/run/secrets/two", "one two\n"},
                              {"/etc/panelgate/profiles/broken.yaml", "descriptions: x: y\n"}});
