@@ -23,9 +23,10 @@ std::optional<std::string> environment(const std::string& name) {
 Loaded load_file(const std::string& path) {
     const auto text = config::RealFiles().read(path);
     if (!text) {
-        std::cerr << "panelgate: cannot read " << path << ": " << std::strerror(errno)
+        const std::string why = std::strerror(errno);
+        std::cerr << "panelgate: cannot read " << path << ": " << why
                   << " (give another file with -c)\n";
-        return {std::nullopt, kNoInput};
+        return {std::nullopt, kNoInput, {{path, {0, 0}, "cannot be read: " + why}}};
     }
     return load_text(*text, path);
 }
@@ -37,6 +38,7 @@ Loaded load_text(std::string_view text, const std::string& name) {
     if (!loaded.config) {
         std::cerr << problems.text();
         loaded.code = kBadConfig;
+        loaded.problems = problems.list();
     }
     return loaded;
 }
