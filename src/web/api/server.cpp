@@ -10,14 +10,15 @@
 namespace panelgate::web {
 
 Server::Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-               Providers providers) {
+               Providers providers, Surface surface) {
     auto api = std::make_shared<Api>();
     api->directory = &directory;
     api->providers = std::move(providers);
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
     site->product = "panelgate/" + api->providers.version;
-    site->routes = routes(std::move(api));
+    site->routes =
+        surface == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
     site->next_caller = bus::next_client_id;
     listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
 }

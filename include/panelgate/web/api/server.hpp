@@ -30,12 +30,15 @@ struct Providers {
     EventHub* events = nullptr;  ///< never null; outlives the server
 };
 
+/// Who is served: the gateway, or simulated panels alone, whose directory may be without buses.
+enum class Surface : std::uint8_t { gateway, simulator };
+
 /// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor; the
 /// directory and what it points to outlive the server.
 class Server {
   public:
     Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-           Providers providers);
+           Providers providers, Surface surface = Surface::gateway);
     /// Ends everything that stop() would let finish; answers still owed are not sent.
     ~Server();
     Server(const Server&) = delete;
