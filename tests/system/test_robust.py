@@ -53,8 +53,8 @@ class BadClients(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.program = harness.demo()
-        cls.addClassCleanup(cls.program.stop)
+        cls.program = cls.enterClassContext(
+            harness.configured(config.gateway(config.line(), http=config.OPERATOR)))
         cls.http_port = cls.program.http_port()
         cls.good = cls.program.client()
         cls.addClassCleanup(cls.good.close)
