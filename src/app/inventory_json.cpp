@@ -92,7 +92,7 @@ json::object listener_json(const tcp_server::Settings& listener) {
     json::object units;
     for (const auto& [unit, target] : listener.units)
         units[std::to_string(unit)] = target.line + '/' + std::to_string(target.station);
-    const auto network = [](const tcp_server::Network& one) {
+    const auto network = [](const Network& one) {
         return json::value(one.address + '/' + std::to_string(one.prefix));
     };
     return {{"listen", listener.name()},

@@ -72,7 +72,7 @@ std::string text_of(const tcp_server::Settings& listener) {
     text += ", " + rights(listener.read_only) + ", for ";
     if (listener.allow.empty()) text += "everybody";
     for (std::size_t i = 0; i < listener.allow.size(); ++i) {
-        const tcp_server::Network& network = listener.allow[i];
+        const Network& network = listener.allow[i];
         text += (i > 0 ? " " : "") + network.address + '/' + std::to_string(network.prefix);
     }
     text += '\n';

@@ -62,7 +62,6 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     apply_templates(loading, tree);
     MapReader root(tree, loading.problems, "the configuration");
     if (tree.kind != yaml::Node::Kind::map) return;
-    root.has("templates");  // known, though nothing of it is left
     loading.config.profiles = load_profiles(loading, root);
     load_lines(loading, root);
     load_modbus_tcp(loading, root);
@@ -74,6 +73,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
                                                    listeners->items.empty());
     if (is_empty && root.child("http") == nullptr)
         loading.problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
+    root.has("templates");  // known, though nothing of it is left
     root.finish();
     if (loading.problems.empty()) warn_of_doors(loading, tree);
 }

@@ -2,6 +2,8 @@
 
 #include <string_view>
 
+#include "panelgate/base/utf8.hpp"
+
 namespace panelgate::yaml {
 namespace {
 
@@ -80,6 +82,11 @@ class Expansion {
             const std::string& name = variable->name;
             problems_.add(node.mark, "the environment has no " + name + "; set it, or write ${" +
                                          name + ":-default}");
+            return text;
+        }
+        if (!is_utf8(*value)) {
+            problems_.add(node.mark,
+                          "what the environment has as " + variable->name + " is not UTF-8");
             return text;
         }
         brought_ += value->size();

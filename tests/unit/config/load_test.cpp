@@ -184,6 +184,19 @@ TEST(ConfigLoad, ListenersMayAllAskForAFreePort) {
     EXPECT_EQ(config.modbus_tcp.size(), 2U);
 }
 
+TEST(ConfigLoad, TakesNothingFromTheEnvironmentIntoASecret) {
+    const MemoryFiles files({{"/run/secrets/ops", "${BAUD}$$0123456789"}});
+    yaml::Problems problems("f.yaml");
+    const auto config = load(kSimple +
+                                 "http: {tokens: [{name: ops, role: operator, file: "
+                                 "${DIR}/ops}]}\n",
+                             files, problems, [](const std::string& name) {
+                                 return name == "DIR" ? "/run/secrets" : "38400";
+                             });
+    ASSERT_TRUE(config) << problems.text();
+    EXPECT_EQ(config->http->tokens.at(0).secret, "${BAUD}$$0123456789");
+}
+
 TEST(ConfigLoad, ReadsTokensFromTheirFiles) {
     const MemoryFiles files({{"/run/secrets/ops", "\n s3cret \r\n"}});
     const Config config =

@@ -9,8 +9,12 @@ namespace panelgate::yaml {
 namespace {
 
 std::optional<std::string> environment(const std::string& name) {
-    const std::map<std::string, std::string> set{
-        {"BAUD", "38400"}, {"EMPTY", ""}, {"TRICKY", "}, x: [1"}};
+    const std::map<std::string, std::string> set{{"BAUD", "38400"},
+                                                 {"EMPTY", ""},
+                                                 {"TRICKY", "}, x: [1"},
+                                                 {"LATIN",
+                                                  "\xB0"
+                                                  "C"}};
     const auto found = set.find(name);
     if (found == set.end()) return std::nullopt;
     return found->second;
@@ -71,6 +75,10 @@ TEST(YamlVariables, WhatIsNeitherFormIsAProblem) {
     for (const std::string form : {"${}", "${1X}", "${A-b}", "${A:b}", "${A B}"})
         EXPECT_EQ(read("a: " + form), "f:1:4: '" + form + '\'' + wanted);
     EXPECT_EQ(read("a: '${A'"), "f:1:4: '${A'" + wanted);
+}
+
+TEST(YamlVariables, WhatIsNoUtf8IsAProblem) {
+    EXPECT_EQ(read("a: ${LATIN}"), "f:1:4: what the environment has as LATIN is not UTF-8\n");
 }
 
 TEST(YamlVariables, KeysStayAsTheyAre) {
