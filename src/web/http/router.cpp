@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "access.hpp"
-#include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -66,8 +65,10 @@ Problem not_found(const Found& found) {
 
 }  // namespace
 
-Handling dispatch(HttpRequest request, const Site* site) {
+Handling dispatch(HttpRequest request, const Site* site, std::optional<Problem> barred) {
     Found found = find_route(request, site->routes);
+    const bool free = found.route != nullptr && found.route->needed == Role::none;
+    if (barred && !free) co_return to_response(*barred);
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = check_access(request, found.route->needed, site->settings);
     if (refused) co_return to_response(*refused);

@@ -5,8 +5,8 @@
 #include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
-#include <set>
 
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/web/http/site.hpp"
@@ -14,6 +14,7 @@
 namespace panelgate::web {
 
 class HttpSession;
+struct Shared;
 
 /// Accepts connections and owns their sessions. Lives in the one thread that runs the executor.
 class HttpListener : public std::enable_shared_from_this<HttpListener> {
@@ -32,10 +33,12 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
 
   private:
     void take(boost::asio::ip::tcp::socket socket);
+    /// May it ask only for what is free?
+    bool make_room(const Caller& caller);
 
-    std::shared_ptr<const Site> site_;
+    std::shared_ptr<Shared> shared_;
     rt::Acceptor acceptor_;
-    std::set<std::shared_ptr<HttpSession>> sessions_;
+    std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by their callers' ids
 };
 
 }  // namespace panelgate::web

@@ -23,9 +23,15 @@ struct Settings {
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
     std::size_t max_connections = 256;
-    std::size_t max_body = 64 * 1024;  ///< bytes
-    Duration idle_timeout = 60s;       ///< of a keep-alive connection
-    Duration request_timeout = 10s;    ///< to receive one request, and to send one answer
+    std::size_t max_per_address = 32;      ///< of these
+    std::size_t probe_places = 16;         ///< beyond these: only what is free is answered there
+    std::size_t max_body = 64 * 1024;      ///< bytes
+    Duration first_request_timeout = 10s;  ///< of a connection that has not asked anything yet
+    Duration idle_timeout = 60s;           ///< of a keep-alive connection
+    Duration request_timeout = 10s;        ///< to receive one request, and to send one answer
+    /// How long a client that has closed its sending side is waited for before it is asked whether
+    /// it is still there, and how long between two such questions.
+    Duration half_close_grace = 2s;
 
     std::string name() const { return address + ":" + std::to_string(port); }
 };

@@ -18,7 +18,7 @@ using Handling = boost::asio::awaitable<HttpResponse>;
 struct Route {
     std::string_view verb;     ///< "GET" stands for HEAD, too
     std::string_view pattern;  ///< {} stands for any one segment
-    Role needed = Role::none;
+    Role needed = Role::none;  ///< none: free, also when everything else is barred
     std::function<Handling(HttpRequest)> handler;
 };
 

@@ -1,0 +1,159 @@
+"""The HTTP server's doors: how many get in, and when they have left."""
+import contextlib
+import json
+import socket
+import struct
+import unittest
+
+import harness
+from config import OPERATOR, gateway, line
+
+PRESS = "/api/v1/stations/press/devices/"
+
+
+class Connection:
+    """Raw HTTP: what is sent is what the test says."""
+
+    def __init__(self, port, own_address="127.0.0.1"):
+        self.socket = socket.create_connection(("127.0.0.1", port), harness.PATIENCE,
+                                               (own_address, 0))
+        self._file = self.socket.makefile("rb")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self._file.close()
+        self.socket.close()
+
+    def ask(self, method, path, *headers, body=None, host="localhost", version="1.1"):
+        """The Answer; headers are whole lines."""
+        self.send(method, path, *headers, body=body, host=host, version=version)
+        return self.receive()
+
+    def send(self, method, path, *headers, body=None, host="localhost", version="1.1"):
+        lines = [f"{method} {path} HTTP/{version}", *([f"Host: {host}"] if host else []), *headers]
+        data = b"" if body is None else json.dumps(body).encode()
+        if data:
+            lines.append(f"Content-Length: {len(data)}")
+        self.socket.sendall("\r\n".join([*lines, "", ""]).encode("latin-1") + data)
+
+    def end_input(self):
+        self.socket.shutdown(socket.SHUT_WR)
+
+    def receive(self):
+        """The next answer that is final; None: the connection ended before."""
+        while True:
+            start = self._file.readline()
+            if not start:
+                return None
+            headers = {}
+            while (text := self._file.readline().decode().rstrip("\r\n")):
+                name, value = text.split(": ", 1)
+                headers[name.lower()] = value
+            status = int(start.split()[1])
+            if status >= 200:
+                return Answer(status, headers, self._file.read(int(headers.get("content-length", 0))))
+
+
+class Answer:
+    def __init__(self, status, headers, body):
+        self.status, self.headers, self.body = status, headers, body
+
+    def json(self):
+        return json.loads(self.body)
+
+
+class Doors(unittest.TestCase):
+    CONFIG = gateway(line(), http=OPERATOR)
+
+    @classmethod
+    def setUpClass(cls):
+        cls.stack = contextlib.ExitStack()
+        cls.program = cls.stack.enter_context(harness.configured(cls.CONFIG))
+        cls.port = cls.program.http_port()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.stack.close()
+
+    def ask(self, *request, **options):
+        with Connection(self.port) as connection:
+            return connection.ask(*request, **options)
+
+    def status(self, *request, **options):
+        answer = self.ask(*request, **options)
+        return answer.status if answer else None
+
+
+class Places(Doors):
+    def test_256_idle_connections_close_neither_probes_nor_rest(self):
+        with contextlib.ExitStack() as crowd:
+            for _ in range(256):
+                crowd.enter_context(Connection(self.port))
+            for path in ("/healthz", "/readyz", "/api/v1/stations", PRESS + "UW0", "/metrics"):
+                self.assertEqual(self.status("GET", path), 200, path)
+
+    def test_many_addresses_of_idle_connections_close_nothing_either(self):
+        with contextlib.ExitStack() as crowd:
+            for n in range(2, 12):
+                for _ in range(32):
+                    crowd.enter_context(Connection(self.port, f"127.0.0.{n}"))
+            for path in ("/healthz", "/readyz", "/api/v1/stations", PRESS + "UW0"):
+                self.assertEqual(self.status("GET", path), 200, path)
+
+    def test_with_all_places_of_an_address_busy_it_is_refused_in_words_and_probes_are_answered(self):
+        with contextlib.ExitStack() as crowd:
+            for _ in range(32):
+                crowd.enter_context(Connection(self.port)).ask("GET", "/healthz")
+            streams = [crowd.enter_context(Connection(self.port)) for _ in range(32)]
+            for stream in streams:
+                stream.send("GET", "/api/v1/events")
+                self.assertEqual(stream._file.readline(), b"HTTP/1.1 200 OK\r\n")
+            refused = self.ask("PUT", PRESS + "UW100", body={"values": [1]})
+            self.assertEqual(refused.status, 503)
+            self.assertEqual(refused.headers["content-type"], "application/problem+json")
+            self.assertEqual(refused.headers["retry-after"], "1")
+            self.assertEqual(refused.json()["status"], 503)
+            for path in ("/healthz", "/readyz"):
+                self.assertEqual(self.status("GET", path), 200, path)
+            with Connection(self.port, "127.0.0.2") as other:
+                self.assertEqual(other.ask("GET", "/api/v1/stations").status, 200)
+
+
+class HalfClosed(Doors):
+    def test_P3_a_client_that_closes_its_sending_side_gets_its_answers(self):
+        with Connection(self.port) as client:
+            client.send("GET", PRESS + "UW0?count=5")
+            client.end_input()
+            self.assertEqual(client.receive().json()["values"], [10, 20, 30, 40, 50])
+            self.assertIsNone(client.receive())
+
+    def test_P3_so_do_its_writes(self):
+        for value in range(20):
+            with Connection(self.port) as client:
+                client.send("PUT", PRESS + "UW100", body={"values": [value]})
+                client.end_input()
+                self.assertTrue(client.receive().json()["confirmed"])
+            self.assertEqual(self.program.values(PRESS + "UW100"), [value])
+
+    def test_P2_one_that_was_reset_takes_its_waiting_write_along(self):
+        self.assertEqual(self.program.rest("PUT", PRESS + "UW100", {"values": [7]})[0], 200)
+        self.program.rest("PUT", "/api/v1/simulator/press", {"dead": True})
+        try:
+            with Connection(self.port) as first, Connection(self.port) as leaver:
+                first.send("GET", PRESS + "UW0")
+                leaver.send("PUT", PRESS + "UW100", body={"values": [8]})
+                leaver.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                leaver.close()
+                first.receive()
+        finally:
+            self.program.rest("PUT", "/api/v1/simulator/press", {})
+        self.assertEqual(self.program.values(PRESS + "UW100"), [7])
+
+
+if __name__ == "__main__":
+    unittest.main()
