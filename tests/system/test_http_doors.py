@@ -1,4 +1,4 @@
-"""The HTTP server's doors: how many get in, and when they have left."""
+"""The HTTP server's doors: who gets in, under which name, from where, and how many."""
 import contextlib
 import json
 import socket
@@ -153,6 +153,82 @@ class HalfClosed(Doors):
         finally:
             self.program.rest("PUT", "/api/v1/simulator/press", {})
         self.assertEqual(self.program.values(PRESS + "UW100"), [7])
+
+
+class Names(Doors):
+    def test_a_page_under_a_foreign_name_reads_and_writes_nothing(self):
+        before = self.program.values(PRESS + "UW100")
+        evil = "evil.example:28080"
+        answer = self.ask("PUT", PRESS + "UW100", f"Origin: http://{evil}",
+                          "Content-Type: application/json", body={"values": [4242]}, host=evil)
+        self.assertEqual(answer.status, 421)
+        self.assertEqual(answer.headers["content-type"], "application/problem+json")
+        self.assertIn("evil.example", answer.json()["detail"])
+        for path in ("/", "/metrics", "/api/v1/stations", "/nothing"):
+            self.assertEqual(self.status("GET", path, host=evil), 421, path)
+        self.assertEqual(self.program.values(PRESS + "UW100"), before)
+
+    def test_its_own_names_are_known_in_all_their_forms(self):
+        for host in ("localhost", "LOCALHOST:1", "127.0.0.1", f"127.0.0.1:{self.port}", "localhost.",
+                     socket.gethostname(), "[::1]:80"):
+            self.assertEqual(self.status("GET", "/api/v1/lines", host=host), 200, host)
+
+    def test_probes_are_asked_by_any_name(self):
+        for path in ("/healthz", "/readyz"):
+            self.assertEqual(self.status("GET", path, host="pod-17.cluster"), 200)
+
+    def test_a_request_has_one_host(self):
+        self.assertEqual(self.status("GET", "/", host=None), 400)
+        self.assertEqual(self.status("GET", "/", "Host: localhost"), 400)
+        self.assertEqual(self.status("GET", "/", host=None, version="1.0"), 200)
+
+    def test_absolute_targets_and_options(self):
+        self.assertEqual(self.status("GET", "http://localhost/api/v1/lines"), 200)
+        self.assertEqual(self.status("GET", "http://evil.example/api/v1/lines"), 421)
+        answer = self.ask("OPTIONS", PRESS + "UW100")
+        self.assertEqual((answer.status, answer.headers["allow"]), (204, "GET, HEAD, PUT, OPTIONS"))
+        self.assertEqual(self.status("OPTIONS", "*"), 204)
+
+    def test_pages_of_other_sites_ask_nothing(self):
+        for site, status in (("cross-site", 403), ("same-origin", 200), ("none", 200)):
+            self.assertEqual(self.status("GET", PRESS + "UW0", f"Sec-Fetch-Site: {site}",
+                                         "Sec-Fetch-Mode: no-cors", "Sec-Fetch-Dest: image"), status)
+        self.assertEqual(self.status("GET", "/", "Sec-Fetch-Site: cross-site",
+                                     "Sec-Fetch-Mode: navigate", "Sec-Fetch-Dest: document"), 200)
+
+    def test_media_types_are_compared_without_case(self):
+        for kind, status in (("Application/JSON", 200), ("text/plain", 415)):
+            self.assertEqual(self.status("PUT", PRESS + "UW100", f"Content-Type: {kind}",
+                                         "Origin: http://localhost", body={"values": [1]}), status)
+
+    def test_bytes_that_are_no_utf8_are_refused_and_not_said_again(self):
+        for path in ("/api/v1/stations/%ff", "/api/v1/stations/%C3%28", "/api/v1/stations/\xff",
+                     PRESS + "UW0?type=%80"):
+            answer = self.ask("GET", path)
+            self.assertEqual(answer.status, 400, path)
+            answer.json()
+
+
+class GivenNames(Doors):
+    CONFIG = gateway(line(), http=OPERATOR + ", hosts: [Gateway.plant.example, 192.0.2.7]")
+
+    def test_hosts_take_the_place_of_the_machines_names(self):
+        for host, status in (("gateway.plant.example:8080", 200), ("192.0.2.7", 200),
+                             ("localhost", 200), ("127.0.0.1", 200), ("192.0.2.8", 421),
+                             (socket.gethostname(), 421)):
+            self.assertEqual(self.status("GET", "/api/v1/lines", host=host), status, host)
+
+
+class Allowed(unittest.TestCase):
+    def test_who_is_not_in_the_list_is_closed_without_a_byte(self):
+        with harness.configured(gateway(line(), http=OPERATOR + ", allow: [127.0.0.2/31]")) as program:
+            port = program.http_port()
+            with Connection(port, "127.0.0.3") as friend, Connection(port) as stranger:
+                self.assertEqual(friend.ask("GET", "/healthz").status, 200)
+                with contextlib.suppress(ConnectionError):
+                    stranger.send("GET", "/healthz")
+                    self.assertIsNone(stranger.receive())
+            program.log.wait_for(r"info connection refused .*client=127\.0\.0\.1 .*allow list")
 
 
 if __name__ == "__main__":

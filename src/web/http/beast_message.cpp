@@ -3,11 +3,33 @@
 #include <boost/beast/http/error.hpp>
 #include <utility>
 
+#include "host_names.hpp"
+
 namespace panelgate::web {
 namespace http = boost::beast::http;
 
-HttpRequest to_request(BeastRequest&& message, Target target) {
+std::optional<Target> target_of(const BeastRequest& message) {
+    const bool of_server = message.method() == http::verb::options && message.target() == "*";
+    return parse_target(of_server ? std::string("/*") : std::string(message.target()));
+}
+
+Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
+    const std::size_t named = message.count(http::field::host);
+    if (named > 1) return problem(400, "a request has one Host, not " + std::to_string(named));
+    if (named == 0 && message.version() >= 11) {
+        return problem(400, "a request of HTTP/1.1 must have a Host");
+    }
+    if (named == 0 && !target.authority) return std::string();
+    const std::string authority =
+        target.authority ? *target.authority : std::string(message[http::field::host]);
+    auto host = host_of_authority(authority);
+    if (!host) return problem(400, "the Host must be a name or an address, with a port or without");
+    return *host;
+}
+
+HttpRequest to_request(BeastRequest&& message, Target target, std::string host) {
     HttpRequest request;
+    request.host = std::move(host);
     request.method = message.method_string();
     request.path = std::move(target.path);
     request.query = std::move(target.query);

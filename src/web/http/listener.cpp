@@ -15,6 +15,7 @@ using boost::system::error_code;
 
 HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const Site> site)
     : shared_(std::make_shared<Shared>(std::move(site))),
+      allowed_(shared_->site->settings.allow),
       acceptor_(
           executor, [this](tcp::socket socket) { take(std::move(socket)); },
           [this](const error_code& why) {
@@ -32,6 +33,13 @@ void HttpListener::take(tcp::socket socket) {
     error_code gone;
     const tcp::endpoint peer = socket.remote_endpoint(gone);
     if (gone) return;
+    if (!allowed_.allows(peer.address())) {
+        rt::log(rt::LogLevel::info, "connection refused",
+                {{"listener", shared_->site->settings.name()},
+                 {"client", peer.address().to_string()},
+                 {"reason", "not in the allow list"}});
+        return;
+    }
     const auto caller =
         std::make_shared<Caller>(shared_->site->next_caller(), peer.address().to_string());
     const bool probes_only = make_room(*caller);

@@ -37,6 +37,12 @@ struct Found {
     std::string allow;  ///< methods of the path; empty: no such path
 };
 
+void add_verb(std::string& allow, std::string_view verb) {
+    if (allow.find(verb) != std::string::npos) return;
+    if (!allow.empty()) allow += ", ";
+    allow += verb == "GET" ? "GET, HEAD" : verb;
+}
+
 Found find_route(const HttpRequest& request, const std::vector<Route>& routes) {
     std::string_view verb = request.method;
     if (verb == "HEAD") verb = "GET";
@@ -49,9 +55,7 @@ Found find_route(const HttpRequest& request, const std::vector<Route>& routes) {
             found.arguments = std::move(*arguments);
             return found;
         }
-        if (found.allow.find(route.verb) != std::string::npos) continue;
-        if (!found.allow.empty()) found.allow += ", ";
-        found.allow += route.verb == "GET" ? "GET, HEAD" : route.verb;
+        add_verb(found.allow, route.verb);
     }
     return found;
 }
@@ -63,12 +67,27 @@ Problem not_found(const Found& found) {
     return made;
 }
 
+/// What the path can be asked; of the whole server, of each of its paths (RFC 9110 9.3.7).
+HttpResponse options(const Found& found, const HttpRequest& request, const Site& site) {
+    std::string allow = found.allow;
+    if (request.path == std::vector<std::string>{"*"}) {
+        for (const Route& route : site.routes) add_verb(allow, route.verb);
+    }
+    if (allow.empty()) return to_response(not_found(found));
+    HttpResponse response;
+    response.status = 204;
+    response.headers.emplace_back("Allow", allow + ", OPTIONS");
+    return response;
+}
+
 }  // namespace
 
-Handling dispatch(HttpRequest request, const Site* site, std::optional<Problem> barred) {
+Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
+    const std::shared_ptr<const Site> site = shared->site;
     Found found = find_route(request, site->routes);
     const bool free = found.route != nullptr && found.route->needed == Role::none;
     if (barred && !free) co_return to_response(*barred);
+    if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = check_access(request, found.route->needed, site->settings);
     if (refused) co_return to_response(*refused);

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+#include "origin.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"
@@ -49,6 +50,7 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
       departure_(stream_.socket(), shared_->site->settings.half_close_grace) {
     ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+    local_ = stream_.socket().local_endpoint(ignored).address();
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
@@ -86,11 +88,13 @@ asio::awaitable<bool> HttpSession::serve_one() {
 }
 
 asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
-    auto target = parse_target(std::string(message.target()));
+    auto target = target_of(message);
     if (!target) co_return to_response(problem(400, "the request target cannot be understood"));
+    auto host = host_of(message, *target);
+    if (!host) co_return to_response(host.error());
     departure_.ask_by(nullptr);
     if (message.version() >= 11) departure_.ask_by([this] { send_interim(); });
-    HttpRequest request = to_request(std::move(message), std::move(*target));
+    HttpRequest request = to_request(std::move(message), std::move(*target), std::move(*host));
     request.caller = caller_;
     asio::awaitable<HttpResponse> handling = handle(std::move(request));
     HttpResponse response = co_await std::move(handling);
@@ -157,11 +161,11 @@ asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
 asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
-    std::optional<Problem> barred;
+    std::optional<Problem> barred = check_origin(request, shared_->hosts, local_);
     if (probes_only_) barred = no_place();
     try {
         asio::awaitable<HttpResponse> handling =
-            dispatch(std::move(request), shared_->site.get(), barred);
+            dispatch(std::move(request), shared_.get(), barred);
         HttpResponse response = co_await std::move(handling);
         co_return response;
     } catch (const std::exception& error) {

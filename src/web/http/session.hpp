@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
@@ -51,6 +52,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::beast::tcp_stream stream_;
     std::shared_ptr<Shared> shared_;
     std::shared_ptr<Caller> caller_;
+    boost::asio::ip::address local_;  ///< at our end
     const bool probes_only_;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;

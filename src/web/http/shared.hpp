@@ -3,6 +3,7 @@
 #include <memory>
 #include <utility>
 
+#include "host_names.hpp"
 #include "panelgate/web/http/site.hpp"
 #include "places.hpp"
 
@@ -11,9 +12,12 @@ namespace panelgate::web {
 /// What the sessions of one listener have in common. One thread.
 struct Shared {
     explicit Shared(std::shared_ptr<const Site> with_site)
-        : site(std::move(with_site)), places(site->settings) {}
+        : site(std::move(with_site)),
+          hosts(site->settings, machine_names()),
+          places(site->settings) {}
 
     const std::shared_ptr<const Site> site;
+    const HostNames hosts;
     Places places;
 };
 

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "panelgate/rt/acceptor.hpp"
+#include "panelgate/rt/access_list.hpp"
 #include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
@@ -19,6 +20,7 @@ struct Shared;
 /// Accepts connections and owns their sessions. Lives in the one thread that runs the executor.
 class HttpListener : public std::enable_shared_from_this<HttpListener> {
   public:
+    /// Throws std::invalid_argument for an `allow` that is none.
     HttpListener(boost::asio::any_io_executor executor, std::shared_ptr<const Site> site);
 
     /// On an error (address in use, not an address…) nothing is open.
@@ -37,6 +39,7 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     bool make_room(const Caller& caller);
 
     std::shared_ptr<Shared> shared_;
+    rt::AccessList allowed_;
     rt::Acceptor acceptor_;
     std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by their callers' ids
 };

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::web {
@@ -22,6 +23,8 @@ struct Settings {
     std::uint16_t port = 8080;  ///< 0: any free one
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
+    std::vector<std::string> hosts;  ///< its names; empty: those of the machine
+    std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;
     std::size_t max_per_address = 32;      ///< of these
     std::size_t probe_places = 16;         ///< beyond these: only what is free is answered there
