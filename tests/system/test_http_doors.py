@@ -3,6 +3,8 @@ import contextlib
 import json
 import socket
 import struct
+import tempfile
+import time
 import unittest
 
 import harness
@@ -229,6 +231,42 @@ class Allowed(unittest.TestCase):
                     stranger.send("GET", "/healthz")
                     self.assertIsNone(stranger.receive())
             program.log.wait_for(r"info connection refused .*client=127\.0\.0\.1 .*allow list")
+
+
+class Logins(unittest.TestCase):
+    def setUp(self):
+        file = self.enterContext(tempfile.NamedTemporaryFile("w"))
+        file.write("right-and-long-enough")
+        file.flush()
+        tokens = f"[{{name: ops, role: operator, file: {file.name}}}]"
+        self.program = self.enterContext(harness.configured(
+            gateway(line(), http=f"{OPERATOR}, tokens: {tokens}")))
+        self.port = self.program.http_port()
+
+    def seconds(self, token, status, address="127.0.0.1"):
+        start = time.monotonic()
+        with Connection(self.port, address) as client:
+            answer = client.ask("GET", "/api/v1/lines", f"Authorization: Bearer {token}")
+        self.assertEqual(answer.status, status)
+        return time.monotonic() - start
+
+    def metric(self, name):
+        for text in self.program.get("/metrics")[1].splitlines():
+            if text.startswith(name + " "):
+                return float(text.split()[-1])
+        return None
+
+    def test_wrong_tokens_are_counted_logged_and_slowed_down_by_address(self):
+        free = [self.seconds("wrong", 401) for _ in range(6)]
+        held = [self.seconds("wrong", 401), self.seconds("right-and-long-enough", 200)]
+        others = self.seconds("right-and-long-enough", 200, "127.0.0.2")
+        self.assertGreater(min(held), max(free))
+        self.assertGreater(min(held), others)
+        self.assertEqual(self.metric("panelgate_login_failures_total"), 7)
+        self.assertEqual(self.metric('panelgate_http_requests_total{code="401"}'), 7)
+        self.assertEqual(self.metric('panelgate_http_requests_total{code="200"}'), 4)
+        self.program.log.wait_for(r"warn(ing)? login failed .*client=127\.0\.0\.1")
+        self.assertNotIn("wrong", self.program.log.text())
 
 
 if __name__ == "__main__":

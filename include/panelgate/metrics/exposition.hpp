@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/web/http/counters.hpp"
 
 namespace panelgate::metrics {
 
@@ -17,6 +19,7 @@ struct Snapshot {
     std::vector<tcp_server::Counters> listeners;
     std::vector<points::PointSample> points;
     std::vector<points::RelaySample> relays;
+    std::optional<web::Counters> http;
     std::string version;
     ProcessFacts process;
 };

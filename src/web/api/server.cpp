@@ -17,6 +17,7 @@ Server::Server(boost::asio::any_io_executor executor, Settings settings, const D
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
     site->product = "panelgate/" + api->providers.version;
+    site->now = api->providers.now;
     site->routes = routes(std::move(api));
     site->next_caller = bus::next_client_id;
     listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
@@ -29,6 +30,8 @@ boost::system::error_code Server::start() { return listener_->open(); }
 std::uint16_t Server::port() const { return listener_->port(); }
 
 void Server::stop() { listener_->stop(); }
+
+const Counters& Server::counters() const { return listener_->counters(); }
 
 std::size_t Server::connections() const { return listener_->connections(); }
 

@@ -27,6 +27,8 @@ error_code HttpListener::open() {
     return acceptor_.open(shared_->site->settings.address, shared_->site->settings.port);
 }
 
+const Counters& HttpListener::counters() const { return shared_->counters; }
+
 std::uint16_t HttpListener::port() const { return acceptor_.port(); }
 
 void HttpListener::take(tcp::socket socket) {

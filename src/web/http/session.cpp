@@ -190,6 +190,7 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
     ErrorCode error;
     departure_.request_ends();
+    ++shared_->counters.requests[response.status];
     stream_.expires_after(shared_->site->settings.request_timeout);
     if (head) {
         http::response<http::empty_body> message;
@@ -211,6 +212,7 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
     constexpr const char* kComment = ": \n\n";
+    ++shared_->counters.requests[200];
     bool asked = false;
     asio::steady_timer bell(stream_.get_executor());
     listener->wake = [&bell] { bell.cancel(); };

@@ -10,6 +10,7 @@
 
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/access_list.hpp"
+#include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
@@ -32,6 +33,7 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Closes everything; answers still owed are not sent.
     void abandon();
     std::size_t connections() const { return sessions_.size(); }
+    const Counters& counters() const;
 
   private:
     void take(boost::asio::ip::tcp::socket socket);

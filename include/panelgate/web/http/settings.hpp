@@ -18,11 +18,21 @@ struct Token {
     std::string secret;  ///< read from its file at load
 };
 
+/// How guesses at tokens are slowed down, by address.
+struct LoginSettings {
+    unsigned free = 5;              ///< wrong tokens that cost nothing
+    Duration hold = 1s;             ///< for each request with a token, beyond these
+    Duration forgiven_after = 10s;  ///< each
+    unsigned remembered = 20;       ///< at most, of an address
+    std::size_t addresses = 256;    ///< at most
+};
+
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 8080;  ///< 0: any free one
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
+    LoginSettings logins;
     std::vector<std::string> hosts;  ///< its names; empty: those of the machine
     std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;

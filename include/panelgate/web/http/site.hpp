@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -28,6 +29,7 @@ struct Site {
     std::string product;  ///< of the header Server: "name/1.2.3"
     std::vector<Route> routes;
     std::function<std::uint64_t()> next_caller;  ///< numbers connections
+    std::function<TimePoint()> now;              ///< needed where a route is not free
 };
 
 }  // namespace panelgate::web
