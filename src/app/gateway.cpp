@@ -146,6 +146,7 @@ std::string Gateway::metrics_text() const {
     if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.process = metrics::read_process_facts();
+    snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     return metrics::exposition(snapshot);
 }
 

@@ -8,6 +8,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
+#include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/web/http/counters.hpp"
 
@@ -22,6 +23,7 @@ struct Snapshot {
     std::optional<web::Counters> http;
     std::string version;
     ProcessFacts process;
+    rt::Counters runtime;
 };
 
 /// The Content-Type that goes with exposition().
