@@ -88,18 +88,21 @@ json::object relay_json(const points::Relay& relay) {
             {"on_change", relay.on_change}};
 }
 
+json::value text_json(const std::string& text) { return json::value(text); }
+
+json::value network_json(const Network& network) {
+    return json::value(network.address + '/' + std::to_string(network.prefix));
+}
+
 json::object listener_json(const tcp_server::Settings& listener) {
     json::object units;
     for (const auto& [unit, target] : listener.units)
         units[std::to_string(unit)] = target.line + '/' + std::to_string(target.station);
-    const auto network = [](const Network& one) {
-        return json::value(one.address + '/' + std::to_string(one.prefix));
-    };
     return {{"listen", listener.name()},
-            {"lines", each(listener.lines, [](const auto& name) { return json::value(name); })},
+            {"lines", each(listener.lines, text_json)},
             {"units", std::move(units)},
             {"access", access(listener.read_only)},
-            {"allow", each(listener.allow, network)}};
+            {"allow", each(listener.allow, network_json)}};
 }
 
 json::object http_json(const web::Settings& http) {
@@ -108,7 +111,9 @@ json::object http_json(const web::Settings& http) {
     };
     return {{"listen", http.name()},
             {"anonymous", word(http.anonymous)},
-            {"tokens", each(http.tokens, token)}};
+            {"tokens", each(http.tokens, token)},
+            {"hosts", each(http.hosts, text_json)},
+            {"allow", each(http.allow, network_json)}};
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "inventory.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -66,16 +67,18 @@ std::string text_of(const points::Relay& relay) {
            format_duration(relay.every) + (relay.on_change ? ", on change" : "") + '\n';
 }
 
+std::string text_of(const std::vector<Network>& allow) {
+    std::string text;
+    for (const Network& network : allow) {
+        text += (text.empty() ? "" : " ") + network.address + '/' + std::to_string(network.prefix);
+    }
+    return text.empty() ? "everybody" : text;
+}
+
 std::string text_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
-    text += ", " + rights(listener.read_only) + ", for ";
-    if (listener.allow.empty()) text += "everybody";
-    for (std::size_t i = 0; i < listener.allow.size(); ++i) {
-        const Network& network = listener.allow[i];
-        text += (i > 0 ? " " : "") + network.address + '/' + std::to_string(network.prefix);
-    }
-    text += '\n';
+    text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
     for (const auto& [unit, target] : listener.units) {
         text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
                 std::to_string(target.station) + '\n';
@@ -96,8 +99,11 @@ std::string text_of(web::Role role) {
 }
 
 std::string text_of(const web::Settings& http) {
-    std::string text =
-        "http " + http.name() + ": without a token " + text_of(http.anonymous) + '\n';
+    std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
+                       ", for " + text_of(http.allow);
+    if (!http.hosts.empty()) text += ", as";
+    for (const std::string& host : http.hosts) text += ' ' + host;
+    text += '\n';
     for (const web::Token& token : http.tokens)
         text += "  token " + token.name + ": " + text_of(token.role) + '\n';
     return text;

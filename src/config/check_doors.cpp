@@ -137,11 +137,13 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
 }
 
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
-    if (http.anonymous == web::Role::operator_ && is_any_address(http.address)) {
+    const bool open = is_any_address(http.address) && http.allow.empty();
+    if (open && http.anonymous == web::Role::operator_) {
         loading.warn(mark_of(node, "anonymous"),
                      "whoever reaches port " + std::to_string(http.port) +
                          " of any address may write to the panels without a token; say anonymous: "
-                         "viewer and give writers a token, or listen on 127.0.0.1:" +
+                         "viewer and give writers a token, or name who may, such as allow: "
+                         "[192.168.10.0/24], or listen on 127.0.0.1:" +
                          std::to_string(http.port));
     }
     const Node* tokens = find(node, "tokens");

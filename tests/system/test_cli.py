@@ -148,7 +148,7 @@ class Files(unittest.TestCase):
               {id: 20, name: oven, profile: panasonic-gt, access: read_only}""",
                         unlisted_stations="refuse"),
             modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, allow: [10.0.0.0/8]",
-            http="listen: 127.0.0.1:8080, anonymous: none",
+            http="listen: 127.0.0.1:8080, anonymous: none, hosts: [a.example], allow: ['::1']",
             relays="[{from: oven/GDT0, to: press/UW200, every: 3s, on_change: true}]"))
         text = run("check", "-c", str(self.file)).stdout
         for shown in ("station 31 press, autonics-gplp-s, read and write, answers up to 2s old",
@@ -157,7 +157,7 @@ class Files(unittest.TestCase):
                       "poll UW0, count 32, every 5s", "other stations: refused",
                       "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
-                      "unit 101 is floor1/31", "http 127.0.0.1:8080: without a token nothing"):
+                      "unit 101 is floor1/31", "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
             self.assertIn(shown, text)
         plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
         [line] = plan["lines"]

@@ -197,6 +197,18 @@ TEST(ConfigLoad, TakesNothingFromTheEnvironmentIntoASecret) {
     EXPECT_EQ(config->http->tokens.at(0).secret, "${BAUD}$$0123456789");
 }
 
+TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereHttpMayBeAsked) {
+    const Config config =
+        load_valid(kSimple +
+                   "http:\n  hosts: [gateway.plant.example, 192.0.2.7, 'fd00::7']\n"
+                   "  allow: [10.0.0.0/8, 'fd00::/8']\n");
+    EXPECT_THAT(config.http->hosts, ElementsAre("gateway.plant.example", "192.0.2.7", "fd00::7"));
+    ASSERT_EQ(config.http->allow.size(), 2U);
+    EXPECT_EQ(config.http->allow[0].address, "10.0.0.0");
+    EXPECT_EQ(config.http->allow[0].prefix, 8U);
+    EXPECT_THAT(load_valid(kSimple + "http: {}\n").http->hosts, IsEmpty());
+}
+
 TEST(ConfigLoad, ReadsTokensFromTheirFiles) {
     const MemoryFiles files({{"/run/secrets/ops", "\n s3cret \r\n"}});
     const Config config =

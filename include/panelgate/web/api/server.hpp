@@ -12,6 +12,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -52,6 +53,7 @@ class Server {
     void stop();
     /// Connections open now; after stop() it falls to 0.
     std::size_t connections() const;
+    const Counters& counters() const;
 
   private:
     std::shared_ptr<HttpListener> listener_;
