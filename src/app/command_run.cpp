@@ -9,6 +9,7 @@
 #include "gateway.hpp"
 #include "load.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "run_loop.hpp"
 
@@ -23,13 +24,17 @@ namespace {
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
+    for (const std::string& warning : config.warnings)
+        rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
     boost::asio::io_context io(1);
+    rt::AsioClock clock(io.get_executor());
+    const rt::LogDrain drain(clock);
     SignalLoop loop(io);
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
         gateway.start();
     } catch (const std::system_error& error) {
-        std::cerr << "panelgate: " << error.what() << '\n';
+        rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
     started(gateway);
@@ -55,6 +60,8 @@ void print_demo_help(const config::Config& config, const Gateway& gateway) {
               << "  curl -s '" << url << "/api/v1/stations/press/devices/UW0?count=5'\n"
               << "  curl -s -X PUT -d '{\"values\":[215]}' " << url
               << "/api/v1/stations/oven/devices/GDT108\n"
+              << "  curl -s " << url << "/api/v1/stations/oven/points\n"
+              << "  curl -s " << url << "/api/v1/relays\n"
               << "  mbpoll -m tcp -p " << port << " -a 31 -t 4 -r 1 -c 5 -1 " << host << "\n\n"
               << "Also: " << url << "/metrics and " << url << "/api/v1/lines/floor1/trace?last=20\n"
               << "Ctrl-C ends it.\n"

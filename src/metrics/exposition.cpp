@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "families.hpp"
+#include "http_families.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
@@ -237,6 +238,11 @@ void add_process(Families& out, const Snapshot& snapshot) {
     build.gauge({{"version", snapshot.version}}, 1);
     out.push_back(build.take());
 
+    Family dropped = make_counter("panelgate_log_lines_dropped_total",
+                                  "Log lines lost because stderr's reader stood still.");
+    dropped.counter({}, snapshot.runtime.log_lines_dropped);
+    out.push_back(dropped.take());
+
     const ProcessFacts& process = snapshot.process;
     if (process.cpu_seconds) {
         Family cpu = make_counter("process_cpu_seconds_total",
@@ -274,6 +280,7 @@ std::string exposition(const Snapshot& snapshot) {
     add_points(families, snapshot);
     add_relays(families, snapshot);
     add_listeners(families, snapshot);
+    add_http(families, snapshot);
     add_process(families, snapshot);
     std::erase_if(families, [](const auto& family) { return family.metric.empty(); });
     return prometheus::TextSerializer{}.Serialize(families);

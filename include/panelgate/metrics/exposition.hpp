@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -7,7 +8,9 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
+#include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/web/http/counters.hpp"
 
 namespace panelgate::metrics {
 
@@ -17,8 +20,10 @@ struct Snapshot {
     std::vector<tcp_server::Counters> listeners;
     std::vector<points::PointSample> points;
     std::vector<points::RelaySample> relays;
+    std::optional<web::Counters> http;
     std::string version;
     ProcessFacts process;
+    rt::Counters runtime;
 };
 
 /// The Content-Type that goes with exposition().
