@@ -1,15 +1,20 @@
 #include <boost/asio/io_context.hpp>
+#include <cstddef>
+#include <functional>
 #include <iostream>
+#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
+#include "connection_limits.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "run_loop.hpp"
 
@@ -20,12 +25,24 @@ const Embedded& shipped_demo();  // config/demo.yaml, compiled in
 
 namespace {
 
+/// Before the first one is opened.
+void fit_to_descriptors(config::Config& config) {
+    const std::size_t limit = rt::raise_descriptor_limit();
+    const std::string lowered = fit_connections(config, limit);
+    if (lowered.empty()) return;
+    rt::log(rt::LogLevel::warn, "max_connections lowered",
+            {{"to", lowered},
+             {"why", "this process may open " + std::to_string(limit) +
+                         " files (LimitNOFILE of the service, ulimit -Hn)"}});
+}
+
 /// `started` is told the gateway once it serves.
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
     for (const std::string& warning : config.warnings)
         rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
+    fit_to_descriptors(config);
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
