@@ -2,9 +2,9 @@
 #include <cstddef>
 #include <functional>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -12,6 +12,7 @@
 #include "connection_limits.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/descriptors.hpp"
@@ -50,7 +51,7 @@ ExitCode serve(config::Config config, bool simulate,
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
         gateway.start();
-    } catch (const std::system_error& error) {
+    } catch (const std::runtime_error& error) {
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
@@ -61,11 +62,12 @@ ExitCode serve(config::Config config, bool simulate,
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
-    const auto reachable = [](const std::string& address) {
-        return address == "0.0.0.0" || address == "::" ? std::string("127.0.0.1") : address;
+    const auto reachable = [](const std::string& address) -> std::string {
+        if (address == "::") return "::1";
+        return address == "0.0.0.0" ? "127.0.0.1" : address;
     };
     const std::string url =
-        "http://" + reachable(config.http->address) + ':' + std::to_string(gateway.http_port());
+        "http://" + endpoint_text(reachable(config.http->address), gateway.http_port());
     const std::string host = reachable(config.modbus_tcp[0].address);
     const std::string port = std::to_string(gateway.modbus_port());
     std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "

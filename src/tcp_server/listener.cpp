@@ -13,6 +13,7 @@
 
 #include "access_list.hpp"
 #include "caller.hpp"
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/keep_alive.hpp"
@@ -45,9 +46,7 @@ void set_up(tcp::socket& socket) {
 }
 
 std::string text(const tcp::endpoint& peer) {
-    const std::string address = peer.address().to_string();
-    return (peer.address().is_v6() ? "[" + address + "]" : address) + ":" +
-           std::to_string(peer.port());
+    return endpoint_text(peer.address().to_string(), peer.port());
 }
 
 }  // namespace
@@ -90,8 +89,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
 
 void Listener::Core::start() {
     const Settings& settings = shared_->settings;
-    if (const error_code error = acceptor_.open(settings.address, settings.port))
-        throw std::system_error(error, "cannot listen on " + settings.name());
+    const error_code error = acceptor_.open(settings.address, settings.port, settings.ipv6_only);
+    if (error) throw std::system_error(error, "cannot listen on " + settings.name());
 }
 
 Counters Listener::Core::counters() const {

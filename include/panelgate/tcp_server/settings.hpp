@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::tcp_server {
@@ -29,6 +30,7 @@ struct UnitTarget {
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 502;                  ///< 0: any free one
+    bool ipv6_only = false;                    ///< of "::": another listener has this port for IPv4
     std::vector<std::string> lines;            ///< names; never empty after loading
     std::map<std::uint8_t, UnitTarget> units;  ///< aliases, looked up before `lines`
     BroadcastMode broadcast = BroadcastMode::reply;
@@ -43,7 +45,7 @@ struct Settings {
     int bad_protocol_ids = 3;           ///< in a row close the connection
     Duration output_timeout = 5min;     ///< a client that takes nothing for so long is closed
 
-    std::string name() const { return address + ":" + std::to_string(port); }
+    std::string name() const { return endpoint_text(address, port); }
 };
 
 }  // namespace panelgate::tcp_server

@@ -37,7 +37,8 @@ HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const
           }) {}
 
 error_code HttpListener::open() {
-    return acceptor_.open(site_->settings.address, site_->settings.port);
+    const Settings& settings = site_->settings;
+    return acceptor_.open(settings.address, settings.port, settings.ipv6_only);
 }
 
 std::uint16_t HttpListener::port() const { return acceptor_.port(); }
