@@ -56,8 +56,10 @@ ExitCode serve(config::Config config, bool simulate,
         return kUnavailable;
     }
     started(gateway);
-    loop.run({[&] { gateway.stop_accepting(); }, [&] { return gateway.drained(); },
-              [&] { gateway.stop(); }});
+    loop.run({.begin = [&] { gateway.stop_accepting(); },
+              .done = [&] { return gateway.drained(); },
+              .finish = [&] { gateway.stop(); },
+              .longest_answer = gateway.longest_answer()});
     return kFine;
 }
 

@@ -105,7 +105,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
         std::cerr << "panelgate: " << error.what() << '\n';
         return kUnavailable;
     }
-    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }});
+    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }, {}});
     return kFine;
 }
 

@@ -1,5 +1,6 @@
 #include "gateway.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -130,6 +131,13 @@ void Gateway::start() {
     add_doors();
     openings_.start();
     ready_ = true;
+}
+
+Duration Gateway::longest_answer() const {
+    Duration longest{};
+    for (const config::Line& line : config_.lines)
+        longest = std::max(longest, line.arbiter.queue.deadline);
+    return longest;
 }
 
 void Gateway::stop_accepting() {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "openings.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/poller.hpp"
@@ -36,6 +37,8 @@ class Gateway {
     void stop_accepting();
     /// Nothing is owed to any client any more.
     bool drained() const;
+    /// The longest that a request which was accepted may take to its answer.
+    Duration longest_answer() const;
     /// Closes everything.
     void stop();
 
