@@ -49,14 +49,26 @@ std::string text(const tcp::endpoint& peer) {
     return endpoint_text(peer.address().to_string(), peer.port());
 }
 
+std::shared_ptr<Shared> share(rt::Clock& clock, Settings settings, UnitMap units,
+                              std::string version) {
+    auto own_answers =
+        std::make_shared<OwnAnswers>(clock, settings.own_answers, settings.own_answers_period);
+    return std::make_shared<Shared>(Shared{std::move(settings),
+                                           std::move(units),
+                                           std::move(version),
+                                           clock,
+                                           {},
+                                           clock.now(),
+                                           std::move(own_answers)});
+}
+
 }  // namespace
 
 class Listener::Core : public std::enable_shared_from_this<Core> {
   public:
     Core(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings, UnitMap units,
          std::string version)
-        : shared_(std::make_shared<Shared>(Shared{
-              std::move(settings), std::move(units), std::move(version), clock, {}, clock.now()})),
+        : shared_(share(clock, std::move(settings), std::move(units), std::move(version))),
           allowed_(shared_->settings.allow),
           acceptor_(
               executor, [this](tcp::socket socket) { on_accepted(std::move(socket)); },

@@ -40,7 +40,10 @@ struct Settings {
     std::size_t max_connections = 1024;
     /// Requests of one connection on the buses, or answered and not yet taken by the client.
     std::size_t in_flight = 16;
-    std::size_t waiting = 64;           ///< requests that wait behind them; then nobody reads
+    std::size_t waiting = 64;  ///< requests that wait behind them; then nobody reads
+    /// What the gateway answers by itself, without a line, for all connections together.
+    std::size_t own_answers = 16;  ///< in a period, then they wait for the next one
+    Duration own_answers_period = 1ms;
     Duration partial_adu_timeout = 5s;  ///< a half-sent ADU closes its connection
     int bad_protocol_ids = 3;           ///< in a row close the connection
     Duration output_timeout = 5min;     ///< a client that takes nothing for so long is closed
