@@ -4,15 +4,12 @@
 #include <set>
 #include <string>
 
+#include "panelgate/config/endpoint.hpp"
+
 namespace panelgate::app {
 namespace {
 
 constexpr const char* kEverySix = "::";
-
-template <class Settings>
-bool is_four(const Settings& settings) {
-    return settings.address.find(':') == std::string::npos;
-}
 
 template <class Settings>
 void separate(Settings& settings, const std::set<std::uint16_t>& ports_of_four) {
@@ -24,8 +21,9 @@ void separate(Settings& settings, const std::set<std::uint16_t>& ports_of_four) 
 void separate_families(config::Config& config) {
     std::set<std::uint16_t> ports_of_four;
     for (const tcp_server::Settings& settings : config.modbus_tcp)
-        if (is_four(settings)) ports_of_four.insert(settings.port);
-    if (config.http && is_four(*config.http)) ports_of_four.insert(config.http->port);
+        if (!config::is_ipv6(settings.address)) ports_of_four.insert(settings.port);
+    if (config.http && !config::is_ipv6(config.http->address))
+        ports_of_four.insert(config.http->port);
     ports_of_four.erase(0);  // any free one: never the same
     for (tcp_server::Settings& settings : config.modbus_tcp) separate(settings, ports_of_four);
     if (config.http) separate(*config.http, ports_of_four);
