@@ -9,11 +9,11 @@
 namespace panelgate::app {
 namespace {
 
-constexpr const char* kEverySix = "::";
-
 template <class Settings>
 void separate(Settings& settings, const std::set<std::uint16_t>& ports_of_four) {
-    settings.ipv6_only = settings.address == kEverySix && ports_of_four.contains(settings.port);
+    const bool all_of_six =
+        config::is_any_address(settings.address) && config::is_ipv6(settings.address);
+    settings.ipv6_only = all_of_six && ports_of_four.contains(settings.port);
 }
 
 }  // namespace
