@@ -1,8 +1,10 @@
 #include "gateway.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
+#include "address_families.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
@@ -14,8 +16,22 @@
 
 namespace panelgate::app {
 
+namespace {
+
+boost::system::error_code error_of(tcp_server::Listener& listener) {
+    try {
+        listener.start();
+    } catch (const std::system_error& error) {
+        return error.code();
+    }
+    return {};
+}
+
+}  // namespace
+
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
     : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
+    separate_families(config_);
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
@@ -84,7 +100,8 @@ void Gateway::add_http(const web::Settings& settings) {
     web::Providers providers;
     providers.metrics_text = [this] { return metrics_text(); };
     providers.metrics_type = metrics::kContentType;
-    providers.ready = [this] { return ready_; };
+    providers.ready = [this] { return ready_ && openings_.missing().empty(); };
+    providers.missing = [this] { return openings_.missing(); };
     providers.version = PANELGATE_VERSION;
     providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
@@ -93,29 +110,39 @@ void Gateway::add_http(const web::Settings& settings) {
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }
 
+void Gateway::add_doors() {
+    for (std::size_t i = 0; i < listeners_.size(); ++i) {
+        const tcp_server::Settings& settings = config_.modbus_tcp[i];
+        tcp_server::Listener* listener = listeners_[i].get();
+        openings_.add({"modbus_tcp", settings.address, settings.port,
+                       [listener] { return error_of(*listener); },
+                       [listener] { return listener->port(); }});
+    }
+    if (!http_) return;
+    openings_.add({"http", config_.http->address, config_.http->port,
+                   [this] { return http_->start(); }, [this] { return http_->port(); }});
+}
+
 void Gateway::start() {
     for (const auto& simulated : simulated_) simulated->start();
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
-    for (std::size_t i = 0; i < listeners_.size(); ++i) {
-        listeners_[i]->start();
-        const std::string address =
-            config_.modbus_tcp[i].address + ':' + std::to_string(listeners_[i]->port());
-        rt::log(rt::LogLevel::info, "listening", {{"modbus_tcp", address}});
-    }
-    if (http_) {
-        if (const auto error = http_->start()) {
-            throw std::system_error(error, "cannot listen on " + config_.http->name());
-        }
-        const std::string address = config_.http->address + ':' + std::to_string(http_->port());
-        rt::log(rt::LogLevel::info, "listening", {{"http", address}});
-    }
+    add_doors();
+    openings_.start();
     ready_ = true;
+}
+
+Duration Gateway::longest_answer() const {
+    Duration longest{};
+    for (const config::Line& line : config_.lines)
+        longest = std::max(longest, line.arbiter.queue.deadline);
+    return longest;
 }
 
 void Gateway::stop_accepting() {
     ready_ = false;
+    openings_.stop();
     events_.end();
     open_listeners_ = listeners_.size();
     for (const auto& listener : listeners_) {

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "openings.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/poller.hpp"
@@ -28,12 +30,15 @@ class Gateway {
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
 
-    /// Opens lines and listeners. Throws std::system_error when a listener cannot be opened.
+    /// Opens lines and listeners. Throws CannotListen when a listener cannot be opened; one whose
+    /// address is not there yet is opened later.
     void start();
     /// Stops accepting; what was accepted is answered within its deadline.
     void stop_accepting();
     /// Nothing is owed to any client any more.
     bool drained() const;
+    /// The longest that a request which was accepted may take to its answer.
+    Duration longest_answer() const;
     /// Closes everything.
     void stop();
 
@@ -48,6 +53,7 @@ class Gateway {
     void add_relays();
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
+    void add_doors();
     std::string metrics_text() const;
 
     boost::asio::any_io_executor executor_;
@@ -62,6 +68,7 @@ class Gateway {
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
     web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;
+    Openings openings_{clock_};  ///< of the listeners and of HTTP
     std::size_t open_listeners_ = 0;
     bool ready_ = false;
 };

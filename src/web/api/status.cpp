@@ -38,7 +38,8 @@ Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok
 
 Handling get_readyz(HttpRequest, const Api* api) {
     if (api->providers.ready()) co_return text_response(200, "ready\n");
-    co_return text_response(503, "not ready\n");
+    const std::string missing = api->providers.missing();
+    co_return text_response(503, missing.empty() ? "not ready\n" : "not ready: " + missing + '\n');
 }
 
 Handling get_metrics(HttpRequest, const Api* api) {

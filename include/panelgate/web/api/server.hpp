@@ -23,8 +23,9 @@ class HttpListener;
 /// What the server shows besides the directory. The functions are called in the one thread.
 struct Providers {
     std::function<std::string()> metrics_text;
-    std::string metrics_type;     ///< the content type of that text
-    std::function<bool()> ready;  ///< do configuration and listeners stand?
+    std::string metrics_type;              ///< the content type of that text
+    std::function<bool()> ready;           ///< do configuration and listeners stand?
+    std::function<std::string()> missing;  ///< what does not stand yet, in words
     std::string version;
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<std::vector<points::RelayStatus>()> relays;

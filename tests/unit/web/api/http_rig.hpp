@@ -91,6 +91,7 @@ class HttpRig : public ::testing::Test {
         providers.metrics_text = [] { return "up 1\n"; };
         providers.metrics_type = "text/plain; version=0.0.4; charset=utf-8";
         providers.ready = [this] { return ready; };
+        providers.missing = [this] { return missing; };
         providers.version = "1.2.3";
         providers.now = [this] { return now; };
         providers.relays = [this] { return relays; };
@@ -142,6 +143,7 @@ class HttpRig : public ::testing::Test {
     std::vector<points::RelayStatus> relays;
     EventHub events;
     bool ready = true;
+    std::string missing;
     std::unique_ptr<Server> server;
 };
 

@@ -15,6 +15,8 @@ TEST_F(WebServer, AnswersProbesMetricsAndTheIndex) {
     EXPECT_EQ(get("/readyz").status(), 200u);
     ready = false;
     EXPECT_EQ(get("/readyz").status(), 503u);
+    missing = "modbus_tcp 192.0.2.7:502 (late)";
+    EXPECT_EQ(get("/readyz").body(), "not ready: modbus_tcp 192.0.2.7:502 (late)\n");
     const Reply metrics = get("/metrics");
     EXPECT_EQ(metrics.body(), "up 1\n");
     EXPECT_EQ(metrics.header("Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
@@ -273,6 +275,7 @@ TEST_F(WebServer, AnswersAHandlerThatThrowsWith500) {
     Providers providers;
     providers.metrics_text = []() -> std::string { throw std::runtime_error("no"); };
     providers.ready = [] { return true; };
+    providers.missing = [] { return std::string(); };
     server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
     ASSERT_FALSE(server->start());
     Client client = connect();
