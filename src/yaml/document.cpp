@@ -13,6 +13,7 @@
 #include <tuple>
 
 #include "masking.hpp"
+#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
 
@@ -37,9 +38,11 @@ std::string Problems::text() const {
 
 namespace {
 
-constexpr std::size_t kMaxDepth = 64;
-constexpr std::size_t kMaxNodes = 100'000;
 const std::string kTooDeep = "nested deeper than " + std::to_string(kMaxDepth) + " levels";
+const std::string kTooManyNodes = "more than " + std::to_string(kMaxNodes) +
+                                  " values, repetitions by aliases (*) included; split the file";
+const std::string kTooMuchText = "more than " + std::to_string(kMaxText / 1024 / 1024) +
+                                 " MiB of text, repetitions by aliases (*) included; repeat less";
 
 /// Ends the parsing.
 struct TooLarge {
@@ -52,18 +55,24 @@ Mark mark_of(const YAML::Mark& mark) { return {mark.line + 1, mark.column + 1}; 
 
 struct Size {
     std::size_t nodes = 1;
+    std::size_t text = 0;   ///< bytes of scalars and keys
     std::size_t depth = 0;  ///< levels of lists and maps
 };
 
 Size size_of(const Node& node) {
     Size size;
+    size.text = node.scalar.size();
     const auto add = [&size](const Node& child) {
         const Size inner = size_of(child);
         size.nodes += inner.nodes;
+        size.text += inner.text;
         size.depth = std::max(size.depth, inner.depth);
     };
     for (const Node& item : node.items) add(item);
-    for (const Entry& entry : node.entries) add(entry.value);
+    for (const Entry& entry : node.entries) {
+        size.text += entry.key.size();
+        add(entry.value);
+    }
     if (node.kind == Node::Kind::sequence || node.kind == Node::Kind::map) ++size.depth;
     return size;
 }
@@ -77,6 +86,7 @@ class Builder final : public YAML::EventHandler {
     void OnDocumentStart(const YAML::Mark& mark) override { start_ = mark_of(mark); }
     void OnDocumentEnd() override {}
     void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+        charge(mark_of(mark), {});
         Node node;
         node.mark = mark_of(mark);
         put(std::move(node), anchor);
@@ -90,14 +100,15 @@ class Builder final : public YAML::EventHandler {
         }
         const Size size = size_of(found->second);
         if (stack_.size() + size.depth > kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};
-        nodes_ += size.nodes - 1;  // put() counts one
+        charge(mark_of(mark), size);
         Node node = found->second;
         node.mark = mark_of(mark);
-        put(std::move(node), YAML::NullAnchor);
+        place(std::move(node));
     }
     void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   const std::string& value) override {
         check_tag(mark, tag);
+        charge(mark_of(mark), {1, value.size(), 0});
         Node node;
         node.kind = Node::Kind::scalar;
         node.mark = mark_of(mark);
@@ -138,6 +149,7 @@ class Builder final : public YAML::EventHandler {
     }
     void open(Node::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
         if (stack_.size() >= kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};
+        charge(mark_of(mark), {});
         Open level;
         level.node.kind = kind;
         level.node.mark = mark_of(mark);
@@ -149,11 +161,21 @@ class Builder final : public YAML::EventHandler {
         stack_.pop_back();
         put(std::move(level.node), level.anchor);
     }
+    /// Before the memory is used: a file of 1 MB may repeat itself into gigabytes.
+    void charge(Mark mark, const Size& size) {
+        nodes_ += size.nodes;
+        text_ += size.text;
+        if (nodes_ > kMaxNodes) throw TooLarge{mark, kTooManyNodes};
+        if (text_ > kMaxText) throw TooLarge{mark, kTooMuchText};
+    }
     void put(Node node, YAML::anchor_t anchor) {
-        if (++nodes_ > kMaxNodes) {
-            throw TooLarge{node.mark, "more than " + std::to_string(kMaxNodes) + " values"};
+        if (anchor != YAML::NullAnchor) {
+            charge(node.mark, size_of(node));
+            anchors_[anchor] = node;
         }
-        if (anchor != YAML::NullAnchor) anchors_[anchor] = node;
+        place(std::move(node));
+    }
+    void place(Node node) {
         if (stack_.empty()) {
             root_ = std::move(node);
             return;
@@ -196,6 +218,7 @@ class Builder final : public YAML::EventHandler {
     std::vector<Open> stack_;
     std::map<YAML::anchor_t, Node> anchors_;
     std::size_t nodes_ = 0;
+    std::size_t text_ = 0;
     Node root_;
 };
 

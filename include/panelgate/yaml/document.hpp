@@ -67,9 +67,8 @@ struct Entry {
 };
 
 /// Parses one YAML document. Syntax errors, duplicate keys, non-scalar keys, tags, more than one
-/// document, more than 100000 nodes (aliases counted as what they stand for) and nesting deeper
-/// than 64 are added to `problems`; the result is then whatever could be read (a null node if
-/// nothing).
+/// document, and what exceeds a limit of settings.hpp (aliases counted as what they stand for) are
+/// added to `problems`; the result is then whatever could be read (a null node if nothing).
 Node parse(std::string_view text, Problems& problems);
 
 }  // namespace panelgate::yaml

@@ -175,6 +175,32 @@ TEST(Document, StopsAtAliasesThatGrowWithoutEnd) {
     EXPECT_THAT(read(text).problems, HasSubstr("more than 100000 values"));
 }
 
+TEST(Document, StopsAtAliasesThatRepeatALongText) {
+    const std::string text = "a: &a " + repeat("x", 1'000'000) + "\nb: [*a" + repeat(", *a", 2'999);
+    const std::string problems = read(text + "]\n").problems;
+    EXPECT_EQ(problems,
+              "f.yaml:2:13: more than 4 MiB of text, repetitions by aliases (*) included; "
+              "repeat less\n");
+}
+
+TEST(Document, CountsLongKeysBehindAliases) {
+    std::string text = "a: &a {";
+    for (const char* key : {"k", "l", "m"}) text += repeat(key, 1'000) + ": 1, ";
+    text += "}\nb: [*a" + repeat(", *a", 1'500) + "]\n";
+    EXPECT_THAT(read(text).problems, HasSubstr("more than 4 MiB of text"));
+}
+
+TEST(Document, CountsWhatNestedAnchorsKeep) {
+    std::string text;
+    for (int i = 0; i < 60; ++i) text += "&a" + std::to_string(i) + " [";
+    const std::string closing = repeat("]", 60);
+    EXPECT_THAT(read(text + "x" + closing).problems, IsEmpty());
+    EXPECT_THAT(read(text + repeat("x, ", 3'000) + closing).problems,
+                HasSubstr("more than 100000 values"));
+    EXPECT_THAT(read(text + repeat("x", 1'000'000) + closing).problems,
+                HasSubstr("more than 4 MiB of text"));
+}
+
 TEST(Document, StopsAtAHugeFile) {
     EXPECT_THAT(read(repeat("- x\n", 100'001)).problems, HasSubstr("more than 100000 values"));
 }
