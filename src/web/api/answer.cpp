@@ -1,12 +1,12 @@
 #include "answer.hpp"
 
 #include <boost/json/object.hpp>
-#include <boost/json/serialize.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "refusal.hpp"
 
 namespace panelgate::web {
@@ -77,7 +77,7 @@ std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) 
 HttpResponse json_response(unsigned status, const json::value& body) {
     HttpResponse response;
     response.status = status;
-    response.body = json::serialize(body) + "\n";
+    response.body = json_text(body) + "\n";
     return response;
 }
 

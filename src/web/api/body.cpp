@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <boost/json/array.hpp>
-#include <boost/json/serialize.hpp>
 #include <boost/json/stream_parser.hpp>
 #include <cmath>
 #include <optional>
+
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -34,14 +35,14 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
         if (value.is_bool()) return static_cast<std::uint16_t>(value.get_bool() ? 1 : 0);
         const auto bit = as_whole(value);
         if (bit && (*bit == 0 || *bit == 1)) return static_cast<std::uint16_t>(*bit);
-        return problem(400, "a bit is true, false, 1 or 0, not " + json::serialize(value));
+        return problem(400, "a bit is true, false, 1 or 0, not " + json_excerpt(value));
     }
     const auto number = as_whole(value);
     if (number && *number >= -32768 && *number <= 65535) {
         return static_cast<std::uint16_t>(*number & 0xFFFF);
     }
     return problem(400, "a register is a whole number from 0 to 65535, or from -32768, not " +
-                            json::serialize(value));
+                            json_excerpt(value));
 }
 
 }  // namespace
@@ -64,7 +65,7 @@ Parsed<std::int64_t> whole_number(const json::value& value, std::string_view nam
     const auto number = as_whole(value);
     if (number && *number >= low && *number <= high) return *number;
     return problem(400, std::string(name) + " must be a whole number from " + std::to_string(low) +
-                            " to " + std::to_string(high) + ", not " + json::serialize(value));
+                            " to " + std::to_string(high) + ", not " + json_excerpt(value));
 }
 
 Parsed<std::int64_t> number_member(const json::object& object, std::string_view name,

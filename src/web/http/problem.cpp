@@ -1,6 +1,6 @@
 #include "panelgate/web/http/problem.hpp"
 
-#include <boost/json/serialize.hpp>
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -51,7 +51,7 @@ HttpResponse to_response(const Problem& problem) {
     HttpResponse response;
     response.status = problem.status;
     response.content_type = "application/problem+json";
-    response.body = boost::json::serialize(body) + "\n";
+    response.body = json_text(body) + "\n";
     response.headers = problem.headers;
     return response;
 }

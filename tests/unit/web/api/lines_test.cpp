@@ -12,7 +12,7 @@ TEST_F(ApiLines, ListsTheLines) {
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
     EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
-        "load_percent":50.0,"queue_depth":3,"echo":"absent","findings":[]})"));
+        "load_percent":50,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
 }
@@ -33,7 +33,7 @@ TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
     bus.shares = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
-              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75.0,
+              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75,
         "transactions":12}])"));
 }
 
@@ -63,8 +63,8 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
     bus.made.push_back({7, TimePoint(2s), "refused"});
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
         {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
-        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
-        "decisions":[{"sequence":7,"at":2.0,"text":"refused"}]})"));
+        {"sequence":3,"at":3,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
+        "decisions":[{"sequence":7,"at":2,"text":"refused"}]})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
 }
