@@ -80,6 +80,13 @@ TEST_F(Access, TakesNoOtherSchemeAndNoEmptyToken) {
     EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: bearer let-me\r\n").status(), 200u);
 }
 
+TEST_F(Access, WhoAsksIsCalledByItsAddressAndItsToken) {
+    EXPECT_EQ(write("let-me"), 200u);
+    EXPECT_EQ(bus.names[bus.requests.back().client], "http 127.0.0.1 token ops");
+    EXPECT_EQ(write(""), 200u);
+    EXPECT_EQ(bus.names[bus.requests.back().client], "http 127.0.0.1");
+}
+
 TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
     const char* body = R"({"station":5,"pdu":"0500010000"})";
     const std::string origin = "Origin: http://evil.example\r\nContent-Type: ";

@@ -45,6 +45,8 @@ TEST_F(ApiWrite, NeverSplitsAWrite) {
     const Reply reply = put("press/holding-registers/0", R"({"values":[1,2,3,4,5]})");
     EXPECT_EQ(reply.status(), 422u);
     EXPECT_EQ(reply.at("detail"), "at most 4 values in one write; writes are not split");
+    EXPECT_EQ(reply.at("rule"), "quantity");
+    EXPECT_EQ(reply.at("transmitted"), false);
     EXPECT_EQ(bus.requests.size(), 1u);
 }
 
