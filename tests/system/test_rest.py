@@ -2,6 +2,7 @@
 import datetime
 import struct
 import unittest
+import urllib.error
 import urllib.request
 
 import config
@@ -64,6 +65,22 @@ class Rest(unittest.TestCase):
             self.assertTrue(state.startswith("down: "), state)
             self.assertEqual((status, told["transmitted"]), (502, False))
             self.assertIn(state.removeprefix("down: "), told["detail"])
+
+    def test_P2_mistakes_are_not_executed(self):
+        with harness.configured(PLANT) as program:
+            for body in ('{"values":[1],"values":[2]}', '{"values":[1],"valeus":[3]}',
+                         '{"values":[1],"Values":[2]}'):
+                request = urllib.request.Request(program.url(PRESS + "devices/UW0"),
+                                                 data=body.encode(), method="PUT")
+                with self.subTest(body=body), self.assertRaises(urllib.error.HTTPError) as refused:
+                    urllib.request.urlopen(request, timeout=harness.PATIENCE)
+                self.assertEqual(refused.exception.code, 400)
+                refused.exception.close()
+            for path in ("devices/UW0?cuont=9", "devices/UW0?count=1&count=2"):
+                self.assertEqual(program.get(PRESS + path)[0], 400, path)
+            self.assertEqual(program.rest("PUT", PRESS + "devices/UW0?count=7", {"values": [1]})[0],
+                             400)
+            self.assertEqual(program.values(PRESS + "devices/UW0"), [10])
 
     def test_numbers_are_written_as_people_write_them(self):
         with harness.configured(PLANT) as program:

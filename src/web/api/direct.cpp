@@ -111,7 +111,7 @@ HttpResponse raw_answer(const bus::Answer& answer) {
 Handling post_broadcast(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body);
+    const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
     if (!body) co_return to_response(body.error());
     auto planned = broadcast_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
@@ -123,7 +123,7 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
 Handling post_raw(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body);
+    const auto body = parse_object(request.body, {"station", "pdu"});
     if (!body) co_return to_response(body.error());
     auto planned = raw_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());

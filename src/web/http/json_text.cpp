@@ -58,9 +58,8 @@ std::string json_text(const json::value& value) {
     return text;
 }
 
-std::string json_excerpt(const json::value& value) {
+std::string excerpt(std::string text) {
     constexpr std::size_t kMost = 80;
-    std::string text = json_text(value);
     if (text.size() <= kMost) return text;
     std::size_t end = kMost;
     while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;

@@ -1,5 +1,6 @@
 #include "panelgate/web/http/problem.hpp"
 
+#include "panelgate/base/suggest.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
@@ -40,6 +41,19 @@ std::string title_of(unsigned status) {
 }  // namespace
 
 Problem problem(unsigned status, std::string detail) { return {status, std::move(detail)}; }
+
+Problem unknown_name(const std::string& what, const std::string& name,
+                     std::span<const std::string_view> known) {
+    std::string text = "unknown " + what + " '" + excerpt(name) + '\'';
+    const std::string near = nearest(excerpt(name), known);
+    if (!near.empty()) return problem(400, text + "; did you mean '" + near + "'?");
+    text += known.empty() ? "; there is none here" : "; known here: ";
+    for (const std::string_view& word : known) {
+        if (&word != &known.front()) text += ", ";
+        text += word;
+    }
+    return problem(400, std::move(text));
+}
 
 HttpResponse to_response(const Problem& problem) {
     boost::json::object body;

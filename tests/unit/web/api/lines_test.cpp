@@ -116,6 +116,18 @@ TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
         403u);
 }
 
+TEST_F(ApiLines, P2WhatMayBeAMistakeInABodyIsNotExecuted) {
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast",
+                  R"({"table":"coils","address":1,"values":[1],"verfy":true})")
+                  .at("detail"),
+              "unknown member 'verfy'; did you mean 'verify'?");
+    EXPECT_EQ(
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"station":6,"pdu":"0500010000"})")
+            .status(),
+        400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiLines, SaysWhyABroadcastDidNotLeave) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::line_down, false); };
     const Reply reply = ask("POST", "/api/v1/lines/floor1/broadcast",

@@ -100,5 +100,24 @@ TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
               405u);
 }
 
+TEST_F(Access, AQueryThatNobodyKnowsIsRefusedOnEveryPath) {
+    for (const char* path :
+         {"/", "/healthz", "/readyz", "/metrics", "/api/v1/lines", "/api/v1/lines/floor1",
+          "/api/v1/lines/floor1/trace", "/api/v1/stations", "/api/v1/stations/press",
+          "/api/v1/events", "/api/v1/relays", "/api/v1/stations/press/points",
+          "/api/v1/stations/press/coils/1", "/api/v1/stations/press/coils/1/interpretations",
+          "/api/v1/stations/press/devices/UW1"}) {
+        const Reply reply = get(std::string(path) + "?cuont=9");
+        EXPECT_EQ(reply.status(), 400u) << path;
+        EXPECT_EQ(std::string(reply.at("detail").as_string()).substr(0, 21),
+                  "unknown query 'cuont'")
+            << path;
+    }
+    EXPECT_EQ(get("/api/v1/stations/press/coils/1?count=1&count=2").at("detail"),
+              "the query 'count' is given twice");
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/raw?count=1", "{}").status(), 400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 }  // namespace
 }  // namespace panelgate::web

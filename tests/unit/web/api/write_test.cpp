@@ -101,6 +101,18 @@ TEST_F(ApiWrite, RefusesValuesThatDoNotFit) {
     EXPECT_TRUE(bus.requests.empty());
 }
 
+TEST_F(ApiWrite, P2WhatMayBeAMistakeIsNotExecuted) {
+    for (const char* body : {R"({"values":[1],"values":[2]})", R"({"values":[1],"valeus":[3]})",
+                             R"({"values":[1],"Values":[1]})", R"({"Values":[1]})"}) {
+        EXPECT_EQ(put("press/holding-registers/1", body).status(), 400u) << body;
+    }
+    for (const char* query : {"count=7", "cuont=1", "=1"}) {
+        const std::string path = std::string("press/holding-registers/1?") + query;
+        EXPECT_EQ(put(path, R"({"values":[1]})").status(), 400u) << query;
+    }
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiWrite, PointsAtTheMistakeInABody) {
     const Reply reply = put("press/coils/1", "{\"values\":\n  [1,]}");
     EXPECT_EQ(reply.status(), 400u);
