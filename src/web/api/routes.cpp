@@ -25,7 +25,7 @@ constexpr Row kRows[] = {
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/lines", get_lines, kSee},
     {"GET", "/api/v1/lines/{}", get_line, kSee},
-    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, "last"},
+    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, "last since"},
     {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange},
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange},
     {"GET", "/api/v1/stations", get_stations, kSee},
