@@ -47,7 +47,7 @@ std::optional<Target> parse_target(std::string_view target) {
         const auto name = decode(next_part(pair, '='), true);
         auto value = decode(pair, true);
         if (!name || !value) return std::nullopt;
-        if (!parsed.query.emplace(*name, std::move(*value)).second) parsed.repeated_query = *name;
+        parsed.query.emplace(*name, std::move(*value));
     }
     return parsed;
 }
