@@ -14,10 +14,10 @@ namespace panelgate::web {
 /// A request as handlers see it; nothing of Beast.
 struct HttpRequest {
     std::string method;
-    std::string host;                            ///< lower case; empty: HTTP/1.0 without one
-    std::vector<std::string> path;               ///< segments, percent-decoded
-    std::map<std::string, std::string> query;    ///< decoded; of equal names the last
-    std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
+    std::string host;                               ///< lower case; empty: HTTP/1.0 without one
+    std::vector<std::string> path;                  ///< segments, percent-decoded
+    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
+    std::map<std::string, std::string> headers;     ///< those of kHeadersRead, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for
     std::shared_ptr<Caller> caller;
