@@ -168,6 +168,53 @@ TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
     EXPECT_TRUE(bus->clients().empty());
 }
 
+TEST_F(BusTest, P6TellsOfEveryWriteBeforeItsAnswer) {
+    std::vector<WriteEvent> told;
+    settings.observe = [&](const BusEvent& event) {
+        if (const auto* write = std::get_if<WriteEvent>(&event)) told.push_back(*write);
+    };
+    make_bus();
+    bus->start();
+    ask(17, kRead);
+    EXPECT_TRUE(told.empty());
+    line->reply = kWrite;
+    ask(17, kWrite, 1, true);
+    ASSERT_EQ(told.size(), 2u);
+    EXPECT_EQ(told[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
+    EXPECT_FALSE(told[0].ended);
+    EXPECT_TRUE(told[1].ended);
+    line->fail_writes = true;
+    ask(0, kWrite);
+    ASSERT_EQ(told.size(), 4u) << "lost on its way: nobody knows what has come of it";
+    EXPECT_EQ(told[3].station, 0);
+}
+
+TEST_F(BusTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
+    bus->start();
+    for (int i = 0; i < 20; ++i) {
+        ask(17, kRead);
+        clock.advance(100ms);
+    }
+    EXPECT_GT(bus->status().load_percent, 0);
+    EXPECT_EQ(bus->status().load_percent, bus->status().load_percent);
+    clock.advance(25s);
+    EXPECT_EQ(bus->status().load_percent, 0) << "idle since, and nobody has asked";
+}
+
+TEST_F(BusTest, CountsHowOftenAStationMayHaveBeenRestarted) {
+    bus->start();
+    ask(17, kRead);
+    const std::uint64_t before = bus->station_status(17).returns;
+    line->reply.clear();
+    ask(17, kRead);
+    line->reply = kReply;
+    ask(17, kRead);
+    EXPECT_EQ(bus->station_status(17).returns, before + 1) << "it was silent";
+    line->events()->on_down("pulled");
+    line->events()->on_up();
+    EXPECT_EQ(bus->station_status(17).returns, before + 2) << "the line was away";
+}
+
 TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     bus->start();
     const Answer answer = ask(17, kRead);
