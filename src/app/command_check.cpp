@@ -51,6 +51,7 @@ void print_json(const config::Config& config) {
 ExitCode check(const std::string& file, bool json) {
     const Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
+    print_warnings(*loaded.config);
     if (json) {
         print_json(*loaded.config);
     } else {

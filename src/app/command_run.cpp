@@ -9,6 +9,7 @@
 #include "gateway.hpp"
 #include "load.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "run_loop.hpp"
 
@@ -23,13 +24,17 @@ namespace {
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
+    for (const std::string& warning : config.warnings)
+        rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
     boost::asio::io_context io(1);
+    rt::AsioClock clock(io.get_executor());
+    const rt::LogDrain drain(clock);
     SignalLoop loop(io);
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
         gateway.start();
     } catch (const std::system_error& error) {
-        std::cerr << "panelgate: " << error.what() << '\n';
+        rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
     started(gateway);

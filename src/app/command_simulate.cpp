@@ -89,11 +89,14 @@ class Panels {
 ExitCode simulate(const std::string& file, const std::vector<std::string>& texts) {
     const Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
+    print_warnings(*loaded.config);
     std::map<std::string, std::string> links;
     if (!parse_links(texts, *loaded.config, links)) return kUsage;
 
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
+    rt::AsioClock clock(io.get_executor());
+    const rt::LogDrain drain(clock);
     SignalLoop loop(io);
     Panels panels(io.get_executor());
     try {

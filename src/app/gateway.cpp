@@ -154,6 +154,7 @@ std::string Gateway::metrics_text() const {
     snapshot.relays = relay_samples(relays_->status());
     snapshot.version = PANELGATE_VERSION;
     snapshot.process = metrics::read_process_facts();
+    snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     return metrics::exposition(snapshot);
 }
 

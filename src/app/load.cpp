@@ -27,10 +27,12 @@ Loaded load_text(std::string_view text, const std::string& name) {
     if (!loaded.config) {
         std::cerr << problems.text();
         loaded.code = kBadConfig;
-        return loaded;
     }
-    for (const std::string& warning : loaded.config->warnings) std::cerr << warning << '\n';
     return loaded;
+}
+
+void print_warnings(const config::Config& config) {
+    for (const std::string& warning : config.warnings) std::cerr << warning << '\n';
 }
 
 }  // namespace panelgate::app

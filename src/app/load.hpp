@@ -15,9 +15,11 @@ struct Loaded {
     ExitCode code = kFine;
 };
 
-/// Reads and checks a file. Warnings go to stderr too.
+/// Reads and checks a file. Its warnings are told by whoever uses it.
 Loaded load_file(const std::string& path);
 /// The same for text; `name` stands in messages.
 Loaded load_text(std::string_view text, const std::string& name);
+/// To stderr, a line each: of commands that keep no log.
+void print_warnings(const config::Config& config);
 
 }  // namespace panelgate::app

@@ -48,6 +48,10 @@ const Station* Plant::find(std::string_view line, std::uint8_t id) const {
                  [&](const Station& station) { return station.line == line && station.id == id; });
 }
 
+const Station* Plant::find_unit(int unit) const {
+    return first(stations_, [&](const Station& station) { return station.unit == unit; });
+}
+
 Station& Plant::at(std::string_view line, std::uint8_t id) {
     for (Station& station : stations_) {
         if (station.line == line && station.id == id) return station;

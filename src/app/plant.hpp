@@ -53,6 +53,8 @@ class Plant {
 
     const Station* find(std::string_view name) const;
     const Station* find(std::string_view line, std::uint8_t id) const;
+    /// By Station::unit; where listeners differ, several have the same: the first of them.
+    const Station* find_unit(int unit) const;
     /// Of a station that add() has brought.
     Station& at(std::string_view line, std::uint8_t id);
     /// Its name, or its id when it is not listed; "" for everybody (station 0).

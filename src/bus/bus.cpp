@@ -14,6 +14,7 @@
 #include "refusals.hpp"
 #include "request_counters.hpp"
 #include "station_events.hpp"
+#include "write_log.hpp"
 
 namespace panelgate::bus {
 
@@ -35,6 +36,7 @@ struct Bus::State final : public line::Line::Events {
         std::uint8_t station = 0;
         std::uint8_t function = 0;
         TimePoint arrived;
+        std::optional<Deed> deed{};
     };
 
     State(asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
@@ -94,7 +96,7 @@ struct Bus::State final : public line::Line::Events {
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
-    std::map<ClientId, std::string> client_names;
+    ClientNames client_names;
     LoadMeter load;
     Refusals refusals;
     line::Drive<arbiter::Arbiter, State> drive;
@@ -135,6 +137,7 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
+    entry.deed = deed_of(request, name_of(client_names, request.client));
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -225,6 +228,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     const Duration took = clock.now() - entry.arrived;
     const Outcome outcome = outcome_of(result);
     counters.count(entry.station, entry.function, outcome, took);
+    if (entry.deed) log_deed(settings, entry.station, *entry.deed, outcome);
     observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());

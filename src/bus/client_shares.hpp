@@ -9,8 +9,11 @@
 
 namespace panelgate::bus {
 
+using ClientNames = std::map<ClientId, std::string>;
+/// "client 12" when nobody named it.
+std::string name_of(const ClientNames& names, ClientId client);
+
 /// The greediest clients with their names.
-std::vector<ClientShare> client_shares(const arbiter::BusShares& shares,
-                                       const std::map<ClientId, std::string>& names);
+std::vector<ClientShare> client_shares(const arbiter::BusShares& shares, const ClientNames& names);
 
 }  // namespace panelgate::bus

@@ -237,6 +237,11 @@ void add_process(Families& out, const Snapshot& snapshot) {
     build.gauge({{"version", snapshot.version}}, 1);
     out.push_back(build.take());
 
+    Family dropped = make_counter("panelgate_log_lines_dropped_total",
+                                  "Log lines lost because stderr's reader stood still.");
+    dropped.counter({}, snapshot.runtime.log_lines_dropped);
+    out.push_back(dropped.take());
+
     const ProcessFacts& process = snapshot.process;
     if (process.cpu_seconds) {
         Family cpu = make_counter("process_cpu_seconds_total",

@@ -1,12 +1,20 @@
 #include "panelgate/rt/log.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/details/null_mutex.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstdlib>
 #include <memory>
+
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/log_output.hpp"
+#include "panelgate/rt/log_throttle.hpp"
 
 namespace panelgate::rt {
 namespace {
@@ -26,26 +34,61 @@ spdlog::level::level_enum level_of(LogLevel level) {
         case LogLevel::trace:
             return spdlog::level::trace;
     }
-    return spdlog::level::err;
+    std::abort();
+}
+
+/// As the configuration calls them.
+std::string_view word(LogLevel level) {
+    switch (level) {
+        case LogLevel::error:
+            return "error";
+        case LogLevel::warn:
+            return "warn";
+        case LogLevel::info:
+            return "info";
+        case LogLevel::debug:
+            return "debug";
+        case LogLevel::trace:
+            return "trace";
+    }
+    std::abort();
+}
+
+LogOutput& output() {
+    static LogOutput instance(STDERR_FILENO);
+    return instance;
+}
+
+class Sink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+  public:
+    std::string formatted(const spdlog::details::log_msg& message) {
+        spdlog::memory_buf_t line;
+        formatter_->format(message, line);
+        return {line.data(), line.size()};
+    }
+
+  private:
+    void sink_it_(const spdlog::details::log_msg& message) override {
+        output().write(formatted(message));
+    }
+    void flush_() override {}
+};
+
+const std::shared_ptr<Sink>& sink() {
+    static const auto instance = std::make_shared<Sink>();
+    return instance;
 }
 
 spdlog::logger& logger() {
-    static const std::shared_ptr<spdlog::logger> instance = [] {
-        auto sink = std::make_shared<spdlog::sinks::stderr_sink_st>();
-        auto made = std::make_shared<spdlog::logger>("panelgate", std::move(sink));
-        made->flush_on(spdlog::level::trace);
-        return made;
-    }();
-    return *instance;
+    static spdlog::logger instance("panelgate", sink());
+    return instance;
 }
 
 /// Of the LogTap that lives.
 std::shared_ptr<std::vector<std::string>> g_tapped;
 
-std::string_view label(LogLevel level) {
-    const spdlog::string_view_t word = spdlog::level::to_string_view(level_of(level));
-    return {word.data(), word.size()};
-}
+/// Who has said what lately.
+LogThrottle g_throttle;
 
 /// JSON string escapes; good for text too.
 std::string escaped(std::string_view text) {
@@ -69,6 +112,40 @@ std::string text_value(const std::string& value) {
     return plain ? value : '"' + escaped(value) + '"';
 }
 
+std::string field_of(std::string_view key, const std::string& value) {
+    return g_format == LogFormat::json ? fmt::format(",\"{}\":\"{}\"", key, escaped(value))
+                                       : fmt::format(" {}={}", key, text_value(value));
+}
+
+std::string line_of(LogLevel level, std::string_view event, std::span<const LogField> fields) {
+    std::string line =
+        g_format == LogFormat::json
+            ? fmt::format("\"level\":\"{}\",\"event\":\"{}\"", word(level), escaped(event))
+            : fmt::format("{} {}", word(level), event);
+    for (const auto& [key, value] : fields) line += field_of(key, value);
+    return line;
+}
+
+std::string subject_of(std::span<const LogField> fields) {
+    std::string subject;
+    std::size_t taken = 0;
+    for (const auto& [key, value] : fields) {
+        if (++taken > 2) break;
+        // A client's next connection has another port.
+        subject += key == "client" ? value.substr(0, value.rfind(':')) : value;
+        subject += '\0';
+    }
+    return subject;
+}
+
+void put(LogLevel level, std::string_view event, std::span<const LogField> fields,
+         std::uint64_t left_out) {
+    std::string line = line_of(level, event, fields);
+    if (left_out > 0) line += field_of("left_out", std::to_string(left_out));
+    if (g_tapped) return g_tapped->push_back(std::move(line));
+    logger().log(level_of(level), line);
+}
+
 }  // namespace
 
 void set_up_log(const LogSettings& settings) {
@@ -76,12 +153,18 @@ void set_up_log(const LogSettings& settings) {
     logger().set_level(level_of(settings.level));
     const bool json = settings.format == LogFormat::json;
     logger().set_formatter(std::make_unique<spdlog::pattern_formatter>(
-        json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ","level":"%l",%v})"
-             : "%Y-%m-%dT%H:%M:%S.%eZ %l %v",
-        spdlog::pattern_time_type::utc));
+        json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %v",
+        spdlog::pattern_time_type::utc, "\n"));
+    output().on_lost([](std::uint64_t lines) {
+        const std::string text = line_of(LogLevel::warn, "log lines dropped",
+                                         {{LogField{"count", std::to_string(lines)}}});
+        return sink()->formatted({"panelgate", spdlog::level::warn, text});
+    });
 }
 
 bool log_enabled(LogLevel level) { return logger().should_log(level_of(level)); }
+
+std::uint64_t log_lines_dropped() { return output().dropped(); }
 
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields) {
     log(level, event, std::span(fields.begin(), fields.size()));
@@ -89,21 +172,55 @@ void log(LogLevel level, std::string_view event, std::initializer_list<LogField>
 
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
-    std::string line;
-    if (g_format == LogFormat::json) {
-        line = fmt::format("\"event\":\"{}\"", escaped(event));
-        for (const auto& [key, value] : fields)
-            line += fmt::format(",\"{}\":\"{}\"", key, escaped(value));
-    } else {
-        line = std::string(event);
-        for (const auto& [key, value] : fields)
-            line += fmt::format(" {}={}", key, text_value(value));
+    std::uint64_t left_out = 0;
+    if (level <= LogLevel::info) {
+        const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event,
+                                            subject_of(fields), LogThrottle::kIncidents);
+        if (!passed) return;
+        left_out = *passed;
     }
-    if (g_tapped) return g_tapped->push_back(fmt::format("{} {}", label(level), line));
-    logger().log(level_of(level), line);
+    put(level, event, fields, left_out);
 }
 
-LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) { g_tapped = lines_; }
+void log_deed(std::string_view event, std::string_view subject,
+              std::initializer_list<LogField> fields) {
+    if (!log_enabled(LogLevel::info)) return;
+    const auto passed =
+        g_throttle.pass(std::chrono::steady_clock::now(), event, subject, LogThrottle::kDeeds);
+    if (passed) put(LogLevel::info, event, std::span(fields.begin(), fields.size()), *passed);
+}
+
+struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
+    explicit State(Clock& its_clock) : clock(its_clock), alarm(clock.make_alarm()) {}
+
+    void watch() {
+        constexpr Duration kPause = 20ms;
+        if (!output().pending()) return;
+        alarm->arm(clock.now() + kPause, [self = shared_from_this()] {
+            output().flush();
+            self->watch();
+        });
+    }
+
+    Clock& clock;
+    std::unique_ptr<Alarm> alarm;
+};
+
+LogDrain::LogDrain(Clock& clock) : state_(std::make_shared<State>(clock)) {
+    output().on_pending([state = state_.get()] { state->watch(); });
+    state_->watch();
+}
+
+LogDrain::~LogDrain() {
+    output().on_pending({});
+    state_->alarm->cancel();
+    output().flush();
+}
+
+LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) {
+    g_tapped = lines_;
+    g_throttle = {};
+}
 
 LogTap::~LogTap() { g_tapped.reset(); }
 

@@ -98,7 +98,7 @@ class Files(unittest.TestCase):
             for ports in ((port, 0), (0, port)):
                 errors = self.errors(good(*ports), UNAVAILABLE, "run")
                 self.assertIn(f"127.0.0.1:{port}", errors)
-                told = [line for line in errors.splitlines() if line.startswith("panelgate: ")]
+                told = [line for line in errors.splitlines() if " error " in line]
                 self.assertEqual(len(told), 1, errors)
 
     def test_check_prints_the_plan_as_text_and_json(self):

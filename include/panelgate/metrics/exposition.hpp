@@ -7,6 +7,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
+#include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 
 namespace panelgate::metrics {
@@ -19,6 +20,7 @@ struct Snapshot {
     std::vector<points::RelaySample> relays;
     std::string version;
     ProcessFacts process;
+    rt::Counters runtime;
 };
 
 /// The Content-Type that goes with exposition().

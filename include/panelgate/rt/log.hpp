@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <initializer_list>
 #include <memory>
 #include <span>
@@ -13,18 +14,42 @@
 
 namespace panelgate::rt {
 
+class Clock;
+
 using LogField = std::pair<std::string_view, std::string>;
 
-/// To stderr; a pipe that is full or closed loses lines, never blocks or ends the program.
+/// To stderr, whose reader may be slow, stopped or gone: nobody waits for it. Lines that it does
+/// not take wait (LogOutput); then they are lost and counted.
 void set_up_log(const LogSettings& settings);
 bool log_enabled(LogLevel level);
+/// Lines that nobody will see, because stderr's reader stood still.
+std::uint64_t log_lines_dropped();
+
+/// Hands over what waits, now and then, for as long as it lives.
+class LogDrain {
+  public:
+    explicit LogDrain(Clock& clock);
+    ~LogDrain();
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;
+};
+
 /// One line an event: `2026-11-21T10:00:00.123Z info line up line=floor1 device=/dev/x`. Values
-/// with blanks or quotes are quoted; control characters are escaped.
+/// with blanks or quotes are quoted; control characters are escaped. The first two fields say whom
+/// it is about: from error to info, the same event of the same subject is soon left out
+/// (LogThrottle), and what follows tells how often in the field `left_out`. Of a field `client` the
+/// port does not count.
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
+/// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
+/// times at once, then once a minute.
+void log_deed(std::string_view event, std::string_view subject,
+              std::initializer_list<LogField> fields);
 
-/// For tests: while it lives, lines go to it, without their time, instead of to stderr. One at a
-/// time.
+/// For tests: while it lives, lines go to it, without their time, instead of to stderr, and nothing
+/// that was said before makes it leave one out. One at a time.
 class LogTap {
   public:
     LogTap();

@@ -78,6 +78,8 @@ TEST_F(PlantTest, AUnitIsWhatTheFirstListenerThatReachesAStationCallsIt) {
     EXPECT_EQ(plant.find("mixer")->unit, 5);
     EXPECT_EQ(plant.find("oven")->unit, 105) << "the lowest";
     EXPECT_EQ(plant.find("meter")->unit, 7);
+    EXPECT_EQ(plant.find_unit(105), plant.find("oven"));
+    EXPECT_EQ(plant.find_unit(205), nullptr) << "an alias";
 }
 
 TEST_F(PlantTest, AStationThatNoListenerReachesHasNoUnit) {

@@ -21,14 +21,25 @@ TEST_F(LogTest, QuotesInTextOnlyWhatHasToBe) {
 TEST_F(LogTest, GivesEachFieldAKeyOfItsOwnInJson) {
     set_up_log({LogLevel::info, LogFormat::json});
     log(LogLevel::warn, "cannot accept", {{"listener", "127.0.0.1:502"}, {"reason", "a\tb"}});
-    EXPECT_THAT(tap.lines(), ElementsAre("warning \"event\":\"cannot accept\",\"listener\":"
-                                         "\"127.0.0.1:502\",\"reason\":\"a\\u0009b\""));
+    EXPECT_THAT(tap.lines(),
+                ElementsAre("\"level\":\"warn\",\"event\":\"cannot accept\",\"listener\":"
+                            "\"127.0.0.1:502\",\"reason\":\"a\\u0009b\""));
 }
 
 TEST_F(LogTest, SaysNothingBelowItsLevel) {
     set_up_log({LogLevel::warn, LogFormat::text});
     log(LogLevel::info, "line up");
     EXPECT_EQ(tap.count(""), 0u);
+}
+
+TEST_F(LogTest, LeavesOutWhoRepeatsHimselfWhateverHisPort) {
+    for (int port = 50000; port < 50100; ++port) {
+        log(LogLevel::info, "connection closed",
+            {{"listener", "a:502"}, {"client", "10.0.0.7:" + std::to_string(port)}});
+    }
+    log(LogLevel::info, "connection closed", {{"listener", "a:502"}, {"client", "10.0.0.8:1"}});
+    EXPECT_EQ(tap.count("client=10.0.0.7"), 3u);
+    EXPECT_EQ(tap.count("client=10.0.0.8"), 1u);
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "panelgate/base/outcome.hpp"
+#include "panelgate/bus/bus.hpp"
+
+namespace panelgate::bus {
+
+/// What the log is to say of a client's write when it has ended.
+struct Deed {
+    std::string client;
+    std::string place;  ///< "holding-registers/100", or empty
+    std::string pdu;    ///< hex; the first bytes of a long one
+};
+
+/// Nothing for what changes nothing and for what no client wants (polls, relays).
+std::optional<Deed> deed_of(const Request& request, const std::string& client);
+/// One line at info.
+void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);
+
+}  // namespace panelgate::bus

@@ -1,0 +1,42 @@
+#include "panelgate/rt/log_throttle.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace panelgate::rt {
+
+std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view event,
+                                               std::string_view subject, const Pace& pace) {
+    std::string key(event);
+    key += '\0';
+    key += subject;
+    auto found = seen_.find(key);
+    if (found == seen_.end()) {
+        make_room(now);
+        found = seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst, 0}).first;
+    }
+    Seen& seen = found->second;
+    // Credit comes back one at a time: what was quiet for long may speak freely again.
+    const auto earned = (now - seen.last) / pace.interval;
+    if (earned > 0)
+        seen.credit = static_cast<int>(std::min<std::int64_t>(pace.burst, seen.credit + earned));
+    if (seen.credit == 0) {
+        ++seen.left_out;
+        return std::nullopt;
+    }
+    --seen.credit;
+    seen.last = now;
+    return std::exchange(seen.left_out, 0);
+}
+
+/// Whoever has been quiet for an interval is as good as new; if nobody has, the one quiet longest.
+void LogThrottle::make_room(TimePoint now) {
+    if (seen_.size() < kMostSubjects) return;
+    std::erase_if(
+        seen_, [&](const auto& entry) { return now - entry.second.last >= entry.second.interval; });
+    if (seen_.size() < kMostSubjects) return;
+    seen_.erase(
+        std::ranges::min_element(seen_, {}, [](const auto& entry) { return entry.second.last; }));
+}
+
+}  // namespace panelgate::rt

@@ -1,0 +1,123 @@
+"""What the program writes to stderr: that nobody waits for its reader, and what stands in it."""
+import contextlib
+import itertools
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import tempfile
+import unittest
+import urllib.request
+
+import config
+import harness
+from harness import read_registers, write_register
+
+FAST = config.line(baud=1000000, stations="{id: 31, name: press}")
+FOREIGN = bytes.fromhex("00000000ffffff00")  # a length that closes the connection: a line at info
+
+
+class Unread:
+    """The program, whose stderr is a full pipe that nobody reads."""
+
+    def __init__(self, text):
+        self.folder = tempfile.TemporaryDirectory()
+        path = os.path.join(self.folder.name, "panelgate.yaml")
+        with open(path, "w") as file:
+            file.write(text)
+        self.reader, writer = os.pipe()
+        self.process = subprocess.Popen([harness.PANELGATE, "run", "-c", path],
+                                        stdin=subprocess.DEVNULL, stderr=writer)
+        os.close(writer)
+        self.ports = self._ports()
+
+    def _ports(self):
+        """Its lines are read until the last listener has told its port, and then no more."""
+        said = ""
+        while not (found := re.search(r"modbus_tcp=\S*:(\d+)\n(?:.*\n)*?.*http=\S*:(\d+)\n", said)):
+            part = os.read(self.reader, 4096).decode()
+            assert part, said
+            said += part
+        return int(found[1]), int(found[2])
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        os.close(self.reader)
+        self.folder.cleanup()
+
+    def metric(self, name):
+        with urllib.request.urlopen(f"http://127.0.0.1:{self.ports[1]}/metrics",
+                                    timeout=harness.PATIENCE) as response:
+            text = response.read().decode()
+        return float(re.search(rf"^{name} (\S+)$", text, re.M)[1])
+
+
+class Log(unittest.TestCase):
+    def test_P3_P5_a_reader_of_stderr_that_stalls_stops_nobody(self):
+        text = config.gateway(FAST, log="{level: trace}")
+        with Unread(text) as program:
+            modbus, _ = program.ports
+            with harness.Client(modbus) as client:
+                for n in itertools.count():
+                    self.assertEqual(len(client.ask(31, read_registers(0, 5))), 12)
+                    if n % 100 == 99 and program.metric("panelgate_log_lines_dropped_total") > 0:
+                        break
+            program.process.send_signal(signal.SIGTERM)
+            self.assertEqual(program.process.wait(harness.PATIENCE), 0)
+
+    def test_who_repeats_himself_is_quoted_now_and_then(self):
+        with harness.configured(config.gateway(config.line())) as program:
+            for _ in range(100):
+                with program.client() as client:
+                    client.send_bytes(FOREIGN)
+                    self.assertTrue(client.is_closed_by_peer())
+            self.assertLess(program.log.text().count("connection closed"), 10)
+
+    def test_each_write_of_a_client_leaves_a_line_with_who_and_what(self):
+        with harness.configured(config.gateway(FAST, http=config.OPERATOR)) as program:
+            with program.client() as client:
+                client.ask(31, write_register(1000, 7))
+                port = client.socket.getsockname()[1]
+            program.log.wait_for(
+                r"info write line=floor1 station=press client=\"modbus_tcp 127.0.0.1:%d\" "
+                r"at=holding-registers/1000 pdu=0603e80007 outcome=\w+" % port)
+            program.rest("PUT", "/api/v1/stations/press/holding-registers/1001", {"values": [8]})
+            program.log.wait_for(r"info write .*at=holding-registers/1001 .*outcome=ok")
+            program.rest("POST", "/api/v1/lines/floor1/raw",
+                         {"station": 31, "pdu": "0603EA0009"})
+            program.log.wait_for(r"info write .*at=holding-registers/1002 .*outcome=ok")
+            program.rest("POST", "/api/v1/lines/floor1/broadcast",
+                         {"table": "holding-registers", "address": 1003, "values": [1]})
+            program.log.wait_for(r"info write .*station=broadcast .*at=holding-registers/1003 ")
+
+    def test_a_program_that_writes_without_end_does_not_fill_the_disk(self):
+        with harness.configured(config.gateway(FAST)) as program:
+            with program.client() as client:
+                for n in range(100):
+                    client.ask(31, write_register(1000, n))
+            self.assertIn(program.log.text().count(" info write "), range(20, 40))
+
+    def test_a_json_log_has_nothing_but_json_also_when_the_program_cannot_start(self):
+        with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as taken:
+            listen = f'listen: "127.0.0.1:{taken.getsockname()[1]}"'
+            with tempfile.TemporaryDirectory() as folder:
+                path = os.path.join(folder, "panelgate.yaml")
+                with open(path, "w") as file:
+                    file.write(config.gateway(config.line(), modbus=listen, log="{format: json}"))
+                done = subprocess.run([harness.PANELGATE, "run", "-c", path], text=True,
+                                      capture_output=True, timeout=harness.PATIENCE)
+        self.assertEqual(done.returncode, 69)
+        lines = [json.loads(line) for line in done.stderr.splitlines()]
+        self.assertEqual({*lines[-1]} >= {"time", "level", "event", "reason"}, True, lines)
+        self.assertEqual(lines[-1]["level"], "error")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,149 @@
+#include "panelgate/rt/log_output.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <pty.h>
+#include <sys/socket.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <sstream>
+#include <string>
+#include <utility>
+
+namespace panelgate::rt {
+namespace {
+
+/// Both ends of a way to a reader who reads only when told to.
+struct Way {
+    int reader = -1;
+    int writer = -1;
+
+    Way(int reading, int writing) : reader(reading), writer(writing) {
+        ::fcntl(reader, F_SETFL, O_NONBLOCK);
+    }
+    Way(Way&& other) noexcept
+        : reader(std::exchange(other.reader, -1)), writer(std::exchange(other.writer, -1)) {}
+    ~Way() {
+        if (reader >= 0) ::close(reader);
+        if (writer >= 0) ::close(writer);
+    }
+    std::string read() const {
+        std::string all;
+        std::array<char, 4096> part{};
+        for (;;) {
+            const ssize_t got = ::read(reader, part.data(), part.size());
+            if (got <= 0) return all;
+            all.append(part.data(), static_cast<std::size_t>(got));
+        }
+    }
+};
+
+Way pipe_way() {
+    std::array<int, 2> ends{};
+    if (::pipe(ends.data()) != 0) std::abort();
+    return {ends[0], ends[1]};
+}
+
+Way socket_way() {
+    std::array<int, 2> ends{};
+    if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) std::abort();
+    return {ends[0], ends[1]};
+}
+
+Way terminal_way() {
+    int master = -1;
+    int slave = -1;
+    termios raw{};
+    ::cfmakeraw(&raw);
+    if (::openpty(&master, &slave, nullptr, &raw, nullptr) != 0) std::abort();
+    return {master, slave};
+}
+
+std::string line_of(int number) { return std::to_string(number) + std::string(60, '.') + '\n'; }
+
+class LogOutputTest : public testing::TestWithParam<Way (*)()> {
+  protected:
+    /// Reads and flushes until nothing moves any more.
+    std::string drain(LogOutput& output) const {
+        std::string all;
+        for (;;) {
+            output.flush();
+            const std::string part = way_.read();
+            if (part.empty() && !output.pending()) return all;
+            all += part;
+        }
+    }
+    Way way_ = GetParam()();
+};
+
+INSTANTIATE_TEST_SUITE_P(Of, LogOutputTest, testing::Values(&pipe_way, &socket_way, &terminal_way),
+                         [](const auto& info) {
+                             return info.param == &pipe_way     ? "APipe"
+                                    : info.param == &socket_way ? "ASocket"
+                                                                : "ATerminal";
+                         });
+
+TEST_P(LogOutputTest, AReaderWhoStandsStillLosesNoLineThatFitsAndStopsNobody) {
+    LogOutput output(way_.writer, 1 << 20);
+    std::string wanted;
+    for (int i = 0; i < 10000; ++i) {
+        output.write(line_of(i));  // would never end if it waited
+        wanted += line_of(i);
+    }
+    EXPECT_TRUE(output.pending());
+    EXPECT_EQ(drain(output), wanted);
+    EXPECT_EQ(output.dropped(), 0u);
+}
+
+TEST_P(LogOutputTest, WhatDoesNotFitIsDroppedCountedAndTold) {
+    constexpr std::size_t kMost = 1000;
+    LogOutput output(way_.writer, kMost);
+    output.on_lost([](std::uint64_t lines) { return "lost " + std::to_string(lines) + "\n"; });
+    constexpr int kLines = 10000;
+    for (int i = 0; i < kLines; ++i) output.write(line_of(i));
+    EXPECT_GT(output.dropped(), 0u);
+    std::istringstream all(drain(output));
+    int next = 0;
+    for (std::string line; std::getline(all, line);) {
+        if (line.starts_with("lost ")) {
+            next += std::stoi(line.substr(5));
+        } else {
+            ASSERT_EQ(line + '\n', line_of(next++)) << "in order, and each line whole";
+        }
+    }
+    EXPECT_EQ(next, kLines) << "each line was handed over or told to be lost";
+    output.write("and on\n");
+    EXPECT_EQ(drain(output), "and on\n");
+}
+
+TEST_P(LogOutputTest, SomebodyIsToldWhenLinesBeginToWait) {
+    LogOutput output(way_.writer);
+    int told = 0;
+    output.on_pending([&] { ++told; });
+    output.write(line_of(0));
+    EXPECT_EQ(told, 0);
+    while (!output.pending()) output.write(line_of(1));
+    EXPECT_EQ(told, 1);
+}
+
+TEST_P(LogOutputTest, AReaderWhoLeftCostsNothing) {
+    std::signal(SIGPIPE, SIG_IGN);  // as the program does
+    LogOutput output(way_.writer);
+    ::close(std::exchange(way_.reader, -1));
+    for (int i = 0; i < 10000; ++i) output.write(line_of(i));
+    EXPECT_FALSE(output.pending());
+}
+
+TEST_P(LogOutputTest, TheDescriptorOfOthersStaysAsItWas) {
+    const int before = ::fcntl(way_.writer, F_GETFL);
+    LogOutput output(way_.writer);
+    output.write("x\n");
+    EXPECT_EQ(::fcntl(way_.writer, F_GETFL), before);
+}
+
+}  // namespace
+}  // namespace panelgate::rt
