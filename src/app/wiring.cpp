@@ -1,6 +1,5 @@
 #include "wiring.hpp"
 
-#include <cstdint>
 #include <cstdlib>
 #include <optional>
 
@@ -10,21 +9,28 @@
 namespace panelgate::app {
 namespace {
 
-/// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
+std::optional<bus::Rule> rule_of(profile::Judgement judgement) {
+    switch (judgement) {
+        case profile::Judgement::fine:
+            return std::nullopt;
+        case profile::Judgement::illegal_function:
+            return bus::Rule::function;
+        case profile::Judgement::illegal_value:
+            return bus::Rule::quantity;
+        case profile::Judgement::illegal_address:
+            return bus::Rule::range;
+        case profile::Judgement::write_protected:
+            return bus::Rule::write_protected;
+    }
+    std::abort();
+}
+
+/// Refuses what the panel's manual rules out. The profile outlives it.
 bus::Guard guard_of(const profile::PanelProfile& profile) {
-    return [&profile](const modbus::Request& request) -> std::optional<std::uint8_t> {
-        switch (profile::judge(profile, request)) {
-            case profile::Judgement::fine:
-                return std::nullopt;
-            case profile::Judgement::illegal_function:
-                return std::uint8_t{1};
-            case profile::Judgement::illegal_address:
-            case profile::Judgement::write_protected:
-                return std::uint8_t{2};
-            case profile::Judgement::illegal_value:
-                return std::uint8_t{3};
-        }
-        std::abort();
+    return [&profile](const modbus::Request& request) -> std::optional<bus::Objection> {
+        const auto rule = rule_of(profile::judge(profile, request));
+        if (!rule) return std::nullopt;
+        return bus::Objection{*rule, profile::explain(profile, request)};
     };
 }
 

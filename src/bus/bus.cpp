@@ -82,6 +82,9 @@ struct Bus::State final : public line::Line::Events {
         if (up) doctor.look(now, arbiter, *line);
     }
     void answer(Pending pending, Answer answer);
+    WallTime on_the_wall(TimePoint at) const {
+        return wall_time_of(at, clock.now(), rt::wall_now());
+    }
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
@@ -96,7 +99,6 @@ struct Bus::State final : public line::Line::Events {
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
-    ClientNames client_names;
     LoadMeter load;
     Refusals refusals;
     line::Drive<arbiter::Arbiter, State> drive;
@@ -137,7 +139,7 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
-    entry.deed = deed_of(request, name_of(client_names, request.client));
+    entry.deed = deed_of(request, arbiter.client_names().of(request.client));
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -195,6 +197,7 @@ void Bus::State::act(arbiter::Note& note) {
     frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
     frame.why = std::move(note.why);
+    frame.time = on_the_wall(note.at);
     recorder.add(std::move(frame));
 }
 
@@ -202,7 +205,7 @@ void Bus::State::act(arbiter::Decision& decision) {
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
     }
-    decisions.add({0, decision.at, std::move(decision.text)});
+    decisions.add({0, decision.at, std::move(decision.text), on_the_wall(decision.at)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
@@ -232,6 +235,8 @@ void Bus::State::answer(Pending entry, Answer result) {
     observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
+    if (!result.pdu && result.pdu.error() == Fault::line_down)
+        result.why = up ? "its device is being closed" : why_down;
     const bool refused = !result.transmitted && result.source == Source::bus;
     auto hand_over = [handler = std::move(entry.handler), result = std::move(result)]() mutable {
         handler(std::move(result));
@@ -272,13 +277,11 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::cancel(ClientId client) {
-    state_->client_names.erase(client);
     state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); });
 }
 
 void Bus::name_client(ClientId client, std::string name) {
-    if (state_->client_names.size() >= arbiter::BusShares::kClients) return;
-    state_->client_names.insert_or_assign(client, std::move(name));
+    state_->arbiter.name_client(client, std::move(name));
 }
 
 LineStatus Bus::status() const {
@@ -296,7 +299,7 @@ LineStatus Bus::status() const {
 }
 
 std::vector<ClientShare> Bus::clients() const {
-    return client_shares(state_->arbiter.shares(), state_->client_names);
+    return client_shares(state_->arbiter.shares(), state_->arbiter.client_names());
 }
 
 StationStatus Bus::station_status(std::uint8_t station) const {

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
+#include "panelgate/base/number_text.hpp"
 #include "text.hpp"
 
 namespace panelgate::points {
@@ -133,15 +133,15 @@ std::optional<Value> scaled(const Point& point, double raw) {
     return Value(value);
 }
 
-std::optional<Value> decode_float(const Point& point, double raw) {
+std::optional<Value> decode_double(const Point& point, double raw) {
     if (means_none(point, raw)) return std::nullopt;
     return scaled(point, raw);
 }
 
-std::string number_text(double value) {
-    char buffer[32];
-    const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value);
-    return error == std::errc() ? std::string(buffer, end) : std::string();
+/// As a float prints, 0.1: widened to a double it would be 0.10000000149011612.
+std::optional<Value> decode_float(const Point& point, float raw) {
+    if (means_none(point, static_cast<double>(raw))) return std::nullopt;
+    return scaled(point, as_printed(raw));
 }
 
 WriteRefusal refusal(std::string message) { return {std::move(message)}; }
@@ -172,8 +172,8 @@ Limits limits_of(Type type) {
         case Type::bcd32:
             return {0, 99999999};
         case Type::f32:
-            return {-static_cast<double>(std::numeric_limits<float>::max()),
-                    static_cast<double>(std::numeric_limits<float>::max())};
+            return {-as_printed(std::numeric_limits<float>::max()),
+                    as_printed(std::numeric_limits<float>::max())};
         case Type::f64:
         case Type::string:
             return {-std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
@@ -318,7 +318,7 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
     const std::uint64_t bits = joined(words);
     if (point.type == Type::f32)
         return decode_float(point, std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
-    if (point.type == Type::f64) return decode_float(point, std::bit_cast<double>(bits));
+    if (point.type == Type::f64) return decode_double(point, std::bit_cast<double>(bits));
     const auto raw = raw_of(point.type, bits);
     if (!raw || means_none(point, static_cast<std::uint64_t>(raw->number))) return std::nullopt;
     if (point.type == Type::boolean) return Value(raw->number != 0);

@@ -70,6 +70,9 @@ class FakeBus : public bus::BusClient {
     }
 
     std::vector<bus::ClientShare> clients() const override { return shares; }
+    void name_client(bus::ClientId client, std::string name) override {
+        names[client] = std::move(name);
+    }
 
     static bus::Answer reply(Bytes pdu) {
         return {Result<Bytes>(std::move(pdu)), true, bus::Source::bus, {}};
@@ -84,6 +87,7 @@ class FakeBus : public bus::BusClient {
     bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, EchoState::absent};
     bus::Rights rights;  ///< to everything, at first
     std::vector<bus::ClientShare> shares;
+    std::map<bus::ClientId, std::string> names;
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
     std::vector<bus::TraceDecision> made;  ///< decisions

@@ -15,6 +15,7 @@
 #include "panelgate/base/health.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/wall_time.hpp"
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -47,8 +48,9 @@ struct Answer {
     Source source = Source::bus;
     Duration age{};       ///< of the value, when source is cache
     bool shared = false;  ///< another request's transaction answered this one, too
-    /// The rights forbid it: `pdu` is Fault::denied, or of a guard the exception.
+    /// It is refused here and never transmitted: `pdu` is Fault::denied, or a guard's exception.
     std::optional<Refusal> refusal{};
+    std::string why{};  ///< of Fault::line_down: what is wrong with the line, as its state says
 };
 using AnswerHandler = std::function<void(Answer)>;
 
@@ -59,6 +61,7 @@ struct TraceFrame {
     FrameKind kind = FrameKind::request;
     Bytes bytes;
     std::string why;  ///< of a sent frame: why this one at this time
+    WallTime time{};  ///< `at`, by the clock on the wall
 };
 
 /// Why something was not done, or not at once; one line.
@@ -66,11 +69,12 @@ struct TraceDecision {
     std::uint64_t sequence = 0;  ///< counts from 1 a line
     TimePoint at;
     std::string text;
+    WallTime time{};  ///< `at`, by the clock on the wall
 };
 
 /// What one client has used of a line's time (P9).
 struct ClientShare {
-    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"; "client 12" when nobody named it
+    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"
     Duration busy{};
     double percent = 0;  ///< of what all clients that are there have used
     std::uint64_t transactions = 0;
@@ -135,7 +139,8 @@ class BusClient {
         static_cast<void>(last);
         return {};
     }
-    /// What a client is to be called in clients(), until cancel().
+    /// What a client is to be called in clients() and in the trace, until cancel(). The last name
+    /// counts.
     virtual void name_client(ClientId client, std::string name) {
         static_cast<void>(client);
         static_cast<void>(name);

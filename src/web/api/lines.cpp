@@ -47,6 +47,7 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
 json::object describe(const bus::TraceFrame& frame) {
     json::object object;
     object["sequence"] = frame.sequence;
+    object["time"] = rfc3339(frame.time);
     object["at"] = to_seconds(frame.at.time_since_epoch());
     object["direction"] = label(direction_of(frame.kind));
     object["station"] = nullptr;
@@ -60,6 +61,7 @@ json::object describe(const bus::TraceFrame& frame) {
 json::object describe(const bus::TraceDecision& decision) {
     json::object object;
     object["sequence"] = decision.sequence;
+    object["time"] = rfc3339(decision.time);
     object["at"] = to_seconds(decision.at.time_since_epoch());
     object["text"] = decision.text;
     return object;

@@ -3,7 +3,6 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
-#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"

@@ -8,6 +8,7 @@
 
 #include "access.hpp"
 #include "panelgate/web/http/problem.hpp"
+#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -71,6 +72,9 @@ Handling dispatch(HttpRequest request, const Site* site) {
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = check_access(request, found.route->needed, site->settings);
     if (refused) co_return to_response(*refused);
+    const auto mistaken = check_queries(request, found.route->queries);
+    if (mistaken) co_return to_response(*mistaken);
+    if (request.caller) request.caller->uses_token(token_name(request, site->settings));
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);

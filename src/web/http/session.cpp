@@ -40,6 +40,7 @@ HttpRequest to_request(BeastRequest&& message, Target target) {
     request.method = message.method_string();
     request.path = std::move(target.path);
     request.query = std::move(target.query);
+    request.repeated_query = std::move(target.repeated_query);
     for (const char* name : kHeadersRead) {
         const auto field = message.find(name);
         if (field != message.end()) request.headers[name] = field->value();

@@ -15,7 +15,8 @@ namespace panelgate::web {
 struct HttpRequest {
     std::string method;
     std::vector<std::string> path;               ///< segments, percent-decoded
-    std::map<std::string, std::string> query;    ///< decoded; of equal names the last
+    std::map<std::string, std::string> query;    ///< decoded; of equal names the first
+    std::string repeated_query;                  ///< a name that comes more than once; "" for none
     std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for

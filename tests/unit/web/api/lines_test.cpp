@@ -12,7 +12,7 @@ TEST_F(ApiLines, ListsTheLines) {
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
     EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
-        "load_percent":50.0,"queue_depth":3,"echo":"absent","findings":[]})"));
+        "load_percent":50,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
 }
@@ -33,7 +33,7 @@ TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
     bus.shares = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
-              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75.0,
+              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75,
         "transactions":12}])"));
 }
 
@@ -58,13 +58,14 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
                           TimePoint(2500ms),
                           FrameKind::request,
                           {0x1F, 0x01, 0x01, 0x20, 0x00, 0x05, 0xFF, 0x81},
-                          "next in turn"});
+                          "next in turn",
+                          WallTime(2500ms)});
     bus.frames.push_back({3, TimePoint(3s), FrameKind::damaged, {}, {}});
     bus.made.push_back({7, TimePoint(2s), "refused"});
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
-        {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
-        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
-        "decisions":[{"sequence":7,"at":2.0,"text":"refused"}]})"));
+        {"sequence":2,"time":"1970-01-01T00:00:02.500000Z","at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
+        {"sequence":3,"time":"1970-01-01T00:00:00.000000Z","at":3,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
+        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}]})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
 }
@@ -115,6 +116,18 @@ TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
         403u);
 }
 
+TEST_F(ApiLines, P2WhatMayBeAMistakeInABodyIsNotExecuted) {
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast",
+                  R"({"table":"coils","address":1,"values":[1],"verfy":true})")
+                  .at("detail"),
+              "unknown member 'verfy'; did you mean 'verify'?");
+    EXPECT_EQ(
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"station":6,"pdu":"0500010000"})")
+            .status(),
+        400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiLines, SaysWhyABroadcastDidNotLeave) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::line_down, false); };
     const Reply reply = ask("POST", "/api/v1/lines/floor1/broadcast",
@@ -137,6 +150,28 @@ TEST_F(ApiLines, GivesAPanelsExceptionToARawRequestAsAnAnswer) {
     const Reply reply = ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"pdu":"0b"})");
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(), json_of(R"({"pdu":"8B01","exception":1})"));
+}
+
+TEST_F(ApiLines, P2ARawRequestToStation0IsABroadcastAndNobodyHasReplied) {
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"06000A0001"})");
+    EXPECT_EQ(reply.status(), 202u);
+    EXPECT_EQ(reply.json(), json_of(R"({"transmitted":true,"confirmed":false})"));
+    EXPECT_EQ(bus.requests[0].station, 0);
+}
+
+TEST_F(ApiLines, ARawRequestThatAGuardRefusesWasNotAnsweredByThePanel) {
+    bus.script = [](const bus::Request&) {
+        bus::Answer answer = test::FakeBus::reply({0x83, 2});
+        answer.transmitted = false;
+        answer.refusal = bus::Refusal{bus::Rule::range, "press"};
+        return answer;
+    };
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":31,"pdu":"0300640002"})");
+    EXPECT_EQ(reply.status(), 422u);
+    EXPECT_EQ(reply.at("transmitted"), false);
+    EXPECT_EQ(reply.at("rule"), "range");
 }
 
 TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {

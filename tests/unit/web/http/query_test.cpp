@@ -28,5 +28,24 @@ TEST(Query, GivesAValueWithinItsBounds) {
     EXPECT_FALSE(query_number(request, "last", 0, 10, 5));
 }
 
+TEST(Query, WhatNobodyKnowsOrIsGivenTwiceIsRefused) {
+    const std::string_view known[] = {"count", "type"};
+    HttpRequest request;
+    EXPECT_FALSE(check_queries(request, {}));
+    request.query = {{"count", "1"}};
+    EXPECT_FALSE(check_queries(request, known));
+    EXPECT_EQ(check_queries(request, {}).value().detail,
+              "unknown query 'count'; there is none here");
+    request.repeated_query = "count";
+    EXPECT_EQ(check_queries(request, known).value().detail, "the query 'count' is given twice");
+    request.query = {{"cuont", "1"}};
+    EXPECT_EQ(check_queries(request, known).value().status, 400u);
+    EXPECT_EQ(check_queries(request, known).value().detail,
+              "unknown query 'cuont'; did you mean 'count'?");
+    request.query = {{"address", "1"}};
+    EXPECT_EQ(check_queries(request, known).value().detail,
+              "unknown query 'address'; known here: count, type");
+}
+
 }  // namespace
 }  // namespace panelgate::web
