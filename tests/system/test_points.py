@@ -50,7 +50,7 @@ class Points(unittest.TestCase):
         with harness.configured(PRESS) as program:
             until(lambda: quality(program, "total") == "good")
             self.assertEqual(program.rest("PUT", POINT + "level", {"value": 21.5}),
-                             (200, {"transmitted": True, "confirmed": True}))
+                             (200, {"transmitted": True, "confirmed": True, "value": 21.5}))
             level = until(lambda: (lambda p: p if p["value"] == 21.5 else None)(
                 program.get(POINT + "level")[1]))
             self.assertEqual((level["unit"], level["quality"], level["at"]),
@@ -75,11 +75,15 @@ class Points(unittest.TestCase):
             for point, value, status, text in (
                     ("level", 400.5, 422, "level must be at most 400"),
                     ("total", -1, 422, "total must be from 0 to 4294967295"),
+                    ("total", 1.5, 422, "total cannot be exactly 1.5"),
+                    ("level", 21.55, 422, "the nearest that it can be are 21.5 and 21.6"),
                     ("mode", "walking", 422, "mode has no label 'walking'"),
                     ("level", None, 400, "value must be"), ("pressure", 1, 404, "no point")):
                 got, body = program.rest("PUT", POINT + point, {"value": value})
                 self.assertEqual(got, status, body)
                 self.assertIn(text, body["detail"])
+            self.assertEqual(program.rest("PUT", POINT + "level?round=true", {"value": 21.56}),
+                             (200, {"transmitted": True, "confirmed": True, "value": 21.6}))
 
     def test_P10_a_dead_panel_is_stale_then_absent_and_its_age_grows(self):
         with harness.configured(PRESS) as program:

@@ -89,8 +89,8 @@ class Rest(unittest.TestCase):
             for point, shown in (("tenth", "0.1"), ("level", "29.5")):
                 path = PRESS + "points/" + point
                 for _ in range(2000):  # its next poll comes soon
-                    value = program.get(path)[1]["value"]
-                    if value is not None and abs(value - float(shown)) < 1e-6:
+                    point = program.get(path)[1]
+                    if point["quality"] == "good" and abs(point["value"] - float(shown)) < 1e-6:
                         break
                 self.assertIn(f'"value":{shown},', text_of(program, path))
             self.assertRegex(text_of(program, "/metrics"), r'point="tenth",unit=""\} 0\.1\n')
