@@ -26,6 +26,16 @@ def text_of(program, path):
         return response.read().decode()
 
 
+def polled(program, point, as_wanted=lambda value: True):
+    """Waits until a poll has brought a value like this; each look is a request to the program."""
+    for _ in range(5000):
+        shown = program.get(PRESS + "points/" + point)[1]
+        value = shown["value"]
+        if shown["quality"] == "good" and as_wanted(value):
+            return
+    raise AssertionError(f"{point} is never as it should be, but {value}")
+
+
 class Rest(unittest.TestCase):
     def test_what_is_refused_here_says_so_and_by_which_rule(self):
         with harness.configured(PLANT) as program:
@@ -88,10 +98,7 @@ class Rest(unittest.TestCase):
             self.assertEqual(program.rest("PUT", PRESS + "points/level", {"value": 29.5})[0], 200)
             for point, shown in (("tenth", "0.1"), ("level", "29.5")):
                 path = PRESS + "points/" + point
-                for _ in range(2000):  # its next poll comes soon
-                    point = program.get(path)[1]
-                    if point["quality"] == "good" and abs(point["value"] - float(shown)) < 1e-6:
-                        break
+                polled(program, point, lambda value: abs(value - float(shown)) < 1e-6)
                 self.assertIn(f'"value":{shown},', text_of(program, path))
             self.assertRegex(text_of(program, "/metrics"), r'point="tenth",unit=""\} 0\.1\n')
             for path in ("/api/v1/lines", FLOOR[:-1], FLOOR + "trace", PRESS + "points",
@@ -102,6 +109,7 @@ class Rest(unittest.TestCase):
         with harness.configured(PLANT) as program, program.client() as client:
             client.ask(31, harness.read_registers(0))
             program.values(PRESS + "devices/UW0")
+            polled(program, "level")
             frames = program.get(FLOOR + "trace?last=500")[1]["frames"]
             now = datetime.datetime.now(datetime.timezone.utc)
             port = client.socket.getsockname()[1]

@@ -62,7 +62,7 @@ Parsed<json::object> parse_object(std::string_view body) {
     if (used < body.size()) return bad_json(body, used, "something follows the value");
     if (const auto twice = find_repeated_member(body))
         return problem(400, "the member '" + excerpt(twice->name) +
-                                "' comes a second time: " + place_of(body, twice->end));
+                                "' comes a second time: " + place_of(body, twice->at));
     const json::value value = parser.release();
     if (!value.is_object()) return problem(400, "the body must be a JSON object");
     return value.get_object();

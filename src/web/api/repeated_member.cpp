@@ -1,5 +1,6 @@
 #include "repeated_member.hpp"
 
+#include <algorithm>
 #include <boost/json/basic_parser_impl.hpp>
 #include <boost/system/errc.hpp>
 #include <boost/system/error_code.hpp>
@@ -75,7 +76,11 @@ std::optional<RepeatedMember> find_repeated_member(std::string_view json) {
     const std::size_t used = parser.write_some(false, json.data(), json.size(), error);
     auto& name = parser.handler().repeated;
     if (!name) return std::nullopt;
-    return RepeatedMember{std::move(*name), used};
+    // With escapes the name is longer in the text: then its end has to do.
+    const std::string quoted = '"' + *name;
+    const std::size_t begin = used - std::min(used, quoted.size());
+    const bool plain = json.substr(begin, quoted.size()) == quoted;
+    return RepeatedMember{std::move(*name), plain ? begin : used};
 }
 
 }  // namespace panelgate::web

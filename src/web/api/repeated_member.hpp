@@ -9,7 +9,7 @@ namespace panelgate::web {
 
 struct RepeatedMember {
     std::string name;
-    std::size_t end = 0;  ///< of the second one's name, in the text
+    std::size_t at = 0;  ///< where the second one begins, in the text
 };
 
 /// The first member that an object in this text has twice, at any depth: parsers of values keep the

@@ -1,8 +1,10 @@
 #include "panelgate/web/http/json_text.hpp"
 
+#include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <boost/json/serialize.hpp>
+#include <boost/json/string.hpp>
 #include <cstddef>
 
 #include "panelgate/base/number_text.hpp"
@@ -12,6 +14,20 @@ namespace json = boost::json;
 namespace {
 
 void append(std::string& text, const json::value& value);
+
+/// Most texts need no escape; a trace has thousands of them.
+void append(std::string& text, json::string_view words) {
+    const bool plain = std::ranges::none_of(words, [](char c) {
+        return static_cast<unsigned char>(c) < 0x20 || c == '"' || c == '\\';
+    });
+    if (!plain) {
+        text += json::serialize(words);
+        return;
+    }
+    text += '"';
+    text += words;
+    text += '"';
+}
 
 void append(std::string& text, const json::array& array) {
     text += '[';
@@ -30,7 +46,7 @@ void append(std::string& text, const json::object& object) {
     for (const auto& [name, value] : object) {
         if (!first) text += ',';
         first = false;
-        text += json::serialize(json::string_view(name));
+        append(text, name);
         text += ':';
         append(text, value);
     }
@@ -41,6 +57,8 @@ void append(std::string& text, const json::object& object) {
 void append(std::string& text, const json::value& value) {
     if (const json::array* array = value.if_array()) return append(text, *array);
     if (const json::object* object = value.if_object()) return append(text, *object);
+    if (const json::string* words = value.if_string())
+        return append(text, json::string_view(*words));
     const double* number = value.if_double();
     if (number == nullptr) {
         text += json::serialize(value);

@@ -69,7 +69,7 @@ TEST(Body, WithAMemberThatNobodyKnowsIsRefused) {
 
 TEST(Body, WithAMemberTwiceIsRefusedAtAnyDepth) {
     EXPECT_EQ(registers_error("{\"values\":[1],\n\"values\":[2]}"),
-              "the member 'values' comes a second time: line 2, column 9");
+              "the member 'values' comes a second time: line 2, column 1");
     EXPECT_THAT(registers_error(R"({"values":[{"a":1,"a":2}]})"),
                 StartsWith("the member 'a' comes a second time: line 1, "));
 }
