@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <system_error>
 #include <utility>
+#include <variant>
 
 #include "address_families.hpp"
 #include "panelgate/line/tcp_line.hpp"
@@ -41,7 +42,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, b
 void Gateway::add_line(const config::Line& line, bool simulate) {
     bus::Settings settings = bus_settings(line);
     settings.observe = [this, name = line.name](const bus::BusEvent& event) {
-        publish(events_, plant_, name, event);
+        on_bus_event(name, event);
     };
     line::Settings device = line.device;
     sim::SimulatedBus* simulated = nullptr;
@@ -62,6 +63,13 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     add_poller(line, *buses_.back());
 }
 
+void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
+    publish(events_, plant_, line, event);
+    const auto* write = std::get_if<bus::WriteEvent>(&event);
+    const auto listener = write_listeners_.find(line);
+    if (write != nullptr && listener != write_listeners_.end()) listener->second(*write);
+}
+
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
 void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
     auto polled = polled_stations(line);
@@ -73,6 +81,7 @@ void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
         if (polls == nullptr) continue;
         plant_.at(line.name, station.id).points.emplace(station.points, station.polls, *polls);
     }
+    write_listeners_[line.name] = poller.write_listener();
     poller.on_update([this, name = line.name](std::uint8_t id, const auto& wants) {
         publish_points(events_, plant_.at(name, id), wants, clock_.now());
     });

@@ -3,6 +3,8 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
@@ -48,6 +51,7 @@ class Gateway {
     }
 
   private:
+    void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void add_line(const config::Line& line, bool simulate);
     void add_poller(const config::Line& line, bus::Bus& bus);
     void add_relays();
@@ -61,6 +65,8 @@ class Gateway {
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
     Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
+    /// Who hears of the writes on a line, by its name; buses tell to their end.
+    std::map<std::string, std::function<void(const bus::WriteEvent&)>> write_listeners_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;

@@ -208,6 +208,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
+    ledger_.written(group, false);
     std::string why;
     if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
     quiet_.on_sent(timing.sent, group.station);

@@ -50,6 +50,7 @@ struct Bus::State final : public line::Line::Events {
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
           doctor(settings),
+          load(c.now()),
           refusals(executor, clock),
           drive(clock, *line, arbiter, *this) {}
 
@@ -67,6 +68,9 @@ struct Bus::State final : public line::Line::Events {
     void act(arbiter::Note& note);
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
+    void act(const arbiter::Written& written) {
+        observe(WriteEvent{written.station, written.items, written.ended});
+    }
     void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {
         if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
@@ -74,6 +78,7 @@ struct Bus::State final : public line::Line::Events {
     void check_delivery(TimePoint now);
     void on_deadline(TimePoint now);
     void settled(TimePoint now) {
+        load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, arbiter, *line);
     }
     void answer(Pending pending, Answer answer);
@@ -94,16 +99,18 @@ struct Bus::State final : public line::Line::Events {
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
-    mutable LoadMeter load;
+    LoadMeter load;
     Refusals refusals;
     line::Drive<arbiter::Arbiter, State> drive;
     std::map<arbiter::Ticket, Pending> pending;
     bool up = false;
+    std::uint64_t ups = 0;  ///< how often the line came up
     std::string why_down = "not opened yet";
 };
 
 void Bus::State::on_up() {
     up = true;
+    ++ups;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
     observe(LineEvent{true, {}});
     arbiter.set_lead(line->lead());
@@ -284,7 +291,7 @@ LineStatus Bus::status() const {
     status.up = state_->up;
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
-    status.load_percent = state_->load.update(state_->clock.now(), state_->arbiter.counters().busy);
+    status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
     if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
     status.findings = state_->doctor.findings();
@@ -299,6 +306,7 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
     status.state = health.state();
+    status.returns = health.returns() + state_->ups;
     if (const auto last = health.last_success()) status.last_success = state_->clock.now() - *last;
     return status;
 }

@@ -29,8 +29,9 @@ def text_of(program, path):
 def polled(program, point, as_wanted=lambda value: True):
     """Waits until a poll has brought a value like this; each look is a request to the program."""
     for _ in range(5000):
-        value = program.get(PRESS + "points/" + point)[1]["value"]
-        if value is not None and as_wanted(value):
+        shown = program.get(PRESS + "points/" + point)[1]
+        value = shown["value"]
+        if shown["quality"] == "good" and as_wanted(value):
             return
     raise AssertionError(f"{point} is never as it should be, but {value}")
 

@@ -95,7 +95,7 @@ struct LineStatus {
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;  ///< busy share of the last seconds
+    double load_percent = 0;  ///< busy share of the last ten seconds, the same for all who ask
     EchoState echo = EchoState::unknown;
     std::vector<LineFinding> findings{};  ///< the likeliest first; none on a healthy line
 };
@@ -103,6 +103,8 @@ struct LineStatus {
 struct StationStatus {
     Health state = Health::unknown;
     std::optional<Duration> last_success;  ///< how long ago
+    /// How often it, or its line, was gone and came back: each may have been a restart.
+    std::uint64_t returns = 0;
 };
 
 /// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long

@@ -36,7 +36,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/relays", get_relays, kSee},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee},
-    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange},
+    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, "round"},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, "count"},
     // Before the tables: "devices" is none of them.
     {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, "count type"},

@@ -98,7 +98,7 @@ TEST(Value, EveryTypeAndOrderRoundTrips) {
     }
 }
 
-TEST(Value, ScaleAndOffsetAreInvertedToTheNearestRawNumber) {
+TEST(Value, ScaleAndOffsetAreInverted) {
     Point point = point_of(Type::i16);
     point.scale = 0.1;
     point.offset = -5;
@@ -107,7 +107,7 @@ TEST(Value, ScaleAndOffsetAreInvertedToTheNearestRawNumber) {
         const Words words{static_cast<std::uint16_t>(raw)};
         EXPECT_EQ(*encode(point, *decode(point, words)), words);
     }
-    EXPECT_EQ(encode(point, 21.4601)->front(), 265);
+    EXPECT_EQ(encode(point, 21.4601, Rounding::nearest)->front(), 265);
 }
 
 TEST(Value, SentinelsBadDigitsAndNumbersThatAreNoneGiveNothing) {
