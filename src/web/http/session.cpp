@@ -58,7 +58,8 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     message.set(http::field::cache_control, "no-store");
     message.set("X-Content-Type-Options", "nosniff");
     for (const auto& [name, value] : response.headers) message.set(name, value);
-    message.content_length(response.body.size());
+    message.content_length(response.shared_body ? response.shared_body->size()
+                                                : response.body.size());
     message.keep_alive(keep_alive);
 }
 
@@ -197,11 +198,18 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
     ErrorCode error;
     stream_.expires_after(site_->settings.request_timeout);
-    if (head) {
+    if (head || response.shared_body) {
         http::response<http::empty_body> message;
         set_head(message, response, keep_alive, site_->product);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
+        // In pieces of 64 KB, between which the loop serves others: Beast would hand the kernel all
+        // of it at once.
+        if (!error && !head) {
+            const asio::const_buffer body = asio::buffer(*response.shared_body);
+            co_await asio::async_write(stream_, body,
+                                       asio::redirect_error(asio::use_awaitable, error));
+        }
     } else {
         http::response<http::string_body> message;
         set_head(message, response, keep_alive, site_->product);
