@@ -80,7 +80,7 @@ web::Directory directory_of(const Plant& plant, const profile::PanelProfile& gen
     return directory;
 }
 
-bool PointCopy::next(std::vector<points::PointSample>& samples, TimePoint now) {
+bool PointCopy::next(std::deque<points::PointSample>& samples, TimePoint now) {
     for (std::size_t left = kPiece; left > 0 && station_ < plant_->stations().size();) {
         const Station& station = plant_->stations()[station_];
         if (!station.points || point_ == station.points->points().size()) {

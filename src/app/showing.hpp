@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ class PointCopy {
 
     explicit PointCopy(const Plant& plant) : plant_(&plant) {}
     /// Adds the next ones as they are now; false: all have been.
-    bool next(std::vector<points::PointSample>& samples, TimePoint now);
+    bool next(std::deque<points::PointSample>& samples, TimePoint now);
 
   private:
     const Plant* plant_;

@@ -39,18 +39,6 @@ for line in sys.stdin:
 """
 
 
-def plant(lines, stations, points, every):
-    """Simulated lines, all of them polled."""
-    def station(n, i):
-        listed = ", ".join(f"{{name: p{p}, at: UW{100 + p}, unit: celsius, every: {every}}}"
-                           for p in range(points))
-        return f"{{id: {i}, name: s{n}-{i}, profile: autonics-gplp-s, points: [{listed}]}}"
-    made = [config.line(f"line{n}",
-                        stations=", ".join(station(n, i) for i in range(1, stations + 1)))
-            for n in range(1, lines + 1)]
-    return config.gateway(*made, modbus=None)
-
-
 class Healthz:
     """How long each /healthz of one connection took, in ms."""
 
@@ -139,7 +127,7 @@ def report(binary, options):
     print(f"\n{binary}")
     print(f"{'path':<36}{'bytes':>10}{'ms':>8}{'loop CPU':>10}{'all CPU':>9}"
           f"{'healthz p50':>13}{'p99':>8}{'max':>8}")
-    text = plant(options.lines, options.stations, options.points, options.every)
+    text = config.wide(options.lines, options.stations, options.points, every=options.every)
     with harness.configured(text) as program:
         program.log.wait_for("line up", options.lines)
         fetcher = Fetcher(program.http_port())

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -17,7 +18,7 @@ namespace panelgate::metrics {
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<tcp_server::Counters> listeners;
-    std::vector<points::PointSample> points;
+    std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::string version;
     ProcessFacts process;

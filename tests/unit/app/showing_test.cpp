@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <deque>
 #include <memory>
 
 #include "support/fake_bus.hpp"
@@ -91,8 +92,8 @@ TEST_F(ShowingTest, AStationThatNobodyHasListedIsAPanelOfAnyKind) {
     EXPECT_FALSE(directory_of(plant, generic).find_station("floor1:9"));
 }
 
-std::vector<points::PointSample> all_points(const Plant& plant, TimePoint now) {
-    std::vector<points::PointSample> samples;
+std::deque<points::PointSample> all_points(const Plant& plant, TimePoint now) {
+    std::deque<points::PointSample> samples;
     PointCopy copy(plant);
     while (copy.next(samples, now)) {
     }
@@ -124,7 +125,7 @@ TEST_F(ShowingTest, AScrapeCopiesManyPointsSomeAtATime) {
     const points::StationPolls polled(points::wants_of(floor.stations[0].points, {}),
                                       points::make_plan_limits(panel, SerialFormat{}, 2ms), now);
     wide.at("floor1", 31).points.emplace(floor.stations[0].points, floor.stations[0].polls, polled);
-    std::vector<points::PointSample> samples;
+    std::deque<points::PointSample> samples;
     PointCopy copy(wide);
     EXPECT_TRUE(copy.next(samples, now));
     EXPECT_EQ(samples.size(), PointCopy::kPiece);
