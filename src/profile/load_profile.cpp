@@ -258,7 +258,8 @@ void load_identification(MapReader& in, PanelProfile& profile) {
         made.reply = load_pdu(entry, "reply").value_or(Bytes());
         made.means = entry.required_text("means").value_or("");
         made.source = entry.text("source").value_or("");
-        if (!made.request.empty() && !modbus::is_pure_read(made.request))
+        const auto request = modbus::Request::make(made.request, modbus::QuantityCheck::wide);
+        if (!made.request.empty() && !(request && request->is_read()))
             entry.problem("request", "a panel is identified by reads only");
         entry.finish();
         profile.identification.push_back(std::move(made));

@@ -28,7 +28,7 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (pdu.empty()) return refuse(Fault::malformed);
     auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
-    const bool writes = request ? !request->is_read() : !modbus::is_read(pdu[0]);
+    const bool writes = !modbus::is_pure_read(pdu);  // also of one that is malformed
     if (writes && settings.read_only) return refuse(Fault::denied);
     if (settings.diagnostics_unit == unit && !units.is_alias(unit)) return Diagnose{};
 

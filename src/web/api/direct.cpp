@@ -82,9 +82,8 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
         return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
     }
     const auto id = static_cast<std::uint8_t>(*station);
-    const std::uint8_t function = pdu->front();
+    const bool reads = modbus::is_pure_read(*pdu);  // also of one that is malformed
     auto made = request_to(id, std::move(*pdu));
-    const bool reads = made ? made->request.is_read() : modbus::is_read(function);
     const auto allowed = check_raw_station(directory, line, id, reads);
     if (!allowed) return allowed.error();
     return made;

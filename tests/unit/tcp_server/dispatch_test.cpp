@@ -53,6 +53,17 @@ TEST_F(DispatchTest, ForwardsToTheStationThatTheUnitStandsFor) {
     EXPECT_EQ(decided(101, kWrite), "to b/3");
 }
 
+TEST_F(DispatchTest, AMalformedReadIsMalformedWhereOnlyReadsAreAllowed) {
+    settings.read_only = true;
+    for (const Bytes& pdu : {"03 00"_hex, "07 00"_hex, "2B 0E"_hex, "2B 0E 01"_hex}) {
+        EXPECT_EQ(decided(1, pdu), "refused 03") << to_hex(pdu);
+        EXPECT_EQ(decided(2, pdu), "refused 03") << to_hex(pdu);
+        EXPECT_EQ(decided(77, pdu), "refused 0a") << to_hex(pdu);
+    }
+    EXPECT_EQ(decided(1, "06 00 01"_hex), "refused 01") << "a write, whatever its length";
+    EXPECT_EQ(decided(1, "2B 0D 01"_hex), "refused 01") << "CANopen may write";
+}
+
 TEST_F(DispatchTest, AFunctionThatCannotBeIsRefusedWhoeverIsAsked) {
     for (const Bytes& pdu : {"00 00 00"_hex, "80 01"_hex, "83 02"_hex, "FF"_hex}) {
         EXPECT_EQ(decided(1, pdu), "refused 01") << to_hex(pdu);
