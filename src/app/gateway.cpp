@@ -153,6 +153,7 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const
     if (points.next(snapshot.points, clock_.now())) return true;
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
     snapshot.relays = relay_samples(relays_->status());
+    if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     snapshot.runtime.loop_lag = lag_.seconds();

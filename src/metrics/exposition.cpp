@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "families.hpp"
+#include "http_families.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
@@ -287,7 +288,7 @@ using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
     add_requests,      add_station_times, add_wire_counters, add_exceptions, add_line_counters,
     add_uart_counters, add_line_state,    add_station_state, add_points,     add_relays,
-    add_listeners,     add_loop,          add_process,
+    add_listeners,     add_http,          add_loop,          add_process,
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/web/http/counters.hpp"
 
 namespace panelgate::metrics {
 
@@ -20,6 +22,7 @@ struct Snapshot {
     std::vector<tcp_server::Counters> listeners;
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
+    std::optional<web::Counters> http;
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;
