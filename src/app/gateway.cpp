@@ -9,9 +9,7 @@
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
-#include "panelgate/metrics/process.hpp"
 #include "panelgate/rt/log.hpp"
-#include "showing.hpp"
 #include "simulated_line.hpp"
 #include "wiring.hpp"
 
@@ -107,7 +105,13 @@ void Gateway::add_listener(const tcp_server::Settings& settings) {
 
 void Gateway::add_http(const web::Settings& settings) {
     web::Providers providers;
-    providers.metrics_text = [this] { return metrics_text(); };
+    const auto copy = [this] {
+        return [this, points = PointCopy(plant_)](metrics::Snapshot& into) mutable {
+            return copy_figures(into, points);
+        };
+    };
+    scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
+    providers.metrics = scrapes_.get();
     providers.metrics_type = metrics::kContentType;
     providers.ready = [this] { return ready_ && openings_.missing().empty(); };
     providers.missing = [this] { return openings_.missing(); };
@@ -133,6 +137,7 @@ void Gateway::add_doors() {
 }
 
 void Gateway::start() {
+    lag_.start();
     for (const auto& simulated : simulated_) simulated->start();
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
@@ -165,6 +170,7 @@ bool Gateway::drained() const {
 }
 
 void Gateway::stop() {
+    lag_.stop();
     for (const auto& listener : listeners_) listener->close_now();
     http_.reset();
     relays_->stop();
@@ -173,17 +179,21 @@ void Gateway::stop() {
     for (const auto& simulated : simulated_) simulated->stop();
 }
 
-std::string Gateway::metrics_text() const {
-    metrics::Snapshot snapshot;
-    for (const auto& bus : buses_) snapshot.lines.push_back(bus->report());
+/// One piece: a line, some points, or all the rest, which is small.
+bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const {
+    const std::size_t lines = snapshot.lines.size();
+    if (lines < buses_.size()) {
+        snapshot.lines.push_back(buses_[lines]->report());
+        return true;
+    }
+    if (points.next(snapshot.points, clock_.now())) return true;
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
-    snapshot.points = point_samples(plant_, clock_.now());
     snapshot.relays = relay_samples(relays_->status());
     if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;
-    snapshot.process = metrics::read_process_facts();
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
-    return metrics::exposition(snapshot);
+    snapshot.runtime.loop_lag = lag_.seconds();
+    return false;
 }
 
 }  // namespace panelgate::app

@@ -17,12 +17,15 @@
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/loop_lag.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
+#include "scrapes.hpp"
+#include "showing.hpp"
 
 namespace panelgate::app {
 
@@ -58,10 +61,11 @@ class Gateway {
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
     void add_doors();
-    std::string metrics_text() const;
+    bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;
 
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
+    rt::LoopLag lag_{clock_};
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
     Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
@@ -72,6 +76,7 @@ class Gateway {
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     std::unique_ptr<points::Relays> relays_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    std::unique_ptr<Scrapes> scrapes_;
     web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;
     Openings openings_{clock_};  ///< of the listeners and of HTTP

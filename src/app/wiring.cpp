@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <optional>
+#include <vector>
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/judge.hpp"
@@ -34,6 +35,13 @@ bus::Guard guard_of(const profile::PanelProfile& profile) {
     };
 }
 
+/// Of the functions that read and write values, those that the panel has.
+std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
+    std::vector<std::uint8_t> functions{1, 2, 3, 4, 5, 6, 15, 16};
+    std::erase_if(functions, [&](std::uint8_t code) { return !profile.has_function(code); });
+    return functions;
+}
+
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
     std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
     for (const arbiter::StationSettings& settings : line.arbiter.stations) {
@@ -53,6 +61,7 @@ bus::Settings bus_settings(const config::Line& line) {
         bus::StationSettings& made = settings.stations[station.id];
         made.name = station.name;
         made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
+        made.functions = functions_of(*station.profile);
         if (station.guard) made.guard = guard_of(*station.profile);
     }
     return settings;

@@ -96,6 +96,7 @@ struct Bus::State final : public line::Line::Events {
     arbiter::Arbiter arbiter;
     Rights rights;
     RequestCounters counters;
+    std::uint64_t happened = 0;  ///< the last sequence number of a frame or decision
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
@@ -193,6 +194,7 @@ void Bus::State::act(arbiter::Note& note) {
                  {"why", note.why}});
     }
     TraceFrame frame;
+    frame.sequence = ++happened;
     frame.at = note.at;
     frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
@@ -205,7 +207,7 @@ void Bus::State::act(arbiter::Decision& decision) {
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
     }
-    decisions.add({0, decision.at, std::move(decision.text), on_the_wall(decision.at)});
+    decisions.add({++happened, decision.at, std::move(decision.text), on_the_wall(decision.at)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
@@ -319,6 +321,14 @@ std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->reco
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
     return state_->decisions.last(last);
+}
+
+std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->recorder.since(sequence, most);
+}
+
+std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->decisions.since(sequence, most);
 }
 
 bool Bus::idle() const { return state_->arbiter.idle(); }

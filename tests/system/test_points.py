@@ -112,7 +112,7 @@ class Points(unittest.TestCase):
             self.assertEqual(client.ask(31, b"\x17\0\0\0\1\0\0\0\1\2\0\0"), b"\x97\x01")
             self.assertEqual(client.ask(31, read_registers(0xFFF0)), b"\x83\x02")
             self.assertEqual(client.ask(31, struct.pack(">BHHBH", 16, 0, 1, 2, 1)), b"\x90\x02")
-            sent = [frame[:6] for way, frame in program.trace("floor1", 1000) if way == "sent"]
+            sent = [frame[:6] for way, frame in program.trace("floor1", 500) if way == "sent"]
             self.assertNotIn(bytes([31]) + read_registers(0xFFF0), sent)
             self.assertEqual(client.ask(31, struct.pack(">BHH", 6, 0, 1)), b"\x86\x01")
 

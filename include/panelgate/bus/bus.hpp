@@ -66,6 +66,9 @@ class Bus final : public BusClient {
     std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
     std::vector<TraceDecision> decisions(std::size_t last) const override;
+    std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const override;
+    std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
+                                               std::size_t most) const override;
     void name_client(ClientId client, std::string name) override;
 
     LineReport report() const;

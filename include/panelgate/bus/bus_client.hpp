@@ -56,7 +56,7 @@ using AnswerHandler = std::function<void(Answer)>;
 
 /// A frame on the wire, for traces.
 struct TraceFrame {
-    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    std::uint64_t sequence = 0;  ///< counts a line's frames and decisions, from 1
     TimePoint at;                ///< first bit out; last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
@@ -66,7 +66,7 @@ struct TraceFrame {
 
 /// Why something was not done, or not at once; one line.
 struct TraceDecision {
-    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    std::uint64_t sequence = 0;  ///< one count with the frames
     TimePoint at;
     std::string text;
     WallTime time{};  ///< `at`, by the clock on the wall
@@ -137,6 +137,19 @@ class BusClient {
     /// The last decisions, oldest first, at most `last`.
     virtual std::vector<TraceDecision> decisions(std::size_t last) const {
         static_cast<void>(last);
+        return {};
+    }
+    /// The first frames that follow this sequence number, oldest first, at most `most`.
+    virtual std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const {
+        static_cast<void>(sequence);
+        static_cast<void>(most);
+        return {};
+    }
+    /// The same of the decisions.
+    virtual std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
+                                                       std::size_t most) const {
+        static_cast<void>(sequence);
+        static_cast<void>(most);
         return {};
     }
     /// What a client is to be called in clients() and in the trace, until cancel(). The last name

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panelgate/modbus/request.hpp"
 
@@ -41,6 +42,8 @@ struct StationSettings {
     std::string name;
     Access access = Access::read_write;
     Guard guard{};  ///< empty: whatever is asked goes out
+    /// What its panel is likely to be asked: counted from the start, with 0.
+    std::vector<std::uint8_t> functions{};
 };
 
 /// Those that the configuration lists, by their ids.

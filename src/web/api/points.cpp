@@ -4,6 +4,7 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
+#include "long_answer.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -93,14 +94,18 @@ json::array describe(const std::vector<points::Interpretation>& all) {
 Handling get_points(HttpRequest request, const Api* api) {
     const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
-    json::array list;
-    if (station->points != nullptr) {
-        for (const Point& point : station->points->points())
-            list.push_back(describe(*api, *station->points, point));
+    LongAnswer body;
+    body.begin_list("points");
+    const std::size_t count = station->points == nullptr ? 0 : station->points->points().size();
+    for (std::size_t i = 0; i < count; ++i) {
+        body.add(describe(*api, *station->points, station->points->points()[i]));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
     }
-    json::object body;
-    body["points"] = std::move(list);
-    co_return json_response(200, body);
+    body.end_list();
+    co_return body.response();
 }
 
 Handling get_point(HttpRequest request, const Api* api) {

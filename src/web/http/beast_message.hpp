@@ -38,7 +38,8 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     for (const auto& [name, value] : response.headers) message.set(name, value);
     if (response.status != 204) {  // it has no body, and must not say so (RFC 9110 8.6)
         message.set(field::content_type, response.content_type);
-        message.content_length(response.body.size());
+        message.content_length(response.shared_body ? response.shared_body->size()
+                                                    : response.body.size());
     }
     message.keep_alive(keep_alive);
 }

@@ -41,6 +41,17 @@ TEST_F(WiringTest, ABusIsToldWhatMayBeDoneToItsStations) {
     EXPECT_FALSE(stations.at(5).guard);
 }
 
+TEST_F(WiringTest, WhatAPanelHasIsCountedFromTheStart) {
+    floor.stations[0].profile = shipped.find("autonics-arm");
+    std::vector<std::uint8_t> expected{1, 2, 3, 4, 5, 6, 15, 16};
+    std::erase_if(expected, [&](std::uint8_t code) {
+        return !floor.stations[0].profile->has_function(code);
+    });
+    const bus::Stations stations = bus_settings(floor).stations;
+    EXPECT_EQ(stations.at(31).functions, expected);
+    EXPECT_EQ(stations.at(5).functions.size(), 8u) << "generic: all that read and write values";
+}
+
 TEST_F(WiringTest, AGuardRefusesAsThePanelWould) {
     const bus::Guard guard = bus_settings(floor).stations.at(31).guard;
     ASSERT_TRUE(guard);

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -200,6 +202,21 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
     EXPECT_EQ(bus->station_status(17).state, Health::online);
+}
+
+TEST_F(BusTest, NumbersFramesAndDecisionsOfALineTogether) {
+    bus->start();
+    ask(17, kRead);
+    std::set<std::uint64_t> numbers;
+    for (const TraceFrame& frame : bus->trace(100)) numbers.insert(frame.sequence);
+    for (const TraceDecision& decision : bus->decisions(100)) numbers.insert(decision.sequence);
+    EXPECT_EQ(numbers.size(), bus->trace(100).size() + bus->decisions(100).size());
+    EXPECT_EQ(*numbers.begin(), 1u);
+    EXPECT_EQ(*numbers.rbegin(), numbers.size());
+    ASSERT_GE(bus->trace(100).size(), 2u);
+    const auto later = bus->trace_since(bus->trace(100)[0].sequence, 1);
+    ASSERT_EQ(later.size(), 1u);
+    EXPECT_EQ(later[0].sequence, bus->trace(100)[1].sequence);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {

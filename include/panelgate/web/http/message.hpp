@@ -23,14 +23,18 @@ struct HttpRequest {
     std::shared_ptr<Caller> caller;
 };
 /// The request headers that anything here looks at.
-inline constexpr const char* kHeadersRead[] = {"authorization",  "origin",
-                                               "content-type",   "sec-fetch-site",
-                                               "sec-fetch-mode", "sec-fetch-dest"};
+inline constexpr const char* kHeadersRead[] = {
+    "accept-encoding", "authorization",  "origin",        "content-type",
+    "sec-fetch-site",  "sec-fetch-mode", "sec-fetch-dest"};
+
+/// A body that several are sent, so that it is in memory once.
+using SharedText = std::shared_ptr<const std::string>;
 
 struct HttpResponse {
     unsigned status = 200;
     std::string content_type = "application/json";
     std::string body;
+    SharedText shared_body;  ///< not null: sent in place of `body`
     std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
     /// Not null: there is no body, events follow for as long as the client listens.
     std::shared_ptr<EventHub::Listener> events;

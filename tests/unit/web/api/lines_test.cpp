@@ -1,3 +1,9 @@
+#include <boost/asio/post.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
 #include "http_rig.hpp"
 
 namespace panelgate::web {
@@ -65,9 +71,90 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
         {"sequence":2,"time":"1970-01-01T00:00:02.500000Z","at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
         {"sequence":3,"time":"1970-01-01T00:00:00.000000Z","at":3,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
-        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}]})"));
+        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}],"next":7})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
+}
+
+/// "1 2 | 3 next 3": frames, decisions, next.
+std::string told(const Reply& reply) {
+    std::string text;
+    for (const char* list : {"frames", "decisions"}) {
+        for (const auto& entry : reply.at(list).as_array())
+            text += std::to_string(entry.at("sequence").to_number<int>()) + ' ';
+        if (std::string_view(list) == "frames") text += "| ";
+    }
+    return text + "next " + std::to_string(reply.at("next").to_number<int>());
+}
+
+TEST_F(ApiLines, GivesWhatFollowsASequenceNumber) {
+    const std::string trace = "/api/v1/lines/floor1/trace";
+    EXPECT_EQ(told(get(trace + "?since=0")), "| next 0");
+    for (const int number : {1, 2, 4, 6})
+        bus.frames.emplace_back().sequence = static_cast<std::uint64_t>(number);
+    for (const int number : {3, 5})
+        bus.made.emplace_back().sequence = static_cast<std::uint64_t>(number);
+    EXPECT_EQ(told(get(trace + "?since=0")), "1 2 4 6 | 3 5 next 6");
+    EXPECT_EQ(told(get(trace + "?since=4")), "6 | 5 next 6");
+    EXPECT_EQ(told(get(trace + "?since=6")), "| next 6");
+    EXPECT_EQ(told(get(trace + "?since=99")), "| next 6") << "the gateway was started anew";
+    EXPECT_EQ(told(get(trace + "?since=1&last=2")), "2 | 3 next 3");
+    for (const char* wrong : {"?since=", "?since=-1", "?since=x", "?since=99999999999999999999"})
+        EXPECT_EQ(get(trace + wrong).status(), 400u) << wrong;
+}
+
+TEST_F(ApiLines, GivesAtMostAPageOfATrace) {
+    for (std::uint64_t number = 1; number <= 1200; ++number) {
+        if (number % 2 == 0) {
+            bus.frames.emplace_back().sequence = number;
+        } else {
+            bus.made.emplace_back().sequence = number;
+        }
+    }
+    EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=501").status(), 400u);
+    std::size_t entries = 0;
+    std::uint64_t next = 0;
+    for (int pages = 0; pages < 3; ++pages) {
+        const Reply page = get("/api/v1/lines/floor1/trace?since=" + std::to_string(next));
+        const std::size_t size =
+            page.at("frames").as_array().size() + page.at("decisions").as_array().size();
+        EXPECT_LE(size, 500u);
+        entries += size;
+        next = page.at("next").to_number<std::uint64_t>();
+    }
+    EXPECT_EQ(entries, 1200u);
+    EXPECT_EQ(next, 1200u);
+}
+
+TEST_F(ApiLines, AListOfManyStationsLetsOthersHaveTheirTurn) {
+    for (int i = 0; i < 1000; ++i) {
+        directory.stations.push_back(directory.stations[0]);
+        directory.stations.back().name = "s" + std::to_string(i);
+    }
+    Client client = connect();
+    client.send("GET /api/v1/stations HTTP/1.1\r\nHost: x\r\n\r\n");
+    std::size_t turns = 0;
+    const std::function<void()> turn = [&] {
+        ++turns;
+        if (turns < 10'000) boost::asio::post(io, turn);
+    };
+    boost::asio::post(io, turn);
+    const Reply reply = client.receive();
+    EXPECT_EQ(reply.at("stations").as_array().size(), 1001u);
+    EXPECT_GT(turns, 30u);
+}
+
+TEST_F(ApiLines, AListWhoseCallerLeavesIsNotMadeToItsEnd) {
+    for (int i = 0; i < 1000; ++i) directory.stations.push_back(directory.stations[0]);
+    start();
+    {
+        Client client = connect();
+        client.send("GET /api/v1/stations HTTP/1.1\r\nHost: x\r\n\r\n");
+        for (int i = 0; i < 8; ++i) io.run_one();
+    }
+    server.reset();
+    directory.stations.clear();
+    io.poll();
 }
 
 TEST_F(ApiLines, SendsABroadcastAndDoesNotCallItConfirmed) {
