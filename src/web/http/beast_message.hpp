@@ -44,7 +44,7 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     message.keep_alive(keep_alive);
 }
 
-/// Is it the client's fault, and not the end of its connection?
+/// Is it the client's fault, and not the end of its connection between two requests?
 bool is_parse_error(boost::system::error_code why);
 Problem problem_of_parse(boost::system::error_code why, std::size_t max_body);
 

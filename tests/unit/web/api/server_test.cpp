@@ -165,6 +165,14 @@ TEST_F(WebServer, P3AnswersAClientThatHasClosedItsSendingSide) {
     EXPECT_EQ(client.receive().error, http::error::end_of_stream);
 }
 
+TEST_F(WebServer, TellsAClientThatClosesItsSendingSideTooEarly) {
+    Client client = connect();
+    client.send("GET /healthz HTTP/1.1\r\nHost: x\r\n");
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    EXPECT_EQ(client.receive().status(), 400u);
+    EXPECT_EQ(client.receive().error, http::error::end_of_stream);
+}
+
 TEST_F(WebServer, P3AsksAClientThatHasClosedItsSendingSideWhetherItIsStillThere) {
     settings.half_close_grace = 1ms;
     bus.script = [](const bus::Request&) { return std::nullopt; };
