@@ -68,4 +68,13 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
     return made;
 }
 
+std::vector<Route> simulator_routes(std::shared_ptr<const Api> api) {
+    std::vector<Route> some = routes(std::move(api));
+    std::erase_if(some, [](const Route& route) {
+        return route.pattern != "/healthz" && route.pattern != "/readyz" &&
+               !route.pattern.starts_with("/api/v1/simulator/");
+    });
+    return some;
+}
+
 }  // namespace panelgate::web

@@ -14,6 +14,7 @@ namespace panelgate::web {
 /// A request as handlers see it; nothing of Beast.
 struct HttpRequest {
     std::string method;
+    std::string host;                               ///< lower case; empty: HTTP/1.0 without one
     std::vector<std::string> path;                  ///< segments, percent-decoded
     std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
     std::map<std::string, std::string> headers;     ///< those of kHeadersRead, names in lower case
@@ -22,7 +23,9 @@ struct HttpRequest {
     std::shared_ptr<Caller> caller;
 };
 /// The request headers that anything here looks at.
-inline constexpr const char* kHeadersRead[] = {"authorization", "origin", "content-type"};
+inline constexpr const char* kHeadersRead[] = {"authorization",  "origin",
+                                               "content-type",   "sec-fetch-site",
+                                               "sec-fetch-mode", "sec-fetch-dest"};
 
 struct HttpResponse {
     unsigned status = 200;
