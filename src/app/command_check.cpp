@@ -1,63 +1,71 @@
-#include <boost/json.hpp>
+#include <algorithm>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
 #include <iostream>
+#include <tuple>
+#include <vector>
 
 #include "commands.hpp"
+#include "inventory.hpp"
 #include "load.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
 namespace {
 
+namespace json = boost::json;
+
 void print_text(const std::string& file, const config::Config& config) {
     std::cout << file << " is valid: " << config.lines.size() << " line(s), "
               << config.modbus_tcp.size() << " Modbus/TCP listener(s), "
-              << (config.http ? "HTTP on " + config.http->name() : "no HTTP") << '\n';
-    for (const config::Line& line : config.lines) {
-        std::cout << "line " << line.name << ": " << line.device.device << ", "
-                  << to_string(line.device.serial) << '\n';
-        for (const config::Station& station : line.stations) {
-            std::cout << "  station " << int{station.id} << ' ' << station.name << ", "
-                      << station.profile->name << (station.read_only ? ", read only" : "") << '\n';
-        }
-    }
-    for (const tcp_server::Settings& listener : config.modbus_tcp) {
-        std::cout << "modbus_tcp " << listener.name() << ':';
-        for (const std::string& line : listener.lines) std::cout << ' ' << line;
-        std::cout << '\n';
-    }
+              << (config.http ? "HTTP on " + config.http->name() : "no HTTP") << '\n'
+              << inventory_text(config);
 }
 
-void print_json(const config::Config& config) {
-    boost::json::array lines;
-    for (const config::Line& line : config.lines) {
-        boost::json::array stations;
-        for (const config::Station& station : line.stations) {
-            stations.push_back(boost::json::object{
-                {"id", station.id}, {"name", station.name}, {"profile", station.profile->name}});
+/// As a person reads them: the file itself first, from top to bottom.
+json::array errors_json(const std::string& file, std::vector<yaml::Problem> problems) {
+    std::ranges::sort(problems, {}, [&](const yaml::Problem& problem) {
+        return std::tuple(problem.file != file, problem.file, problem.mark.line,
+                          problem.mark.column, problem.message);
+    });
+    json::array errors;
+    for (const yaml::Problem& problem : problems) {
+        json::object error{{"file", problem.file}};
+        if (problem.mark.line > 0) {  // else it is of the whole file
+            error["line"] = problem.mark.line;
+            error["column"] = problem.mark.column;
         }
-        lines.push_back(boost::json::object{{"name", line.name},
-                                            {"device", line.device.device},
-                                            {"serial", to_string(line.device.serial)},
-                                            {"stations", std::move(stations)}});
+        error["message"] = problem.message;
+        errors.push_back(std::move(error));
     }
-    boost::json::array warnings;
-    for (const std::string& warning : config.warnings) warnings.emplace_back(warning);
-    std::cout << boost::json::serialize(boost::json::object{{"lines", std::move(lines)},
-                                                            {"warnings", std::move(warnings)}})
-              << '\n';
+    return errors;
+}
+
+/// Of a file with faults `lines` and its like are not there.
+void print_json(const std::string& file, const Loaded& loaded) {
+    json::object all{{"valid", loaded.config.has_value()}};
+    json::array warnings;
+    if (loaded.config) {
+        all = inventory_json(*loaded.config);
+        all["valid"] = true;
+        for (const std::string& warning : loaded.config->warnings) warnings.emplace_back(warning);
+    }
+    all["errors"] = errors_json(file, loaded.problems);
+    all["warnings"] = std::move(warnings);
+    std::cout << web::json_text(all) << '\n';
 }
 
 }  // namespace
 
 ExitCode check(const std::string& file, bool json) {
     const Loaded loaded = load_file(file);
-    if (!loaded.config) return loaded.code;
-    print_warnings(*loaded.config);
+    if (loaded.config) print_warnings(*loaded.config);
     if (json) {
-        print_json(*loaded.config);
-    } else {
+        print_json(file, loaded);
+    } else if (loaded.config) {
         print_text(file, *loaded.config);
     }
-    return kFine;
+    return loaded.code;
 }
 
 }  // namespace panelgate::app

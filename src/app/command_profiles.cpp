@@ -2,6 +2,7 @@
 #include <string_view>
 #include <vector>
 
+#include "catalogue.hpp"
 #include "commands.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/profile/describe.hpp"
@@ -28,9 +29,10 @@ const profile::PanelProfile* find(const profile::Catalogue& catalogue, const std
 
 }  // namespace
 
-ExitCode address(const std::string& name, const std::string& what) {
-    const profile::Catalogue catalogue = profile::Catalogue::shipped();
-    const profile::PanelProfile* profile = find(catalogue, name);
+ExitCode address(const std::string& name, const std::string& what, const std::string& dir) {
+    const auto catalogue = load_catalogue(dir);
+    if (!catalogue) return kBadConfig;
+    const profile::PanelProfile* profile = find(*catalogue, name);
     if (profile == nullptr) return kUsage;
     const auto text = profile::describe_address(*profile, what);
     if (!text) {
@@ -41,15 +43,16 @@ ExitCode address(const std::string& name, const std::string& what) {
     return kFine;
 }
 
-ExitCode profiles(const std::string& name) {
-    const profile::Catalogue catalogue = profile::Catalogue::shipped();
+ExitCode profiles(const std::string& name, const std::string& dir) {
+    const auto catalogue = load_catalogue(dir);
+    if (!catalogue) return kBadConfig;
     if (!name.empty()) {
-        const profile::PanelProfile* profile = find(catalogue, name);
+        const profile::PanelProfile* profile = find(*catalogue, name);
         if (profile == nullptr) return kUsage;
         std::cout << profile::describe(*profile);
         return kFine;
     }
-    for (const auto& [known, profile] : catalogue.all()) {
+    for (const auto& [known, profile] : catalogue->all()) {
         std::cout << known << std::string(known.size() < 20 ? 20 - known.size() : 1, ' ')
                   << profile.description << '\n';
     }

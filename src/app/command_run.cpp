@@ -60,6 +60,8 @@ void print_demo_help(const config::Config& config, const Gateway& gateway) {
               << "  curl -s '" << url << "/api/v1/stations/press/devices/UW0?count=5'\n"
               << "  curl -s -X PUT -d '{\"values\":[215]}' " << url
               << "/api/v1/stations/oven/devices/GDT108\n"
+              << "  curl -s " << url << "/api/v1/stations/oven/points\n"
+              << "  curl -s " << url << "/api/v1/relays\n"
               << "  mbpoll -m tcp -p " << port << " -a 31 -t 4 -r 1 -c 5 -1 " << host << "\n\n"
               << "Also: " << url << "/metrics and " << url << "/api/v1/lines/floor1/trace?last=20\n"
               << "Ctrl-C ends it.\n"

@@ -4,9 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "catalogue.hpp"
 #include "commands.hpp"
-#include "panelgate/config/profiles_dir.hpp"
-#include "panelgate/config/real_files.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/scan/options.hpp"
@@ -39,16 +38,6 @@ std::optional<scan::Settings> parse_options(const ScanOptions& options) {
     return std::nullopt;
 }
 
-/// The shipped profiles and those of --profiles; false (and told) when something is wrong there.
-bool load_profiles(const std::string& dir, profile::Catalogue& catalogue) {
-    if (dir.empty()) return true;
-    yaml::Problems problems(dir);
-    const auto faults = config::add_profiles(dir, config::RealFiles(), catalogue, problems);
-    for (const std::string& fault : faults) std::cerr << "panelgate: --profiles: " << fault << '\n';
-    std::cerr << problems.text();
-    return faults.empty() && problems.empty();
-}
-
 void print(const ScanOptions& options, const ScanRun& run) {
     const scan::Result result = run.result();
     if (options.yaml) {
@@ -71,15 +60,15 @@ void print(const ScanOptions& options, const ScanRun& run) {
 ExitCode scan(const ScanOptions& options) {
     const auto settings = parse_options(options);
     if (!settings) return kUsage;
-    profile::Catalogue profiles = profile::Catalogue::shipped();
-    if (!load_profiles(options.profiles, profiles)) return kBadConfig;
+    const auto profiles = load_catalogue(options.profiles);
+    if (!profiles) return kBadConfig;
     rt::LogSettings quiet;
     quiet.level = rt::LogLevel::error;  // the result is what there is to say
     rt::set_up_log(quiet);
     line::Settings device;
     device.device = options.device;
     boost::asio::io_context io(1);
-    ScanRun run(io, *settings, profiles, device);
+    ScanRun run(io, *settings, *profiles, device);
     run.run();
     if (!run.has_begun()) {
         std::cerr << "panelgate: " << run.cut_short() << '\n';

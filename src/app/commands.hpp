@@ -14,9 +14,12 @@ ExitCode run(const std::string& file, bool simulate);
 /// `http` and `modbus` replace the demo's addresses when not empty: "ADDR:PORT".
 ExitCode demo(const std::string& http, const std::string& modbus);
 ExitCode check(const std::string& file, bool json);
-/// `links`: "NAME=PTY-LINK" a line; no entry = only the pty's own path is printed.
-ExitCode simulate(const std::string& file, const std::vector<std::string>& links);
-ExitCode address(const std::string& profile, const std::string& what);
+/// `links`: "NAME=PTY-LINK" or "NAME=tcp://ADDR:PORT" a line; no entry: its pty alone. `http`:
+/// "ADDR:PORT" of the REST that sets faults, or empty.
+ExitCode simulate(const std::string& file, const std::vector<std::string>& links,
+                  const std::string& http);
+/// `dir`: a directory of further profiles, or empty.
+ExitCode address(const std::string& profile, const std::string& what, const std::string& dir);
 /// The command line of `scan` as typed; lists are empty when not given.
 struct ScanOptions {
     std::string device;
@@ -28,7 +31,7 @@ struct ScanOptions {
     bool speak = false;  ///< although another master is talking
 };
 ExitCode scan(const ScanOptions& options);
-/// Lists all, or describes one.
-ExitCode profiles(const std::string& name);
+/// Lists all, or describes one; `dir` as of address().
+ExitCode profiles(const std::string& name, const std::string& dir);
 
 }  // namespace panelgate::app

@@ -152,6 +152,7 @@ std::string Gateway::metrics_text() const {
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
     snapshot.points = point_samples(plant_, clock_.now());
     snapshot.relays = relay_samples(relays_->status());
+    if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.process = metrics::read_process_facts();
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();

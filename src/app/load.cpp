@@ -1,6 +1,7 @@
 #include "load.hpp"
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -9,13 +10,23 @@
 #include "panelgate/config/real_files.hpp"
 
 namespace panelgate::app {
+namespace {
+
+std::optional<std::string> environment(const std::string& name) {
+    const char* value = std::getenv(name.c_str());
+    if (value == nullptr) return std::nullopt;
+    return value;
+}
+
+}  // namespace
 
 Loaded load_file(const std::string& path) {
     const auto text = config::RealFiles().read(path);
     if (!text) {
-        std::cerr << "panelgate: cannot read " << path << ": " << std::strerror(errno)
+        const std::string why = std::strerror(errno);
+        std::cerr << "panelgate: cannot read " << path << ": " << why
                   << " (give another file with -c)\n";
-        return {std::nullopt, kNoInput};
+        return {std::nullopt, kNoInput, {{path, {0, 0}, "cannot be read: " + why}}};
     }
     return load_text(*text, path);
 }
@@ -23,10 +34,11 @@ Loaded load_file(const std::string& path) {
 Loaded load_text(std::string_view text, const std::string& name) {
     yaml::Problems problems(name);
     Loaded loaded;
-    loaded.config = config::load(text, config::RealFiles(), problems);
+    loaded.config = config::load(text, config::RealFiles(), problems, environment);
     if (!loaded.config) {
         std::cerr << problems.text();
         loaded.code = kBadConfig;
+        loaded.problems = problems.list();
     }
     return loaded;
 }

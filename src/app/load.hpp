@@ -3,9 +3,11 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "exit_code.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::app {
 
@@ -13,6 +15,9 @@ namespace panelgate::app {
 struct Loaded {
     std::optional<config::Config> config;
     ExitCode code = kFine;
+    /// What is wrong, when there is no configuration; of a file that cannot be read without a place
+    /// (line 0).
+    std::vector<yaml::Problem> problems;
 };
 
 /// Reads and checks a file. Its warnings are told by whoever uses it.

@@ -1,10 +1,14 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <iostream>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "commands.hpp"
+#include "panelgate/base/suggest.hpp"
 
 namespace {
 
@@ -13,12 +17,13 @@ using namespace panelgate::app;
 
 constexpr const char* kAbout =
     "panelgate: a Modbus RTU-to-TCP gateway for operator panels on RS-485 lines";
+constexpr const char* kVersion = "panelgate " PANELGATE_VERSION;
 
 /// The command line; the command that is asked for runs while it is parsed.
 class CommandLine {
   public:
     CommandLine() {
-        cli_.set_version_flag("--version", std::string("panelgate ") + PANELGATE_VERSION);
+        cli_.set_version_flag("-V,--version", kVersion);
         cli_.require_subcommand(1);
         add_run();
         add_demo();
@@ -27,11 +32,21 @@ class CommandLine {
         add_scan();
         add_address();
         add_profiles();
+        add_help();
     }
 
-    ExitCode parse(int argc, char** argv) {
+    ExitCode parse(std::vector<std::string> words) {
+        if (words.empty()) return which_command("a command is missing");
+        if (words[0] == "help") {
+            words.erase(words.begin());
+            words.emplace_back("--help");
+        }
+        if (!words[0].starts_with('-') && !has_command(words[0]))
+            return which_command("there is no command '" + words[0] + '\'' +
+                                 did_you_mean(words[0]));
         try {
-            cli_.parse(argc, argv);
+            std::ranges::reverse(words);  // as CLI11 takes them
+            cli_.parse(std::move(words));
         } catch (const CLI::ParseError& error) {
             const bool asked_for =
                 error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
@@ -42,6 +57,44 @@ class CommandLine {
     }
 
   private:
+    std::vector<std::string> commands() const {
+        std::vector<std::string> names;
+        for (const CLI::App* command : cli_.get_subcommands({}))
+            names.push_back(command->get_name());
+        return names;
+    }
+
+    bool has_command(const std::string& name) const {
+        const auto names = commands();
+        return std::ranges::find(names, name) != names.end();
+    }
+
+    std::string did_you_mean(std::string_view typed) const {
+        const auto names = commands();
+        const std::string near =
+            nearest(typed, std::vector<std::string_view>(names.begin(), names.end()));
+        return near.empty() ? "" : "; did you mean '" + near + "'?";
+    }
+
+    ExitCode which_command(const std::string& what) const {
+        std::cerr << "panelgate: " << what << "\nCommands:";
+        for (const std::string& name : commands()) std::cerr << ' ' << name;
+        std::cerr << "; `panelgate help` says what they do\n";
+        return kUsage;
+    }
+
+    void add_help() {
+        CLI::App* version = cli_.add_subcommand("version", "print the version");
+        version->callback([] { std::cout << kVersion << '\n'; });
+        cli_.add_subcommand("help", "say what all commands do, or what COMMAND does");
+    }
+
+    void add_profiles_dir(CLI::App* command, std::string& dir) {
+        command->add_option(
+            "--profiles", dir,
+            "directory of further panel profiles, as profiles_dir of a configuration");
+    }
+
     void add_file(CLI::App* command) {
         command->add_option("-c,--config", file_, "configuration file")->capture_default_str();
     }
@@ -77,7 +130,10 @@ class CommandLine {
         command->add_option(
             "--line", links_,
             "NAME=PTY-LINK, a link to the line's pty, or NAME=tcp://ADDR:PORT, RTU over TCP");
-        command->callback([this] { code_ = simulate(file_, links_); });
+        command->add_option(
+            "--http", http_,
+            "ADDR:PORT of a REST API for the panels' faults (port 0: any free one)");
+        command->callback([this] { code_ = simulate(file_, links_, http_); });
     }
 
     void add_scan() {
@@ -89,9 +145,7 @@ class CommandLine {
         command->add_option("--parity", scan_.parity, "none, even, odd or a list of them");
         command->add_option("--stations", scan_.stations,
                             "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
-        command->add_option(
-            "--profiles", scan_.profiles,
-            "directory of further panel profiles, as profiles_dir of a configuration");
+        add_profiles_dir(command, scan_.profiles);
         command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->add_flag("--speak", scan_.speak, "scan although another master is talking");
         command->footer(
@@ -107,13 +161,15 @@ class CommandLine {
             cli_.add_subcommand("address", "vendor notation to Modbus table and address, and back");
         command->add_option("PROFILE", profile_)->required();
         command->add_option("NOTATION", notation_, "UB180, or back: coil/288")->required();
-        command->callback([this] { code_ = address(profile_, notation_); });
+        add_profiles_dir(command, profiles_dir_);
+        command->callback([this] { code_ = address(profile_, notation_, profiles_dir_); });
     }
 
     void add_profiles() {
         CLI::App* command = cli_.add_subcommand("profiles", "list the panel profiles, or show one");
         command->add_option("NAME", name_);
-        command->callback([this] { code_ = profiles(name_); });
+        add_profiles_dir(command, profiles_dir_);
+        command->callback([this] { code_ = profiles(name_, profiles_dir_); });
     }
 
     CLI::App cli_{kAbout, "panelgate"};
@@ -128,13 +184,14 @@ class CommandLine {
     std::string profile_;
     std::string notation_;
     std::string name_;
+    std::string profiles_dir_;
 };
 
 }  // namespace
 
 int main(int argc, char** argv) {
     try {
-        return CommandLine().parse(argc, argv);
+        return CommandLine().parse({argv + 1, argv + argc});
     } catch (const std::exception& error) {
         std::cerr << "panelgate: internal error: " << error.what() << '\n';
         return kInternal;

@@ -1,31 +1,15 @@
 #include "showing.hpp"
 
 #include <cstdint>
-#include <memory>
 #include <utility>
 #include <variant>
 
 #include "panelgate/points/value.hpp"
-#include "panelgate/sim/misbehaviour.hpp"
 #include "panelgate/web/api/event_text.hpp"
+#include "simulated_line.hpp"
 
 namespace panelgate::app {
 namespace {
-
-/// How REST reaches the faults of a simulated panel; null for a real one. The bus outlives it.
-std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bus,
-                                                           std::uint8_t station) {
-    if (bus == nullptr || !bus->has(station)) return nullptr;
-    web::SimulatedPanel panel;
-    panel.faults = [bus, station] { return sim::to_numbers(bus->faults(station)); };
-    panel.set_faults = [bus, station](const sim::FaultNumbers& numbers) {
-        sim::Misbehaviour faults;
-        auto wrong = sim::from_numbers(numbers, faults);
-        if (!wrong) bus->set_faults(station, faults);
-        return wrong;
-    };
-    return std::make_shared<const web::SimulatedPanel>(std::move(panel));
-}
 
 web::StationEntry entry_of(const Station& station) {
     web::StationEntry entry;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "panelgate/rt/log.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
 #include "panelgate/sim/station.hpp"
 
 namespace panelgate::app {
@@ -22,6 +23,20 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
                                                    std::move(stations));
     rt::log(rt::LogLevel::info, "simulating", {{"line", line.name}, {"device", bus->device()}});
     return bus;
+}
+
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(sim::SimulatedBus* bus,
+                                                           std::uint8_t station) {
+    if (bus == nullptr || !bus->has(station)) return nullptr;
+    web::SimulatedPanel panel;
+    panel.faults = [bus, station] { return sim::to_numbers(bus->faults(station)); };
+    panel.set_faults = [bus, station](const sim::FaultNumbers& numbers) {
+        sim::Misbehaviour faults;
+        auto wrong = sim::from_numbers(numbers, faults);
+        if (!wrong) bus->set_faults(station, faults);
+        return wrong;
+    };
+    return std::make_shared<const web::SimulatedPanel>(std::move(panel));
 }
 
 }  // namespace panelgate::app

@@ -40,6 +40,7 @@ void TcpBridge::State::serve(tcp::socket socket) {
     client = std::move(socket);
     error_code ignored;
     client.set_option(tcp::no_delay(true), ignored);
+    client.non_blocking(true, ignored);
     from_client(++connections);
 }
 
@@ -80,6 +81,7 @@ TcpBridge::TcpBridge(const asio::any_io_executor& executor, const config::Endpoi
     const int fd = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) throw std::system_error(errno, std::generic_category(), device);
     state_->device.assign(fd);
+    state_->device.non_blocking(true);  // else a write waits for those who read on this very loop
     if (const error_code error = acceptor_.open(endpoint.address, endpoint.port)) {
         throw std::system_error(
             error, "cannot listen on " + endpoint.address + ':' + std::to_string(endpoint.port));

@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <array>
 
 #include "panelgate/yaml/map_reader.hpp"
@@ -30,6 +31,15 @@ std::optional<Endpoint> parse_endpoint(std::string_view text) {
     if (!port || *port < 0 || *port > 65535 || bits == 0 || bracketed != (bits == 128))
         return std::nullopt;
     return Endpoint{std::move(address), static_cast<std::uint16_t>(*port)};
+}
+
+bool is_ipv6(const std::string& address) { return bits_of_address(address) == 128; }
+
+bool is_any_address(const std::string& address) {
+    std::array<unsigned char, 16> buffer{};
+    const int family = is_ipv6(address) ? AF_INET6 : AF_INET;
+    return inet_pton(family, address.c_str(), buffer.data()) == 1 &&
+           std::ranges::all_of(buffer, [](unsigned char byte) { return byte == 0; });
 }
 
 std::optional<Cidr> parse_cidr(std::string_view text) {

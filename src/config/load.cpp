@@ -1,13 +1,18 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <set>
+#include <string>
 #include <string_view>
 #include <utility>
 
+#include "check_doors.hpp"
 #include "loader.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/profiles_dir.hpp"
+#include "panelgate/yaml/merge_keys.hpp"
+#include "templates.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -43,6 +48,52 @@ std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapRea
         root.problem("profiles_dir", "profiles_dir: " + fault);
     }
     return catalogue;
+}
+
+/// Keys for whoever writes the file: a place for anchors.
+void drop_extensions(yaml::Node& tree) {
+    std::erase_if(tree.entries,
+                  [](const yaml::Entry& entry) { return entry.key.starts_with("x-"); });
+}
+
+void load_tree(Loading& loading, yaml::Node& tree) {
+    yaml::resolve_merge_keys(tree, loading.problems);
+    drop_extensions(tree);
+    apply_templates(loading, tree);
+    MapReader root(tree, loading.problems, "the configuration");
+    if (tree.kind != yaml::Node::Kind::map) return;
+    loading.config.profiles = load_profiles(loading, root);
+    load_lines(loading, root);
+    load_modbus_tcp(loading, root);
+    load_http(loading, root);
+    load_log(loading, root);
+    load_relays(loading, root);
+    const yaml::Node* listeners = root.child("modbus_tcp");
+    const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
+                                                   listeners->items.empty());
+    if (is_empty && root.child("http") == nullptr)
+        loading.problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
+    root.has("templates");  // known, though nothing of it is left
+    root.finish();
+    if (loading.problems.empty()) warn_of_doors(loading, tree);
+}
+
+/// All of `unset`, and of `found` what does not only follow from it, at the same place. What many
+/// stations have from one template is told once.
+void tell(const yaml::Problems& unset, const yaml::Problems& found, yaml::Problems& problems) {
+    std::set<std::pair<int, int>> silent;
+    for (const yaml::Problem& problem : unset.list())
+        silent.emplace(problem.mark.line, problem.mark.column);
+    std::set<std::string> told;
+    for (const yaml::Problems* some : {&unset, &found}) {
+        yaml::Problems fresh(some->file());
+        for (const yaml::Problem& problem : some->list()) {
+            const bool follows = some == &found && problem.file == found.file() &&
+                                 silent.contains({problem.mark.line, problem.mark.column});
+            if (!follows && told.insert(yaml::format(problem)).second) fresh.add(problem);
+        }
+        problems.take(fresh);
+    }
 }
 
 }  // namespace
@@ -81,29 +132,21 @@ std::optional<bool> load_read_only(MapReader& in) {
     return *chosen == 1;
 }
 
-std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems) {
-    const yaml::Node tree = yaml::parse(text, problems);
+std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
+                           const yaml::Environment& environment) {
+    yaml::Node tree = yaml::parse(text, problems);
     if (tree.kind == yaml::Node::Kind::null) {
         if (problems.empty())
             problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
         return std::nullopt;
     }
+    yaml::Problems unset(problems.file());
+    yaml::expand_variables(tree, environment, unset);
+    yaml::Problems found(problems.file());
     Config config;
-    Loading loading{files, problems, config, {}};
-    MapReader root(tree, problems, "the configuration");
-    if (tree.kind != yaml::Node::Kind::map) return std::nullopt;
-    config.profiles = load_profiles(loading, root);
-    load_lines(loading, root);
-    load_modbus_tcp(loading, root);
-    load_http(loading, root);
-    load_log(loading, root);
-    load_relays(loading, root);
-    const yaml::Node* listeners = root.child("modbus_tcp");
-    const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
-                                                   listeners->items.empty());
-    if (is_empty && root.child("http") == nullptr)
-        problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
-    root.finish();
+    Loading loading{files, found, config, {}};
+    load_tree(loading, tree);
+    tell(unset, found, problems);
     if (!problems.empty()) return std::nullopt;
     return config;
 }

@@ -2,7 +2,9 @@
 #include <array>
 #include <map>
 #include <utility>
+#include <vector>
 
+#include "load_hosts.hpp"
 #include "loader.hpp"
 #include "panelgate/config/endpoint.hpp"
 
@@ -161,13 +163,13 @@ void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& set
     }
 }
 
-void load_allow(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
     const Node* list = in.sequence("allow");
     if (list == nullptr) return;
     for (const Node& item : list->items) {
         const auto cidr = parse_cidr(item.scalar);
         if (cidr) {
-            settings.allow.push_back({cidr->address, cidr->prefix});
+            allow.push_back({cidr->address, cidr->prefix});
         } else {
             loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not '" +
                                                 item.scalar + '\'');
@@ -196,7 +198,7 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     settings.broadcast = in.choice<Mode>("broadcast", kModes).value_or(settings.broadcast);
     load_diagnostics(loading, in, settings);
     settings.read_only = load_read_only(in).value_or(false);
-    load_allow(loading, in, settings);
+    load_allow(loading, in, settings.allow);
     settings.max_connections =
         static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
     refuse_tls(in);
@@ -276,6 +278,8 @@ void load_http(Loading& loading, MapReader& root) {
          {"viewer", web::Role::viewer},
          {"operator", web::Role::operator_}}};
     settings.anonymous = in.choice<web::Role>("anonymous", kRoles).value_or(settings.anonymous);
+    load_hosts(loading, in, settings);
+    load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
     refuse_tls(in);
     in.finish();

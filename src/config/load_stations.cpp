@@ -140,6 +140,7 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
 
 Station load_station(Loading& loading, const Node& node, const LineInWork& work) {
     MapReader in(node, loading.problems, "a station");
+    in.has("template");  // known, though apply_templates() has left nothing of it
     Station station;
     station.id = load_id(in, work.line);
     station.name = load_station_name(loading, in, work.line, station.id);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <set>
 #include <span>
@@ -20,7 +21,10 @@ struct Loading {
     std::set<std::string> station_names;
 
     void warn(yaml::Mark mark, const std::string& message) {
-        config.warnings.push_back(yaml::format({problems.file(), mark, "warning: " + message}));
+        std::string text = yaml::format({problems.file(), mark, "warning: " + message});
+        // Many stations may have it from one template.
+        if (std::ranges::find(config.warnings, text) == config.warnings.end())
+            config.warnings.push_back(std::move(text));
     }
 };
 

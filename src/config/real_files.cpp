@@ -44,4 +44,10 @@ std::optional<std::vector<std::string>> RealFiles::list_yaml(const std::string& 
     return paths;
 }
 
+bool RealFiles::is_readable_by_all(const std::string& path) const {
+    std::error_code error;
+    const fs::perms rights = fs::status(path, error).permissions();
+    return !error && (rights & fs::perms::others_read) != fs::perms::none;
+}
+
 }  // namespace panelgate::config

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "families.hpp"
+#include "http_families.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
@@ -279,6 +280,7 @@ std::string exposition(const Snapshot& snapshot) {
     add_points(families, snapshot);
     add_relays(families, snapshot);
     add_listeners(families, snapshot);
+    add_http(families, snapshot);
     add_process(families, snapshot);
     std::erase_if(families, [](const auto& family) { return family.metric.empty(); });
     return prometheus::TextSerializer{}.Serialize(families);

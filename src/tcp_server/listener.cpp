@@ -11,10 +11,10 @@
 #include <system_error>
 #include <utility>
 
-#include "access_list.hpp"
 #include "caller.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
+#include "panelgate/rt/access_list.hpp"
 #include "panelgate/rt/keep_alive.hpp"
 #include "session.hpp"
 #include "shared.hpp"
@@ -81,7 +81,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void tell_when_empty();
 
     std::shared_ptr<Shared> shared_;
-    AccessList allowed_;
+    rt::AccessList allowed_;
     rt::Acceptor acceptor_;
     std::set<std::shared_ptr<Session>> sessions_;
     std::function<void()> done_;

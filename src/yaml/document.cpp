@@ -12,6 +12,8 @@
 #include <sstream>
 #include <tuple>
 
+#include "masking.hpp"
+
 namespace panelgate::yaml {
 
 std::string format(const Problem& problem) {
@@ -99,7 +101,7 @@ class Builder final : public YAML::EventHandler {
         Node node;
         node.kind = Node::Kind::scalar;
         node.mark = mark_of(mark);
-        node.scalar = value;
+        node.scalar = unmask_variables(value);
         node.quoted = tag == "!";
         put(std::move(node), anchor);
     }
@@ -209,7 +211,7 @@ void refuse_second_document(YAML::Parser& parser, Problems& problems) {
 Node parse(std::string_view text, Problems& problems) {
     Builder builder(problems);
     try {
-        std::istringstream in{std::string(text)};
+        std::istringstream in{mask_variables(text)};
         YAML::Parser parser(in);
         if (parser.HandleNextDocument(builder)) refuse_second_document(parser, problems);
     } catch (const TooLarge& reason) {

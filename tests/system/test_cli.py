@@ -1,5 +1,6 @@
 """The command line: exit codes, and what a person reads when something is wrong."""
 import json
+import os
 import pathlib
 import socket
 import tempfile
@@ -37,6 +38,36 @@ class CommandLine(unittest.TestCase):
                           ["address", "autonics-gplp-s", "XY12"]):
             with self.subTest(arguments=arguments):
                 self.assertNotEqual(self.expect(USAGE, *arguments).stderr.strip(), "")
+
+    def test_a_mistyped_command_is_told_the_nearest(self):
+        for typed, near in (("chekc", "check"), ("simulat", "simulate"), ("dmeo", "demo")):
+            told = self.expect(USAGE, typed, "-c", "x.yaml").stderr
+            self.assertIn(f"there is no command '{typed}'; did you mean '{near}'?", told)
+        self.assertIn("Commands: run demo check", self.expect(USAGE, "fly").stderr)
+        self.assertIn("a command is missing", self.expect(USAGE).stderr)
+
+    def test_version_and_help_are_commands_too(self):
+        version = self.expect(0, "--version").stdout
+        for asked in (["version"], ["-V"]):
+            self.assertEqual(self.expect(0, *asked).stdout, version)
+        self.assertEqual(self.expect(0, "help").stdout, self.expect(0, "--help").stdout)
+        self.assertEqual(self.expect(0, "help", "check").stdout,
+                         self.expect(0, "check", "--help").stdout)
+        self.assertIn("did you mean 'check'?", self.expect(USAGE, "help", "chek").stderr)
+
+    def test_address_and_profiles_know_those_of_a_directory(self):
+        with tempfile.TemporaryDirectory() as folder:
+            own = (ROOT / "config/profiles/autonics-gplp-s.yaml").read_text()
+            file = pathlib.Path(folder) / "my-panel.yaml"
+            file.write_text(own.replace("description: ", "description: my own ", 1))
+            given = ("--profiles", folder)
+            self.assertRegex(self.expect(0, "profiles", *given).stdout, "(?m)^my-panel +my own ")
+            self.assertIn("my own", self.expect(0, "profiles", "my-panel", *given).stdout)
+            self.assertIn("UB180 -> coil 288",
+                          self.expect(0, "address", "my-panel", "UB180", *given).stdout)
+            file.write_text("descriptoin: x\n")
+            self.assertIn(f"{file}:1:1: ", self.expect(BAD_CONFIG, "profiles", *given).stderr)
+        self.expect(BAD_CONFIG, "profiles", *given)
 
     def test_an_address_is_translated_both_ways(self):
         first = self.expect(0, "address", "autonics-gplp-s", "UB180").stdout.splitlines()[0]
@@ -108,6 +139,71 @@ class Files(unittest.TestCase):
         self.assertIn("press", text)
         plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
         self.assertEqual([line["name"] for line in plan["lines"]], ["floor1"])
+
+    def test_check_prints_all_that_a_file_holds(self):
+        self.file.write_text(config.gateway(
+            config.line(stations="""{id: 31, name: press, profile: autonics-gplp-s, max_age: 2s,
+              poll: [{read: UW0, count: 32, every: 5s}],
+              points: [{name: level, at: UW100, writable: true, min: 1, max: 2.5, unit: m}]},
+              {id: 20, name: oven, profile: panasonic-gt, access: read_only}""",
+                        unlisted_stations="refuse"),
+            modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, allow: [10.0.0.0/8]",
+            http="listen: 127.0.0.1:8080, anonymous: none, hosts: [a.example], allow: ['::1']",
+            relays="[{from: oven/GDT0, to: press/UW200, every: 3s, on_change: true}]"))
+        text = run("check", "-c", str(self.file)).stdout
+        for shown in ("station 31 press, autonics-gplp-s, read and write, answers up to 2s old",
+                      "station 20 oven, panasonic-gt, read only",
+                      "point level: UW100, u16, every 1s, in m, writable from 1 to 2.5",
+                      "poll UW0, count 32, every 5s", "other stations: refused",
+                      "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
+                      "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
+                      "unit 101 is floor1/31", "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
+            self.assertIn(shown, text)
+        plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
+        [line] = plan["lines"]
+        self.assertEqual(line["polls"], [{"station": "press", "read": "UW0", "count": 32,
+                                          "every_ms": 5000}])
+        self.assertEqual([s["access"] for s in line["stations"]], ["read_write", "read_only"])
+        self.assertEqual(line["stations"][0]["points"][0]["name"], "level")
+        self.assertEqual(plan["relays"][0]["to"], "press/UW200")
+        self.assertEqual(plan["modbus_tcp"][0]["units"], {"101": "floor1/31"})
+        self.assertEqual(plan["http"]["anonymous"], "none")
+        self.assertEqual((plan["valid"], plan["errors"]), (True, []))
+
+    def test_check_tells_errors_as_json_too(self):
+        self.file.write_text(good().replace("device: sim", "devise: sim"))
+        ended = run("check", "-c", str(self.file), "--format", "json")
+        self.assertEqual(ended.returncode, BAD_CONFIG)
+        told = json.loads(ended.stdout)
+        self.assertFalse(told["valid"])
+        places = [(e["file"], e["line"], e["column"]) for e in told["errors"]]
+        self.assertEqual(places, [(str(self.file), 2, 5), (str(self.file), 3, 5)])
+        for error in told["errors"]:
+            self.assertIn("{file}:{line}:{column}: {message}".format(**error), ended.stderr)
+        gone = run("check", "-c", str(self.file) + "x", "--format", "json")
+        self.assertEqual(gone.returncode, NO_INPUT)
+        self.assertIn("No such file", json.loads(gone.stdout)["errors"][0]["message"])
+
+    def test_check_warns_of_a_token_that_others_can_read(self):
+        token = self.file.with_name("token")
+        token.write_text("0123456789abcdef")
+        token.chmod(0o644)
+        self.file.write_text(config.gateway(config.line(), http="listen: 127.0.0.1:0, tokens: "
+                             f"[{{name: ops, role: operator, file: {token}}}]"))
+        warned = run("check", "-c", str(self.file))
+        self.assertEqual(warned.returncode, 0)
+        self.assertIn(f"chmod o-r {token}", warned.stderr)
+        token.chmod(0o640)
+        self.assertEqual(run("check", "-c", str(self.file)).stderr, "")
+
+    def test_values_come_from_the_environment(self):
+        self.file.write_text(good().replace("38400", "${PANELGATE_TEST_BAUD}"))
+        unset = run("check", "-c", str(self.file))
+        self.assertEqual(unset.returncode, BAD_CONFIG)
+        self.assertIn("the environment has no PANELGATE_TEST_BAUD", unset.stderr)
+        given = run("check", "-c", str(self.file),
+                    env={**os.environ, "PANELGATE_TEST_BAUD": "38400"})
+        self.assertIn("38400 8N1", given.stdout)
 
     def test_every_shipped_configuration_is_valid(self):
         files = sorted((ROOT / "config").glob("*.yaml"))

@@ -53,8 +53,8 @@ class BadClients(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        cls.program = harness.demo()
-        cls.addClassCleanup(cls.program.stop)
+        cls.program = cls.enterClassContext(
+            harness.configured(config.gateway(config.line(), http=config.OPERATOR)))
         cls.http_port = cls.program.http_port()
         cls.good = cls.program.client()
         cls.addClassCleanup(cls.good.close)
@@ -113,10 +113,10 @@ class BadClients(unittest.TestCase):
         chance = random.Random(21)
         hopeless = [b"GET\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01",
                     b"GET / HTTP/1.1\r\n" + b"x: " + b"y" * 100_000 + b"\r\n\r\n",
-                    b"PUT /api/v1/stations/press/devices/UW100 HTTP/1.1\r\nHost: x\r\n"
+                    b"PUT /api/v1/stations/press/devices/UW100 HTTP/1.1\r\nHost: localhost\r\n"
                     b"Content-Length: 99999999999\r\n\r\n",
-                    b"GET /%zz HTTP/1.1\r\nHost: x\r\n\r\n",
-                    b"GET /api/v1/stations/%00%ff HTTP/1.1\r\nHost: x\r\n\r\n"]
+                    b"GET /%zz HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                    b"GET /api/v1/stations/%00%ff HTTP/1.1\r\nHost: localhost\r\n\r\n"]
         hopeless += [chance.randbytes(chance.randrange(1, 3000)) for _ in range(30)]
         for data in hopeless:
             with socket.create_connection(("127.0.0.1", self.http_port), harness.PATIENCE) as client:

@@ -15,6 +15,7 @@
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/http/settings.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/variables.hpp"
 
 namespace panelgate::config {
 
@@ -59,9 +60,13 @@ struct Files {
     virtual std::optional<std::string> read(const std::string& path) const = 0;
     /// Paths of the *.yaml files in a directory, sorted; nothing when it cannot be listed.
     virtual std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const = 0;
+    /// By everybody on the machine.
+    virtual bool is_readable_by_all(const std::string&) const { return false; }
 };
 
-/// Text -> Config. Nothing is returned when `problems` got any entry.
-std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems);
+/// Text -> Config. Nothing is returned when `problems` got any entry. `environment` gives the
+/// values of ${NAME}; files that are named in the text are taken as they are.
+std::optional<Config> load(std::string_view text, const Files& files, yaml::Problems& problems,
+                           const yaml::Environment& environment = {});
 
 }  // namespace panelgate::config

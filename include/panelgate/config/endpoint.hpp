@@ -15,6 +15,11 @@ struct Endpoint {
 /// "127.0.0.1:502", "[::1]:502"; nothing on anything else (names are not looked up).
 std::optional<Endpoint> parse_endpoint(std::string_view text);
 
+/// Of an address that parse_endpoint() has taken.
+bool is_ipv6(const std::string& address);
+/// 0.0.0.0 or ::, in any spelling: all addresses of the machine.
+bool is_any_address(const std::string& address);
+
 /// "10.0.0.0/8" or a bare address: address and prefix length; nothing on anything else.
 struct Cidr {
     std::string address;

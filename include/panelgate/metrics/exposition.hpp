@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/web/http/counters.hpp"
 
 namespace panelgate::metrics {
 
@@ -18,6 +20,7 @@ struct Snapshot {
     std::vector<tcp_server::Counters> listeners;
     std::vector<points::PointSample> points;
     std::vector<points::RelaySample> relays;
+    std::optional<web::Counters> http;
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;

@@ -7,18 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::tcp_server {
 
 /// What happens to unit 0 with a write.
 enum class BroadcastMode : std::uint8_t { reply, silent, deny };
-
-/// A network in CIDR form; a bare address is /32 or /128.
-struct Network {
-    std::string address;
-    unsigned prefix = 0;
-};
 
 struct UnitTarget {
     std::string line;

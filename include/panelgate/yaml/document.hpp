@@ -27,6 +27,8 @@ class Problems {
   public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
     void add(Mark mark, std::string message) { list_.push_back({file_, mark, std::move(message)}); }
+    /// Keeps the problem's own file.
+    void add(Problem problem) { list_.push_back(std::move(problem)); }
     /// Adds those of another file that this one names; they keep their file.
     void take(const Problems& other) {
         list_.insert(list_.end(), other.list_.begin(), other.list_.end());

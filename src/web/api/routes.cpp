@@ -25,7 +25,7 @@ constexpr Row kRows[] = {
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/lines", get_lines, kSee},
     {"GET", "/api/v1/lines/{}", get_line, kSee},
-    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, "last"},
+    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, "last since"},
     {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange},
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange},
     {"GET", "/api/v1/stations", get_stations, kSee},
@@ -66,6 +66,15 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries)});
     }
     return made;
+}
+
+std::vector<Route> simulator_routes(std::shared_ptr<const Api> api) {
+    std::vector<Route> some = routes(std::move(api));
+    std::erase_if(some, [](const Route& route) {
+        return route.pattern != "/healthz" && route.pattern != "/readyz" &&
+               !route.pattern.starts_with("/api/v1/simulator/");
+    });
+    return some;
 }
 
 }  // namespace panelgate::web

@@ -10,5 +10,7 @@ namespace panelgate::web {
 
 /// Every path of the contract's section 5. The handlers share the API.
 std::vector<Route> routes(std::shared_ptr<const Api> api);
+/// Those that need no bus: probes, and the faults of simulated panels.
+std::vector<Route> simulator_routes(std::shared_ptr<const Api> api);
 
 }  // namespace panelgate::web

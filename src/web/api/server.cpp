@@ -10,14 +10,16 @@
 namespace panelgate::web {
 
 Server::Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-               Providers providers) {
+               Providers providers, Surface surface) {
     auto api = std::make_shared<Api>();
     api->directory = &directory;
     api->providers = std::move(providers);
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
     site->product = "panelgate/" + api->providers.version;
-    site->routes = routes(std::move(api));
+    site->now = api->providers.now;
+    site->routes =
+        surface == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
     site->next_caller = bus::next_client_id;
     listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
 }
@@ -29,6 +31,8 @@ boost::system::error_code Server::start() { return listener_->open(); }
 std::uint16_t Server::port() const { return listener_->port(); }
 
 void Server::stop() { listener_->stop(); }
+
+const Counters& Server::counters() const { return listener_->counters(); }
 
 std::size_t Server::connections() const { return listener_->connections(); }
 

@@ -1,7 +1,8 @@
 #include "access.hpp"
 
-#include <cctype>
 #include <string_view>
+
+#include "to_lower.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -24,11 +25,7 @@ std::string_view header(const HttpRequest& request, const char* name) {
 /// The token after "Bearer " (RFC 6750 2.1; schemes are compared without case, RFC 9110 11.1).
 std::optional<std::string_view> bearer_token(std::string_view authorization) {
     constexpr std::string_view kScheme = "bearer ";
-    if (authorization.size() < kScheme.size()) return std::nullopt;
-    for (std::size_t i = 0; i < kScheme.size(); ++i) {
-        const auto lower = std::tolower(static_cast<unsigned char>(authorization[i]));
-        if (lower != kScheme[i]) return std::nullopt;
-    }
+    if (to_lower(authorization.substr(0, kScheme.size())) != kScheme) return std::nullopt;
     return authorization.substr(kScheme.size());
 }
 
@@ -49,10 +46,16 @@ Problem unauthorized(std::string detail) {
     return made;
 }
 
+/// Media types are compared without case (RFC 9110 8.3.1).
+bool is_json(std::string_view content_type) {
+    std::string_view type = content_type.substr(0, content_type.find(';'));
+    while (type.ends_with(' ') || type.ends_with('\t')) type.remove_suffix(1);
+    return to_lower(type) == "application/json";
+}
+
 bool is_foreign_form(const HttpRequest& request) {
     if (request.method == "GET" || request.method == "HEAD") return false;
-    return !header(request, "origin").empty() &&
-           !header(request, "content-type").starts_with("application/json");
+    return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
 }
 
 }  // namespace

@@ -1,72 +1,89 @@
 #include "panelgate/web/http/listener.hpp"
 
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <exception>
-#include <string_view>
 #include <utility>
 
 #include "panelgate/rt/log.hpp"
 #include "session.hpp"
+#include "shared.hpp"
 
 namespace panelgate::web {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
-namespace {
-
-/// As much as goes without waiting; the connection is closed whatever comes of it.
-void refuse(tcp::socket socket) {
-    static constexpr std::string_view kFull =
-        "HTTP/1.1 503 Service Unavailable\r\nRetry-After: 1\r\nContent-Length: 0\r\n"
-        "Connection: close\r\n\r\n";
-    error_code ignored;
-    socket.non_blocking(true, ignored);
-    socket.write_some(asio::const_buffer(kFull.data(), kFull.size()), ignored);
-}
-
-}  // namespace
 
 HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const Site> site)
-    : site_(std::move(site)),
+    : shared_(std::make_shared<Shared>(std::move(site))),
+      allowed_(shared_->site->settings.allow),
       acceptor_(
           executor, [this](tcp::socket socket) { take(std::move(socket)); },
           [this](const error_code& why) {
               rt::log(rt::LogLevel::warn, "cannot accept",
-                      {{"listener", site_->settings.name()}, {"reason", why.message()}});
+                      {{"listener", shared_->site->settings.name()}, {"reason", why.message()}});
           }) {}
 
 error_code HttpListener::open() {
-    return acceptor_.open(site_->settings.address, site_->settings.port);
+    return acceptor_.open(shared_->site->settings.address, shared_->site->settings.port);
 }
+
+const Counters& HttpListener::counters() const { return shared_->counters; }
 
 std::uint16_t HttpListener::port() const { return acceptor_.port(); }
 
 void HttpListener::take(tcp::socket socket) {
-    if (sessions_.size() >= site_->settings.max_connections) {
-        refuse(std::move(socket));
+    error_code gone;
+    const tcp::endpoint peer = socket.remote_endpoint(gone);
+    if (gone) return;
+    if (!allowed_.allows(peer.address())) {
+        rt::log(rt::LogLevel::info, "connection refused",
+                {{"listener", shared_->site->settings.name()},
+                 {"client", peer.address().to_string()},
+                 {"reason", "not in the allow list"}});
         return;
     }
-    auto session = std::make_shared<HttpSession>(std::move(socket), site_);
-    sessions_.insert(session);
-    asio::co_spawn(acceptor_.get_executor(), HttpSession::run(session),
-                   [self = weak_from_this(), session](std::exception_ptr failed) {
-                       if (failed) rt::log(rt::LogLevel::error, "http session failed");
-                       session->abandon();
-                       if (const auto listener = self.lock()) listener->sessions_.erase(session);
-                   });
+    const auto caller =
+        std::make_shared<Caller>(shared_->site->next_caller(), peer.address().to_string());
+    const bool probes_only = make_room(*caller);
+    auto session = std::make_shared<HttpSession>(std::move(socket), shared_, caller, probes_only);
+    sessions_.emplace(caller->id(), session);
+    asio::co_spawn(
+        acceptor_.get_executor(), HttpSession::run(session),
+        [self = weak_from_this(), session, id = caller->id()](std::exception_ptr failed) {
+            if (failed) rt::log(rt::LogLevel::error, "http session failed");
+            session->abandon();
+            const auto listener = self.lock();
+            if (!listener) return;
+            listener->shared_->places.leave(id);
+            listener->sessions_.erase(id);
+        });
+}
+
+bool HttpListener::make_room(const Caller& caller) {
+    const Places::Arrival arrival = shared_->places.arrive(caller.id(), caller.address());
+    if (arrival.probes_only) {
+        rt::log(rt::LogLevel::warn, "http requests refused",
+                {{"listener", shared_->site->settings.name()},
+                 {"client", caller.address()},
+                 {"reason", "all places are taken"}});
+    }
+    if (arrival.leaves) {
+        const auto displaced = sessions_.find(*arrival.leaves);
+        if (displaced != sessions_.end()) std::shared_ptr(displaced->second)->abandon();
+    }
+    return arrival.probes_only;
 }
 
 void HttpListener::stop() {
     acceptor_.close();
     const auto sessions = sessions_;
-    for (const auto& session : sessions) session->stop();
+    for (const auto& [id, session] : sessions) session->stop();
 }
 
 void HttpListener::abandon() {
     stop();
     const auto sessions = sessions_;
-    for (const auto& session : sessions) session->abandon();
+    for (const auto& [id, session] : sessions) session->abandon();
 }
 
 }  // namespace panelgate::web

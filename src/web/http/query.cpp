@@ -19,9 +19,10 @@ std::optional<Problem> check_queries(const HttpRequest& request,
     for (const auto& [name, value] : request.query) {
         if (std::ranges::find(known, name) == known.end())
             return unknown_name("query", name, known);
+        if (request.query.count(name) > 1)
+            return problem(400, "the query '" + name + "' is given twice");
     }
-    if (request.repeated_query.empty()) return std::nullopt;
-    return problem(400, "the query '" + request.repeated_query + "' is given twice");
+    return std::nullopt;
 }
 
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,

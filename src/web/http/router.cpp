@@ -1,5 +1,10 @@
 #include "router.hpp"
 
+#include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/system/error_code.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -7,10 +12,12 @@
 #include <vector>
 
 #include "access.hpp"
+#include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
+namespace asio = boost::asio;
 namespace {
 
 /// What the pattern's {} stand for in this path, or nothing when it does not match.
@@ -39,6 +46,12 @@ struct Found {
     std::string allow;  ///< methods of the path; empty: no such path
 };
 
+void add_verb(std::string& allow, std::string_view verb) {
+    if (allow.find(verb) != std::string::npos) return;
+    if (!allow.empty()) allow += ", ";
+    allow += verb == "GET" ? "GET, HEAD" : verb;
+}
+
 Found find_route(const HttpRequest& request, const std::vector<Route>& routes) {
     std::string_view verb = request.method;
     if (verb == "HEAD") verb = "GET";
@@ -51,9 +64,7 @@ Found find_route(const HttpRequest& request, const std::vector<Route>& routes) {
             found.arguments = std::move(*arguments);
             return found;
         }
-        if (found.allow.find(route.verb) != std::string::npos) continue;
-        if (!found.allow.empty()) found.allow += ", ";
-        found.allow += route.verb == "GET" ? "GET, HEAD" : route.verb;
+        add_verb(found.allow, route.verb);
     }
     return found;
 }
@@ -65,12 +76,59 @@ Problem not_found(const Found& found) {
     return made;
 }
 
+/// What the path can be asked; of the whole server, of each of its paths (RFC 9110 9.3.7).
+HttpResponse options(const Found& found, const HttpRequest& request, const Site& site) {
+    std::string allow = found.allow;
+    if (request.path == std::vector<std::string>{"*"}) {
+        for (const Route& route : site.routes) add_verb(allow, route.verb);
+    }
+    if (allow.empty()) return to_response(not_found(found));
+    HttpResponse response;
+    response.status = 204;
+    response.headers.emplace_back("Allow", allow + ", OPTIONS");
+    return response;
+}
+
+/// A request with a token, when its address may be guessing.
+asio::awaitable<void> hold_up(const HttpRequest* request, Shared* shared) {
+    const Duration hold = shared->logins.hold(shared->site->now(), request->caller->address());
+    if (hold == Duration::zero()) co_return;
+    asio::steady_timer timer(co_await asio::this_coro::executor, hold);
+    boost::system::error_code ignored;
+    co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
+}
+
+void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
+    const std::string& address = request.caller->address();
+    if (!failed) return shared.logins.succeeded(address);
+    ++shared.counters.login_failures;
+    shared.logins.failed(shared.site->now(), address);
+    rt::log(rt::LogLevel::warn, "login failed",
+            {{"listener", shared.site->settings.name()}, {"client", address}});
+}
+
+/// check_access(), and what comes of a token.
+asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
+                                              Shared* shared) {
+    const bool login = needed != Role::none && request->headers.contains("authorization");
+    if (login) co_await hold_up(request, shared);
+    const auto refused = check_access(*request, needed, shared->site->settings);
+    // With a token, nothing but one that nobody has is a 401.
+    if (login) judge_login(*request, refused && refused->status == 401, *shared);
+    co_return refused;
+}
+
 }  // namespace
 
-Handling dispatch(HttpRequest request, const Site* site) {
+Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
+    const std::shared_ptr<const Site> site = shared->site;
     Found found = find_route(request, site->routes);
+    const bool free = found.route != nullptr && found.route->needed == Role::none;
+    if (barred && !free) co_return to_response(*barred);
+    if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
-    const auto refused = check_access(request, found.route->needed, site->settings);
+    const auto refused = co_await admit(&request, found.route->needed, shared);
+    if (request.caller->has_left()) co_return HttpResponse();
     if (refused) co_return to_response(*refused);
     const auto mistaken = check_queries(request, found.route->queries);
     if (mistaken) co_return to_response(*mistaken);

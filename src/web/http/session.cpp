@@ -1,7 +1,5 @@
 #include "session.hpp"
 
-#include <sys/socket.h>
-
 #include <array>
 #include <boost/asio/error.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -12,14 +10,15 @@
 #include <boost/beast/http/error.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
-#include <cerrno>
 #include <exception>
+#include <string>
+#include <string_view>
 #include <utility>
 
+#include "origin.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "router.hpp"
-#include "target.hpp"
 
 namespace panelgate::web {
 namespace asio = boost::asio;
@@ -27,72 +26,35 @@ namespace beast = boost::beast;
 namespace http = boost::beast::http;
 namespace {
 
-constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 constexpr std::size_t kReadSize = 4096;
 /// What a client whose request was refused may still send before it is cut off.
 constexpr std::size_t kDrainLimit = 1024 * 1024;
 constexpr Duration kDrainTime = 2s;
+constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
-using BeastRequest = http::request<http::string_body>;
-
-HttpRequest to_request(BeastRequest&& message, Target target) {
-    HttpRequest request;
-    request.method = message.method_string();
-    request.path = std::move(target.path);
-    request.query = std::move(target.query);
-    request.repeated_query = std::move(target.repeated_query);
-    for (const char* name : kHeadersRead) {
-        const auto field = message.find(name);
-        if (field != message.end()) request.headers[name] = field->value();
-    }
-    request.body = std::move(message.body());
-    return request;
-}
-
-template <class Message>
-void set_head(Message& message, const HttpResponse& response, bool keep_alive,
-              const std::string& product) {
-    message.version(11);
-    message.result(response.status);
-    message.set(http::field::server, product);
-    message.set(http::field::content_type, response.content_type);
-    message.set(http::field::cache_control, "no-store");
-    message.set("X-Content-Type-Options", "nosniff");
-    for (const auto& [name, value] : response.headers) message.set(name, value);
-    message.content_length(response.body.size());
-    message.keep_alive(keep_alive);
-}
-
-Problem problem_of_parse(boost::system::error_code why, std::size_t max_body) {
-    if (why == http::error::body_limit) {
-        return problem(413, "a body has at most " + std::to_string(max_body) + " bytes");
-    }
-    if (why == http::error::header_limit || why == http::error::buffer_overflow) {
-        return problem(431, "a header has at most " + std::to_string(kHeaderLimit) + " bytes");
-    }
-    return problem(400, "this is not an HTTP/1.1 request: " + why.message());
-}
-
-bool is_parse_error(boost::system::error_code why) {
-    return why.category() == http::make_error_code(http::error::bad_method).category() &&
-           why != http::error::end_of_stream && why != http::error::partial_message;
+Problem no_place() {
+    Problem made = problem(503, "all places of this server are taken; only probes are answered");
+    made.headers.emplace_back("Retry-After", "1");
+    return made;
 }
 
 }  // namespace
 
-HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<const Site> site)
+HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
+                         std::shared_ptr<Caller> caller, bool probes_only)
     : stream_(std::move(socket)),
-      site_(std::move(site)),
-      buffer_(kHeaderLimit + kReadSize + site_->settings.max_body) {
-    boost::system::error_code ignored;
+      shared_(std::move(shared)),
+      caller_(std::move(caller)),
+      probes_only_(probes_only),
+      buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
+      departure_(stream_.socket(), shared_->site->settings.half_close_grace) {
+    ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
-    boost::system::error_code gone;
-    const auto peer = stream_.socket().remote_endpoint(gone);
-    caller_ = std::make_shared<Caller>(site_->next_caller(),
-                                       gone ? std::string() : peer.address().to_string());
+    local_ = stream_.socket().local_endpoint(ignored).address();
 }
 
 asio::awaitable<void> HttpSession::run(std::shared_ptr<HttpSession> self) {
+    self->departure_.start(self, [session = self.get()] { session->abandon(); });
     bool more = true;
     while (more && !self->stopping_) more = co_await self->serve_one();
     self->abandon();
@@ -106,20 +68,12 @@ asio::awaitable<bool> HttpSession::serve_one() {
     }
     if (failed) co_return false;
 
-    busy_ = true;
+    set_busy(true);
     BeastRequest message = parser_->release();
-    const bool keep_alive = message.keep_alive();
+    const bool keep_alive = message.keep_alive() && !probes_only_;
     const bool head = message.method() == http::verb::head;
-    auto target = parse_target(std::string(message.target()));
-    HttpResponse response;
-    if (target) {
-        HttpRequest request = to_request(std::move(message), std::move(*target));
-        request.caller = caller_;
-        asio::awaitable<HttpResponse> handling = handle(std::move(request));
-        response = co_await std::move(handling);
-    } else {
-        response = to_response(problem(400, "the request target cannot be understood"));
-    }
+    asio::awaitable<HttpResponse> answering = answer(std::move(message));
+    HttpResponse response = co_await std::move(answering);
     bool more = false;
     if (!caller_->has_left() && response.events && !head) {
         asio::awaitable<void> sending = send_events(std::move(response.events));
@@ -128,25 +82,62 @@ asio::awaitable<bool> HttpSession::serve_one() {
         asio::awaitable<bool> sending = send(std::move(response), head, keep_alive && !stopping_);
         more = co_await std::move(sending);
     }
-    busy_ = false;
+    if (probes_only_ && !caller_->has_left()) co_await drain();
+    set_busy(false);
     co_return more;
+}
+
+asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
+    auto target = target_of(message);
+    if (!target) co_return to_response(problem(400, "the request target cannot be understood"));
+    auto host = host_of(message, *target);
+    if (!host) co_return to_response(host.error());
+    departure_.ask_by(nullptr);
+    if (message.version() >= 11) departure_.ask_by([this] { send_interim(); });
+    HttpRequest request = to_request(std::move(message), std::move(*target), std::move(*host));
+    request.caller = caller_;
+    asio::awaitable<HttpResponse> handling = handle(std::move(request));
+    HttpResponse response = co_await std::move(handling);
+    co_return response;
+}
+
+void HttpSession::set_busy(bool busy) {
+    busy_ = busy;
+    if (busy) {
+        shared_->places.busy(caller_->id());
+        departure_.request_runs();
+    } else {
+        shared_->places.idle(caller_->id());
+        departure_.request_ends();
+    }
+}
+
+/// Before the answer, which it cannot mix with: nothing is on its way, so all of it is taken.
+/// Clients step over it (RFC 9110 15.2).
+void HttpSession::send_interim() {
+    ErrorCode ignored;
+    stream_.socket().non_blocking(true, ignored);
+    stream_.socket().write_some(asio::buffer(kContinue), ignored);
 }
 
 /// One whole request, into parser_.
 asio::awaitable<boost::system::error_code> HttpSession::receive() {
     parser_.emplace();
     parser_->header_limit(kHeaderLimit);
-    parser_->body_limit(site_->settings.max_body);
+    parser_->body_limit(shared_->site->settings.max_body);
     ErrorCode error;
     if (buffer_.size() == 0) {
-        stream_.expires_after(site_->settings.idle_timeout);
+        const Settings& settings = shared_->site->settings;
+        stream_.expires_after(asked_before_ ? settings.idle_timeout
+                                            : settings.first_request_timeout);
         const auto space = buffer_.prepare(kReadSize);
         const std::size_t n = co_await stream_.async_read_some(
             space, asio::redirect_error(asio::use_awaitable, error));
         if (error) co_return error;
         buffer_.commit(n);
     }
-    stream_.expires_after(site_->settings.request_timeout);
+    asked_before_ = true;
+    stream_.expires_after(shared_->site->settings.request_timeout);
     co_await http::async_read_header(stream_, buffer_, *parser_,
                                      asio::redirect_error(asio::use_awaitable, error));
     if (error || parser_->is_done()) co_return error;
@@ -157,7 +148,6 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
 asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
     ErrorCode error;
     if (beast::iequals(parser_->get()[http::field::expect], "100-continue")) {
-        static constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
         const asio::const_buffer text(kContinue.data(), kContinue.size());
         co_await asio::async_write(stream_, text, asio::redirect_error(asio::use_awaitable, error));
         if (error) co_return error;
@@ -171,9 +161,11 @@ asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
 asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
-    watch_for_departure();
+    std::optional<Problem> barred = check_origin(request, shared_->hosts, local_);
+    if (probes_only_) barred = no_place();
     try {
-        asio::awaitable<HttpResponse> handling = dispatch(std::move(request), site_.get());
+        asio::awaitable<HttpResponse> handling =
+            dispatch(std::move(request), shared_.get(), barred);
         HttpResponse response = co_await std::move(handling);
         co_return response;
     } catch (const std::exception& error) {
@@ -186,8 +178,8 @@ asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
 }
 
 asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
-    busy_ = true;
-    HttpResponse response = to_response(problem_of_parse(why, site_->settings.max_body));
+    set_busy(true);
+    HttpResponse response = to_response(problem_of_parse(why, shared_->site->settings.max_body));
     asio::awaitable<bool> sending = send(std::move(response), false, false);
     co_await std::move(sending);
     co_await drain();
@@ -197,15 +189,17 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
 /// Did it go out, and may another request follow?
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
     ErrorCode error;
-    stream_.expires_after(site_->settings.request_timeout);
+    departure_.request_ends();
+    ++shared_->counters.requests[response.status];
+    stream_.expires_after(shared_->site->settings.request_timeout);
     if (head) {
         http::response<http::empty_body> message;
-        set_head(message, response, keep_alive, site_->product);
+        set_head(message, response, keep_alive, shared_->site->product);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
     } else {
         http::response<http::string_body> message;
-        set_head(message, response, keep_alive, site_->product);
+        set_head(message, response, keep_alive, shared_->site->product);
         message.body() = std::move(response.body);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
@@ -217,16 +211,23 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
 /// forgetting the connection, and notices a client that has gone.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
+    constexpr const char* kComment = ": \n\n";
+    ++shared_->counters.requests[200];
+    bool asked = false;
     asio::steady_timer bell(stream_.get_executor());
     listener->wake = [&bell] { bell.cancel(); };
+    departure_.ask_by([&] {
+        asked = true;
+        bell.cancel();
+    });
     listener_ = listener;
     std::string text =
-        "HTTP/1.1 200 OK\r\nServer: " + site_->product +
+        "HTTP/1.1 200 OK\r\nServer: " + shared_->site->product +
         "\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n"
         "X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n: panelgate\n\n";
     ErrorCode error;
     while (!error) {
-        stream_.expires_after(site_->settings.request_timeout);
+        stream_.expires_after(shared_->site->settings.request_timeout);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
         if (error || listener->ended() || stopping_) break;
@@ -235,8 +236,10 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         ErrorCode rung;
         bell.expires_after(kHeartbeat);
         co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
-        text = rung ? listener->take() : ": \n\n";
+        text = rung ? listener->take() : kComment;
+        if (text.empty() && std::exchange(asked, false)) text = kComment;
     }
+    departure_.ask_by(nullptr);
     listener->wake = nullptr;
     listener_.reset();
 }
@@ -254,28 +257,6 @@ asio::awaitable<void> HttpSession::drain() {
     }
 }
 
-/// While a request runs nobody reads: this notices a client that goes away, so that what it asked
-/// for leaves the queues. Stops looking once a pipelined request is there.
-void HttpSession::watch_for_departure() {
-    if (watching_ || !stream_.socket().is_open()) return;
-    watching_ = true;
-    auto self = shared_from_this();
-    stream_.socket().async_wait(asio::ip::tcp::socket::wait_read, [self](ErrorCode error) {
-        self->watching_ = false;
-        if (error || !self->busy_ || !self->stream_.socket().is_open()) return;
-        if (self->client_has_left()) self->abandon();
-    });
-}
-
-bool HttpSession::client_has_left() {
-    char byte = 0;
-    const auto n = ::recv(stream_.socket().native_handle(), &byte, 1, MSG_PEEK | MSG_DONTWAIT);
-    if (n > 0) return false;
-    if (n == 0 || (errno != EAGAIN && errno != EWOULDBLOCK)) return true;
-    watch_for_departure();  // it was the beginning of this very request
-    return false;
-}
-
 void HttpSession::stop() {
     stopping_ = true;
     if (listener_ && listener_->wake) listener_->wake();
@@ -286,6 +267,7 @@ void HttpSession::abandon() {
     stopping_ = true;
     if (listener_ && listener_->wake) listener_->wake();
     caller_->leave();
+    departure_.request_ends();
     close();
 }
 

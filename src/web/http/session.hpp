@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
@@ -9,7 +10,10 @@
 #include <memory>
 #include <optional>
 
+#include "beast_message.hpp"
+#include "departure.hpp"
 #include "panelgate/web/http/site.hpp"
+#include "shared.hpp"
 
 namespace panelgate::web {
 
@@ -17,7 +21,9 @@ namespace panelgate::web {
 /// has ended; everything in the one thread.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
-    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<const Site> site);
+    /// With `probes_only` it answers one request, and only of what is free.
+    HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
+                std::shared_ptr<Caller> caller, bool probes_only);
 
     /// Serves until the client goes away, breaks the protocol, is idle for too long, or stop().
     static boost::asio::awaitable<void> run(std::shared_ptr<HttpSession> self);
@@ -33,24 +39,28 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<ErrorCode> receive();
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
+    boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
     boost::asio::awaitable<HttpResponse> handle(HttpRequest request);
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
     boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
     boost::asio::awaitable<void> drain();
-    void watch_for_departure();
-    bool client_has_left();
+    void set_busy(bool busy);
+    void send_interim();
     void close();
 
     boost::beast::tcp_stream stream_;
-    std::shared_ptr<const Site> site_;
+    std::shared_ptr<Shared> shared_;
     std::shared_ptr<Caller> caller_;
+    boost::asio::ip::address local_;  ///< at our end
+    const bool probes_only_;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
+    Departure departure_;
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
-    bool busy_ = false;  ///< a whole request is here and not yet answered
+    bool asked_before_ = false;  ///< it is not the first request that is waited for
+    bool busy_ = false;          ///< a whole request is here and not yet answered
     bool stopping_ = false;
-    bool watching_ = false;  ///< an async_wait of watch_for_departure() is pending
 };
 
 }  // namespace panelgate::web

@@ -1,6 +1,8 @@
 #include "target.hpp"
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/utf8.hpp"
+#include "to_lower.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -17,6 +19,7 @@ std::optional<std::string> decode(std::string_view text, bool plus_is_blank) {
         out += static_cast<char>(byte->front());
         i += 2;
     }
+    if (!is_utf8(out)) return std::nullopt;
     return out;
 }
 
@@ -28,14 +31,28 @@ std::string_view next_part(std::string_view& text, char separator) {
     return part;
 }
 
+/// Cuts off "http://host:port" (schemes are compared without case, RFC 3986 3.1). Nothing when
+/// there is none.
+std::optional<std::string> take_authority(std::string_view& target) {
+    for (const std::string_view scheme : {"http://", "https://"}) {
+        if (to_lower(target.substr(0, scheme.size())) != scheme) continue;
+        target.remove_prefix(scheme.size());
+        const std::string authority(target.substr(0, target.find_first_of("/?#")));
+        target.remove_prefix(authority.size());
+        return authority;
+    }
+    return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Target> parse_target(std::string_view target) {
-    if (!target.starts_with('/')) return std::nullopt;
+    Target parsed;
+    parsed.authority = take_authority(target);
+    if (!parsed.authority && !target.starts_with('/')) return std::nullopt;
     target = next_part(target, '#');
     std::string_view path = next_part(target, '?');
-    path.remove_prefix(1);
-    Target parsed;
+    if (!path.empty()) path.remove_prefix(1);
     while (!path.empty()) {
         auto segment = decode(next_part(path, '/'), false);
         if (!segment) return std::nullopt;
@@ -47,7 +64,7 @@ std::optional<Target> parse_target(std::string_view target) {
         const auto name = decode(next_part(pair, '='), true);
         auto value = decode(pair, true);
         if (!name || !value) return std::nullopt;
-        if (!parsed.query.emplace(*name, std::move(*value)).second) parsed.repeated_query = *name;
+        parsed.query.emplace(*name, std::move(*value));
     }
     return parsed;
 }

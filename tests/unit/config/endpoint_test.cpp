@@ -25,6 +25,12 @@ TEST(Endpoint, RefusesEverythingElse) {
         EXPECT_FALSE(parse_endpoint(text)) << text;
 }
 
+TEST(Endpoint, KnowsTheAddressesThatAreAll) {
+    for (const char* all : {"0.0.0.0", "::", "0::0", "0:0:0:0:0:0:0:0"})
+        EXPECT_TRUE(is_any_address(all)) << all;
+    for (const char* one : {"127.0.0.1", "::1", "0.0.0.1", ""}) EXPECT_FALSE(is_any_address(one));
+}
+
 TEST(Cidr, ReadsNetworksAndBareAddresses) {
     const auto network = parse_cidr("10.0.0.0/8");
     ASSERT_TRUE(network);

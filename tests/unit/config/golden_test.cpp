@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <ostream>
 #include <set>
 #include <stdexcept>
@@ -45,14 +46,20 @@ std::vector<Place> places() {
     return all;
 }
 
+std::optional<std::string> environment(const std::string& name) {
+    return name == "BAUD" ? std::optional<std::string>("38400") : std::nullopt;
+}
+
 /// What the user reads: the problems, or the warnings of a valid file.
 std::string told(const std::string& configuration) {
-    const MemoryFiles files({{"/run/secrets/ops", "  secret \n"},
+    const MemoryFiles files({{"/run/secrets/ops", "  secret-0123456789 \n"},
+                             {"/run/secrets/short", "secret\n"},
+                             {"/public/ops", "secret-0123456789\n"},
                              {"/run/secrets/empty", " \n"},
                              {"/run/secrets/two", "one two\n"},
                              {"/etc/panelgate/profiles/broken.yaml", "descriptions: x: y\n"}});
     yaml::Problems problems("panelgate.yaml");
-    const auto config = load(configuration, files, problems);
+    const auto config = load(configuration, files, problems, environment);
     EXPECT_EQ(config.has_value(), problems.empty());
     if (!config) return problems.text();
     std::string warnings;

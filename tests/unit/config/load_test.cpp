@@ -184,6 +184,31 @@ TEST(ConfigLoad, ListenersMayAllAskForAFreePort) {
     EXPECT_EQ(config.modbus_tcp.size(), 2U);
 }
 
+TEST(ConfigLoad, TakesNothingFromTheEnvironmentIntoASecret) {
+    const MemoryFiles files({{"/run/secrets/ops", "${BAUD}$$0123456789"}});
+    yaml::Problems problems("f.yaml");
+    const auto config = load(kSimple +
+                                 "http: {tokens: [{name: ops, role: operator, file: "
+                                 "${DIR}/ops}]}\n",
+                             files, problems, [](const std::string& name) {
+                                 return name == "DIR" ? "/run/secrets" : "38400";
+                             });
+    ASSERT_TRUE(config) << problems.text();
+    EXPECT_EQ(config->http->tokens.at(0).secret, "${BAUD}$$0123456789");
+}
+
+TEST(ConfigLoad, ReadsByWhichNamesAndFromWhereHttpMayBeAsked) {
+    const Config config =
+        load_valid(kSimple +
+                   "http:\n  hosts: [gateway.plant.example, 192.0.2.7, 'fd00::7']\n"
+                   "  allow: [10.0.0.0/8, 'fd00::/8']\n");
+    EXPECT_THAT(config.http->hosts, ElementsAre("gateway.plant.example", "192.0.2.7", "fd00::7"));
+    ASSERT_EQ(config.http->allow.size(), 2U);
+    EXPECT_EQ(config.http->allow[0].address, "10.0.0.0");
+    EXPECT_EQ(config.http->allow[0].prefix, 8U);
+    EXPECT_THAT(load_valid(kSimple + "http: {}\n").http->hosts, IsEmpty());
+}
+
 TEST(ConfigLoad, ReadsTokensFromTheirFiles) {
     const MemoryFiles files({{"/run/secrets/ops", "\n s3cret \r\n"}});
     const Config config =

@@ -28,6 +28,11 @@ class MemoryFiles final : public Files {
         return paths;
     }
 
+    /// Those of this folder.
+    bool is_readable_by_all(const std::string& path) const override {
+        return path.starts_with("/public/");
+    }
+
   private:
     std::map<std::string, std::string> texts_;
 };

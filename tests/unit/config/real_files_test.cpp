@@ -43,6 +43,15 @@ TEST_F(RealFilesTest, SaysWhyAFileCannotBeRead) {
     EXPECT_EQ(errno, EFBIG);
 }
 
+TEST_F(RealFilesTest, KnowsWhatEverybodyMayRead) {
+    const std::string path = put("token", "secret");
+    fs::permissions(path, fs::perms(0640));
+    EXPECT_FALSE(RealFiles().is_readable_by_all(path));
+    fs::permissions(path, fs::perms(0644));
+    EXPECT_TRUE(RealFiles().is_readable_by_all(path));
+    EXPECT_FALSE(RealFiles().is_readable_by_all((dir_ / "absent").string()));
+}
+
 TEST_F(RealFilesTest, ListsTheYamlFilesOfADirectorySorted) {
     for (const char* name : {"b.yaml", "a.yaml", "c.yml", "README"}) put(name, "");
     EXPECT_THAT(RealFiles().list_yaml(dir_.string()).value(),

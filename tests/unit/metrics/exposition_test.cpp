@@ -56,6 +56,19 @@ void expect_lines(const std::string& text, std::initializer_list<const char*> li
     for (const char* line : lines) EXPECT_THAT(text, HasSubstr("\n" + std::string(line) + "\n"));
 }
 
+TEST(Exposition, CountsWhatTheHttpServerAnsweredAndWhoGuessed) {
+    Snapshot snapshot = filled();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("login_failures")));
+    snapshot.http.emplace();
+    expect_lines(exposition(snapshot), {"panelgate_login_failures_total 0"});
+    snapshot.http->requests = {{200, 17}, {421, 2}};
+    snapshot.http->login_failures = 3;
+    expect_lines(exposition(snapshot), {"# TYPE panelgate_http_requests_total counter",
+                                        "panelgate_http_requests_total{code=\"200\"} 17",
+                                        "panelgate_http_requests_total{code=\"421\"} 2",
+                                        "panelgate_login_failures_total 3"});
+}
+
 TEST(Exposition, GivesTheCountersOfAStationExactly) {
     expect_lines(
         exposition(filled()),

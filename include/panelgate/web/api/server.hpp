@@ -12,6 +12,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -30,12 +31,15 @@ struct Providers {
     EventHub* events = nullptr;  ///< never null; outlives the server
 };
 
+/// Who is served: the gateway, or simulated panels alone, whose directory may be without buses.
+enum class Surface : std::uint8_t { gateway, simulator };
+
 /// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor; the
 /// directory and what it points to outlive the server.
 class Server {
   public:
     Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-           Providers providers);
+           Providers providers, Surface surface = Surface::gateway);
     /// Ends everything that stop() would let finish; answers still owed are not sent.
     ~Server();
     Server(const Server&) = delete;
@@ -49,6 +53,7 @@ class Server {
     void stop();
     /// Connections open now; after stop() it falls to 0.
     std::size_t connections() const;
+    const Counters& counters() const;
 
   private:
     std::shared_ptr<HttpListener> listener_;

@@ -5,19 +5,23 @@
 #include <boost/system/error_code.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
-#include <set>
 
 #include "panelgate/rt/acceptor.hpp"
+#include "panelgate/rt/access_list.hpp"
+#include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/site.hpp"
 
 namespace panelgate::web {
 
 class HttpSession;
+struct Shared;
 
 /// Accepts connections and owns their sessions. Lives in the one thread that runs the executor.
 class HttpListener : public std::enable_shared_from_this<HttpListener> {
   public:
+    /// Throws std::invalid_argument for an `allow` that is none.
     HttpListener(boost::asio::any_io_executor executor, std::shared_ptr<const Site> site);
 
     /// On an error (address in use, not an address…) nothing is open.
@@ -29,13 +33,17 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// Closes everything; answers still owed are not sent.
     void abandon();
     std::size_t connections() const { return sessions_.size(); }
+    const Counters& counters() const;
 
   private:
     void take(boost::asio::ip::tcp::socket socket);
+    /// May it ask only for what is free?
+    bool make_room(const Caller& caller);
 
-    std::shared_ptr<const Site> site_;
+    std::shared_ptr<Shared> shared_;
+    rt::AccessList allowed_;
     rt::Acceptor acceptor_;
-    std::set<std::shared_ptr<HttpSession>> sessions_;
+    std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by their callers' ids
 };
 
 }  // namespace panelgate::web

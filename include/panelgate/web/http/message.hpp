@@ -14,16 +14,18 @@ namespace panelgate::web {
 /// A request as handlers see it; nothing of Beast.
 struct HttpRequest {
     std::string method;
-    std::vector<std::string> path;               ///< segments, percent-decoded
-    std::map<std::string, std::string> query;    ///< decoded; of equal names the first
-    std::string repeated_query;                  ///< a name that comes more than once; "" for none
-    std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
+    std::string host;                               ///< lower case; empty: HTTP/1.0 without one
+    std::vector<std::string> path;                  ///< segments, percent-decoded
+    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
+    std::map<std::string, std::string> headers;     ///< those of kHeadersRead, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for
     std::shared_ptr<Caller> caller;
 };
 /// The request headers that anything here looks at.
-inline constexpr const char* kHeadersRead[] = {"authorization", "origin", "content-type"};
+inline constexpr const char* kHeadersRead[] = {"authorization",  "origin",
+                                               "content-type",   "sec-fetch-site",
+                                               "sec-fetch-mode", "sec-fetch-dest"};
 
 struct HttpResponse {
     unsigned status = 200;

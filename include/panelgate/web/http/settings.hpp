@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::web {
@@ -17,15 +18,33 @@ struct Token {
     std::string secret;  ///< read from its file at load
 };
 
+/// How guesses at tokens are slowed down, by address.
+struct LoginSettings {
+    unsigned free = 5;              ///< wrong tokens that cost nothing
+    Duration hold = 1s;             ///< for each request with a token, beyond these
+    Duration forgiven_after = 10s;  ///< each
+    unsigned remembered = 20;       ///< at most, of an address
+    std::size_t addresses = 256;    ///< at most
+};
+
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 8080;  ///< 0: any free one
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
+    LoginSettings logins;
+    std::vector<std::string> hosts;  ///< its names; empty: those of the machine
+    std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;
-    std::size_t max_body = 64 * 1024;  ///< bytes
-    Duration idle_timeout = 60s;       ///< of a keep-alive connection
-    Duration request_timeout = 10s;    ///< to receive one request, and to send one answer
+    std::size_t max_per_address = 32;      ///< of these
+    std::size_t probe_places = 16;         ///< beyond these: only what is free is answered there
+    std::size_t max_body = 64 * 1024;      ///< bytes
+    Duration first_request_timeout = 10s;  ///< of a connection that has not asked anything yet
+    Duration idle_timeout = 60s;           ///< of a keep-alive connection
+    Duration request_timeout = 10s;        ///< to receive one request, and to send one answer
+    /// How long a client that has closed its sending side is waited for before it is asked whether
+    /// it is still there, and how long between two such questions.
+    Duration half_close_grace = 2s;
 
     std::string name() const { return address + ":" + std::to_string(port); }
 };

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
 
@@ -18,7 +19,7 @@ using Handling = boost::asio::awaitable<HttpResponse>;
 struct Route {
     std::string_view verb;     ///< "GET" stands for HEAD, too
     std::string_view pattern;  ///< {} stands for any one segment
-    Role needed = Role::none;
+    Role needed = Role::none;  ///< none: free, also when everything else is barred
     std::function<Handling(HttpRequest)> handler;
     std::vector<std::string_view> queries{};  ///< that it understands; any other is refused
 };
@@ -29,6 +30,7 @@ struct Site {
     std::string product;  ///< of the header Server: "name/1.2.3"
     std::vector<Route> routes;
     std::function<std::uint64_t()> next_caller;  ///< numbers connections
+    std::function<TimePoint()> now;              ///< needed where a route is not free
 };
 
 }  // namespace panelgate::web

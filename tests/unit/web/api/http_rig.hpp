@@ -61,6 +61,7 @@ class HttpRig : public ::testing::Test {
     HttpRig() : bus(io.get_executor()), panel(test_profile()) {
         settings.port = 0;
         settings.anonymous = Role::operator_;
+        settings.hosts = {"x"};
         directory.lines.push_back({"floor1", "/dev/ttyUSB0", &bus, true});
         directory.lines.push_back({"floor2", "/dev/ttyUSB1", &bus, false});
         directory.generic = shipped.find("generic");

@@ -75,8 +75,13 @@ TEST(Access, TakesNoFormFromAForeignPage) {
     EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
     request.headers["content-type"] = "text/plain";
     EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
-    request.headers["content-type"] = "application/json; charset=utf-8";
-    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u);
+    request.headers["content-type"] = "application/jsonp";
+    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 415u);
+    for (const char* type :
+         {"application/json", "Application/JSON", "application/json ; charset=utf-8"}) {
+        request.headers["content-type"] = type;
+        EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u) << type;
+    }
     request.headers.erase("content-type");
     request.method = "GET";
     EXPECT_EQ(refusal(request, Role::viewer, Role::viewer), 0u);

@@ -30,6 +30,7 @@ class HttpServer : public ::testing::Test {
         auto site = std::make_shared<Site>();
         site->settings.port = 0;
         site->settings.anonymous = Role::none;
+        site->settings.hosts = {"x"};
         site->product = "toy/1";
         site->next_caller = [this] { return ++callers; };
         site->routes.push_back({"GET", "/whoami", Role::none, [this](HttpRequest request) {

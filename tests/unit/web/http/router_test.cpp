@@ -5,6 +5,8 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <exception>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,14 +34,17 @@ class Router : public ::testing::Test {
         HttpRequest request;
         request.method = method;
         request.path = std::move(path);
+        request.caller = std::make_shared<Caller>(1, "192.0.2.1");
+        Shared shared(std::make_shared<Site>(site));
         boost::asio::io_context io;
         HttpResponse got;
-        boost::asio::co_spawn(io, dispatch(std::move(request), &site),
+        boost::asio::co_spawn(io, dispatch(std::move(request), &shared, barred),
                               [&](std::exception_ptr, HttpResponse made) { got = made; });
         io.run();
         return got;
     }
     Site site;
+    std::optional<Problem> barred;
 };
 
 TEST_F(Router, TakesTheFirstRouteThatFits) {
@@ -84,6 +89,31 @@ TEST_F(Router, AsksForTheRoleOfTheRouteAndOnlyThen) {
     EXPECT_EQ(ask("GET", {"a"}).status, 200u);
     EXPECT_EQ(ask("PUT", {"a"}).status, 401u);
     EXPECT_EQ(ask("PUT", {"b"}).status, 404u);
+}
+
+TEST_F(Router, TellsWhatAPathCanBeAsked) {
+    add("GET", "/a/{}", Role::viewer);
+    add("PUT", "/a/{}", Role::operator_);
+    add("POST", "/b");
+    const HttpResponse response = ask("OPTIONS", {"a", "b"});
+    EXPECT_EQ(response.status, 204u);
+    EXPECT_EQ(response.body, "");
+    ASSERT_EQ(response.headers.size(), 1u);
+    EXPECT_EQ(response.headers[0].first, "Allow");
+    EXPECT_EQ(response.headers[0].second, "GET, HEAD, PUT, OPTIONS");
+    EXPECT_EQ(ask("OPTIONS", {"*"}).headers.at(0).second, "GET, HEAD, PUT, POST, OPTIONS");
+    EXPECT_EQ(ask("OPTIONS", {"c"}).status, 404u);
+}
+
+TEST_F(Router, AnswersOnlyWhatIsFreeToWhoIsBarred) {
+    add("GET", "/healthz");
+    add("GET", "/a", Role::viewer);
+    barred = problem(503, "no place");
+    EXPECT_EQ(ask("GET", {"healthz"}).status, 200u);
+    for (const char* method : {"GET", "POST", "OPTIONS"}) {
+        EXPECT_EQ(ask(method, {"a"}).status, 503u) << method;
+        EXPECT_EQ(ask(method, {"nothing"}).status, 503u) << method;
+    }
 }
 
 }  // namespace

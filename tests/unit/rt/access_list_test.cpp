@@ -1,10 +1,10 @@
-#include "access_list.hpp"
+#include "panelgate/rt/access_list.hpp"
 
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
-namespace panelgate::tcp_server {
+namespace panelgate::rt {
 namespace {
 
 bool allows(const std::vector<Network>& networks, const char* peer) {
@@ -53,4 +53,4 @@ TEST(AccessList, RefusesWhatIsNotANetwork) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::rt

@@ -1,10 +1,10 @@
-#include "access_list.hpp"
+#include "panelgate/rt/access_list.hpp"
 
 #include <algorithm>
 #include <stdexcept>
 #include <string>
 
-namespace panelgate::tcp_server {
+namespace panelgate::rt {
 namespace {
 
 namespace ip = boost::asio::ip;
@@ -47,4 +47,4 @@ bool AccessList::allows(const ip::address& peer) const {
     });
 }
 
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::rt

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "panelgate/tcp_server/settings.hpp"
+#include "panelgate/base/network.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::rt {
 
 /// Which peers may connect (CON-06). An IPv4 peer matches IPv4 networks whether the socket shows it
 /// as IPv4 or as v4-mapped IPv6; ::/0 is everybody. Pure.
@@ -26,4 +26,4 @@ class AccessList {
     std::vector<Entry> allowed_;
 };
 
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::rt

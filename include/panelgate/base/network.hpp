@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+namespace panelgate {
+
+/// A network in CIDR form; a bare address is /32 or /128.
+struct Network {
+    std::string address;
+    unsigned prefix = 0;
+};
+
+}  // namespace panelgate

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+namespace panelgate {
+
+/// Bytes of the UTF-8 sequence that `text` begins with, 0 when it begins with none (RFC 3629, 4).
+std::size_t utf8_sequence(std::string_view text);
+bool is_utf8(std::string_view text);
+
+}  // namespace panelgate

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstddef>
+
+namespace panelgate::config {
+
+/// What templates may give to all stations together: a short file must not become a large memory.
+inline constexpr std::size_t kMaxTemplateValues = 500'000;
+inline constexpr std::size_t kMaxTemplateText = 16 * 1024 * 1024;  ///< bytes of keys and scalars
+
+/// A token of fewer characters is warned of: 16 hexadecimal digits are 64 bits.
+inline constexpr std::size_t kShortToken = 16;
+
+}  // namespace panelgate::config

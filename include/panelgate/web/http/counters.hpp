@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+namespace panelgate::web {
+
+struct Counters {
+    std::map<unsigned, std::uint64_t> requests;  ///< answered, by status
+    std::uint64_t login_failures = 0;            ///< requests with a token that nobody has
+};
+
+}  // namespace panelgate::web

@@ -1,0 +1,129 @@
+#include <boost/json/array.hpp>
+#include <chrono>
+#include <cstdlib>
+#include <string_view>
+#include <utility>
+
+#include "inventory.hpp"
+
+namespace panelgate::app {
+namespace {
+
+namespace json = boost::json;
+
+std::int64_t milliseconds(Duration duration) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(duration).count();
+}
+
+std::string_view access(bool read_only) { return read_only ? "read_only" : "read_write"; }
+
+std::string_view word(web::Role role) {
+    switch (role) {
+        case web::Role::none:
+            return "none";
+        case web::Role::viewer:
+            return "viewer";
+        case web::Role::operator_:
+            return "operator";
+    }
+    std::abort();
+}
+
+/// An array of what `make` makes of each.
+template <class List, class Make>
+json::array each(const List& list, const Make& make) {
+    json::array made;
+    for (const auto& one : list) made.push_back(make(one));
+    return made;
+}
+
+json::object point_json(const points::Point& point) {
+    json::object made{{"name", point.name},
+                      {"at", point.at},
+                      {"type", label(point.type)},
+                      {"every_ms", milliseconds(point.every)},
+                      {"writable", point.writable}};
+    if (!point.unit.empty()) made["unit"] = point.unit;
+    return made;
+}
+
+json::object station_json(const config::Station& station,
+                          const arbiter::StationSettings& settings) {
+    return {{"id", station.id},
+            {"name", station.name},
+            {"profile", station.profile->name},
+            {"access", access(station.read_only)},
+            {"guard", station.guard},
+            {"retry_writes", settings.retry_writes},
+            {"max_age_ms", milliseconds(settings.max_age)},
+            {"points", each(station.points, point_json)}};
+}
+
+json::object line_json(const config::Line& line) {
+    json::array stations;
+    json::array polls;
+    for (std::size_t i = 0; i < line.stations.size(); ++i) {
+        const config::Station& station = line.stations[i];
+        stations.push_back(station_json(station, line.arbiter.stations[i]));
+        for (const points::Poll& poll : station.polls) {
+            polls.push_back(json::object{{"station", station.name},
+                                         {"read", poll.read},
+                                         {"count", poll.count},
+                                         {"every_ms", milliseconds(poll.every)}});
+        }
+    }
+    return {{"name", line.name},
+            {"device", line.device.device},
+            {"serial", to_string(line.device.serial)},
+            {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},
+            {"stations", std::move(stations)},
+            {"polls", std::move(polls)}};
+}
+
+json::object relay_json(const points::Relay& relay) {
+    return {{"from", relay.from.station + '/' + relay.from.at},
+            {"to", relay.to.station + '/' + relay.to.at},
+            {"count", relay.count},
+            {"every_ms", milliseconds(relay.every)},
+            {"on_change", relay.on_change}};
+}
+
+json::value text_json(const std::string& text) { return json::value(text); }
+
+json::value network_json(const Network& network) {
+    return json::value(network.address + '/' + std::to_string(network.prefix));
+}
+
+json::object listener_json(const tcp_server::Settings& listener) {
+    json::object units;
+    for (const auto& [unit, target] : listener.units)
+        units[std::to_string(unit)] = target.line + '/' + std::to_string(target.station);
+    return {{"listen", listener.name()},
+            {"lines", each(listener.lines, text_json)},
+            {"units", std::move(units)},
+            {"access", access(listener.read_only)},
+            {"allow", each(listener.allow, network_json)}};
+}
+
+json::object http_json(const web::Settings& http) {
+    const auto token = [](const web::Token& one) {
+        return json::object{{"name", one.name}, {"role", word(one.role)}};
+    };
+    return {{"listen", http.name()},
+            {"anonymous", word(http.anonymous)},
+            {"tokens", each(http.tokens, token)},
+            {"hosts", each(http.hosts, text_json)},
+            {"allow", each(http.allow, network_json)}};
+}
+
+}  // namespace
+
+json::object inventory_json(const config::Config& config) {
+    json::object made{{"lines", each(config.lines, line_json)},
+                      {"relays", each(config.relays, relay_json)},
+                      {"modbus_tcp", each(config.modbus_tcp, listener_json)}};
+    if (config.http) made["http"] = http_json(*config.http);
+    return made;
+}
+
+}  // namespace panelgate::app

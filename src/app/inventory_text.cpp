@@ -1,0 +1,123 @@
+#include <array>
+#include <charconv>
+#include <cstddef>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "inventory.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+
+namespace panelgate::app {
+namespace {
+
+using yaml::format_duration;
+
+/// The shortest that is this number.
+std::string number(double value) {
+    std::array<char, 32> text{};
+    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
+
+std::string rights(bool read_only) { return read_only ? "read only" : "read and write"; }
+
+std::string text_of(const points::Point& point) {
+    std::string text = "    point " + point.name + ": " + point.at;
+    if (point.bit) text += " bit " + std::to_string(*point.bit);
+    text += ", " + std::string(label(point.type)) + ", every " + format_duration(point.every);
+    if (!point.unit.empty()) text += ", in " + point.unit;
+    if (point.writable) {
+        text += ", writable";
+        if (point.min) text += " from " + number(*point.min);
+        if (point.max) text += " to " + number(*point.max);
+    }
+    return text + '\n';
+}
+
+std::string text_of(const config::Station& station, const arbiter::StationSettings& settings) {
+    std::string text = "  station " + std::to_string(station.id) + ' ' + station.name + ", " +
+                       station.profile->name + ", " + rights(station.read_only);
+    if (station.guard) text += ", guarded";
+    if (settings.retry_writes) text += ", writes are repeated";
+    if (settings.max_age > Duration::zero())
+        text += ", answers up to " + format_duration(settings.max_age) + " old";
+    text += '\n';
+    for (const points::Point& point : station.points) text += text_of(point);
+    for (const points::Poll& poll : station.polls) {
+        text += "    poll " + poll.read + ", count " + std::to_string(poll.count) + ", every " +
+                format_duration(poll.every) + '\n';
+    }
+    return text;
+}
+
+std::string text_of(const config::Line& line) {
+    std::string text = "line " + line.name + ": " + line.device.device;
+    if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
+    text += '\n';
+    for (std::size_t i = 0; i < line.stations.size(); ++i)
+        text += text_of(line.stations[i], line.arbiter.stations[i]);
+    return text +
+           "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
+           '\n';
+}
+
+std::string text_of(const points::Relay& relay) {
+    return "relay " + relay.name() + ": count " + std::to_string(relay.count) + ", every " +
+           format_duration(relay.every) + (relay.on_change ? ", on change" : "") + '\n';
+}
+
+std::string text_of(const std::vector<Network>& allow) {
+    std::string text;
+    for (const Network& network : allow) {
+        text += (text.empty() ? "" : " ") + network.address + '/' + std::to_string(network.prefix);
+    }
+    return text.empty() ? "everybody" : text;
+}
+
+std::string text_of(const tcp_server::Settings& listener) {
+    std::string text = "modbus_tcp " + listener.name() + ':';
+    for (const std::string& line : listener.lines) text += ' ' + line;
+    text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
+    for (const auto& [unit, target] : listener.units) {
+        text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
+                std::to_string(target.station) + '\n';
+    }
+    return text;
+}
+
+std::string text_of(web::Role role) {
+    switch (role) {
+        case web::Role::none:
+            return "nothing";
+        case web::Role::viewer:
+            return "read";
+        case web::Role::operator_:
+            return "read and write";
+    }
+    std::abort();
+}
+
+std::string text_of(const web::Settings& http) {
+    std::string text = "http " + http.name() + ": without a token " + text_of(http.anonymous) +
+                       ", for " + text_of(http.allow);
+    if (!http.hosts.empty()) text += ", as";
+    for (const std::string& host : http.hosts) text += ' ' + host;
+    text += '\n';
+    for (const web::Token& token : http.tokens)
+        text += "  token " + token.name + ": " + text_of(token.role) + '\n';
+    return text;
+}
+
+}  // namespace
+
+std::string inventory_text(const config::Config& config) {
+    std::string text;
+    for (const config::Line& line : config.lines) text += text_of(line);
+    for (const points::Relay& relay : config.relays) text += text_of(relay);
+    for (const tcp_server::Settings& listener : config.modbus_tcp) text += text_of(listener);
+    if (config.http) text += text_of(*config.http);
+    return text;
+}
+
+}  // namespace panelgate::app

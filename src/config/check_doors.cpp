@@ -1,0 +1,176 @@
+#include "check_doors.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/config/settings.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using tcp_server::UnitTarget;
+using yaml::Mark;
+using yaml::Node;
+
+const Node* find(const Node& map, std::string_view key) {
+    const auto found = std::ranges::find(map.entries, key, &yaml::Entry::key);
+    return found == map.entries.end() ? nullptr : &found->value;
+}
+
+/// Of the key's value, or of the map when it is not there.
+Mark mark_of(const Node& map, std::string_view key) {
+    const Node* value = find(map, key);
+    return value != nullptr ? value->mark : map.mark;
+}
+
+const Line& line_of(const Config& config, std::string_view name) {
+    return *std::ranges::find(config.lines, name, &Line::name);
+}
+
+const Station* station_of(const Config& config, const UnitTarget& target) {
+    const std::vector<Station>& stations = line_of(config, target.line).stations;
+    const auto found = std::ranges::find(stations, target.station, &Station::id);
+    return found == stations.end() ? nullptr : &*found;
+}
+
+/// One that means nobody yet.
+std::string free_unit(const tcp_server::Settings& listener) {
+    int unit = 101;
+    while (unit < 247 && listener.units.contains(static_cast<std::uint8_t>(unit))) ++unit;
+    return std::to_string(unit);
+}
+
+bool can_write(const Config& config, const tcp_server::Settings& listener) {
+    const auto writable = [&](const std::string& name) {
+        const Line& line = line_of(config, name);
+        const bool passes = !line.refuse_unlisted && listener.lines.size() == 1;
+        return passes || !std::ranges::all_of(line.stations, &Station::read_only);
+    };
+    return !listener.read_only && std::ranges::any_of(listener.lines, writable);
+}
+
+/// Listeners where they are written, all of them.
+struct Door {
+    Mark mark;
+    std::string address;
+    std::uint16_t port = 0;
+    std::string name;
+};
+
+bool takes(const Door& all, const Door& other) {
+    const bool same_family = is_ipv6(all.address) == is_ipv6(other.address);
+    return same_family && all.port != 0 && all.port == other.port && is_any_address(all.address);
+}
+
+void warn_of_ports(Loading& loading, const std::vector<Door>& doors) {
+    for (std::size_t i = 0; i < doors.size(); ++i) {
+        for (std::size_t j = 0; j < i; ++j) {
+            const bool later_is_all = takes(doors[i], doors[j]);
+            if (!later_is_all && !takes(doors[j], doors[i])) continue;
+            const Door& all = later_is_all ? doors[i] : doors[j];
+            const Door& one = later_is_all ? doors[j] : doors[i];
+            loading.warn(doors[i].mark,
+                         all.name + " (line " + std::to_string(all.mark.line) + ") takes port " +
+                             std::to_string(all.port) + " of every address, that of " + one.name +
+                             " (line " + std::to_string(one.mark.line) +
+                             ") too: only one of them can be opened; leave one out, or give it "
+                             "another port");
+        }
+    }
+}
+
+void warn_of_open_listener(Loading& loading, const Node& node,
+                           const tcp_server::Settings& listener) {
+    if (!is_any_address(listener.address) || !listener.allow.empty()) return;
+    if (!can_write(loading.config, listener)) return;
+    loading.warn(mark_of(node, "listen"),
+                 "whoever reaches port " + std::to_string(listener.port) +
+                     " of any address may write to the panels; name who may, such as allow: "
+                     "[192.168.10.0/24], or say access: read_only, or listen on 127.0.0.1:" +
+                     std::to_string(listener.port));
+}
+
+/// A unit that is not the station of this id, and what is to be known of both.
+void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings& listener,
+                  std::uint8_t unit, const UnitTarget& target) {
+    const Station* reached = station_of(loading.config, target);
+    if (reached == nullptr || reached->id == unit) return;
+    for (const std::string& line : listener.lines) {
+        const Station* hidden = station_of(loading.config, {line, unit});
+        if (hidden == nullptr) continue;
+        const auto is_hidden = [&](const auto& other) {
+            return other.second.line == line && other.second.station == unit;
+        };
+        const auto other = std::ranges::find_if(listener.units, is_hidden);
+        const auto named = [](const Station& station) {
+            return '\'' + station.name + "' (station " + std::to_string(station.id) + ')';
+        };
+        const std::string text = "unit " + std::to_string(unit) + " is " + named(*reached);
+        const Mark mark = mark_of(*find(node, "units"), std::to_string(unit));
+        if (other == listener.units.end()) {
+            loading.warn(mark, text + ", so no unit is " + named(*hidden) +
+                                   "; give it one, such as " + free_unit(listener) + ": " + line +
+                                   '/' + hidden->name);
+        } else if (other->first == reached->id && unit < other->first) {
+            loading.warn(mark, text + " and unit " + std::to_string(other->first) + " is " +
+                                   named(*hidden) +
+                                   ": swapped? Without 'units' each station has its own id");
+        }
+    }
+}
+
+void warn_of_token(Loading& loading, const Node& node, const web::Token& token) {
+    const Node* file = find(node, "file");
+    if (token.secret.size() < kShortToken)
+        loading.warn(file->mark, "the token in " + file->scalar + " has " +
+                                     std::to_string(token.secret.size()) + " characters; take " +
+                                     std::to_string(kShortToken) +
+                                     " or more, such as of `openssl rand -hex 16`");
+    if (loading.files.is_readable_by_all(file->scalar))
+        loading.warn(file->mark, "everybody on this machine can read the token file " +
+                                     file->scalar + "; `chmod o-r " + file->scalar + '`');
+}
+
+void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
+    const bool open = is_any_address(http.address) && http.allow.empty();
+    if (open && http.anonymous == web::Role::operator_) {
+        loading.warn(mark_of(node, "anonymous"),
+                     "whoever reaches port " + std::to_string(http.port) +
+                         " of any address may write to the panels without a token; say anonymous: "
+                         "viewer and give writers a token, or name who may, such as allow: "
+                         "[192.168.10.0/24], or listen on 127.0.0.1:" +
+                         std::to_string(http.port));
+    }
+    const Node* tokens = find(node, "tokens");
+    for (std::size_t i = 0; i < http.tokens.size(); ++i)
+        warn_of_token(loading, tokens->items[i], http.tokens[i]);
+}
+
+}  // namespace
+
+void warn_of_doors(Loading& loading, const Node& tree) {
+    std::vector<Door> doors;
+    for (std::size_t i = 0; i < loading.config.modbus_tcp.size(); ++i) {
+        const Node& node = find(tree, "modbus_tcp")->items[i];
+        const tcp_server::Settings& listener = loading.config.modbus_tcp[i];
+        doors.push_back(
+            {mark_of(node, "listen"), listener.address, listener.port, listener.name()});
+        warn_of_open_listener(loading, node, listener);
+        for (const auto& [unit, target] : listener.units)
+            warn_of_unit(loading, node, listener, unit, target);
+    }
+    if (loading.config.http) {
+        const web::Settings& http = *loading.config.http;
+        const Node& node = *find(tree, "http");
+        doors.push_back({mark_of(node, "listen"), http.address, http.port, http.name()});
+        warn_of_http(loading, node, http);
+    }
+    warn_of_ports(loading, doors);
+}
+
+}  // namespace panelgate::config

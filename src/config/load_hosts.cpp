@@ -1,0 +1,40 @@
+#include "load_hosts.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include "panelgate/config/endpoint.hpp"
+
+namespace panelgate::config {
+namespace {
+
+/// A name as a browser would send it, or an address without brackets.
+bool is_host(std::string_view text) {
+    if (text.find('/') == text.npos && parse_cidr(text)) return true;
+    return !text.empty() && !text.ends_with('.') && std::ranges::all_of(text, [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '.' || c == '_';
+    });
+}
+
+}  // namespace
+
+void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
+    const yaml::Node* list = in.sequence("hosts");
+    if (list == nullptr) return;
+    for (const yaml::Node& item : list->items) {
+        if (is_host(item.scalar)) {
+            settings.hosts.push_back(item.scalar);
+        } else {
+            loading.problems.add(item.mark,
+                                 "hosts lists names such as gateway.plant.example, without http:// "
+                                 "and without a port, not '" +
+                                     item.scalar + '\'');
+        }
+    }
+    if (list->items.empty())
+        in.problem("hosts",
+                   "hosts must name at least one host; leave it out for the machine's names");
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,173 @@
+#include "templates.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/config/settings.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using yaml::Entry;
+using yaml::Node;
+
+Node* find(Node& map, std::string_view key) {
+    const auto found = std::ranges::find(map.entries, key, &Entry::key);
+    return found == map.entries.end() ? nullptr : &found->value;
+}
+
+std::optional<Node> take(Node& map, std::string_view key) {
+    const auto found = std::ranges::find(map.entries, key, &Entry::key);
+    if (found == map.entries.end()) return std::nullopt;
+    Node value = std::move(found->value);
+    map.entries.erase(found);
+    return value;
+}
+
+struct Size {
+    std::size_t values = 0;
+    std::size_t text = 0;
+
+    bool fits() const { return values <= kMaxTemplateValues && text <= kMaxTemplateText; }
+    Size& operator+=(const Size& other) {
+        values += other.values;
+        text += other.text;
+        return *this;
+    }
+};
+
+Size size_of(const Node& node) {
+    Size size{1, node.scalar.size()};
+    for (const Node& item : node.items) size += size_of(item);
+    for (const Entry& entry : node.entries) {
+        size.text += entry.key.size();
+        size += size_of(entry.value);
+    }
+    return size;
+}
+
+/// Adds what `map` does not say itself.
+void add_missing(Node& map, const Node& from) {
+    for (const Entry& entry : from.entries) {
+        Node* own = find(map, entry.key);
+        if (own == nullptr) {
+            map.entries.push_back(entry);
+        } else if (own->kind == Node::Kind::map && entry.value.kind == Node::Kind::map) {
+            add_missing(*own, entry.value);
+        }
+    }
+}
+
+struct Template {
+    yaml::Mark mark;
+    Node body;
+    Size size;
+    bool used = false;
+};
+
+class Templates {
+  public:
+    explicit Templates(Loading& loading) : loading_(loading) {}
+
+    void read(Node& list) {
+        if (list.kind != Node::Kind::map && list.kind != Node::Kind::null) {
+            loading_.problems.add(list.mark,
+                                  "templates must be a map of stations by name, such as "
+                                  "templates: {meter: {profile: generic}}");
+        }
+        for (Entry& entry : list.entries) read_one(entry);
+    }
+
+    void apply(Node& station) {
+        const auto named = take(station, "template");
+        if (!named) return;
+        if (named->kind != Node::Kind::scalar) {
+            loading_.problems.add(named->mark, "template must be the name of one of 'templates'");
+            return;
+        }
+        const auto found = templates_.find(named->scalar);
+        if (found == templates_.end()) {
+            loading_.problems.add(named->mark, unknown(named->scalar));
+            return;
+        }
+        found->second.used = true;
+        const bool had_room = given_.fits();
+        given_ += found->second.size;
+        if (given_.fits()) {
+            add_missing(station, found->second.body);
+        } else if (had_room) {
+            loading_.problems.add(named->mark,
+                                  "templates give more than " + std::to_string(kMaxTemplateValues) +
+                                      " values, or " + std::to_string(kMaxTemplateText >> 20U) +
+                                      " MiB of text, to all stations together");
+        }
+    }
+
+    void warn_of_unused() {
+        for (const auto& [name, one] : templates_) {
+            if (!one.used) loading_.warn(one.mark, "no station has template: " + name);
+        }
+    }
+
+  private:
+    void read_one(Entry& entry) {
+        if (!is_name(entry.key))
+            loading_.problems.add(entry.mark,
+                                  "the name of a template must be of a-z, 0-9 and '-', "
+                                  "not '" +
+                                      entry.key + '\'');
+        Node& body = entry.value;
+        if (body.kind != Node::Kind::map)
+            loading_.problems.add(body.mark,
+                                  "a template must be a map of a station's keys, such as "
+                                  "{profile: generic}");
+        for (const std::string_view own : {"id", "name", "template"}) {
+            const auto key = std::ranges::find(body.entries, own, &Entry::key);
+            if (key == body.entries.end()) continue;
+            loading_.problems.add(key->mark, "'" + std::string(own) +
+                                                 "' is a station's own: it cannot stand in a "
+                                                 "template");
+            body.entries.erase(key);
+        }
+        const Size size = size_of(body);
+        templates_[entry.key] = {entry.mark, std::move(body), size, false};
+    }
+
+    std::string unknown(const std::string& typed) const {
+        const std::string text = "there is no template '" + typed + '\'';
+        if (templates_.empty())
+            return text + "; add 'templates', such as templates: {" + typed +
+                   ": {profile: generic}}";
+        std::vector<std::string_view> names;
+        for (const auto& [name, one] : templates_) names.push_back(name);
+        return text + did_you_mean(typed, names, "templates");
+    }
+
+    Loading& loading_;
+    std::map<std::string, Template> templates_;
+    Size given_;
+};
+
+}  // namespace
+
+void apply_templates(Loading& loading, Node& tree) {
+    Templates templates(loading);
+    if (auto list = take(tree, "templates")) templates.read(*list);
+    Node* lines = find(tree, "lines");
+    if (lines != nullptr) {
+        for (Node& line : lines->items) {
+            Node* stations = find(line, "stations");
+            if (stations == nullptr) continue;
+            for (Node& station : stations->items) templates.apply(station);
+        }
+    }
+    templates.warn_of_unused();
+}
+
+}  // namespace panelgate::config

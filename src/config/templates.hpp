@@ -1,0 +1,14 @@
+#pragma once
+
+#include "loader.hpp"
+#include "panelgate/yaml/document.hpp"
+
+namespace panelgate::config {
+
+/// Gives every station that names a `template` what that says and the station does not: its own
+/// keys win, maps are put together key by key (as a station's `timing` with its line's), lists are
+/// the station's or the template's. `templates` and `template` are gone from the tree then. What
+/// comes from a template keeps its marks.
+void apply_templates(Loading& loading, yaml::Node& tree);
+
+}  // namespace panelgate::config

@@ -1,0 +1,59 @@
+#include "beast_message.hpp"
+
+#include <boost/beast/http/error.hpp>
+#include <utility>
+
+#include "host_names.hpp"
+
+namespace panelgate::web {
+namespace http = boost::beast::http;
+
+std::optional<Target> target_of(const BeastRequest& message) {
+    const bool of_server = message.method() == http::verb::options && message.target() == "*";
+    return parse_target(of_server ? std::string("/*") : std::string(message.target()));
+}
+
+Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
+    const std::size_t named = message.count(http::field::host);
+    if (named > 1) return problem(400, "a request has one Host, not " + std::to_string(named));
+    if (named == 0 && message.version() >= 11) {
+        return problem(400, "a request of HTTP/1.1 must have a Host");
+    }
+    if (named == 0 && !target.authority) return std::string();
+    const std::string authority =
+        target.authority ? *target.authority : std::string(message[http::field::host]);
+    auto host = host_of_authority(authority);
+    if (!host) return problem(400, "the Host must be a name or an address, with a port or without");
+    return *host;
+}
+
+HttpRequest to_request(BeastRequest&& message, Target target, std::string host) {
+    HttpRequest request;
+    request.host = std::move(host);
+    request.method = message.method_string();
+    request.path = std::move(target.path);
+    request.query = std::move(target.query);
+    for (const char* name : kHeadersRead) {
+        const auto field = message.find(name);
+        if (field != message.end()) request.headers[name] = field->value();
+    }
+    request.body = std::move(message.body());
+    return request;
+}
+
+bool is_parse_error(boost::system::error_code why) {
+    return why.category() == http::make_error_code(http::error::bad_method).category() &&
+           why != http::error::end_of_stream && why != http::error::partial_message;
+}
+
+Problem problem_of_parse(boost::system::error_code why, std::size_t max_body) {
+    if (why == http::error::body_limit) {
+        return problem(413, "a body has at most " + std::to_string(max_body) + " bytes");
+    }
+    if (why == http::error::header_limit || why == http::error::buffer_overflow) {
+        return problem(431, "a header has at most " + std::to_string(kHeaderLimit) + " bytes");
+    }
+    return problem(400, "this is not an HTTP/1.1 request: " + why.message());
+}
+
+}  // namespace panelgate::web

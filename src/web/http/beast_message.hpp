@@ -1,0 +1,50 @@
+#pragma once
+
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/string_body.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "target.hpp"
+
+namespace panelgate::web {
+
+// Between Beast's messages and ours.
+
+using BeastRequest = boost::beast::http::request<boost::beast::http::string_body>;
+
+constexpr std::uint32_t kHeaderLimit = 16 * 1024;
+
+/// The target, "*" of OPTIONS as a path. Nothing when it cannot be understood.
+std::optional<Target> target_of(const BeastRequest& message);
+/// The host that is asked (RFC 9112 3.2); "" of HTTP/1.0 without one.
+Parsed<std::string> host_of(const BeastRequest& message, const Target& target);
+HttpRequest to_request(BeastRequest&& message, Target target, std::string host);
+
+template <class Message>
+void set_head(Message& message, const HttpResponse& response, bool keep_alive,
+              const std::string& product) {
+    using boost::beast::http::field;
+    message.version(11);
+    message.result(response.status);
+    message.set(field::server, product);
+    message.set(field::cache_control, "no-store");
+    message.set("X-Content-Type-Options", "nosniff");
+    for (const auto& [name, value] : response.headers) message.set(name, value);
+    if (response.status != 204) {  // it has no body, and must not say so (RFC 9110 8.6)
+        message.set(field::content_type, response.content_type);
+        message.content_length(response.body.size());
+    }
+    message.keep_alive(keep_alive);
+}
+
+/// Is it the client's fault, and not the end of its connection?
+bool is_parse_error(boost::system::error_code why);
+Problem problem_of_parse(boost::system::error_code why, std::size_t max_body);
+
+}  // namespace panelgate::web

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <boost/asio/ip/address.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "panelgate/web/http/settings.hpp"
+
+namespace panelgate::web {
+
+/// The host of "NAME", "NAME:PORT", "[ADDRESS]:PORT": in lower case, without brackets and without
+/// the dot at the end. Nothing when it is none.
+std::optional<std::string> host_of_authority(std::string_view authority);
+
+/// What this machine calls itself, without asking a name server.
+std::vector<std::string> machine_names();
+
+/// By which names the server may be called. A page whose name was rebound to our address calls us
+/// by its own; browsers let no page choose another. Pure.
+class HostNames {
+  public:
+    HostNames(const Settings& settings, const std::vector<std::string>& machine);
+
+    /// `host` is of host_of_authority(); `local` is the connection's address at our end. Always
+    /// ours are that address, the one that is listened on, and the loopback, by address and name.
+    bool knows(const std::string& host, const boost::asio::ip::address& local) const;
+
+  private:
+    std::set<std::string> names_;
+    std::set<boost::asio::ip::address> addresses_;
+};
+
+}  // namespace panelgate::web

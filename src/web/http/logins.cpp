@@ -1,0 +1,40 @@
+#include "logins.hpp"
+
+#include <algorithm>
+
+namespace panelgate::web {
+
+Duration Logins::hold(TimePoint now, const std::string& address) const {
+    const auto known = known_.find(address);
+    if (known == known_.end()) return Duration::zero();
+    return count_at(now, known->second) > settings_.free ? settings_.hold : Duration::zero();
+}
+
+void Logins::failed(TimePoint now, const std::string& address) {
+    const bool fresh = !known_.contains(address);
+    if (fresh && known_.size() >= settings_.addresses) {
+        known_.erase(std::ranges::min_element(known_, {},
+                                              [](const auto& entry) { return entry.second.last; }));
+    }
+    Failures& failures = known_[address];
+    const unsigned before = fresh ? 0 : count_at(now, failures);
+    failures = {std::min(before + 1, settings_.remembered), now};
+}
+
+void Logins::succeeded(const std::string& address) {
+    const auto known = known_.find(address);
+    if (known == known_.end()) return;
+    if (known->second.count <= 1) {
+        known_.erase(known);
+    } else {
+        --known->second.count;
+    }
+}
+
+unsigned Logins::count_at(TimePoint now, const Failures& failures) const {
+    const auto forgiven = static_cast<unsigned>(
+        std::min<Duration::rep>((now - failures.last) / settings_.forgiven_after, failures.count));
+    return failures.count - forgiven;
+}
+
+}  // namespace panelgate::web

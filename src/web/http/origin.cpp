@@ -1,0 +1,42 @@
+#include "origin.hpp"
+
+#include <string>
+#include <string_view>
+
+#include "to_lower.hpp"
+
+namespace panelgate::web {
+namespace {
+
+std::string header(const HttpRequest& request, const char* name) {
+    const auto found = request.headers.find(name);
+    return found == request.headers.end() ? std::string() : to_lower(found->second);
+}
+
+/// A page is shown; the interface is for programs, and each call of it may cost time on a line.
+bool is_page(const HttpRequest& request) {
+    return request.path.empty() || (request.path[0] != "api" && request.path[0] != "metrics");
+}
+
+/// Fetch Metadata: https://www.w3.org/TR/fetch-metadata/
+bool follows_link(const HttpRequest& request) {
+    return (request.method == "GET" || request.method == "HEAD") &&
+           header(request, "sec-fetch-mode") == "navigate" &&
+           header(request, "sec-fetch-dest") == "document" && is_page(request);
+}
+
+}  // namespace
+
+std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
+                                    const boost::asio::ip::address& local) {
+    if (!request.host.empty() && !names.knows(request.host, local)) {
+        return problem(421, "this gateway is not called '" + request.host +
+                                "'; if it shall be, name it in http: hosts");
+    }
+    if (header(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
+        return problem(403, "a page of another site may not ask this gateway");
+    }
+    return std::nullopt;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,61 @@
+#include "places.hpp"
+
+#include <algorithm>
+
+namespace panelgate::web {
+
+Places::Places(const Settings& settings)
+    : limit_(settings.max_connections),
+      limit_of_address_(settings.max_per_address),
+      limit_of_probes_(settings.probe_places) {}
+
+Places::Arrival Places::arrive(Id id, const std::string& address) {
+    Arrival arrival;
+    if (count(false, &address) >= limit_of_address_) {
+        arrival.leaves = longest_idle(false, &address);
+        arrival.probes_only = !arrival.leaves;
+    } else if (count(false) >= limit_) {
+        arrival.leaves = longest_idle(false);
+        arrival.probes_only = !arrival.leaves;
+    }
+    if (arrival.probes_only && count(true) >= limit_of_probes_) arrival.leaves = longest_idle(true);
+    if (arrival.leaves) leave(*arrival.leaves);
+    guests_[id] = {address, arrival.probes_only, false, ++turn_};
+    return arrival;
+}
+
+void Places::busy(Id id) {
+    const auto guest = guests_.find(id);
+    if (guest != guests_.end() && !guest->second.probes_only) guest->second.busy = true;
+}
+
+void Places::idle(Id id) {
+    const auto guest = guests_.find(id);
+    if (guest == guests_.end() || !guest->second.busy) return;
+    guest->second.busy = false;
+    guest->second.since = ++turn_;
+}
+
+void Places::leave(Id id) { guests_.erase(id); }
+
+std::size_t Places::count(bool probes_only, const std::string* address) const {
+    return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
+        const Guest& guest = entry.second;
+        return guest.probes_only == probes_only && (!address || guest.address == *address);
+    }));
+}
+
+std::optional<Places::Id> Places::longest_idle(bool probes_only, const std::string* address) const {
+    std::optional<Id> found;
+    std::uint64_t since = 0;
+    for (const auto& [id, guest] : guests_) {
+        if (guest.busy || guest.probes_only != probes_only) continue;
+        if (address && guest.address != *address) continue;
+        if (found && guest.since > since) continue;
+        found = id;
+        since = guest.since;
+    }
+    return found;
+}
+
+}  // namespace panelgate::web

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "panelgate/web/http/settings.hpp"
+
+namespace panelgate::web {
+
+/// Who may stay when many want to: so many connections, so many of them an address. To a full house
+/// whoever has had no request for longest gives its place; where all have one, there are a few
+/// places more that answer probes, and the newest of these displaces the oldest. Pure.
+class Places {
+  public:
+    using Id = std::uint64_t;
+    struct Arrival {
+        bool probes_only = false;
+        std::optional<Id> leaves;  ///< has no place any more: to be closed
+    };
+
+    explicit Places(const Settings& settings);
+
+    Arrival arrive(Id id, const std::string& address);
+    /// A whole request is here: nobody takes its place before idle(). These do nothing for who has
+    /// none.
+    void busy(Id id);
+    void idle(Id id);
+    void leave(Id id);
+
+  private:
+    struct Guest {
+        std::string address;
+        bool probes_only = false;
+        bool busy = false;
+        std::uint64_t since = 0;  ///< turn at which it became idle, or came
+    };
+    std::size_t count(bool probes_only, const std::string* address = nullptr) const;
+    std::optional<Id> longest_idle(bool probes_only, const std::string* address = nullptr) const;
+
+    std::size_t limit_;
+    std::size_t limit_of_address_;
+    std::size_t limit_of_probes_;
+    std::map<Id, Guest> guests_;
+    std::uint64_t turn_ = 0;
+};
+
+}  // namespace panelgate::web

@@ -1,0 +1,111 @@
+#include "panelgate/yaml/variables.hpp"
+
+#include <string_view>
+
+#include "panelgate/base/utf8.hpp"
+
+namespace panelgate::yaml {
+namespace {
+
+constexpr std::size_t kMost = std::size_t{1} << 20;  ///< bytes that variables bring, in all
+
+bool is_variable_name(std::string_view text) {
+    constexpr std::string_view kDigits = "0123456789";
+    constexpr std::string_view kLetters =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789";
+    return !text.empty() && kDigits.find(text[0]) == std::string_view::npos &&
+           text.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+/// NAME or NAME:-default, without the braces.
+struct Variable {
+    std::string name;
+    std::optional<std::string> fallback;
+};
+
+std::optional<Variable> parse_variable(std::string_view text) {
+    const std::size_t minus = text.find(":-");
+    Variable variable{std::string(text.substr(0, minus)), {}};
+    if (minus != std::string_view::npos) variable.fallback = std::string(text.substr(minus + 2));
+    if (!is_variable_name(variable.name)) return std::nullopt;
+    return variable;
+}
+
+class Expansion {
+  public:
+    Expansion(const Environment& environment, Problems& problems)
+        : environment_(environment), problems_(problems) {}
+
+    void expand(Node& node) {
+        if (node.kind == Node::Kind::scalar && node.scalar.find('$') != std::string::npos)
+            node.scalar = expanded(node);
+        for (Node& item : node.items) expand(item);
+        for (Entry& entry : node.entries) expand(entry.value);
+    }
+
+  private:
+    std::string expanded(const Node& node) {
+        const std::string_view from = node.scalar;
+        std::string to;
+        std::size_t at = 0;
+        while (at < from.size()) {
+            const std::string_view rest = from.substr(at);
+            if (rest.starts_with("$$")) {
+                to += '$';
+                at += 2;
+            } else if (rest.starts_with("${")) {
+                const std::size_t end = rest.find('}');
+                to += value_of(node, rest.substr(0, end == rest.npos ? end : end + 1));
+                at = end == rest.npos ? from.size() : at + end + 1;
+            } else {
+                to += from[at++];
+            }
+        }
+        return to;
+    }
+
+    /// `typed`: with dollar and braces. What it cannot be stays as it is.
+    std::string value_of(const Node& node, std::string_view typed) {
+        const std::string text(typed);
+        const bool closed = typed.ends_with('}');
+        const auto variable =
+            closed ? parse_variable(typed.substr(2, typed.size() - 3)) : std::nullopt;
+        if (!variable) {
+            problems_.add(node.mark, '\'' + text +
+                                         "' must be ${NAME} or ${NAME:-default}, NAME of letters, "
+                                         "digits and '_'; a dollar itself is $$");
+            return text;
+        }
+        auto value = environment_ ? environment_(variable->name) : std::nullopt;
+        if (variable->fallback && value.value_or("").empty()) value = variable->fallback;
+        if (!value) {
+            const std::string& name = variable->name;
+            problems_.add(node.mark, "the environment has no " + name + "; set it, or write ${" +
+                                         name + ":-default}");
+            return text;
+        }
+        if (!is_utf8(*value)) {
+            problems_.add(node.mark,
+                          "what the environment has as " + variable->name + " is not UTF-8");
+            return text;
+        }
+        brought_ += value->size();
+        if (brought_ <= kMost) return *value;
+        if (brought_ - value->size() <= kMost)
+            problems_.add(node.mark,
+                          "variables bring more than " + std::to_string(kMost) + " bytes");
+        return text;
+    }
+
+    const Environment& environment_;
+    Problems& problems_;
+    std::size_t brought_ = 0;
+};
+
+}  // namespace
+
+void expand_variables(Node& tree, const Environment& environment, Problems& problems) {
+    Expansion(environment, problems).expand(tree);
+}
+
+}  // namespace panelgate::yaml

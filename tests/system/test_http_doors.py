@@ -1,0 +1,273 @@
+"""The HTTP server's doors: who gets in, under which name, from where, and how many."""
+import contextlib
+import json
+import socket
+import struct
+import tempfile
+import time
+import unittest
+
+import harness
+from config import OPERATOR, gateway, line
+
+PRESS = "/api/v1/stations/press/devices/"
+
+
+class Connection:
+    """Raw HTTP: what is sent is what the test says."""
+
+    def __init__(self, port, own_address="127.0.0.1"):
+        self.socket = socket.create_connection(("127.0.0.1", port), harness.PATIENCE,
+                                               (own_address, 0))
+        self._file = self.socket.makefile("rb")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self._file.close()
+        self.socket.close()
+
+    def ask(self, method, path, *headers, body=None, host="localhost", version="1.1"):
+        """The Answer; headers are whole lines."""
+        self.send(method, path, *headers, body=body, host=host, version=version)
+        return self.receive()
+
+    def send(self, method, path, *headers, body=None, host="localhost", version="1.1"):
+        lines = [f"{method} {path} HTTP/{version}", *([f"Host: {host}"] if host else []), *headers]
+        data = b"" if body is None else json.dumps(body).encode()
+        if data:
+            lines.append(f"Content-Length: {len(data)}")
+        self.socket.sendall("\r\n".join([*lines, "", ""]).encode("latin-1") + data)
+
+    def end_input(self):
+        self.socket.shutdown(socket.SHUT_WR)
+
+    def receive(self):
+        """The next answer that is final; None: the connection ended before."""
+        while True:
+            start = self._file.readline()
+            if not start:
+                return None
+            headers = {}
+            while (text := self._file.readline().decode().rstrip("\r\n")):
+                name, value = text.split(": ", 1)
+                headers[name.lower()] = value
+            status = int(start.split()[1])
+            if status >= 200:
+                return Answer(status, headers, self._file.read(int(headers.get("content-length", 0))))
+
+
+class Answer:
+    def __init__(self, status, headers, body):
+        self.status, self.headers, self.body = status, headers, body
+
+    def json(self):
+        return json.loads(self.body)
+
+
+class Doors(unittest.TestCase):
+    CONFIG = gateway(line(), http=OPERATOR)
+
+    @classmethod
+    def setUpClass(cls):
+        cls.stack = contextlib.ExitStack()
+        cls.program = cls.stack.enter_context(harness.configured(cls.CONFIG))
+        cls.port = cls.program.http_port()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.stack.close()
+
+    def ask(self, *request, **options):
+        with Connection(self.port) as connection:
+            return connection.ask(*request, **options)
+
+    def status(self, *request, **options):
+        answer = self.ask(*request, **options)
+        return answer.status if answer else None
+
+
+class Places(Doors):
+    def test_256_idle_connections_close_neither_probes_nor_rest(self):
+        with contextlib.ExitStack() as crowd:
+            for _ in range(256):
+                crowd.enter_context(Connection(self.port))
+            for path in ("/healthz", "/readyz", "/api/v1/stations", PRESS + "UW0", "/metrics"):
+                self.assertEqual(self.status("GET", path), 200, path)
+
+    def test_many_addresses_of_idle_connections_close_nothing_either(self):
+        with contextlib.ExitStack() as crowd:
+            for n in range(2, 12):
+                for _ in range(32):
+                    crowd.enter_context(Connection(self.port, f"127.0.0.{n}"))
+            for path in ("/healthz", "/readyz", "/api/v1/stations", PRESS + "UW0"):
+                self.assertEqual(self.status("GET", path), 200, path)
+
+    def test_with_all_places_of_an_address_busy_it_is_refused_in_words_and_probes_are_answered(self):
+        with contextlib.ExitStack() as crowd:
+            for _ in range(32):
+                crowd.enter_context(Connection(self.port)).ask("GET", "/healthz")
+            streams = [crowd.enter_context(Connection(self.port)) for _ in range(32)]
+            for stream in streams:
+                stream.send("GET", "/api/v1/events")
+                self.assertEqual(stream._file.readline(), b"HTTP/1.1 200 OK\r\n")
+            refused = self.ask("PUT", PRESS + "UW100", body={"values": [1]})
+            self.assertEqual(refused.status, 503)
+            self.assertEqual(refused.headers["content-type"], "application/problem+json")
+            self.assertEqual(refused.headers["retry-after"], "1")
+            self.assertEqual(refused.json()["status"], 503)
+            for path in ("/healthz", "/readyz"):
+                self.assertEqual(self.status("GET", path), 200, path)
+            with Connection(self.port, "127.0.0.2") as other:
+                self.assertEqual(other.ask("GET", "/api/v1/stations").status, 200)
+
+
+class HalfClosed(Doors):
+    def test_P3_a_client_that_closes_its_sending_side_gets_its_answers(self):
+        with Connection(self.port) as client:
+            client.send("GET", PRESS + "UW0?count=5")
+            client.end_input()
+            self.assertEqual(client.receive().json()["values"], [10, 20, 30, 40, 50])
+            self.assertIsNone(client.receive())
+
+    def test_P3_so_do_its_writes(self):
+        for value in range(20):
+            with Connection(self.port) as client:
+                client.send("PUT", PRESS + "UW100", body={"values": [value]})
+                client.end_input()
+                self.assertTrue(client.receive().json()["confirmed"])
+            self.assertEqual(self.program.values(PRESS + "UW100"), [value])
+
+    def test_P2_one_that_was_reset_takes_its_waiting_write_along(self):
+        self.assertEqual(self.program.rest("PUT", PRESS + "UW100", {"values": [7]})[0], 200)
+        self.program.rest("PUT", "/api/v1/simulator/press", {"dead": True})
+        try:
+            with Connection(self.port) as first, Connection(self.port) as leaver:
+                first.send("GET", PRESS + "UW0")
+                leaver.send("PUT", PRESS + "UW100", body={"values": [8]})
+                leaver.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                leaver.close()
+                first.receive()
+        finally:
+            self.program.rest("PUT", "/api/v1/simulator/press", {})
+        self.assertEqual(self.program.values(PRESS + "UW100"), [7])
+
+
+class Names(Doors):
+    def test_a_page_under_a_foreign_name_reads_and_writes_nothing(self):
+        before = self.program.values(PRESS + "UW100")
+        evil = "evil.example:28080"
+        answer = self.ask("PUT", PRESS + "UW100", f"Origin: http://{evil}",
+                          "Content-Type: application/json", body={"values": [4242]}, host=evil)
+        self.assertEqual(answer.status, 421)
+        self.assertEqual(answer.headers["content-type"], "application/problem+json")
+        self.assertIn("evil.example", answer.json()["detail"])
+        for path in ("/", "/metrics", "/api/v1/stations", "/nothing"):
+            self.assertEqual(self.status("GET", path, host=evil), 421, path)
+        self.assertEqual(self.program.values(PRESS + "UW100"), before)
+
+    def test_its_own_names_are_known_in_all_their_forms(self):
+        for host in ("localhost", "LOCALHOST:1", "127.0.0.1", f"127.0.0.1:{self.port}", "localhost.",
+                     socket.gethostname(), "[::1]:80"):
+            self.assertEqual(self.status("GET", "/api/v1/lines", host=host), 200, host)
+
+    def test_probes_are_asked_by_any_name(self):
+        for path in ("/healthz", "/readyz"):
+            self.assertEqual(self.status("GET", path, host="pod-17.cluster"), 200)
+
+    def test_a_request_has_one_host(self):
+        self.assertEqual(self.status("GET", "/", host=None), 400)
+        self.assertEqual(self.status("GET", "/", "Host: localhost"), 400)
+        self.assertEqual(self.status("GET", "/", host=None, version="1.0"), 200)
+
+    def test_absolute_targets_and_options(self):
+        self.assertEqual(self.status("GET", "http://localhost/api/v1/lines"), 200)
+        self.assertEqual(self.status("GET", "http://evil.example/api/v1/lines"), 421)
+        answer = self.ask("OPTIONS", PRESS + "UW100")
+        self.assertEqual((answer.status, answer.headers["allow"]), (204, "GET, HEAD, PUT, OPTIONS"))
+        self.assertEqual(self.status("OPTIONS", "*"), 204)
+
+    def test_pages_of_other_sites_ask_nothing(self):
+        for site, status in (("cross-site", 403), ("same-origin", 200), ("none", 200)):
+            self.assertEqual(self.status("GET", PRESS + "UW0", f"Sec-Fetch-Site: {site}",
+                                         "Sec-Fetch-Mode: no-cors", "Sec-Fetch-Dest: image"), status)
+        self.assertEqual(self.status("GET", "/", "Sec-Fetch-Site: cross-site",
+                                     "Sec-Fetch-Mode: navigate", "Sec-Fetch-Dest: document"), 200)
+
+    def test_media_types_are_compared_without_case(self):
+        for kind, status in (("Application/JSON", 200), ("text/plain", 415)):
+            self.assertEqual(self.status("PUT", PRESS + "UW100", f"Content-Type: {kind}",
+                                         "Origin: http://localhost", body={"values": [1]}), status)
+
+    def test_bytes_that_are_no_utf8_are_refused_and_not_said_again(self):
+        for path in ("/api/v1/stations/%ff", "/api/v1/stations/%C3%28", "/api/v1/stations/\xff",
+                     PRESS + "UW0?type=%80"):
+            answer = self.ask("GET", path)
+            self.assertEqual(answer.status, 400, path)
+            answer.json()
+
+
+class GivenNames(Doors):
+    CONFIG = gateway(line(), http=OPERATOR + ", hosts: [Gateway.plant.example, 192.0.2.7]")
+
+    def test_hosts_take_the_place_of_the_machines_names(self):
+        for host, status in (("gateway.plant.example:8080", 200), ("192.0.2.7", 200),
+                             ("localhost", 200), ("127.0.0.1", 200), ("192.0.2.8", 421),
+                             (socket.gethostname(), 421)):
+            self.assertEqual(self.status("GET", "/api/v1/lines", host=host), status, host)
+
+
+class Allowed(unittest.TestCase):
+    def test_who_is_not_in_the_list_is_closed_without_a_byte(self):
+        with harness.configured(gateway(line(), http=OPERATOR + ", allow: [127.0.0.2/31]")) as program:
+            port = program.http_port()
+            with Connection(port, "127.0.0.3") as friend, Connection(port) as stranger:
+                self.assertEqual(friend.ask("GET", "/healthz").status, 200)
+                with contextlib.suppress(ConnectionError):
+                    stranger.send("GET", "/healthz")
+                    self.assertIsNone(stranger.receive())
+            program.log.wait_for(r"info connection refused .*client=127\.0\.0\.1 .*allow list")
+
+
+class Logins(unittest.TestCase):
+    def setUp(self):
+        file = self.enterContext(tempfile.NamedTemporaryFile("w"))
+        file.write("right-and-long-enough")
+        file.flush()
+        tokens = f"[{{name: ops, role: operator, file: {file.name}}}]"
+        self.program = self.enterContext(harness.configured(
+            gateway(line(), http=f"{OPERATOR}, tokens: {tokens}")))
+        self.port = self.program.http_port()
+
+    def seconds(self, token, status, address="127.0.0.1"):
+        start = time.monotonic()
+        with Connection(self.port, address) as client:
+            answer = client.ask("GET", "/api/v1/lines", f"Authorization: Bearer {token}")
+        self.assertEqual(answer.status, status)
+        return time.monotonic() - start
+
+    def metric(self, name):
+        for text in self.program.get("/metrics")[1].splitlines():
+            if text.startswith(name + " "):
+                return float(text.split()[-1])
+        return None
+
+    def test_wrong_tokens_are_counted_logged_and_slowed_down_by_address(self):
+        free = [self.seconds("wrong", 401) for _ in range(6)]
+        held = [self.seconds("wrong", 401), self.seconds("right-and-long-enough", 200)]
+        others = self.seconds("right-and-long-enough", 200, "127.0.0.2")
+        self.assertGreater(min(held), max(free))
+        self.assertGreater(min(held), others)
+        self.assertEqual(self.metric("panelgate_login_failures_total"), 7)
+        self.assertEqual(self.metric('panelgate_http_requests_total{code="401"}'), 7)
+        self.assertEqual(self.metric('panelgate_http_requests_total{code="200"}'), 4)
+        self.program.log.wait_for(r"warn(ing)? login failed .*client=127\.0\.0\.1")
+        self.assertNotIn("wrong", self.program.log.text())
+
+
+if __name__ == "__main__":
+    unittest.main()

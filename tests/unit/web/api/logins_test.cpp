@@ -1,0 +1,65 @@
+#include <string>
+
+#include "http_rig.hpp"
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::web {
+namespace {
+
+class LoginAttempts : public HttpRig {
+  protected:
+    LoginAttempts() {
+        settings.anonymous = Role::none;
+        settings.tokens.push_back({"ops", Role::operator_, "right"});
+        settings.logins.free = 2;
+        settings.logins.hold = 1ms;
+        start();
+    }
+    unsigned status(const std::string& token, const char* target = "/api/v1/lines") {
+        return ask("GET", target, "", "Authorization: Bearer " + token + "\r\n").status();
+    }
+};
+
+TEST_F(LoginAttempts, AreCountedAndLoggedWhenTheyFail) {
+    const rt::LogTap log;
+    EXPECT_EQ(status("right"), 200u);
+    EXPECT_EQ(status("wrong"), 401u);
+    EXPECT_EQ(get("/api/v1/lines").status(), 401u);       // nobody tried
+    EXPECT_EQ(status("wrong", "/healthz"), 200u);         // nobody looks
+    EXPECT_EQ(status("wrong", "/api/v1/nothing"), 404u);  // nobody looks
+    EXPECT_EQ(server->counters().login_failures, 1u);
+    EXPECT_EQ(server->counters().requests.at(401), 2u);
+    EXPECT_EQ(server->counters().requests.at(200), 2u);
+    EXPECT_EQ(log.count("login failed"), 1u);
+    EXPECT_EQ(log.count("client=127.0.0.1"), 1u);
+    EXPECT_EQ(log.count("wrong"), 0u);
+}
+
+TEST_F(LoginAttempts, OfAnAddressThatGuessesAreHeldUpAndThenJudged) {
+    for (int i = 0; i < 6; ++i) EXPECT_EQ(status("wrong"), 401u);
+    EXPECT_EQ(status("right"), 200u);
+    EXPECT_EQ(server->counters().login_failures, 6u);
+}
+
+TEST_F(LoginAttempts, MayBeGivenUpWhileTheyAreHeld) {
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
+    Client client = connect();
+    client.send("GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
+    while (server->connections() == 0) io.run_one();
+    io.poll();
+    server.reset();
+    EXPECT_TRUE(client.receive().error);
+}
+
+TEST_F(LoginAttempts, FromWhereNobodyMayAreClosedWithoutAByte) {
+    settings.allow = {{"192.0.2.0", 24}};
+    start();
+    const rt::LogTap log;
+    Client client = connect();
+    EXPECT_TRUE(client.receive().error);
+    EXPECT_EQ(server->connections(), 0u);
+    EXPECT_EQ(log.count("not in the allow list"), 1u);
+}
+
+}  // namespace
+}  // namespace panelgate::web

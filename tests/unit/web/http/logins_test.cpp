@@ -1,0 +1,65 @@
+#include "logins.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace panelgate::web {
+namespace {
+
+class LoginsTest : public ::testing::Test {
+  protected:
+    void fail(unsigned times, const std::string& address = "a") {
+        for (unsigned i = 0; i < times; ++i) logins.failed(now, address);
+    }
+    bool held(const std::string& address = "a") const {
+        return logins.hold(now, address) > Duration::zero();
+    }
+    LoginSettings settings;
+    Logins logins{settings};
+    TimePoint now{1h};
+};
+
+TEST_F(LoginsTest, HoldUpNobodyForAFewMistakes) {
+    fail(settings.free);
+    EXPECT_FALSE(held());
+}
+
+TEST_F(LoginsTest, HoldUpAnAddressThatGuesses) {
+    fail(settings.free + 1);
+    EXPECT_EQ(logins.hold(now, "a"), settings.hold);
+    EXPECT_FALSE(held("b"));
+}
+
+TEST_F(LoginsTest, ForgiveWithTime) {
+    fail(1000);
+    now += settings.forgiven_after;
+    EXPECT_TRUE(held());
+    now += settings.forgiven_after * settings.remembered;
+    EXPECT_FALSE(held());
+    fail(settings.free);
+    EXPECT_FALSE(held());
+}
+
+TEST_F(LoginsTest, ForgiveAnAddressWithMoreRightTokensThanWrongOnes) {
+    fail(settings.free + 1);
+    logins.succeeded("a");
+    EXPECT_FALSE(held());
+    for (unsigned i = 0; i < 100; ++i) logins.succeeded("a");
+    EXPECT_EQ(logins.addresses(), 0u);
+    fail(settings.free + 1);
+    EXPECT_TRUE(held());
+}
+
+TEST_F(LoginsTest, RememberSoManyAddressesAndForgetTheOneThatFailedLongestAgo) {
+    fail(settings.free + 1, "old");
+    now += 1ms;
+    for (unsigned i = 0; i + 1 < settings.addresses; ++i) fail(1, std::to_string(i));
+    EXPECT_TRUE(held("old"));
+    fail(1, "one more");
+    EXPECT_FALSE(held("old"));
+    EXPECT_EQ(logins.addresses(), settings.addresses);
+}
+
+}  // namespace
+}  // namespace panelgate::web

@@ -1,0 +1,91 @@
+#include "places.hpp"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+
+namespace panelgate::web {
+namespace {
+
+using Id = Places::Id;
+
+class PlacesTest : public ::testing::Test {
+  protected:
+    PlacesTest() {
+        Settings settings;
+        settings.max_connections = 3;
+        settings.max_per_address = 2;
+        settings.probe_places = 2;
+        places.emplace(settings);
+    }
+    Places::Arrival come(Id id, const std::string& address) { return places->arrive(id, address); }
+    void fill_and_keep_busy() {
+        come(1, "a");
+        come(2, "a");
+        come(3, "b");
+        for (Id id = 1; id <= 3; ++id) places->busy(id);
+    }
+    std::optional<Places> places;
+};
+
+TEST_F(PlacesTest, HasRoomUpToItsLimit) {
+    for (const auto& arrival : {come(1, "a"), come(2, "a"), come(3, "b")}) {
+        EXPECT_FALSE(arrival.probes_only);
+        EXPECT_FALSE(arrival.leaves);
+    }
+}
+
+TEST_F(PlacesTest, TakesThePlaceOfWhoHasBeenIdleForLongest) {
+    come(1, "a");
+    come(2, "b");
+    come(3, "c");
+    places->busy(1);
+    places->idle(1);
+    EXPECT_EQ(come(4, "d").leaves, 2u);
+    EXPECT_EQ(come(5, "d").leaves, 3u);
+    EXPECT_EQ(come(6, "e").leaves, 1u);
+}
+
+TEST_F(PlacesTest, LetsAnAddressWithManyConnectionsDisplaceOnlyItsOwn) {
+    come(1, "b");
+    come(2, "a");
+    come(3, "a");
+    const auto arrival = come(4, "a");
+    EXPECT_EQ(arrival.leaves, 2u);
+    EXPECT_FALSE(arrival.probes_only);
+}
+
+TEST_F(PlacesTest, DisplacesNobodyWhoHasARequest) {
+    fill_and_keep_busy();
+    for (const auto& arrival : {come(4, "a"), come(5, "c")}) {
+        EXPECT_TRUE(arrival.probes_only);
+        EXPECT_FALSE(arrival.leaves);
+    }
+    places->idle(3);
+    EXPECT_EQ(come(6, "c").leaves, 3u);
+}
+
+TEST_F(PlacesTest, HasAlwaysAPlaceForAProbe) {
+    fill_and_keep_busy();
+    for (Id id = 4; id < 100; ++id) {
+        const auto arrival = come(id, "a");
+        EXPECT_TRUE(arrival.probes_only);
+        EXPECT_EQ(arrival.leaves, id < 6 ? std::nullopt : std::optional<Id>(id - 2));
+        places->busy(id);
+    }
+}
+
+TEST_F(PlacesTest, HasThePlaceAgainOfWhoLeft) {
+    fill_and_keep_busy();
+    places->leave(1);
+    EXPECT_FALSE(come(4, "a").probes_only);
+    places->busy(4);
+    places->leave(1);
+    places->busy(1);
+    places->idle(1);
+    EXPECT_TRUE(come(5, "a").probes_only);
+}
+
+}  // namespace
+}  // namespace panelgate::web
