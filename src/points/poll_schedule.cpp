@@ -86,9 +86,15 @@ void PollSchedule::hasten(std::size_t index, TimePoint now) {
     if (entry.due <= turn) return;
     last_extra_ = turn;
     extra_free_ = std::max(extra_free_, now) + settings_.extra_every;
-    queue_.erase({entry.due, index});
-    entry.due = turn;
+    again_at(index, turn);
     entry.hastened = true;
+}
+
+void PollSchedule::again_at(std::size_t index, TimePoint when) {
+    Entry& entry = entries_[index];
+    if (entry.under_way || entry.due <= when) return;
+    queue_.erase({entry.due, index});
+    entry.due = when;
     queue_.emplace(entry.due, index);
 }
 

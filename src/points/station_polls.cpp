@@ -11,6 +11,9 @@
 namespace panelgate::points {
 namespace {
 
+/// What was written and could not be read behind that is asked for again so soon.
+constexpr Duration kAgain = 5s;
+
 std::vector<Duration> intervals_of(const std::vector<PlannedRead>& plan) {
     std::vector<Duration> intervals;
     for (const PlannedRead& read : plan) intervals.push_back(read.every);
@@ -86,6 +89,7 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
+        if (is_outdated(planned)) schedule_.again_at(read, now + kAgain);
     }
     return planned.wants;
 }

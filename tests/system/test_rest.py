@@ -27,7 +27,7 @@ def text_of(program, path):
 
 
 def polled(program, point, as_wanted=lambda value: True):
-    """Waits until a poll has brought a value like this; each look is a request to the program."""
+    """Waits until a poll has brought a good value like this; each look is a request to the program."""
     for _ in range(5000):
         shown = program.get(PRESS + "points/" + point)[1]
         value = shown["value"]

@@ -47,6 +47,9 @@ class PollSchedule {
     /// wanted one before; its next turn will do when that comes first. Of an entry that is under
     /// way: nothing, on_done() comes first.
     void hasten(std::size_t entry, TimePoint now);
+    /// A turn besides at this time, unless its next one comes first. Of one that is under way:
+    /// nothing.
+    void again_at(std::size_t entry, TimePoint when);
     /// This entry has ended, well or not. One that is not under way is ignored.
     void on_done(std::size_t entry, TimePoint now);
 

@@ -161,6 +161,20 @@ TEST(StationPolls, P10AReadThatAWriteOvertakesIsOldAndAskedAgain) {
     EXPECT_GT(*polls.next_due(), asked + 1s);
 }
 
+TEST(StationPolls, P10WhatCannotBeReadBehindAWriteIsAskedForAgainSoon) {
+    StationPolls polls({registers(7, 1, 1h)}, limits(), kStart);
+    const auto good = [](const Bytes& pdu) { return Result<Bytes>(reply_to(pdu)); };
+    const auto silent = [](const Bytes&) { return Result<Bytes>(Fault::timeout); };
+    play(polls, kStart, 10s, good);
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
+    polls.on_write(kStart + 10s, items);
+    polls.on_written(kStart + 11s, items);
+    EXPECT_EQ(play(polls, kStart + 11s, 59s, silent).size(), 12u) << "at once, then every 5 s";
+    EXPECT_EQ(play(polls, kStart + 70s, 10s, good).size(), 1u);
+    EXPECT_EQ(quality_of(polls.reading(0), 1h, kStart + 80s), Quality::good);
+    EXPECT_EQ(play(polls, kStart + 80s, 10min, silent).size(), 0u);
+}
+
 TEST(StationPolls, WhoWritesWithoutPauseGetsNoMoreThanAFewReadsASecond) {
     StationPolls polls({registers(7, 1, 60s)}, limits(), kStart);
     const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
