@@ -80,7 +80,8 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
 std::string told(const Reply& reply) {
     std::string text;
     for (const char* list : {"frames", "decisions"}) {
-        for (const auto& entry : reply.at(list).as_array())
+        const boost::json::value entries = reply.at(list);
+        for (const auto& entry : entries.as_array())
             text += std::to_string(entry.at("sequence").to_number<int>()) + ' ';
         if (std::string_view(list) == "frames") text += "| ";
     }
