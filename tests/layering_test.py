@@ -22,8 +22,9 @@ LIBRARIES = {
     "prometheus-cpp": ("prometheus/",),
     "spdlog": ("spdlog/", "fmt/"),
     "yaml-cpp": ("yaml-cpp/",),
+    "zlib": ("zlib.h",),
 }
-THIRD_PARTY = re.compile(r"^(boost|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/")
+THIRD_PARTY = re.compile(r"^((boost|yaml-cpp|prometheus|spdlog|fmt|CLI|gtest|gmock)/|zlib\.h$)")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 CLOCK = re.compile(r"::now\s*\(")
 DETACHED = re.compile(r"\bdetached\b")

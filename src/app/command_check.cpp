@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
-#include <boost/json/serialize.hpp>
 #include <iostream>
 #include <tuple>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "commands.hpp"
 #include "inventory.hpp"
 #include "load.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -52,7 +52,7 @@ void print_json(const std::string& file, const Loaded& loaded) {
     }
     all["errors"] = errors_json(file, loaded.problems);
     all["warnings"] = std::move(warnings);
-    std::cout << json::serialize(all) << '\n';
+    std::cout << web::json_text(all) << '\n';
 }
 
 }  // namespace

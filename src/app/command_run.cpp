@@ -1,15 +1,21 @@
 #include <boost/asio/io_context.hpp>
+#include <cstddef>
+#include <functional>
 #include <iostream>
+#include <stdexcept>
+#include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "commands.hpp"
+#include "connection_limits.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "run_loop.hpp"
 
@@ -20,12 +26,24 @@ const Embedded& shipped_demo();  // config/demo.yaml, compiled in
 
 namespace {
 
+/// Before the first one is opened.
+void fit_to_descriptors(config::Config& config) {
+    const std::size_t limit = rt::raise_descriptor_limit();
+    const std::string lowered = fit_connections(config, limit);
+    if (lowered.empty()) return;
+    rt::log(rt::LogLevel::warn, "max_connections lowered",
+            {{"to", lowered},
+             {"why", "this process may open " + std::to_string(limit) +
+                         " files (LimitNOFILE of the service, ulimit -Hn)"}});
+}
+
 /// `started` is told the gateway once it serves.
 ExitCode serve(config::Config config, bool simulate,
                const std::function<void(const Gateway&)>& started) {
     rt::set_up_log(config.log);
     for (const std::string& warning : config.warnings)
         rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
+    fit_to_descriptors(config);
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
@@ -33,22 +51,25 @@ ExitCode serve(config::Config config, bool simulate,
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
         gateway.start();
-    } catch (const std::system_error& error) {
+    } catch (const std::runtime_error& error) {
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
     started(gateway);
-    loop.run({[&] { gateway.stop_accepting(); }, [&] { return gateway.drained(); },
-              [&] { gateway.stop(); }});
+    loop.run({.begin = [&] { gateway.stop_accepting(); },
+              .done = [&] { return gateway.drained(); },
+              .finish = [&] { gateway.stop(); },
+              .longest_answer = gateway.longest_answer()});
     return kFine;
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
-    const auto reachable = [](const std::string& address) {
-        return address == "0.0.0.0" || address == "::" ? std::string("127.0.0.1") : address;
+    const auto reachable = [](const std::string& address) -> std::string {
+        if (address == "::") return "::1";
+        return address == "0.0.0.0" ? "127.0.0.1" : address;
     };
     const std::string url =
-        "http://" + reachable(config.http->address) + ':' + std::to_string(gateway.http_port());
+        "http://" + endpoint_text(reachable(config.http->address), gateway.http_port());
     const std::string host = reachable(config.modbus_tcp[0].address);
     const std::string port = std::to_string(gateway.modbus_port());
     std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "

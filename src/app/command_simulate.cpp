@@ -86,7 +86,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
         return kUnavailable;
     }
     std::cout << panels.text() << "Ctrl-C ends it.\n" << std::flush;
-    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }});
+    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }, {}});
     return kFine;
 }
 

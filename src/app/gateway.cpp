@@ -1,21 +1,36 @@
 #include "gateway.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
+#include <variant>
 
+#include "address_families.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
-#include "panelgate/metrics/process.hpp"
 #include "panelgate/rt/log.hpp"
-#include "showing.hpp"
 #include "simulated_line.hpp"
 #include "wiring.hpp"
 
 namespace panelgate::app {
 
+namespace {
+
+boost::system::error_code error_of(tcp_server::Listener& listener) {
+    try {
+        listener.start();
+    } catch (const std::system_error& error) {
+        return error.code();
+    }
+    return {};
+}
+
+}  // namespace
+
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
     : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
+    separate_families(config_);
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
@@ -25,7 +40,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, b
 void Gateway::add_line(const config::Line& line, bool simulate) {
     bus::Settings settings = bus_settings(line);
     settings.observe = [this, name = line.name](const bus::BusEvent& event) {
-        publish(events_, plant_, name, event);
+        on_bus_event(name, event);
     };
     line::Settings device = line.device;
     sim::SimulatedBus* simulated = nullptr;
@@ -46,6 +61,13 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     add_poller(line, *buses_.back());
 }
 
+void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
+    publish(events_, plant_, line, event);
+    const auto* write = std::get_if<bus::WriteEvent>(&event);
+    const auto listener = write_listeners_.find(line);
+    if (write != nullptr && listener != write_listeners_.end()) listener->second(*write);
+}
+
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
 void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
     auto polled = polled_stations(line);
@@ -57,6 +79,7 @@ void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
         if (polls == nullptr) continue;
         plant_.at(line.name, station.id).points.emplace(station.points, station.polls, *polls);
     }
+    write_listeners_[line.name] = poller.write_listener();
     poller.on_update([this, name = line.name](std::uint8_t id, const auto& wants) {
         publish_points(events_, plant_.at(name, id), wants, clock_.now());
     });
@@ -82,9 +105,16 @@ void Gateway::add_listener(const tcp_server::Settings& settings) {
 
 void Gateway::add_http(const web::Settings& settings) {
     web::Providers providers;
-    providers.metrics_text = [this] { return metrics_text(); };
+    const auto copy = [this] {
+        return [this, points = PointCopy(plant_)](metrics::Snapshot& into) mutable {
+            return copy_figures(into, points);
+        };
+    };
+    scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
+    providers.metrics = scrapes_.get();
     providers.metrics_type = metrics::kContentType;
-    providers.ready = [this] { return ready_; };
+    providers.ready = [this] { return ready_ && openings_.missing().empty(); };
+    providers.missing = [this] { return openings_.missing(); };
     providers.version = PANELGATE_VERSION;
     providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
@@ -93,29 +123,40 @@ void Gateway::add_http(const web::Settings& settings) {
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }
 
+void Gateway::add_doors() {
+    for (std::size_t i = 0; i < listeners_.size(); ++i) {
+        const tcp_server::Settings& settings = config_.modbus_tcp[i];
+        tcp_server::Listener* listener = listeners_[i].get();
+        openings_.add({"modbus_tcp", settings.address, settings.port,
+                       [listener] { return error_of(*listener); },
+                       [listener] { return listener->port(); }});
+    }
+    if (!http_) return;
+    openings_.add({"http", config_.http->address, config_.http->port,
+                   [this] { return http_->start(); }, [this] { return http_->port(); }});
+}
+
 void Gateway::start() {
+    lag_.start();
     for (const auto& simulated : simulated_) simulated->start();
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
-    for (std::size_t i = 0; i < listeners_.size(); ++i) {
-        listeners_[i]->start();
-        const std::string address =
-            config_.modbus_tcp[i].address + ':' + std::to_string(listeners_[i]->port());
-        rt::log(rt::LogLevel::info, "listening", {{"modbus_tcp", address}});
-    }
-    if (http_) {
-        if (const auto error = http_->start()) {
-            throw std::system_error(error, "cannot listen on " + config_.http->name());
-        }
-        const std::string address = config_.http->address + ':' + std::to_string(http_->port());
-        rt::log(rt::LogLevel::info, "listening", {{"http", address}});
-    }
+    add_doors();
+    openings_.start();
     ready_ = true;
+}
+
+Duration Gateway::longest_answer() const {
+    Duration longest{};
+    for (const config::Line& line : config_.lines)
+        longest = std::max(longest, line.arbiter.queue.deadline);
+    return longest;
 }
 
 void Gateway::stop_accepting() {
     ready_ = false;
+    openings_.stop();
     events_.end();
     open_listeners_ = listeners_.size();
     for (const auto& listener : listeners_) {
@@ -129,6 +170,7 @@ bool Gateway::drained() const {
 }
 
 void Gateway::stop() {
+    lag_.stop();
     for (const auto& listener : listeners_) listener->close_now();
     http_.reset();
     relays_->stop();
@@ -137,17 +179,21 @@ void Gateway::stop() {
     for (const auto& simulated : simulated_) simulated->stop();
 }
 
-std::string Gateway::metrics_text() const {
-    metrics::Snapshot snapshot;
-    for (const auto& bus : buses_) snapshot.lines.push_back(bus->report());
+/// One piece: a line, some points, or all the rest, which is small.
+bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const {
+    const std::size_t lines = snapshot.lines.size();
+    if (lines < buses_.size()) {
+        snapshot.lines.push_back(buses_[lines]->report());
+        return true;
+    }
+    if (points.next(snapshot.points, clock_.now())) return true;
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
-    snapshot.points = point_samples(plant_, clock_.now());
     snapshot.relays = relay_samples(relays_->status());
     if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;
-    snapshot.process = metrics::read_process_facts();
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
-    return metrics::exposition(snapshot);
+    snapshot.runtime.loop_lag = lag_.seconds();
+    return false;
 }
 
 }  // namespace panelgate::app

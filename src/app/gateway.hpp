@@ -3,21 +3,29 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "openings.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "panelgate/rt/loop_lag.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
+#include "scrapes.hpp"
+#include "showing.hpp"
 
 namespace panelgate::app {
 
@@ -28,12 +36,15 @@ class Gateway {
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
 
-    /// Opens lines and listeners. Throws std::system_error when a listener cannot be opened.
+    /// Opens lines and listeners. Throws CannotListen when a listener cannot be opened; one whose
+    /// address is not there yet is opened later.
     void start();
     /// Stops accepting; what was accepted is answered within its deadline.
     void stop_accepting();
     /// Nothing is owed to any client any more.
     bool drained() const;
+    /// The longest that a request which was accepted may take to its answer.
+    Duration longest_answer() const;
     /// Closes everything.
     void stop();
 
@@ -43,25 +54,32 @@ class Gateway {
     }
 
   private:
+    void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void add_line(const config::Line& line, bool simulate);
     void add_poller(const config::Line& line, bus::Bus& bus);
     void add_relays();
     void add_listener(const tcp_server::Settings& settings);
     void add_http(const web::Settings& settings);
-    std::string metrics_text() const;
+    void add_doors();
+    bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;
 
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
+    rt::LoopLag lag_{clock_};
     config::Config config_;
     web::EventHub events_;  ///< buses publish to it to their end
     Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
+    /// Who hears of the writes on a line, by its name; buses tell to their end.
+    std::map<std::string, std::function<void(const bus::WriteEvent&)>> write_listeners_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     std::unique_ptr<points::Relays> relays_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    std::unique_ptr<Scrapes> scrapes_;
     web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;
+    Openings openings_{clock_};  ///< of the listeners and of HTTP
     std::size_t open_listeners_ = 0;
     bool ready_ = false;
 };

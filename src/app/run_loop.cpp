@@ -12,7 +12,6 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr auto kLongestEnd = 10s;
 constexpr auto kLook = 5ms;
 
 /// Lives on run()'s stack for as long as the loop runs.
@@ -38,7 +37,7 @@ class Loop {
             ending_now_ = true;
             rt::log(rt::LogLevel::info, "stopping");
             ending_.begin();
-            limit_.expires_after(kLongestEnd);
+            limit_.expires_after(ending_.patience());
             limit_.async_wait([this](error_code late) {
                 if (!late) finish();
             });

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <functional>
+
+#include "panelgate/base/time.hpp"
 
 namespace panelgate::app {
 
@@ -10,7 +13,11 @@ namespace panelgate::app {
 struct Ending {
     std::function<void()> begin;   ///< first SIGTERM or SIGINT: stop accepting
     std::function<bool()> done;    ///< asked again and again until true
-    std::function<void()> finish;  ///< then, or after 10 s, or at the second signal
+    std::function<void()> finish;  ///< then, or when patience() is over, or at the second signal
+    Duration longest_answer{};     ///< of what is in flight
+
+    /// What has been accepted is answered within its time, and the answer needs a moment to leave.
+    Duration patience() const { return std::max<Duration>(10s, longest_answer + 2s); }
 };
 
 /// Keeps signals from its construction on, so that none ends the program while it starts.

@@ -22,6 +22,15 @@ web::StationEntry entry_of(const Station& station) {
     return entry;
 }
 
+points::PointSample sample_of(const Station& station, const points::Point& point, TimePoint now) {
+    const points::PointReading reading = station.points->read(point, now);
+    points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
+    if (reading.value && reading.quality == points::Quality::good)
+        sample.value = points::number_of(*reading.value);
+    if (reading.age) sample.age = to_seconds(*reading.age);
+    return sample;
+}
+
 /// Puts what a bus tells into the words of /api/v1/events.
 struct Publisher {
     web::EventHub& hub;
@@ -40,6 +49,7 @@ struct Publisher {
         hub.publish("transaction", web::transaction_event(line, station, event.function,
                                                           label(event.outcome), event.took));
     }
+    void operator()(const bus::WriteEvent&) const {}  // the points it touches are told
 };
 
 }  // namespace
@@ -55,20 +65,19 @@ web::Directory directory_of(const Plant& plant, const profile::PanelProfile& gen
     return directory;
 }
 
-std::vector<points::PointSample> point_samples(const Plant& plant, TimePoint now) {
-    std::vector<points::PointSample> samples;
-    for (const Station& station : plant.stations()) {
-        if (!station.points) continue;
-        for (const points::Point& point : station.points->points()) {
-            const points::PointReading reading = station.points->read(point, now);
-            points::PointSample sample{station.line, station.name, point.name, point.unit, {}, {}};
-            if (reading.value && reading.quality == points::Quality::good)
-                sample.value = points::number_of(*reading.value);
-            if (reading.age) sample.age = to_seconds(*reading.age);
-            samples.push_back(std::move(sample));
+bool PointCopy::next(std::deque<points::PointSample>& samples, TimePoint now) {
+    for (std::size_t left = kPiece; left > 0 && station_ < plant_->stations().size();) {
+        const Station& station = plant_->stations()[station_];
+        if (!station.points || point_ == station.points->points().size()) {
+            ++station_;
+            point_ = 0;
+            continue;
         }
+        samples.push_back(sample_of(station, station.points->points()[point_], now));
+        ++point_;
+        --left;
     }
-    return samples;
+    return station_ < plant_->stations().size();
 }
 
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -21,8 +22,20 @@ namespace panelgate::app {
 /// the plant outlive the view.
 web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic);
 
-/// Every point of the plant at a scrape.
-std::vector<points::PointSample> point_samples(const Plant& plant, TimePoint now);
+/// The points of the plant at a scrape, some at a time. The plant outlives it.
+class PointCopy {
+  public:
+    static constexpr std::size_t kPiece = 250;  ///< points: well below a millisecond
+
+    explicit PointCopy(const Plant& plant) : plant_(&plant) {}
+    /// Adds the next ones as they are now; false: all have been.
+    bool next(std::deque<points::PointSample>& samples, TimePoint now);
+
+  private:
+    const Plant* plant_;
+    std::size_t station_ = 0;
+    std::size_t point_ = 0;
+};
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays);
 
 /// Tells those who listen, if anybody does, what has happened on a line.

@@ -3,18 +3,11 @@
 #include <system_error>
 #include <utility>
 
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/rt/log.hpp"
 #include "simulated_line.hpp"
 
 namespace panelgate::app {
-namespace {
-
-std::string host_and_port(const std::string& address, std::uint16_t port) {
-    const bool v6 = config::is_ipv6(address);
-    return (v6 ? '[' + address + ']' : address) + ':' + std::to_string(port);
-}
-
-}  // namespace
 
 SimulatedPanels::SimulatedPanels(boost::asio::any_io_executor executor)
     : executor_(std::move(executor)), clock_(executor_) {}
@@ -46,7 +39,7 @@ std::string SimulatedPanels::lead_to(const std::string& line, const std::string&
     }
     const auto endpoint = config::parse_endpoint(link.substr(kTcpLink.size()));
     bridges_.push_back(std::make_unique<TcpBridge>(executor_, *endpoint, device));
-    const std::string place = host_and_port(endpoint->address, bridges_.back()->port());
+    const std::string place = endpoint_text(endpoint->address, bridges_.back()->port());
     rt::log(rt::LogLevel::info, "listening", {{"line", line}, {"rtu_over_tcp", place}});
     return std::string(kTcpLink) + place;
 }
@@ -58,6 +51,7 @@ void SimulatedPanels::serve_faults(const config::Endpoint& endpoint) {
     settings.anonymous = web::Role::operator_;
     web::Providers providers;
     providers.ready = [] { return true; };
+    providers.missing = [] { return std::string(); };
     providers.version = PANELGATE_VERSION;
     providers.now = [this] { return clock_.now(); };
     providers.events = &nothing_happens_;
@@ -65,7 +59,7 @@ void SimulatedPanels::serve_faults(const config::Endpoint& endpoint) {
                                           web::Surface::simulator);
     if (const auto error = http_->start())
         throw std::system_error(error, "cannot listen on " + settings.name());
-    const std::string place = host_and_port(endpoint.address, http_->port());
+    const std::string place = endpoint_text(endpoint.address, http_->port());
     rt::log(rt::LogLevel::info, "listening", {{"http", place}});
     text_ += "faults: http://" + place + "/api/v1/simulator/{station}\n";
 }

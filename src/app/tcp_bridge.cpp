@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::app {
@@ -84,7 +85,7 @@ TcpBridge::TcpBridge(const asio::any_io_executor& executor, const config::Endpoi
     state_->device.non_blocking(true);  // else a write waits for those who read on this very loop
     if (const error_code error = acceptor_.open(endpoint.address, endpoint.port)) {
         throw std::system_error(
-            error, "cannot listen on " + endpoint.address + ':' + std::to_string(endpoint.port));
+            error, "cannot listen on " + endpoint_text(endpoint.address, endpoint.port));
     }
     state_->from_device();
 }

@@ -1,8 +1,8 @@
 #include "wiring.hpp"
 
-#include <cstdint>
 #include <cstdlib>
 #include <optional>
+#include <vector>
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/judge.hpp"
@@ -10,22 +10,36 @@
 namespace panelgate::app {
 namespace {
 
-/// Refuses with 01, 02 or 03 what the panel's manual rules out. The profile outlives it.
+std::optional<bus::Rule> rule_of(profile::Judgement judgement) {
+    switch (judgement) {
+        case profile::Judgement::fine:
+            return std::nullopt;
+        case profile::Judgement::illegal_function:
+            return bus::Rule::function;
+        case profile::Judgement::illegal_value:
+            return bus::Rule::quantity;
+        case profile::Judgement::illegal_address:
+            return bus::Rule::range;
+        case profile::Judgement::write_protected:
+            return bus::Rule::write_protected;
+    }
+    std::abort();
+}
+
+/// Refuses what the panel's manual rules out. The profile outlives it.
 bus::Guard guard_of(const profile::PanelProfile& profile) {
-    return [&profile](const modbus::Request& request) -> std::optional<std::uint8_t> {
-        switch (profile::judge(profile, request)) {
-            case profile::Judgement::fine:
-                return std::nullopt;
-            case profile::Judgement::illegal_function:
-                return std::uint8_t{1};
-            case profile::Judgement::illegal_address:
-            case profile::Judgement::write_protected:
-                return std::uint8_t{2};
-            case profile::Judgement::illegal_value:
-                return std::uint8_t{3};
-        }
-        std::abort();
+    return [&profile](const modbus::Request& request) -> std::optional<bus::Objection> {
+        const auto rule = rule_of(profile::judge(profile, request));
+        if (!rule) return std::nullopt;
+        return bus::Objection{*rule, profile::explain(profile, request)};
     };
+}
+
+/// Of the functions that read and write values, those that the panel has.
+std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
+    std::vector<std::uint8_t> functions{1, 2, 3, 4, 5, 6, 15, 16};
+    std::erase_if(functions, [&](std::uint8_t code) { return !profile.has_function(code); });
+    return functions;
 }
 
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
@@ -47,6 +61,7 @@ bus::Settings bus_settings(const config::Line& line) {
         bus::StationSettings& made = settings.stations[station.id];
         made.name = station.name;
         made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
+        made.functions = functions_of(*station.profile);
         if (station.guard) made.guard = guard_of(*station.profile);
     }
     return settings;

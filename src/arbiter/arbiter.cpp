@@ -33,7 +33,8 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
         return known->ticket;
     }
     if (stations_.refuses(now, job)) {
-        ledger_.decide(now, [&] { return explain::offline(now, job, health(job.station)); });
+        ledger_.decide(now,
+                       [&] { return explain::offline(now, job, health(job.station), names_); });
         return Fault::offline;
     }
     reception_.stamp(now, job);
@@ -47,12 +48,13 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     }
     const JobQueue::Admission admission = schedule_.backlog().queue().push(job);
     for (const Job& shed : admission.shed) {
-        ledger_.decide(now, [&] { return explain::shed(shed); });
+        ledger_.decide(now, [&] { return explain::shed(shed, names_); });
         const bool sent = shed.attempts > 0;  // in a joined read that did not come about
         ledger_.finish(shed, sent ? Fault::timeout : Fault::busy);
     }
     if (!admission.taken) {
-        ledger_.decide(now, [&] { return explain::full(job, settings_.queue, queue_depth()); });
+        ledger_.decide(now,
+                       [&] { return explain::full(job, settings_.queue, queue_depth(), names_); });
         return Fault::busy;
     }
     step(now);
@@ -61,6 +63,7 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
 
 void Arbiter::cancel(TimePoint now, Client client) {
     ledger_.on_client_gone(client);
+    names_.forget(client);
     for (const Job& job : schedule_.backlog().cancel(client)) ledger_.finish(job, Fault::cancelled);
     if (active_) active_->group().on_gone(client);
     step(now);
@@ -140,7 +143,7 @@ void Arbiter::expire(TimePoint now) {
     expire_active(now);
     for (const Job& job : schedule_.backlog().expire(now)) {
         const bool sent = job.attempts > 0;
-        ledger_.decide(now, [&] { return explain::expired(now, job, sent); });
+        ledger_.decide(now, [&] { return explain::expired(now, job, sent, names_); });
         ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
     for (const Group& group : schedule_.backlog().take_dropped()) {
@@ -205,8 +208,9 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.usual = std::min(station.usual() + latency_, timing.patience);
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
+    ledger_.written(group, false);
     std::string why;
-    if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue());
+    if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
     const EchoFilter echo(adu, echo_memory_.expect(group.request));

@@ -10,19 +10,23 @@ std::string ms(Duration duration) {
     return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " ms";
 }
 
-std::string who(const Job& job) {
-    return std::string(label(job.priority)) + " of client " + std::to_string(job.client) +
-           " to station " + std::to_string(job.station);
+/// "read of modbus_tcp 10.0.0.5:50012 to station 17"; who polls is called after what it polls.
+std::string who(const Job& job, const ClientNames& names) {
+    const std::string name = names.of(job.client);
+    const std::string own = std::string(label(job.priority)) + " of ";
+    if (name.starts_with(own)) return name;
+    return own + name + " to station " + std::to_string(job.station);
 }
 
 }  // namespace
 
-std::string start(TimePoint now, const Group& group, const JobQueue& queue) {
+std::string start(TimePoint now, const Group& group, const JobQueue& queue,
+                  const ClientNames& names) {
     if (group.learns_for != 0)
         return "a write is next and nobody knows whether this line has an echo";
     if (group.probe) return "the station is offline and its probe is due";
     const Job& leader = group.jobs.front();
-    std::string text = who(leader) + ": ";
+    std::string text = who(leader, names) + ": ";
     if (group.attempts > 1) return text + "attempt " + std::to_string(group.attempts);
     text += "next in turn after " + ms(now - leader.arrived) + ", " +
             std::to_string(queue.waiting()) + " wait";
@@ -33,20 +37,22 @@ std::string start(TimePoint now, const Group& group, const JobQueue& queue) {
     return text;
 }
 
-std::string offline(TimePoint now, const Job& job, const StationHealth& health) {
-    return who(job) + " refused: offline after " + std::to_string(health.silent_in_a_row()) +
+std::string offline(TimePoint now, const Job& job, const StationHealth& health,
+                    const ClientNames& names) {
+    return who(job, names) + " refused: offline after " + std::to_string(health.silent_in_a_row()) +
            " silent transactions, next probe in " +
            ms(std::max(health.next_probe() - now, Duration::zero()));
 }
 
-std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting) {
-    return who(job) + " refused: " + std::to_string(waiting) + " of " +
+std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,
+                 const ClientNames& names) {
+    return who(job, names) + " refused: " + std::to_string(waiting) + " of " +
            std::to_string(settings.limit) + " wait on this line, at most " +
            std::to_string(settings.per_client) + " of one client";
 }
 
-std::string shed(const Job& job) {
-    return who(job) + " given up: the queue is full, and its host has the most waiting";
+std::string shed(const Job& job, const ClientNames& names) {
+    return who(job, names) + " given up: the queue is full, and its host has the most waiting";
 }
 
 std::string line_rests(Duration rest, const Group& group) {
@@ -54,8 +60,8 @@ std::string line_rests(Duration rest, const Group& group) {
            std::to_string(group.station) + " did not answer and may do so late";
 }
 
-std::string expired(TimePoint now, const Job& job, bool transmitted) {
-    return who(job) + " given up after " + ms(now - job.arrived) +
+std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names) {
+    return who(job, names) + " given up after " + ms(now - job.arrived) +
            (transmitted ? ": no answer before its deadline"
                         : ": it could not end before its deadline");
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/settings.hpp"
@@ -11,11 +12,14 @@
 /// read it.
 namespace panelgate::arbiter::explain {
 
-std::string start(TimePoint now, const Group& group, const JobQueue& queue);
-std::string offline(TimePoint now, const Job& job, const StationHealth& health);
-std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting);
-std::string shed(const Job& job);
+std::string start(TimePoint now, const Group& group, const JobQueue& queue,
+                  const ClientNames& names);
+std::string offline(TimePoint now, const Job& job, const StationHealth& health,
+                    const ClientNames& names);
+std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,
+                 const ClientNames& names);
+std::string shed(const Job& job, const ClientNames& names);
 std::string line_rests(Duration rest, const Group& group);
-std::string expired(TimePoint now, const Job& job, bool transmitted);
+std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names);
 
 }  // namespace panelgate::arbiter::explain

@@ -81,6 +81,11 @@ void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
     actions_.push_back(StationEvent{kind, station, by});
 }
 
+void Ledger::written(const Group& group, bool ended) {
+    if (group.request.is_read()) return;
+    actions_.push_back(Written{group.station, group.request.access().write, ended});
+}
+
 void Ledger::on_started(TimePoint now, const Job& job) {
     line_.queue_wait[static_cast<std::size_t>(job.priority)].observe(now - job.arrived);
 }

@@ -2,17 +2,10 @@
 
 #include <utility>
 
+#include "panelgate/modbus/may_change.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
-namespace {
-
-/// Could writing these items change what a read of `items` gives?
-bool may_change(const std::optional<modbus::Span>& written, const modbus::Span& items) {
-    return !written || written->table != items.table || written->overlaps(items);
-}
-
-}  // namespace
 
 void ReadCache::store(const ReadSpan& span, Bytes reply, TimePoint sampled) {
     for (const std::uint8_t station : {span.station, kBroadcast}) {
@@ -43,7 +36,7 @@ void ReadCache::on_write(TimePoint now, std::uint8_t station, const modbus::Requ
     const std::optional<modbus::Span> items = request.access().write;
     entries_.remove_if([&](const Entry& entry) {
         return (station == kBroadcast || entry.span.station == station) &&
-               may_change(items, entry.span.items);
+               modbus::may_change(items, entry.span.items);
     });
 }
 

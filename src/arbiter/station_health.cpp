@@ -6,6 +6,7 @@ namespace panelgate::arbiter {
 
 bool StationHealth::on_reply(TimePoint now) {
     const bool back = offline();
+    returns_ += silent_ > 0 ? 1u : 0u;
     state_ = Health::online;
     silent_ = 0;
     last_success_ = now;
@@ -13,6 +14,7 @@ bool StationHealth::on_reply(TimePoint now) {
 }
 
 void StationHealth::on_damaged() {
+    returns_ += silent_ > 0 ? 1u : 0u;
     silent_ = 0;
     state_ = Health::suspect;
 }

@@ -136,6 +136,7 @@ Attempt Arbiter::take_active(TimePoint now) {
     Attempt attempt = std::move(*active_);
     active_.reset();
     ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
+    ledger_.written(attempt.group(), true);
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().request))
         ledger_.event(Kind::echo, attempt.group().station);
     // Where a reply may come before the request has left, early bytes tell nothing.

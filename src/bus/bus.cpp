@@ -50,6 +50,7 @@ struct Bus::State final : public line::Line::Events {
           recorder(settings.trace_frames),
           decisions(settings.trace_decisions),
           doctor(settings),
+          load(c.now()),
           refusals(executor, clock),
           drive(clock, *line, arbiter, *this) {}
 
@@ -67,6 +68,9 @@ struct Bus::State final : public line::Line::Events {
     void act(arbiter::Note& note);
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
+    void act(const arbiter::Written& written) {
+        observe(WriteEvent{written.station, written.items, written.ended});
+    }
     void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {
         if (arbiter.wants_end(now)) arbiter.on_end(now, line->unsent().value_or(Duration::zero()));
@@ -74,9 +78,13 @@ struct Bus::State final : public line::Line::Events {
     void check_delivery(TimePoint now);
     void on_deadline(TimePoint now);
     void settled(TimePoint now) {
+        load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, arbiter, *line);
     }
     void answer(Pending pending, Answer answer);
+    WallTime on_the_wall(TimePoint at) const {
+        return wall_time_of(at, clock.now(), rt::wall_now());
+    }
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
@@ -88,20 +96,22 @@ struct Bus::State final : public line::Line::Events {
     arbiter::Arbiter arbiter;
     Rights rights;
     RequestCounters counters;
+    std::uint64_t happened = 0;  ///< the last sequence number of a frame or decision
     FlightRecorder recorder;
     DecisionRecorder decisions;
     LineDoctor doctor;
-    ClientNames client_names;
-    mutable LoadMeter load;
+    LoadMeter load;
     Refusals refusals;
     line::Drive<arbiter::Arbiter, State> drive;
     std::map<arbiter::Ticket, Pending> pending;
     bool up = false;
+    std::uint64_t ups = 0;  ///< how often the line came up
     std::string why_down = "not opened yet";
 };
 
 void Bus::State::on_up() {
     up = true;
+    ++ups;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
     observe(LineEvent{true, {}});
     arbiter.set_lead(line->lead());
@@ -130,7 +140,7 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
-    entry.deed = deed_of(request, name_of(client_names, request.client));
+    entry.deed = deed_of(request, arbiter.client_names().of(request.client));
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -184,10 +194,12 @@ void Bus::State::act(arbiter::Note& note) {
                  {"why", note.why}});
     }
     TraceFrame frame;
+    frame.sequence = ++happened;
     frame.at = note.at;
     frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
     frame.why = std::move(note.why);
+    frame.time = on_the_wall(note.at);
     recorder.add(std::move(frame));
 }
 
@@ -195,7 +207,7 @@ void Bus::State::act(arbiter::Decision& decision) {
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
     }
-    decisions.add({0, decision.at, std::move(decision.text)});
+    decisions.add({++happened, decision.at, std::move(decision.text), on_the_wall(decision.at)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
@@ -225,6 +237,8 @@ void Bus::State::answer(Pending entry, Answer result) {
     observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, rt::wall_seconds());
+    if (!result.pdu && result.pdu.error() == Fault::line_down)
+        result.why = up ? "its device is being closed" : why_down;
     const bool refused = !result.transmitted && result.source == Source::bus;
     auto hand_over = [handler = std::move(entry.handler), result = std::move(result)]() mutable {
         handler(std::move(result));
@@ -265,13 +279,11 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::cancel(ClientId client) {
-    state_->client_names.erase(client);
     state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); });
 }
 
 void Bus::name_client(ClientId client, std::string name) {
-    if (state_->client_names.size() >= arbiter::BusShares::kClients) return;
-    state_->client_names.insert_or_assign(client, std::move(name));
+    state_->arbiter.name_client(client, std::move(name));
 }
 
 LineStatus Bus::status() const {
@@ -281,7 +293,7 @@ LineStatus Bus::status() const {
     status.up = state_->up;
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.queue_depth = state_->arbiter.queue_depth();
-    status.load_percent = state_->load.update(state_->clock.now(), state_->arbiter.counters().busy);
+    status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
     if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
     status.findings = state_->doctor.findings();
@@ -289,13 +301,14 @@ LineStatus Bus::status() const {
 }
 
 std::vector<ClientShare> Bus::clients() const {
-    return client_shares(state_->arbiter.shares(), state_->client_names);
+    return client_shares(state_->arbiter.shares(), state_->arbiter.client_names());
 }
 
 StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
     status.state = health.state();
+    status.returns = health.returns() + state_->ups;
     if (const auto last = health.last_success()) status.last_success = state_->clock.now() - *last;
     return status;
 }
@@ -308,6 +321,14 @@ std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->reco
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
     return state_->decisions.last(last);
+}
+
+std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->recorder.since(sequence, most);
+}
+
+std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->decisions.since(sequence, most);
 }
 
 bool Bus::idle() const { return state_->arbiter.idle(); }

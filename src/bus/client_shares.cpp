@@ -4,18 +4,14 @@
 
 namespace panelgate::bus {
 
-std::string name_of(const ClientNames& names, ClientId client) {
-    const auto name = names.find(client);
-    return name == names.end() ? "client " + std::to_string(client) : name->second;
-}
-
-std::vector<ClientShare> client_shares(const arbiter::BusShares& shares, const ClientNames& names) {
+std::vector<ClientShare> client_shares(const arbiter::BusShares& shares,
+                                       const arbiter::ClientNames& names) {
     constexpr std::size_t kShown = 100;
     Duration all{};
     std::vector<ClientShare> list;
     for (const auto& [client, share] : shares.all()) {
         ClientShare entry;
-        entry.name = name_of(names, client);
+        entry.name = names.of(client);
         entry.busy = share.busy;
         entry.transactions = share.transactions;
         all += share.busy;

@@ -18,6 +18,7 @@ RequestCounters::RequestCounters(const Stations& stations) {
     for (const auto& [id, station] : stations) {
         stations_[id].station = station.name;
         stations_[id].configured = true;
+        for (const std::uint8_t function : station.functions) stations_[id].requests[function];
     }
 }
 

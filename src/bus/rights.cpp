@@ -1,11 +1,34 @@
 #include "panelgate/bus/rights.hpp"
 
+#include <cstdlib>
+
 namespace panelgate::bus {
+namespace {
+
+modbus::ExceptionCode code_of(Rule rule) {
+    switch (rule) {
+        case Rule::read_only:
+        case Rule::broadcast_over_read_only:
+        case Rule::function:
+            return modbus::ExceptionCode::illegal_function;
+        case Rule::quantity:
+            return modbus::ExceptionCode::illegal_data_value;
+        case Rule::range:
+        case Rule::write_protected:  // the manuals disagree about the code
+            return modbus::ExceptionCode::illegal_data_address;
+    }
+    std::abort();
+}
+
+Refusal refusal_by(Rule rule, std::string station, std::string why = {}) {
+    return {rule, std::move(station), code_of(rule), std::move(why)};
+}
+
+}  // namespace
 
 Result<Bytes> answer_to(const Refusal& refusal, std::uint8_t function) {
-    if (refusal.rule == Refusal::Rule::guard)
-        return modbus::encode_exception(function, refusal.code);
-    return Fault::denied;
+    if (is_access(refusal.rule)) return Fault::denied;
+    return modbus::encode_exception(function, refusal.code);
 }
 
 std::optional<Refusal> Rights::judge(std::uint8_t station, const modbus::Request& request) const {
@@ -15,10 +38,9 @@ std::optional<Refusal> Rights::judge(std::uint8_t station, const modbus::Request
     }
     const auto listed = stations_.find(station);
     if (listed == stations_.end() || !listed->second.guard) return std::nullopt;
-    const auto code = listed->second.guard(request);
-    if (!code) return std::nullopt;
-    return Refusal{Refusal::Rule::guard, listed->second.name,
-                   static_cast<modbus::ExceptionCode>(*code)};
+    auto objection = listed->second.guard(request);
+    if (!objection) return std::nullopt;
+    return refusal_by(objection->rule, listed->second.name, std::move(objection->why));
 }
 
 std::optional<Refusal> Rights::judge_write(std::uint8_t station) const {
@@ -26,16 +48,14 @@ std::optional<Refusal> Rights::judge_write(std::uint8_t station) const {
     const auto listed = stations_.find(station);
     if (listed == stations_.end() || listed->second.access != Access::read_only)
         return std::nullopt;
-    return Refusal{Refusal::Rule::read_only, listed->second.name,
-                   modbus::ExceptionCode::illegal_function};
+    return refusal_by(Rule::read_only, listed->second.name);
 }
 
 /// It reaches every station: one that must not be written forbids it.
 std::optional<Refusal> Rights::judge_broadcast() const {
     for (const auto& [id, station] : stations_) {
         if (station.access != Access::read_only) continue;
-        return Refusal{Refusal::Rule::broadcast_over_read_only, station.name,
-                       modbus::ExceptionCode::illegal_function};
+        return refusal_by(Rule::broadcast_over_read_only, station.name);
     }
     return std::nullopt;
 }

@@ -1,6 +1,25 @@
 #include "panelgate/bus/station_settings.hpp"
 
+#include <cstdlib>
+
 namespace panelgate::bus {
+
+std::string_view label(Rule rule) {
+    switch (rule) {
+        case Rule::read_only:
+        case Rule::broadcast_over_read_only:
+            return "access";
+        case Rule::function:
+            return "function";
+        case Rule::quantity:
+            return "quantity";
+        case Rule::range:
+            return "range";
+        case Rule::write_protected:
+            return "read-only";
+    }
+    std::abort();
+}
 
 std::string name_of(const Stations& stations, std::uint8_t id) {
     const auto listed = stations.find(id);

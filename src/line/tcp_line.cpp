@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "descriptor_line.hpp"
+#include "name_lookup.hpp"
 #include "panelgate/rt/keep_alive.hpp"
 
 namespace panelgate::line {
@@ -46,8 +47,7 @@ void set_options(int fd) {
     ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof patience);
 }
 
-/// Nothing on a name. A number needs no resolver, which answers one line after the other: a name
-/// server that is silent must not keep this line waiting.
+/// Nothing on a name. A number needs no look-up, and no thread for it.
 std::optional<tcp::endpoint> numeric(const TcpEndpoint& endpoint) {
     error_code is_name;
     const asio::ip::address address = asio::ip::make_address(endpoint.host, is_name);
@@ -63,7 +63,7 @@ class TcpLine final : public DescriptorLine {
             TcpEndpoint endpoint)
         : DescriptorLine(executor, clock, std::move(settings)),
           endpoint_(std::move(endpoint)),
-          resolver_(executor),
+          lookup_(executor, endpoint_),
           socket_(executor),
           patience_(clock.make_alarm()) {}
     ~TcpLine() override { stop(); }
@@ -82,7 +82,8 @@ class TcpLine final : public DescriptorLine {
         return ::send(fd(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
     }
     void cancel_open() override;
-    void connect(const tcp::resolver::results_type& addresses);
+    void give_up();
+    void connect(const NameLookup::Addresses& addresses);
     void connected();
     void failed(const std::string& why) {
         cancel_open();
@@ -95,7 +96,7 @@ class TcpLine final : public DescriptorLine {
     }
 
     TcpEndpoint endpoint_;
-    tcp::resolver resolver_;
+    NameLookup lookup_;
     tcp::socket socket_;  ///< while it connects
     std::unique_ptr<rt::Alarm> patience_;
     std::uint64_t attempt_ = 0;
@@ -106,24 +107,24 @@ class TcpLine final : public DescriptorLine {
 
 void TcpLine::begin_open() {
     ++attempt_;
-    patience_->arm(clock().now() + kConnectTimeout, [this] { failed("no answer within 5 s"); });
+    patience_->arm(clock().now() + kConnectTimeout, [this] { give_up(); });
     const auto address = numeric(endpoint_);
     if (!address) return resolve();
-    connect(tcp::resolver::results_type::create(*address, endpoint_.host, endpoint_.port));
+    connect(NameLookup::Addresses::create(*address, endpoint_.host, endpoint_.port));
+}
+
+void TcpLine::give_up() {
+    failed(lookup_.waits() ? "no name server tells its address (5 s)" : "no answer within 5 s");
 }
 
 void TcpLine::resolve() {
-    resolver_.async_resolve(
-        endpoint_.host, endpoint_.port, tcp::resolver::numeric_service,
-        [this, current = current()](const error_code& error,
-                                    const tcp::resolver::results_type& addresses) {
-            if (!current()) return;
-            if (error) return failed(error.message());
-            connect(addresses);
-        });
+    lookup_.ask([this](const error_code& error, const NameLookup::Addresses& addresses) {
+        if (error) return failed(error.message());
+        connect(addresses);
+    });
 }
 
-void TcpLine::connect(const tcp::resolver::results_type& addresses) {
+void TcpLine::connect(const NameLookup::Addresses& addresses) {
     asio::async_connect(socket_, addresses,
                         [this, current = current()](const error_code& error, const tcp::endpoint&) {
                             if (!current()) return;
@@ -148,7 +149,7 @@ void TcpLine::connected() {
 
 void TcpLine::cancel_open() {
     ++attempt_;
-    resolver_.cancel();
+    lookup_.cancel();
     patience_->cancel();
     error_code ignored;
     socket_.close(ignored);

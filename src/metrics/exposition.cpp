@@ -1,7 +1,6 @@
 #include "panelgate/metrics/exposition.hpp"
 
-#include <prometheus/text_serializer.h>
-
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -37,10 +36,16 @@ void each_station(const Snapshot& snapshot, Add add) {
     }
 }
 
-/// Seen from the start with 0: what a station is asked and how that ends on any day.
-constexpr std::array<std::uint8_t, 8> kUsualFunctions{1, 2, 3, 4, 5, 6, 15, 16};
-constexpr std::array kUsualOutcomes{Outcome::ok, Outcome::exception, Outcome::timeout,
-                                    Outcome::damaged};
+/// Seen with 0 from a function's first use on: how that ends on any day.
+constexpr std::array kUsualOutcomes{Outcome::ok, Outcome::exception, Outcome::timeout};
+
+bool is_usual(Outcome outcome) {
+    return std::ranges::find(kUsualOutcomes, outcome) != kUsualOutcomes.end();
+}
+
+bool is_used(const OutcomeCounts& counts) {
+    return std::ranges::any_of(kAllOutcomes, [&](Outcome outcome) { return counts[outcome] > 0; });
+}
 
 std::string function_label(std::uint8_t function) {
     return function == bus::kOtherFunctions ? "other" : std::to_string(function);
@@ -52,39 +57,46 @@ void add_requests_of(Family& family, const StationReport& station, const Labels&
                             std::string(label(outcome))),
                        count);
     };
-    for (const std::uint8_t function : kUsualFunctions) {
-        if (station.requests.contains(function)) continue;
-        for (const Outcome outcome : kUsualOutcomes) add(function, outcome, 0);
-    }
     for (const auto& [function, counts] : station.requests) {
-        for (const Outcome outcome : kAllOutcomes) add(function, outcome, counts[outcome]);
+        const bool used = is_used(counts);
+        for (const Outcome outcome : kAllOutcomes) {
+            const bool expected = used ? is_usual(outcome) : outcome == Outcome::ok;
+            if (expected || counts[outcome] > 0) add(function, outcome, counts[outcome]);
+        }
     }
 }
 
 void add_requests(Families& out, const Snapshot& snapshot) {
     Family requests = make_counter("panelgate_requests_total",
                                    "Requests answered, by function code and outcome.");
-    Family duration = make_histogram("panelgate_request_duration_seconds",
-                                     "Time from the arrival of a request to its answer.");
     each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
         add_requests_of(requests, station, of_station(line, station));
-        duration.histogram(of_station(line, station), station.request_duration);
     });
     out.push_back(requests.take());
-    out.push_back(duration.take());
 }
 
-void add_wire_times(Families& out, const Snapshot& snapshot) {
-    Family transaction = make_histogram("panelgate_bus_transaction_seconds",
-                                        "Time from the first bit out to the last bit in.");
-    Family turnaround = make_histogram("panelgate_turnaround_seconds",
-                                       "Time a panel takes from a request to its reply.");
+void add_times(Families& out, const Snapshot& snapshot, const char* name, const char* help,
+               const Histogram& (*of)(const StationReport&)) {
+    if (out.ended()) return;
+    Family family = make_histogram(name, help);
     each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
-        transaction.histogram(of_station(line, station), station.wire.bus_transaction);
-        turnaround.histogram(of_station(line, station), station.wire.turnaround);
+        family.histogram(of_station(line, station), of(station));
     });
-    out.push_back(transaction.take());
-    out.push_back(turnaround.take());
+    out.push_back(family.take());
+}
+
+void add_station_times(Families& out, const Snapshot& snapshot) {
+    using Station = const StationReport&;
+    using Times = const Histogram&;
+    add_times(out, snapshot, "panelgate_request_duration_seconds",
+              "Time from the arrival of a request to its answer.",
+              [](Station station) -> Times { return station.request_duration; });
+    add_times(out, snapshot, "panelgate_bus_transaction_seconds",
+              "Time from the first bit out to the last bit in.",
+              [](Station station) -> Times { return station.wire.bus_transaction; });
+    add_times(out, snapshot, "panelgate_turnaround_seconds",
+              "Time a panel takes from a request to its reply.",
+              [](Station station) -> Times { return station.wire.turnaround; });
 }
 
 struct WireCounter {
@@ -233,6 +245,13 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
     out.push_back(errors.take());
 }
 
+void add_loop(Families& out, const Snapshot& snapshot) {
+    Family lag = make_histogram("panelgate_loop_lag_seconds",
+                                "How late the one loop comes to a timer, sampled each 100 ms.");
+    lag.histogram({}, snapshot.runtime.loop_lag);
+    out.push_back(lag.take());
+}
+
 void add_process(Families& out, const Snapshot& snapshot) {
     Family build = make_gauge("panelgate_build_info", "1, with the version as a label.");
     build.gauge({{"version", snapshot.version}}, 1);
@@ -265,25 +284,30 @@ void add_process(Families& out, const Snapshot& snapshot) {
           process.start_time_unix);
 }
 
+using Part = void (*)(Families&, const Snapshot&);
+constexpr Part kParts[] = {
+    add_requests,      add_station_times, add_wire_counters, add_exceptions, add_line_counters,
+    add_uart_counters, add_line_state,    add_station_state, add_points,     add_relays,
+    add_listeners,     add_http,          add_loop,          add_process,
+};
+
 }  // namespace
 
+void exposition(const Snapshot& snapshot, const TakeText& take) {
+    Families families(take);
+    for (const Part add : kParts) {
+        if (families.ended()) return;
+        add(families, snapshot);
+    }
+}
+
 std::string exposition(const Snapshot& snapshot) {
-    Families families;
-    add_requests(families, snapshot);
-    add_wire_times(families, snapshot);
-    add_wire_counters(families, snapshot);
-    add_exceptions(families, snapshot);
-    add_line_counters(families, snapshot);
-    add_uart_counters(families, snapshot);
-    add_line_state(families, snapshot);
-    add_station_state(families, snapshot);
-    add_points(families, snapshot);
-    add_relays(families, snapshot);
-    add_listeners(families, snapshot);
-    add_http(families, snapshot);
-    add_process(families, snapshot);
-    std::erase_if(families, [](const auto& family) { return family.metric.empty(); });
-    return prometheus::TextSerializer{}.Serialize(families);
+    std::string text;
+    exposition(snapshot, [&](std::string_view piece) {
+        text += piece;
+        return true;
+    });
+    return text;
 }
 
 }  // namespace panelgate::metrics

@@ -1,9 +1,23 @@
 #include "families.hpp"
 
+#include <prometheus/text_serializer.h>
+
+#include <sstream>
+#include <vector>
+
 namespace panelgate::metrics {
 
 using prometheus::ClientMetric;
 using prometheus::MetricType;
+
+void Families::push_back(prometheus::MetricFamily family) {
+    if (ended_ || family.metric.empty()) return;
+    std::vector<prometheus::MetricFamily> one;
+    one.push_back(std::move(family));
+    std::ostringstream text;
+    prometheus::TextSerializer{}.Serialize(text, one);
+    ended_ = !take_(text.view());
+}
 
 Family::Family(std::string name, std::string help, MetricType type) {
     family_.name = std::move(name);

@@ -7,11 +7,26 @@
 #include <vector>
 
 #include "panelgate/base/histogram.hpp"
+#include "panelgate/metrics/exposition.hpp"
 
 namespace panelgate::metrics {
 
 using Labels = std::vector<prometheus::ClientMetric::Label>;
-using Families = std::vector<prometheus::MetricFamily>;
+
+/// Takes families as they are made and hands on their text: one is in memory at a time. A family
+/// without a metric has none.
+class Families {
+  public:
+    explicit Families(const TakeText& take) : take_(take) {}
+
+    void push_back(prometheus::MetricFamily family);
+    /// Nobody wants the text any more: what is still to be made need not be.
+    bool ended() const { return ended_; }
+
+  private:
+    const TakeText& take_;
+    bool ended_ = false;
+};
 
 /// A family under construction. `help` must not contain backslashes or newlines: the serializer of
 /// prometheus-cpp 1.0 does not escape them.

@@ -9,6 +9,7 @@ PollSchedule::PollSchedule(std::span<const Duration> intervals, TimePoint start,
                            const Settings& settings)
     : start_(start), settings_(settings), entries_(intervals.size()) {
     settings_.max_outstanding = std::max<std::size_t>(settings_.max_outstanding, 1);
+    settings_.extra_burst = std::max<std::size_t>(settings_.extra_burst, 1);
     set_phases(intervals);
     for (std::size_t i = 0; i < entries_.size(); ++i) queue_.emplace(entries_[i].due, i);
 }
@@ -31,7 +32,7 @@ void PollSchedule::set_phases(std::span<const Duration> intervals) {
         const Duration first_step = std::min(every, settings_.first_within) / count;
         for (Duration::rep k = 0; k < count; ++k) {
             entries_[members[static_cast<std::size_t>(k)]] = {
-                every, k * step + offset, start_ + k * first_step + offset, false};
+                every, k * step + offset, start_ + k * first_step + offset, false, false};
         }
         offset += shift;
     }
@@ -48,6 +49,7 @@ std::uint64_t PollSchedule::advance(std::size_t index, TimePoint now) {
     const auto passed = turn_after(now) - turn_after(entry.due);
     queue_.erase({entry.due, index});
     entry.due = origin + turn_after(now) * entry.every;
+    entry.hastened = false;
     queue_.emplace(entry.due, index);
     return static_cast<std::uint64_t>(passed) + 1;
 }
@@ -73,6 +75,27 @@ std::vector<std::size_t> PollSchedule::take_due(TimePoint now) {
         due.push_back(index);
     }
     return due;
+}
+
+void PollSchedule::hasten(std::size_t index, TimePoint now) {
+    Entry& entry = entries_[index];
+    if (entry.under_way || entry.hastened) return;
+    const Duration burst =
+        settings_.extra_every * static_cast<Duration::rep>(settings_.extra_burst - 1);
+    const TimePoint turn = std::max({now, extra_free_ - burst, last_extra_ + 1ns});
+    if (entry.due <= turn) return;
+    last_extra_ = turn;
+    extra_free_ = std::max(extra_free_, now) + settings_.extra_every;
+    again_at(index, turn);
+    entry.hastened = true;
+}
+
+void PollSchedule::again_at(std::size_t index, TimePoint when) {
+    Entry& entry = entries_[index];
+    if (entry.under_way || entry.due <= when) return;
+    queue_.erase({entry.due, index});
+    entry.due = when;
+    queue_.emplace(entry.due, index);
 }
 
 void PollSchedule::on_done(std::size_t index, TimePoint now) {

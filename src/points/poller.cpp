@@ -18,6 +18,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     void ask_all();
     void ask(std::size_t index, StationPolls::Due due);
     void on_answer(std::size_t index, std::size_t read, const bus::Answer& answer, TimePoint asked);
+    void on_write(const bus::WriteEvent& write);
     void arm();
 
     rt::Clock& clock;
@@ -56,6 +57,21 @@ void Poller::State::on_answer(std::size_t index, std::size_t read, const bus::An
     arm();
 }
 
+/// Asks nobody: it is told from inside the bus.
+void Poller::State::on_write(const bus::WriteEvent& write) {
+    const TimePoint now = clock.now();
+    for (Station& station : stations) {
+        if (write.station != 0 && write.station != station.id) continue;
+        if (write.ended) {
+            station.polls.on_written(now, write.items);
+            continue;
+        }
+        const auto wants = station.polls.on_write(now, write.items);
+        if (update && !wants.empty()) update(station.id, wants);
+    }
+    if (write.ended) arm();
+}
+
 void Poller::State::arm() {
     std::optional<TimePoint> next;
     for (const Station& station : stations) {
@@ -82,6 +98,13 @@ Poller::Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation>
 Poller::~Poller() { stop(); }
 
 void Poller::on_update(Update update) { state_->update = std::move(update); }
+
+std::function<void(const bus::WriteEvent&)> Poller::write_listener() const {
+    return [weak = std::weak_ptr(state_)](const bus::WriteEvent& write) {
+        const auto state = weak.lock();
+        if (state && state->running) state->on_write(write);
+    };
+}
 
 void Poller::start() {
     state_->running = true;

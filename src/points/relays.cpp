@@ -43,7 +43,9 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
-        Bytes written;  ///< the last write that was confirmed
+        Bytes written;              ///< the last write that was confirmed
+        TimePoint written_for;      ///< the turn that it was of
+        std::uint64_t returns = 0;  ///< of the target, then
     };
     explicit State(rt::Clock& c) : clock(c) {}
     using Then = void (State::*)(Entry&, const bus::Answer&);
@@ -52,6 +54,7 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void read(Entry& entry);
     void on_read(Entry& entry, const bus::Answer& answer);
     void on_written(Entry& entry, const bus::Answer& answer);
+    bool holds(const Entry& entry, const Bytes& write) const;
     void check_target(Entry& entry);
     void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
     void set(Entry& entry, RelayState state, std::string why = {});
@@ -97,13 +100,20 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     }
     ++entry.status.reads;
     Bytes write = write_of(entry.route, *answer.pdu);
-    if (entry.route.relay.on_change && write == entry.written) {
+    if (entry.route.relay.on_change && holds(entry, write)) {
         check_target(entry);
         arm(entry);
         return;
     }
     entry.written = write;
     ask(entry, *entry.route.to, entry.route.to_station, std::move(write), &State::on_written);
+}
+
+/// The target has this, as far as anybody can know without asking it.
+bool Relays::State::holds(const Entry& entry, const Bytes& write) const {
+    const RelayRoute& route = entry.route;
+    return write == entry.written && entry.due - entry.written_for < route.relay.refresh &&
+           route.to->station_status(route.to_station).returns == entry.returns;
 }
 
 /// Nothing has to be written; but a target that has gone may come back with something else.
@@ -124,6 +134,8 @@ void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
     } else {
         ++entry.status.writes;
         entry.status.last_write = clock.now();
+        entry.written_for = entry.due;
+        entry.returns = entry.route.to->station_status(entry.route.to_station).returns;
         set(entry, RelayState::ok);
     }
     arm(entry);

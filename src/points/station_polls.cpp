@@ -5,10 +5,14 @@
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/may_change.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::points {
 namespace {
+
+/// What was written and could not be read behind that is asked for again so soon.
+constexpr Duration kAgain = 5s;
 
 std::vector<Duration> intervals_of(const std::vector<PlannedRead>& plan) {
     std::vector<Duration> intervals;
@@ -44,7 +48,8 @@ Quality quality_of(const Reading& reading, Duration every, TimePoint now) {
     if (!reading.sampled) return Quality::bad;
     const Duration age = now - *reading.sampled;
     if (age > std::max<Duration>(10 * every, 10s)) return Quality::bad;
-    return reading.failing || age > 2 * every + 1s ? Quality::stale : Quality::good;
+    return reading.failing || reading.outdated() || age > 2 * every + 1s ? Quality::stale
+                                                                         : Quality::good;
 }
 
 StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start)
@@ -72,6 +77,11 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
                                                  const Result<Bytes>& pdu, TimePoint sampled) {
     schedule_.on_done(read, now);
     const PlannedRead planned = plan_[read];
+    // Written since it was asked for: whatever came of it, it is old.
+    const bool overtaken = std::ranges::any_of(planned.wants, [&](std::size_t want) {
+        return readings_[want].written && sampled < *readings_[want].written;
+    });
+    if (overtaken) schedule_.hasten(read, now);
     const auto exception = pdu ? modbus::exception_of(*pdu) : std::nullopt;
     if (pdu && !exception) {
         take(planned, *pdu, sampled);
@@ -79,8 +89,38 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
+        if (is_outdated(planned)) schedule_.again_at(read, now + kAgain);
     }
     return planned.wants;
+}
+
+std::vector<std::size_t> StationPolls::on_write(TimePoint now,
+                                                const std::optional<modbus::Span>& items) {
+    std::vector<std::size_t> outdated;
+    for (std::size_t i = 0; i < wants_.size(); ++i) {
+        Reading& reading = readings_[i];
+        if (!modbus::may_change(items, wants_[i].span)) continue;
+        const bool was_old = reading.outdated();
+        reading.written = now;
+        if (!was_old && reading.outdated()) outdated.push_back(i);
+    }
+    return outdated;
+}
+
+void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& items) {
+    for (const bool themselves : {true, false}) {
+        for (std::size_t i = 0; i < plan_.size(); ++i) {
+            const modbus::Span& span = plan_[i].span;
+            const bool direct = items && items->overlaps(span);
+            if (direct == themselves && modbus::may_change(items, span) && is_outdated(plan_[i]))
+                schedule_.hasten(i, now);
+        }
+    }
+}
+
+bool StationPolls::is_outdated(const PlannedRead& read) const {
+    return std::ranges::any_of(read.wants,
+                               [&](std::size_t want) { return readings_[want].outdated(); });
 }
 
 void StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {

@@ -69,6 +69,22 @@ std::optional<std::string> why_no_registers(const profile::PanelProfile& profile
            (count == 1 ? " register" : " registers at once");
 }
 
+Bytes pdu_of(const profile::PanelProfile& profile, const Point& point,
+             const std::vector<std::uint16_t>& items) {
+    if (point.table == modbus::Table::coils)
+        return write_coil(profile, point.address, items.front() != 0);
+    if (point.bit) return write_bit(profile, point, items.front() != 0);
+    if (items.size() == 1 && profile.has_function(modbus::kWriteSingleRegister))
+        return modbus::encode_write_register(point.address, items.front());
+    return modbus::encode_write_registers(point.address, items);
+}
+
+/// What a read of these items will show; of one bit of a word there is only the bit.
+Value written_value(const Point& point, const std::vector<std::uint16_t>& items) {
+    if (point.type == Type::boolean) return items.front() != 0;
+    return *decode(point, items);
+}
+
 }  // namespace
 
 std::optional<std::string> why_unwritable(const profile::PanelProfile& profile,
@@ -83,18 +99,14 @@ std::optional<std::string> why_unwritable(const profile::PanelProfile& profile,
     return why_no_registers(profile, point.count());
 }
 
-Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& point,
-                             const Value& value) {
+Encoded<PointWrite> write_request(const profile::PanelProfile& profile, const Point& point,
+                                  const Value& value, Rounding rounding) {
     if (!point.writable) return refusal(point.name + " is not writable");
     if (auto why = why_unwritable(profile, point)) return refusal(std::move(*why));
-    const auto items = encode(point, value);
+    const auto items = encode(point, value, rounding);
     if (!items) return items.error();
-    if (point.table == modbus::Table::coils)
-        return write_coil(profile, point.address, items->front() != 0);
-    if (point.bit) return write_bit(profile, point, items->front() != 0);
-    if (items->size() == 1 && profile.has_function(modbus::kWriteSingleRegister))
-        return modbus::encode_write_register(point.address, items->front());
-    return modbus::encode_write_registers(point.address, *items);
+    return PointWrite{pdu_of(profile, point, *items), written_value(point, *items),
+                      label_of(point, *items)};
 }
 
 std::vector<Interpretation> interpretations(std::span<const std::uint16_t> registers) {

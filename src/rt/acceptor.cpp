@@ -2,6 +2,7 @@
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/address.hpp>
+#include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <utility>
@@ -60,12 +61,14 @@ Acceptor::Acceptor(const asio::any_io_executor& executor, Accepted accepted, Fai
 
 Acceptor::~Acceptor() { close(); }
 
-error_code Acceptor::open(const std::string& address, std::uint16_t port) {
+error_code Acceptor::open(const std::string& address, std::uint16_t port, bool ipv6_only) {
     tcp::acceptor& acceptor = state_->acceptor;
     error_code error;
     const tcp::endpoint endpoint(asio::ip::make_address(address, error), port);
     if (!error) acceptor.open(endpoint.protocol(), error);
     if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error && endpoint.address().is_v6())
+        acceptor.set_option(asio::ip::v6_only(ipv6_only), error);
     if (!error) acceptor.bind(endpoint, error);
     if (!error) acceptor.listen(tcp::acceptor::max_listen_connections, error);
     if (error) {

@@ -2,8 +2,13 @@
 
 #include <algorithm>
 #include <iterator>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "panelgate/base/number_text.hpp"
+#include "panelgate/base/suggest.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/sim/collision.hpp"
 
@@ -48,11 +53,16 @@ constexpr Fault kFaults[] = {
     share<&Misbehaviour::duplicate>("duplicate"),
 };
 
-std::string number(double value) {
-    std::string text = std::to_string(value);
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.back() == '.') text.pop_back();
-    return text;
+std::string unknown_fault(const std::string& name) {
+    std::vector<std::string_view> names;
+    std::string all;
+    for (const Fault& fault : kFaults) {
+        names.emplace_back(fault.name);
+        all += (all.empty() ? "" : ", ") + std::string(fault.name);
+    }
+    const std::string near = nearest(name, names);
+    const std::string text = "there is no fault '" + name + '\'';
+    return near.empty() ? text + "; faults are " + all : text + "; did you mean '" + near + "'?";
 }
 
 }  // namespace
@@ -69,13 +79,11 @@ std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviou
         const auto known =
             std::ranges::find_if(kFaults, [&](const Fault& fault) { return fault.name == name; });
         if (known == std::end(kFaults)) {
-            std::string all;
-            for (const Fault& fault : kFaults)
-                all += (all.empty() ? "" : ", ") + std::string(fault.name);
-            return "there is no fault '" + name + "'; faults are " + all;
+            return unknown_fault(name);
         }
         if (!(value >= 0 && value <= known->most)) {
-            return name + " must be from 0 to " + number(known->most) + ", not " + number(value);
+            return name + " must be from 0 to " + number_text(known->most) + ", not " +
+                   number_text(value);
         }
         known->set(made, value);
     }

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "caller.hpp"
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/access_list.hpp"
@@ -45,9 +46,20 @@ void set_up(tcp::socket& socket) {
 }
 
 std::string text(const tcp::endpoint& peer) {
-    const std::string address = peer.address().to_string();
-    return (peer.address().is_v6() ? "[" + address + "]" : address) + ":" +
-           std::to_string(peer.port());
+    return endpoint_text(peer.address().to_string(), peer.port());
+}
+
+std::shared_ptr<Shared> share(rt::Clock& clock, Settings settings, UnitMap units,
+                              std::string version) {
+    auto own_answers =
+        std::make_shared<OwnAnswers>(clock, settings.own_answers, settings.own_answers_period);
+    return std::make_shared<Shared>(Shared{std::move(settings),
+                                           std::move(units),
+                                           std::move(version),
+                                           clock,
+                                           {},
+                                           clock.now(),
+                                           std::move(own_answers)});
 }
 
 }  // namespace
@@ -56,8 +68,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
   public:
     Core(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings, UnitMap units,
          std::string version)
-        : shared_(std::make_shared<Shared>(Shared{
-              std::move(settings), std::move(units), std::move(version), clock, {}, clock.now()})),
+        : shared_(share(clock, std::move(settings), std::move(units), std::move(version))),
           allowed_(shared_->settings.allow),
           acceptor_(
               executor, [this](tcp::socket socket) { on_accepted(std::move(socket)); },
@@ -90,8 +101,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
 
 void Listener::Core::start() {
     const Settings& settings = shared_->settings;
-    if (const error_code error = acceptor_.open(settings.address, settings.port))
-        throw std::system_error(error, "cannot listen on " + settings.name());
+    const error_code error = acceptor_.open(settings.address, settings.port, settings.ipv6_only);
+    if (error) throw std::system_error(error, "cannot listen on " + settings.name());
 }
 
 Counters Listener::Core::counters() const {

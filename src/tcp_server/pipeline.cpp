@@ -98,16 +98,32 @@ void Pipeline::admit() {
 }
 
 void Pipeline::serve(const modbus::Adu& adu) {
-    const auto push = [&](Bytes pdu) { replies_.push(adu.transaction, adu.unit, std::move(pdu)); };
     std::visit(Overloaded{
                    [&](const Refuse& refusal) {
-                       push(modbus::encode_exception(adu.pdu[0], refusal.code));
+                       answer(adu, [function = adu.pdu[0], code = refusal.code] {
+                           return modbus::encode_exception(function, code);
+                       });
                    },
-                   [&](const Diagnose&) { push(diagnose(adu.pdu, *shared_)); },
+                   [&](const Diagnose&) {
+                       answer(adu, [pdu = adu.pdu, shared = shared_.get()] {
+                           return diagnose(pdu, *shared);
+                       });
+                   },
                    [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
                    [&](const Broadcast& broadcasting) { broadcast(adu, broadcasting); },
                },
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units));
+}
+
+void Pipeline::answer(const modbus::Adu& adu, std::function<Bytes()> pdu) {
+    if (shared_->own_answers->may_give()) return replies_.push(adu.transaction, adu.unit, pdu());
+    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+    shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
+        const auto self = weak.lock();
+        if (!self || self->closed_) return false;
+        self->settle(ticket, pdu());
+        return true;
+    });
 }
 
 void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {

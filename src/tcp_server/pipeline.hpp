@@ -52,6 +52,8 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     void forward(const modbus::Adu& adu, Forward forwarding);
     void broadcast(const modbus::Adu& adu, const Broadcast& broadcasting);
     void refuse(const modbus::Adu& adu, Fault fault);
+    /// The gateway's own answer, now or when it is its turn (OwnAnswers).
+    void answer(const modbus::Adu& adu, std::function<Bytes()> pdu);
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
 

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "own_answers.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/log.hpp"
@@ -21,6 +23,7 @@ struct Shared {
     rt::Clock& clock;
     Counters counters;
     TimePoint started;
+    std::shared_ptr<OwnAnswers> own_answers;  ///< never null
 
     /// One line of this listener.
     void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;

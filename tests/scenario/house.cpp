@@ -1,6 +1,7 @@
 #include "house.hpp"
 
 #include <utility>
+#include <variant>
 
 namespace panelgate::scenario {
 namespace {
@@ -34,6 +35,7 @@ House::House(const HousePlan& plan, HouseSeam::Flaw flaw)
       relays_(clock_, routes()) {
     for (const PanelPlan& panel : plan_.line.panels)
         panels_.emplace_back(panel, plan_.line, agenda_, wire_, random_, judge_);
+    if (flaw != HouseSeam::Flaw::untold) hear_write_ = poller_->write_listener();
     wire_.connect([this](ByteView bytes, bool) { line_->come(bytes); },
                   [this](ByteView adu, std::uint64_t connection) {
                       for (Panel& panel : panels_) {
@@ -42,10 +44,14 @@ House::House(const HousePlan& plan, HouseSeam::Flaw flaw)
                   });
 }
 
-bus::Settings House::bus_settings() const {
+bus::Settings House::bus_settings() {
     bus::Settings settings;
     settings.name = kLine;
     settings.arbiter = plan_.line.settings;
+    settings.observe = [this](const bus::BusEvent& event) {
+        const auto* write = std::get_if<bus::WriteEvent>(&event);
+        if (write != nullptr && hear_write_) hear_write_(*write);
+    };
     return settings;
 }
 
@@ -73,6 +79,10 @@ std::unique_ptr<points::Poller> House::make_poller() {
         station.id = plan_.line.panels[i].id;
         station.wants = {
             {{modbus::Table::holding_registers, kPolled, kPolledCount}, plan_.polled[i]}};
+        if (!plan_.calm) {
+            station.wants.push_back(
+                {{modbus::Table::holding_registers, kPolledMemory, kPolledCount}, plan_.polled[i]});
+        }
         station.limits =
             points::make_plan_limits(profile::PanelProfile(), plan_.line.settings.serial,
                                      plan_.line.settings.unlisted.frame_gap.value_or(2ms));
@@ -88,8 +98,23 @@ std::unique_ptr<points::Poller> House::make_poller() {
 void House::judge_poll(std::uint8_t station, const std::vector<std::size_t>& wants) {
     for (const std::size_t want : wants) {
         const points::Reading& reading = poller_->find(station)->reading(want);
-        if (reading.sampled)
-            judge_.judge_values(station, kPolled, reading.values, *reading.sampled);
+        const auto address =
+            static_cast<std::uint16_t>(poller_->find(station)->wants()[want].span.first);
+        if (reading.sampled && address < kMemory)
+            judge_.judge_values(station, address, reading.values, *reading.sampled);
+    }
+}
+
+/// P10: what is called good is what the panel holds now, whoever wrote it.
+void House::judge_points() {
+    if (!polling_ || std::exchange(judged_, seam_.answers()) == seam_.answers()) return;
+    for (const Panel& panel : panels_) {
+        const points::StationPolls* polls = poller_->find(panel.id());
+        if (polls == nullptr || plan_.calm) continue;
+        const points::Want& want = polls->wants()[1];
+        const points::Reading& reading = polls->reading(1);
+        if (quality_of(reading, want.every, agenda_.now()) != points::Quality::good) continue;
+        judge_.judge_values(panel.id(), kPolledMemory, reading.values, agenda_.now());
     }
 }
 
@@ -119,6 +144,7 @@ void House::run() {
     run_until(end, [] { return false; });
     clients_.end();
     poller_->stop();
+    polling_ = false;
     relays_.stop();
     run_until(end + 1min, [this] {
         return seam_.idle() && clients_.idle() && bus_.idle() && uncalled_.empty();
@@ -154,6 +180,7 @@ bool House::step(TimePoint until) {
         clock_.jump();
     }
     settle();
+    judge_points();
     return true;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
 #include <functional>
 #include <list>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "house_seam.hpp"
 #include "panel.hpp"
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "random.hpp"
@@ -42,12 +44,13 @@ class House {
     std::uint64_t relayed() const { return seam_.relayed(); }
 
   private:
-    bus::Settings bus_settings() const;
+    bus::Settings bus_settings();
     tcp_server::Settings listener_settings() const;
     std::shared_ptr<tcp_server::Shared> make_shared_state();
     std::unique_ptr<points::Poller> make_poller();
     std::vector<points::RelayRoute> routes();
     void judge_poll(std::uint8_t station, const std::vector<std::size_t>& wants);
+    void judge_points();
 
     void settle();
     bool step(TimePoint until);
@@ -66,12 +69,15 @@ class House {
     Wire wire_;
     std::list<Panel> panels_;
     HouseLine* line_ = nullptr;
+    std::function<void(const bus::WriteEvent&)> hear_write_;  ///< the bus tells to its end
     bus::Bus bus_;
     HouseSeam seam_;
     HouseClients clients_;
     std::unique_ptr<points::Poller> poller_;
     points::Relays relays_;
-    bool asleep_ = false;  ///< nobody runs the loop
+    std::uint64_t judged_ = 0;  ///< answers, when the points were last looked at
+    bool polling_ = true;       ///< the poller hears of writes
+    bool asleep_ = false;       ///< nobody runs the loop
     std::vector<std::function<void()>> uncalled_;
 };
 

@@ -87,7 +87,8 @@ class HouseSeam final : public bus::BusClient {
         answers_the_other,  ///< with the reply to the request before
         remembers,          ///< a reply longer than it may
         polls_first,        ///< a poll gives way to nobody
-        deaf                ///< the driver does not read before it looks at the clock
+        deaf,               ///< the driver does not read before it looks at the clock
+        untold              ///< the poller does not hear of writes
     };
     HouseSeam(bus::BusClient& bus, const HousePlan& plan, HouseJudge& judge, const Agenda& agenda,
               Flaw flaw)
@@ -143,5 +144,7 @@ inline constexpr std::uint16_t kRelayCount = 2;
 /// What is polled.
 inline constexpr std::uint16_t kPolled = 300;
 inline constexpr std::uint16_t kPolledCount = 4;
+/// … and of what clients write; calm houses have time for the first only.
+inline constexpr std::uint16_t kPolledMemory = kMemory;
 
 }  // namespace panelgate::scenario

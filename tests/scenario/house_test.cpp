@@ -104,6 +104,7 @@ constexpr Broken kBroken[] = {
     {Flaw::answers_at_once, HouseKind::sound, "AnswersAtOnce", "answered from inside transact()"},
     {Flaw::answers_the_other, HouseKind::sound, "AnswersTheOther", "P1: "},
     {Flaw::remembers, HouseKind::memory, "Remembers", "P1: a value that the station did not have"},
+    {Flaw::untold, HouseKind::sound, "UntoldPoller", "P6: a value older than a write"},
     {Flaw::polls_first, HouseKind::calm, "PollsFirst", "P9: polls went before"},
 };
 INSTANTIATE_TEST_SUITE_P(Every, BrokenHouse, testing::ValuesIn(kBroken),

@@ -69,7 +69,19 @@ class FakeBus : public bus::BusClient {
         return {made.begin() + static_cast<std::ptrdiff_t>(skip), made.end()};
     }
 
+    std::vector<bus::TraceFrame> trace_since(std::uint64_t sequence,
+                                             std::size_t most) const override {
+        return since(frames, sequence, most);
+    }
+    std::vector<bus::TraceDecision> decisions_since(std::uint64_t sequence,
+                                                    std::size_t most) const override {
+        return since(made, sequence, most);
+    }
+
     std::vector<bus::ClientShare> clients() const override { return shares; }
+    void name_client(bus::ClientId client, std::string name) override {
+        names[client] = std::move(name);
+    }
 
     static bus::Answer reply(Bytes pdu) {
         return {Result<Bytes>(std::move(pdu)), true, bus::Source::bus, {}};
@@ -84,11 +96,21 @@ class FakeBus : public bus::BusClient {
     bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, EchoState::absent};
     bus::Rights rights;  ///< to everything, at first
     std::vector<bus::ClientShare> shares;
+    std::map<bus::ClientId, std::string> names;
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
     std::vector<bus::TraceDecision> made;  ///< decisions
 
   private:
+    template <class Entry>
+    static std::vector<Entry> since(const std::vector<Entry>& all, std::uint64_t sequence,
+                                    std::size_t most) {
+        std::vector<Entry> found;
+        for (const Entry& entry : all) {
+            if (entry.sequence > sequence && found.size() < most) found.push_back(entry);
+        }
+        return found;
+    }
     using Open = std::pair<bus::ClientId, bus::AnswerHandler>;
 
     void settle(bus::AnswerHandler handler, bus::Answer answer) {

@@ -41,6 +41,7 @@ class Client {
     Reply receive(bool head = false) {
         http::response_parser<http::string_body> parser;
         parser.skip(head);
+        parser.body_limit(boost::none);
         std::optional<boost::system::error_code> done;
         http::async_read(socket_, buffer_, parser, [&](auto error, std::size_t) { done = error; });
         while (!done) io_.run_one();

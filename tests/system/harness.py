@@ -66,11 +66,11 @@ class Output:
 class Program:
     """A running panelgate; a context manager that ends it and fails when it crashed."""
 
-    def __init__(self, *arguments, cwd=None):
+    def __init__(self, *arguments, **options):
         self.arguments = arguments
         self.process = subprocess.Popen(
             [PANELGATE, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, text=True, errors="replace", cwd=cwd)
+            stderr=subprocess.PIPE, text=True, errors="replace", **options)
         self.out = Output(self.process.stdout)
         self.log = Output(self.process.stderr)
 
@@ -148,12 +148,12 @@ def demo():
 
 
 @contextlib.contextmanager
-def configured(text, *arguments):
+def configured(text, *arguments, **options):
     """`run` with this configuration, listening; ends with the block."""
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "panelgate.yaml"
         file.write_text(text)
-        with Program("run", "-c", str(file), *arguments) as program:
+        with Program("run", "-c", str(file), *arguments, **options) as program:
             program.http_port()  # the last that it opens
             yield program
 

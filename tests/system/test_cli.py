@@ -157,7 +157,8 @@ class Files(unittest.TestCase):
                       "poll UW0, count 32, every 5s", "other stations: refused",
                       "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
-                      "unit 101 is floor1/31", "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
+                      "unit 101 is floor1/31",
+                      "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
             self.assertIn(shown, text)
         plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
         [line] = plan["lines"]

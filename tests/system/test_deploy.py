@@ -1,4 +1,5 @@
 """What stands around the program: service, scrape configuration, scripts, the package list."""
+import configparser
 import os
 import pathlib
 import re
@@ -36,6 +37,17 @@ class Deploy(unittest.TestCase):
             self.assertEqual((verified.returncode, verified.stderr), (0, ""))
             rated = run("systemd-analyze", "security", "--offline=true", "--threshold=20", str(unit))
             self.assertEqual(rated.returncode, 0, rated.stdout)
+
+    def test_P7_the_service_comes_back_as_often_as_it_takes_with_every_kind_of_uart(self):
+        unit = configparser.ConfigParser(strict=False, interpolation=None, delimiters="=")
+        unit.optionxform = str
+        unit.read_string(SERVICE.read_text())
+        self.assertEqual(unit["Unit"]["StartLimitIntervalSec"], "0")
+        for key in ("Wants", "After"):
+            self.assertIn("network-online.target", unit["Unit"][key])
+        allowed = set(re.findall(r"(?m)^DeviceAllow=char-(\S+) rw$", SERVICE.read_text()))
+        self.assertLessEqual({"ttyS", "ttyUSB", "ttyACM", "ttyAMA", "ttymxc", "ttyO", "ttySC", "ttyTHS",
+                              "ttyXRUSB", "pts", "ptmx"}, allowed)
 
     @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
     def test_prometheus_takes_the_scrape_configuration(self):

@@ -1,11 +1,12 @@
 """Server-sent events: what happens is told to those who listen."""
 import http.client
 import json
+import struct
 import unittest
 
 import harness
 from harness import read_registers
-from test_points import POINT, PRESS, until
+from test_points import POINT, PRESS, SELDOM, quality, until
 
 
 class Events:
@@ -53,6 +54,15 @@ class ServerSentEvents(unittest.TestCase):
             self.assertEqual(events.next("point", name="level")["quality"], "stale")
             program.rest("PUT", "/api/v1/simulator/press", {})
             events.next("station", station="press", event="online")
+
+    def test_P10_a_point_that_is_written_is_told_as_stale_and_then_as_it_is(self):
+        with harness.configured(SELDOM) as program, program.client() as client:
+            until(lambda: quality(program, "level") == "good")
+            with Events(program, "?types=point") as events:
+                self.assertEqual(client.ask(31, struct.pack(">BHHBH", 16, 100, 1, 2, 333))[0], 16)
+                self.assertEqual(events.next("point", name="level")["quality"], "stale")
+                level = events.next("point", name="level")
+                self.assertEqual((level["value"], level["quality"]), (333, "good"))
 
     def test_only_what_was_asked_for(self):
         with harness.configured(PRESS) as program:

@@ -50,7 +50,7 @@ class Points(unittest.TestCase):
         with harness.configured(PRESS) as program:
             until(lambda: quality(program, "total") == "good")
             self.assertEqual(program.rest("PUT", POINT + "level", {"value": 21.5}),
-                             (200, {"transmitted": True, "confirmed": True}))
+                             (200, {"transmitted": True, "confirmed": True, "value": 21.5}))
             level = until(lambda: (lambda p: p if p["value"] == 21.5 else None)(
                 program.get(POINT + "level")[1]))
             self.assertEqual((level["unit"], level["quality"], level["at"]),
@@ -75,11 +75,15 @@ class Points(unittest.TestCase):
             for point, value, status, text in (
                     ("level", 400.5, 422, "level must be at most 400"),
                     ("total", -1, 422, "total must be from 0 to 4294967295"),
+                    ("total", 1.5, 422, "total cannot be exactly 1.5"),
+                    ("level", 21.55, 422, "the nearest that it can be are 21.5 and 21.6"),
                     ("mode", "walking", 422, "mode has no label 'walking'"),
                     ("level", None, 400, "value must be"), ("pressure", 1, 404, "no point")):
                 got, body = program.rest("PUT", POINT + point, {"value": value})
                 self.assertEqual(got, status, body)
                 self.assertIn(text, body["detail"])
+            self.assertEqual(program.rest("PUT", POINT + "level?round=true", {"value": 21.56}),
+                             (200, {"transmitted": True, "confirmed": True, "value": 21.6}))
 
     def test_P10_a_dead_panel_is_stale_then_absent_and_its_age_grows(self):
         with harness.configured(PRESS) as program:
@@ -108,7 +112,7 @@ class Points(unittest.TestCase):
             self.assertEqual(client.ask(31, b"\x17\0\0\0\1\0\0\0\1\2\0\0"), b"\x97\x01")
             self.assertEqual(client.ask(31, read_registers(0xFFF0)), b"\x83\x02")
             self.assertEqual(client.ask(31, struct.pack(">BHHBH", 16, 0, 1, 2, 1)), b"\x90\x02")
-            sent = [frame[:6] for way, frame in program.trace("floor1", 1000) if way == "sent"]
+            sent = [frame[:6] for way, frame in program.trace("floor1", 500) if way == "sent"]
             self.assertNotIn(bytes([31]) + read_registers(0xFFF0), sent)
             self.assertEqual(client.ask(31, struct.pack(">BHH", 6, 0, 1)), b"\x86\x01")
 
@@ -121,6 +125,64 @@ class Points(unittest.TestCase):
             shown = {(i["type"], i["word_order"]): i["values"] for i in body["interpretations"]}
             self.assertEqual(shown["u32", "CDAB"], [str(0x01020304)])
             self.assertEqual(shown["u32", "ABCD"], [str(0x03040102)])
+
+
+# Asked for once a minute: what happens meanwhile, the points must learn from the writes.
+SELDOM = config.gateway(config.line(stations="""
+      {id: 31, name: press, profile: autonics-gplp-s, points: [
+         {name: level, at: UW100, writable: true, every: 1min},
+         {name: other, at: UW300, every: 1min},
+         {name: running, at: UB1632, every: 1min}]}"""), http=config.OPERATOR)
+
+
+class Written(unittest.TestCase):
+    def follows(self, program, write, value):
+        """From the answer to the write on, the point never shows another value as good; and it
+        shows the new one long before its own turn."""
+        def shown():
+            point = program.get(POINT + "level")[1]
+            metric = re.search(r'panelgate_point_value\{[^}]*point="level"[^}]*\} (\S+)',
+                               program.get("/metrics")[1])
+            if metric:
+                self.assertEqual(float(metric[1]), value)
+            if point["quality"] == "good":
+                self.assertEqual(point["value"], value)
+            return point["quality"] == "good"
+        write()
+        until(shown)
+
+    def test_P10_a_point_follows_whoever_writes_it(self):
+        with harness.configured(SELDOM) as program, program.client() as client:
+            until(lambda: all(quality(program, name) == "good"
+                              for name in ("level", "other", "running")))
+            self.follows(program, lambda: self.assertEqual(
+                program.rest("PUT", POINT + "level", {"value": 222})[0], 200), 222)
+            self.follows(program, lambda: self.assertEqual(
+                client.ask(31, struct.pack(">BHHBH", 16, 100, 1, 2, 333))[0], 16), 333)
+            self.follows(program, lambda: self.assertEqual(
+                client.ask(0, struct.pack(">BHHBH", 16, 100, 1, 2, 444))[0], 16), 444)
+            self.follows(program, lambda: self.assertEqual(
+                program.rest("PUT", "/api/v1/stations/press/devices/UW99",
+                             {"values": [1, 555]})[0], 200), 555)
+            program.rest("PUT", POINT + "level", {"value": 0})
+            until(lambda: quality(program, "level") == "good")
+            # The panel shows one memory as words and as bits: UB1000 is bit 0 of UW100.
+            self.follows(program, lambda: self.assertEqual(
+                program.rest("PUT", "/api/v1/stations/press/devices/UB1000",
+                             {"values": [1]})[0], 200), 1)
+
+
+class Forgetful:
+    """A panel with a few registers that may be silent for a while and then has forgotten them."""
+
+    def __init__(self):
+        self.silences = 0
+
+    def __call__(self, frame):
+        if self.silences > 0:
+            self.silences -= 1
+            return None
+        return echo_address(frame)
 
 
 RELAY = "{from: press/UW100, count: 8, to: oven/GDT200, every: 20ms, on_change: true}"
@@ -158,6 +220,25 @@ class Relay(unittest.TestCase):
                     until(lambda: program.get("/api/v1/relays")[1]["relays"][0]["state"] == "ok")
                     self.assertIsNotNone(re.search(r"panelgate_relay_up\{relay=.*\} 1",
                                                    program.get("/metrics")[1]))
+
+
+    def test_a_target_that_was_silent_is_written_again_though_nothing_has_changed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            oven_line = config.line(
+                "floor2", link, """{id: 20, name: oven, profile: panasonic-gt,
+                                    poll: [{read: GDT300, every: 20ms}]}""",
+                timing="{response_timeout: 100ms}")
+            text = config.gateway(PRESS_LINE, oven_line, relays=f"[{RELAY}]", http=config.OPERATOR)
+            panel = Forgetful()
+            with RtuBus(link, {20: panel}) as oven, harness.configured(text):
+                def writes():
+                    return [f for f in oven.frames(20) if f.bytes[1] == 16]
+                until(lambda: len(writes()) == 1)
+                panel.silences = 2  # a poll and its retry: it may have been switched off and on
+                until(lambda: panel.silences == 0)
+                until(lambda: len(writes()) == 2)
+                self.assertEqual(writes()[0].bytes, writes()[1].bytes)
 
 
 if __name__ == "__main__":

@@ -49,6 +49,7 @@ class Zoo:
         ready = self._process.stdout.readline().split()
         assert ready[:1] == ["ready"], ready
         self.names = ready[1:]
+        self.pid = self._process.pid
 
     def __enter__(self):
         return self

@@ -11,6 +11,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
 
@@ -55,11 +56,18 @@ struct StationEvent {
     Duration by{};
 };
 std::string_view label(StationEvent::Kind kind);
+/// A request that may change what a station holds is about to leave, or its attempt is over,
+/// answered or not. Said at each attempt, before its Finish.
+struct Written {
+    std::uint8_t station = 0;           ///< 0: all of them
+    std::optional<modbus::Span> items;  ///< nothing: the request names none
+    bool ended = false;
+};
 /// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
 /// more: then on_line_down and on_line_up.
 struct Reset {
     std::string_view why;  ///< a literal, for people
 };
-using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Reset>;
+using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset>;
 
 }  // namespace panelgate::arbiter

@@ -3,10 +3,13 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/bus_shares.hpp"
+#include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
@@ -57,6 +60,9 @@ class Arbiter {
     /// The client is gone: what it has waiting is finished as cancelled and never transmitted;
     /// what is on the wire is not sent again for it.
     void cancel(TimePoint now, Client client);
+    /// What a client is to be called where decisions are explained, until cancel().
+    void name_client(Client client, std::string name) { names_.set(client, std::move(name)); }
+    const ClientNames& client_names() const { return names_; }
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now) { step(now); }
     void on_line_up(TimePoint now);
@@ -134,6 +140,7 @@ class Arbiter {
     Reception reception_;
     EchoMemory echo_memory_;
     Ledger ledger_;
+    ClientNames names_;
     std::optional<Attempt> active_;
     TimePoint proved_{};  ///< what was sent before has passed: a later one was answered
     bool up_ = false;

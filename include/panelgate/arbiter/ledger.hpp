@@ -27,6 +27,8 @@ class Ledger {
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
+    /// Says so of a group that may change something.
+    void written(const Group& group, bool ended);
     void reset(std::string_view why) { actions_.push_back(Reset{why}); }
     /// One line, put into words only when Settings::explain wants it.
     template <class Text>

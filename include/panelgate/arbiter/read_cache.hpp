@@ -29,8 +29,8 @@ class ReadCache {
     void store(const ReadSpan& span, Bytes reply, TimePoint sampled);
     /// The youngest value of all these items that is not older than max_age.
     std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
-    /// This request may change what the station holds (0: all stations), answered or not. Other
-    /// tables may show the same memory (Autonics UB and UW), so of these nothing is kept.
+    /// This request may change what the station holds (0: all stations), answered or not: what
+    /// modbus::may_change() says is forgotten.
     void on_write(TimePoint now, std::uint8_t station, const modbus::Request& request);
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }

@@ -24,6 +24,8 @@ class StationHealth {
     bool offline() const { return state_ == Health::offline; }
     std::optional<TimePoint> last_success() const { return last_success_; }
     int silent_in_a_row() const { return silent_; }
+    /// How often it was heard again after a silence: each may have been a restart.
+    std::uint64_t returns() const { return returns_; }
 
     /// A good frame of the station came, in time or late. True when that brought it back.
     bool on_reply(TimePoint now);
@@ -42,6 +44,7 @@ class StationHealth {
     OfflineSettings settings_;
     Health state_ = Health::unknown;
     int silent_ = 0;
+    std::uint64_t returns_ = 0;
     Duration pause_{};
     TimePoint next_probe_{};
     TimePoint next_half_open_{};

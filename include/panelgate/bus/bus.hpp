@@ -12,6 +12,7 @@
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/station_settings.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/rt/clock.hpp"
@@ -31,7 +32,7 @@ struct TransactionEvent {
     Duration took{};  ///< arrival to answer
 };
 /// Something happened that others may want to know.
-using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent>;
+using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent>;
 
 struct Settings {
     std::string name;    ///< of the line
@@ -65,6 +66,9 @@ class Bus final : public BusClient {
     std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
     std::vector<TraceDecision> decisions(std::size_t last) const override;
+    std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const override;
+    std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
+                                               std::size_t most) const override;
     void name_client(ClientId client, std::string name) override;
 
     LineReport report() const;

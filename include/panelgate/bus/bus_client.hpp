@@ -15,6 +15,7 @@
 #include "panelgate/base/health.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/wall_time.hpp"
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -47,30 +48,33 @@ struct Answer {
     Source source = Source::bus;
     Duration age{};       ///< of the value, when source is cache
     bool shared = false;  ///< another request's transaction answered this one, too
-    /// The rights forbid it: `pdu` is Fault::denied, or of a guard the exception.
+    /// It is refused here and never transmitted: `pdu` is Fault::denied, or a guard's exception.
     std::optional<Refusal> refusal{};
+    std::string why{};  ///< of Fault::line_down: what is wrong with the line, as its state says
 };
 using AnswerHandler = std::function<void(Answer)>;
 
 /// A frame on the wire, for traces.
 struct TraceFrame {
-    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    std::uint64_t sequence = 0;  ///< counts a line's frames and decisions, from 1
     TimePoint at;                ///< first bit out; last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
     std::string why;  ///< of a sent frame: why this one at this time
+    WallTime time{};  ///< `at`, by the clock on the wall
 };
 
 /// Why something was not done, or not at once; one line.
 struct TraceDecision {
-    std::uint64_t sequence = 0;  ///< counts from 1 a line
+    std::uint64_t sequence = 0;  ///< one count with the frames
     TimePoint at;
     std::string text;
+    WallTime time{};  ///< `at`, by the clock on the wall
 };
 
 /// What one client has used of a line's time (P9).
 struct ClientShare {
-    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"; "client 12" when nobody named it
+    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"
     Duration busy{};
     double percent = 0;  ///< of what all clients that are there have used
     std::uint64_t transactions = 0;
@@ -91,7 +95,7 @@ struct LineStatus {
     bool up = false;
     std::string state;  ///< "up", or why not: "down: cannot open /dev/x: No such file or directory"
     std::size_t queue_depth = 0;
-    double load_percent = 0;  ///< busy share of the last seconds
+    double load_percent = 0;  ///< busy share of the last ten seconds, the same for all who ask
     EchoState echo = EchoState::unknown;
     std::vector<LineFinding> findings{};  ///< the likeliest first; none on a healthy line
 };
@@ -99,6 +103,8 @@ struct LineStatus {
 struct StationStatus {
     Health state = Health::unknown;
     std::optional<Duration> last_success;  ///< how long ago
+    /// How often it, or its line, was gone and came back: each may have been a restart.
+    std::uint64_t returns = 0;
 };
 
 /// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long
@@ -133,7 +139,21 @@ class BusClient {
         static_cast<void>(last);
         return {};
     }
-    /// What a client is to be called in clients(), until cancel().
+    /// The first frames that follow this sequence number, oldest first, at most `most`.
+    virtual std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const {
+        static_cast<void>(sequence);
+        static_cast<void>(most);
+        return {};
+    }
+    /// The same of the decisions.
+    virtual std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
+                                                       std::size_t most) const {
+        static_cast<void>(sequence);
+        static_cast<void>(most);
+        return {};
+    }
+    /// What a client is to be called in clients() and in the trace, until cancel(). The last name
+    /// counts.
     virtual void name_client(ClientId client, std::string name) {
         static_cast<void>(client);
         static_cast<void>(name);

@@ -17,7 +17,8 @@ inline constexpr std::uint8_t kOtherFunctions = 0;
 /// Counters of one station as clients see it.
 struct StationReport {
     std::string station;  ///< its name; "other" for all that the configuration does not list
-    /// By function code; kOtherFunctions: all that modbus::is_known() does not know.
+    /// By function code; kOtherFunctions: all that modbus::is_known() does not know. Those that
+    /// were used, and those that the settings expect.
     std::map<std::uint8_t, OutcomeCounts> requests;
     Histogram request_duration;
     arbiter::StationCounters wire;

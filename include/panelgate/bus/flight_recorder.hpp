@@ -9,7 +9,7 @@
 
 namespace panelgate::bus {
 
-/// Numbers what happens on a line and keeps the last of it. Entry has a `sequence`.
+/// Keeps the last of what happens on a line. Entry has a `sequence`, which only grows.
 template <class Entry>
 class Recorder {
   public:
@@ -17,7 +17,6 @@ class Recorder {
 
     /// Forgets the oldest when full.
     void add(Entry entry) {
-        entry.sequence = ++sequence_;
         entries_.push_back(std::move(entry));
         if (entries_.size() > limit_) entries_.pop_front();
     }
@@ -26,11 +25,17 @@ class Recorder {
         const std::size_t n = std::min(count, entries_.size());
         return {entries_.end() - static_cast<std::ptrdiff_t>(n), entries_.end()};
     }
+    /// The first ones behind this number, oldest first.
+    std::vector<Entry> since(std::uint64_t sequence, std::size_t most) const {
+        const auto first = std::ranges::upper_bound(entries_, sequence, {}, &Entry::sequence);
+        const auto n =
+            std::min<std::ptrdiff_t>(entries_.end() - first, static_cast<std::ptrdiff_t>(most));
+        return {first, first + n};
+    }
 
   private:
     std::size_t limit_;
     std::deque<Entry> entries_;
-    std::uint64_t sequence_ = 0;
 };
 
 using FlightRecorder = Recorder<TraceFrame>;

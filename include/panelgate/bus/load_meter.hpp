@@ -1,32 +1,36 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::bus {
 
-/// The busy share of a line over the last 5 to 10 seconds. Pure.
+/// The busy share of a line over the last ten whole seconds, or since the start when that is less:
+/// one figure, whoever asks, and however often. Pure.
 class LoadMeter {
   public:
-    /// `busy` only grows. Returns per cent, 0..100.
-    double update(TimePoint now, Duration busy) {
-        if (now - current_.at > kWindow) {
-            previous_ = current_;
-            current_ = {now, busy};
-        }
-        const Duration span = now - previous_.at;
-        if (span <= Duration::zero()) return 0;
-        const double percent = 100.0 * to_seconds(busy - previous_.busy) / to_seconds(span);
-        return percent > 100.0 ? 100.0 : percent;
-    }
+    explicit LoadMeter(TimePoint start) : start_(start) {}
+
+    /// `busy` only grows. What is new of it is taken to have ended now, in one piece.
+    void record(TimePoint now, Duration busy);
+    /// 0..100.
+    double percent(TimePoint now) const;
 
   private:
-    static constexpr Duration kWindow = 5s;
-    struct Mark {
-        TimePoint at;
-        Duration busy{};
-    };
-    Mark previous_;
-    Mark current_;
+    static constexpr std::int64_t kSeconds = 10;
+
+    std::int64_t second_of(TimePoint at) const { return (at - start_) / 1s; }
+    Duration& of(std::int64_t second) {
+        return seconds_[static_cast<std::size_t>(second) % seconds_.size()];
+    }
+    void advance_to(std::int64_t second);
+
+    TimePoint start_;
+    Duration known_{};
+    std::int64_t newest_ = 0;  ///< the last second since the start that the ring holds
+    std::array<Duration, kSeconds + 1> seconds_{};  ///< the busy time of each
 };
 
 }  // namespace panelgate::bus

@@ -15,14 +15,10 @@ namespace panelgate::bus {
 
 /// Why nobody is asked: what may be done to a station does not include this request.
 struct Refusal {
-    enum class Rule : std::uint8_t {
-        read_only,                 ///< a write to a station that may only be read
-        broadcast_over_read_only,  ///< it would write to such a station, too
-        guard,                     ///< its panel's profile rules the request out
-    };
     Rule rule = Rule::read_only;
     std::string station;  ///< the name of the one that the rule protects
     modbus::ExceptionCode code = modbus::ExceptionCode::illegal_function;  ///< for Modbus clients
+    std::string why{};                                                     ///< a guard's own words
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };

@@ -5,13 +5,35 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
 
-/// The exception code that a request is answered with instead of being transmitted, or nothing.
-using Guard = std::function<std::optional<std::uint8_t>(const modbus::Request&)>;
+/// What forbids a request: the access of stations, or a guard by what the panel's profile says.
+enum class Rule : std::uint8_t {
+    read_only,                 ///< a write to a station that may only be read
+    broadcast_over_read_only,  ///< it would write to such a station, too
+    function,                  ///< the panel does not have it
+    quantity,                  ///< more items than it takes, or a request that contradicts itself
+    range,                     ///< not all of it is memory of the panel
+    write_protected,           ///< memory that it does not let be written
+};
+/// "access", "function", "quantity", "range" or "read-only": stable words.
+std::string_view label(Rule rule);
+inline bool is_access(Rule rule) {
+    return rule == Rule::read_only || rule == Rule::broadcast_over_read_only;
+}
+
+/// What a guard says against a request.
+struct Objection {
+    Rule rule = Rule::function;
+    std::string why{};  ///< a clause for the user: "generic has no function 23"
+};
+/// Of what is to be refused instead of being transmitted.
+using Guard = std::function<std::optional<Objection>(const modbus::Request&)>;
 
 enum class Access : std::uint8_t { read_write, read_only };
 
@@ -20,6 +42,8 @@ struct StationSettings {
     std::string name;
     Access access = Access::read_write;
     Guard guard{};  ///< empty: whatever is asked goes out
+    /// What its panel is likely to be asked: counted from the start, with 0.
+    std::vector<std::uint8_t> functions{};
 };
 
 /// Those that the configuration lists, by their ids.

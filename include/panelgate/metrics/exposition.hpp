@@ -1,5 +1,7 @@
 #pragma once
 
+#include <deque>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,11 +16,11 @@
 
 namespace panelgate::metrics {
 
-/// Everything that one scrape shows, copied at the scrape.
+/// Everything that one scrape shows, copied after it was asked for. Each line is of one instant.
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<tcp_server::Counters> listeners;
-    std::vector<points::PointSample> points;
+    std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
     std::string version;
@@ -29,10 +31,15 @@ struct Snapshot {
 /// The Content-Type that goes with exposition().
 inline constexpr std::string_view kContentType = "text/plain; version=0.0.4; charset=utf-8";
 
-/// The text of /metrics (README, Metrics). Series exist from the start with 0, so that a rate()
-/// sees the first event: for requests functions 1-6, 15 and 16 with the outcomes ok, exception,
-/// timeout and damaged, and every outcome of a function that was used; for exceptions codes 1-4. A
-/// station's last success is absent while there was none.
+/// A piece of the text; false: no more of it is wanted.
+using TakeText = std::function<bool(std::string_view)>;
+
+/// The text of /metrics (README, Metrics), a family at a time. What a station's panel is expected
+/// to be asked exists with 0, so that a rate() sees the first event: for requests the outcome ok of
+/// the functions that the bus lists before they are used, and ok, exception and timeout of those
+/// that were; for exceptions codes 1-4. Other outcomes are there once they happened. A station's
+/// last success is absent while there was none. Touches nothing but the snapshot.
+void exposition(const Snapshot& snapshot, const TakeText& take);
 std::string exposition(const Snapshot& snapshot);
 
 }  // namespace panelgate::metrics

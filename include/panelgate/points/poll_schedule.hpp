@@ -29,6 +29,9 @@ class PollSchedule {
         /// Every entry is due once within this time, spread in the same way, so that a slow one has
         /// a value soon; then it takes its turns.
         Duration first_within = 5s;
+        /// Turns out of turn (hasten): so many at once, and then one each so often.
+        std::size_t extra_burst = 16;
+        Duration extra_every = 250ms;
     };
     static constexpr Duration kShortest = 1ms;  ///< shorter intervals are taken for this
 
@@ -40,6 +43,13 @@ class PollSchedule {
     /// The entries to start now, the longest due first; they are under way until on_done(). What
     /// max_outstanding holds back stays due.
     std::vector<std::size_t> take_due(TimePoint now);
+    /// Wants a turn now besides, as soon as the limits of extra turns allow, behind those who
+    /// wanted one before; its next turn will do when that comes first. Of an entry that is under
+    /// way: nothing, on_done() comes first.
+    void hasten(std::size_t entry, TimePoint now);
+    /// A turn besides at this time, unless its next one comes first. Of one that is under way:
+    /// nothing.
+    void again_at(std::size_t entry, TimePoint when);
     /// This entry has ended, well or not. One that is not under way is ignored.
     void on_done(std::size_t entry, TimePoint now);
 
@@ -52,6 +62,7 @@ class PollSchedule {
         Duration phase{};
         TimePoint due;
         bool under_way = false;
+        bool hastened = false;  ///< its next turn is one besides
     };
     void set_phases(std::span<const Duration> intervals);
     std::uint64_t advance(std::size_t index, TimePoint now);
@@ -61,6 +72,8 @@ class PollSchedule {
     std::vector<Entry> entries_;
     std::set<std::pair<TimePoint, std::size_t>> queue_;  ///< every entry, by its next turn
     std::size_t outstanding_ = 0;
+    TimePoint extra_free_;  ///< when all extra turns are there again
+    TimePoint last_extra_;
     ScheduleCounters counters_;
 };
 

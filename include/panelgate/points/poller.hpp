@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/points/station_polls.hpp"
 #include "panelgate/rt/clock.hpp"
 
@@ -20,10 +21,12 @@ struct PolledStation {
 };
 
 /// Runs the polls of one line through its bus, as requests of the class `poll`: one under way a
-/// station. One thread; clock and bus outlive it.
+/// station. What somebody writes is stale at once and read again out of turn. One thread; clock and
+/// bus outlive it.
 class Poller {
   public:
-    /// Called after each answer, with the station's id and its wants that were read or failed.
+    /// Called after each answer, with the station's id and its wants that were read or failed; and
+    /// with those that a write has just made old.
     using Update = std::function<void(std::uint8_t station, const std::vector<std::size_t>& wants)>;
 
     Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations);
@@ -32,6 +35,8 @@ class Poller {
     Poller& operator=(const Poller&) = delete;
 
     void on_update(Update update);
+    /// For whoever hears of the writes on this line; may be called when the poller is gone.
+    std::function<void(const bus::WriteEvent&)> write_listener() const;
     void start();
     /// Takes what waits back from the bus.
     void stop();

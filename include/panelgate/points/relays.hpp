@@ -25,7 +25,8 @@ struct RelayRoute {
 
 /// Copies blocks between stations, over lines too. One request of each relay is open at a time, of
 /// the class `poll`: a relay whose panel is silent keeps nobody waiting. It writes only what it has
-/// read just before. One thread; the clock outlives it.
+/// read just before; with on_change what is new, and all again after a while and whenever the
+/// target may have been restarted. One thread; the clock outlives it.
 class Relays {
   public:
     using Changed = std::function<void(const RelayStatus&)>;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/points/point.hpp"
 
 namespace panelgate::points {
@@ -39,6 +40,8 @@ struct Relay {
     std::uint32_t count = 1;
     Duration every = 1s;
     bool on_change = false;  ///< write only when what was read differs from what was written
+    /// … and again this long after the last write: the target may have lost its memory.
+    Duration refresh = 60s;
 
     /// "press/UW100 to oven/GDT200"
     std::string name() const {

@@ -20,16 +20,22 @@ struct Reading {
     /// When the request for the oldest of them left the gateway's hands; nothing before all of them
     /// were read once.
     std::optional<TimePoint> sampled;
+    /// When a write that may have changed them last left: what was asked for before is old.
+    std::optional<TimePoint> written;
     bool failing = false;                   ///< the last attempt failed
     std::optional<std::uint8_t> exception;  ///< … with this exception of the panel
     std::uint64_t good = 0;
     std::uint64_t failed = 0;
+
+    /// They have been written since.
+    bool outdated() const { return sampled && written && *sampled < *written; }
 };
 
 enum class Quality : std::uint8_t { good, stale, bad };
 std::string_view label(Quality quality);
-/// Good: read within two intervals, and the last attempt succeeded. Bad: never read, or not for ten
-/// intervals and ten seconds. Stale: in between; the value is shown with its age.
+/// Good: read within two intervals, not written since, and the last attempt succeeded. Bad: never
+/// read, or not for ten intervals and ten seconds. Stale: in between; the value is shown with its
+/// age.
 Quality quality_of(const Reading& reading, Duration every, TimePoint now);
 
 /// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.
@@ -51,6 +57,13 @@ class StationPolls {
     std::vector<std::size_t> on_answer(TimePoint now, std::size_t read, const Result<Bytes>& pdu,
                                        TimePoint sampled);
 
+    /// Somebody writes these items (nothing: any) of the station; the request leaves now. Gives the
+    /// wants that are old by that and were not before.
+    std::vector<std::size_t> on_write(TimePoint now, const std::optional<modbus::Span>& items);
+    /// That is over: what it has made old is read again, the items themselves first, out of turn as
+    /// far as the schedule allows.
+    void on_written(TimePoint now, const std::optional<modbus::Span>& items);
+
     const std::vector<Want>& wants() const { return wants_; }
     const Reading& reading(std::size_t want) const { return readings_[want]; }
     const std::vector<PlannedRead>& plan() const { return plan_; }
@@ -60,6 +73,7 @@ class StationPolls {
     void take(const PlannedRead& read, ByteView reply, TimePoint sampled);
     void fail(const PlannedRead& read, std::optional<std::uint8_t> exception);
     bool split(TimePoint now, std::size_t read);
+    bool is_outdated(const PlannedRead& read) const;
 
     std::vector<Want> wants_;
     std::vector<Reading> readings_;

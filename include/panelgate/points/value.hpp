@@ -20,6 +20,7 @@ using Value = std::variant<bool, std::int64_t, std::uint64_t, double, std::strin
 /// Why something cannot be written: one sentence for the user.
 struct WriteRefusal {
     std::string message;
+    bool inexact = false;  ///< Rounding::nearest would do
 };
 [[noreturn]] void throw_exception_from_error(const WriteRefusal& refusal,
                                              const boost::source_location& where);
@@ -33,14 +34,27 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
 /// The name of this raw value, where the point has one.
 std::optional<std::string> label_of(const Point& point, std::span<const std::uint16_t> items);
 
-/// The items that hold this value: the inverse of decode, rounded to the nearest raw number.
-/// Refused outside the type's range or the point's min and max. A label stands for its raw value.
-Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& value);
+/// What to do with a value that no raw number has.
+enum class Rounding : std::uint8_t { exact, nearest };
 
+/// The items that hold this value: the inverse of decode. One that no raw number has is refused,
+/// with the nearest below and above, unless it may be rounded; but a fraction takes the nearest
+/// float, for its digits are never meant to the last bit. Refused outside the type's range, and
+/// where what was asked for or what would be written is outside the point's min and max. A label
+/// stands for its raw value.
+Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& value,
+                                           Rounding rounding = Rounding::exact);
+
+/// A request that writes a point, and what the point is when it is confirmed.
+struct PointWrite {
+    Bytes pdu;
+    Value value;
+    std::optional<std::string> label;
+};
 /// The one request that writes it: 05 or 15 a coil, 06 or 16 registers, 22 or the bit view of the
 /// panel a bit of a word. Never a read and a write: what changed in between would be lost.
-Encoded<Bytes> write_request(const profile::PanelProfile& profile, const Point& point,
-                             const Value& value);
+Encoded<PointWrite> write_request(const profile::PanelProfile& profile, const Point& point,
+                                  const Value& value, Rounding rounding = Rounding::exact);
 
 std::string to_string(const Value& value);
 /// Bits as 0 and 1; nothing for a text.

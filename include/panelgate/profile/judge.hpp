@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -20,6 +21,8 @@ enum class Judgement : std::uint8_t {
 
 Judgement judge(const PanelProfile& profile, ByteView pdu);
 Judgement judge(const PanelProfile& profile, const modbus::Request& request);
+/// Why it is not fine, as a clause for the user: "autonics-gplp-s has no function 23".
+std::string explain(const PanelProfile& profile, const modbus::Request& request);
 
 /// The one area that holds the whole span, or nullptr.
 const Area* find_readable(const PanelProfile& profile, const modbus::Span& span);

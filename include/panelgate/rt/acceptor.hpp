@@ -24,8 +24,10 @@ class Acceptor {
     Acceptor(const Acceptor&) = delete;
     Acceptor& operator=(const Acceptor&) = delete;
 
-    /// Binds and accepts; port 0: any that is free. What is wrong, or nothing.
-    boost::system::error_code open(const std::string& address, std::uint16_t port);
+    /// Binds and accepts; port 0: any that is free. What is wrong, or nothing: then it may be tried
+    /// again. "::" takes IPv4 as well, unless `ipv6_only`.
+    boost::system::error_code open(const std::string& address, std::uint16_t port,
+                                   bool ipv6_only = false);
     /// The port it is bound to; 0 while it is closed.
     std::uint16_t port() const;
     boost::asio::any_io_executor get_executor() const;

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/wall_time.hpp"
 
 namespace panelgate::rt {
 
@@ -29,6 +30,8 @@ class Clock {
     virtual std::unique_ptr<Alarm> make_alarm() = 0;
 };
 
+/// Wall clock, for traces.
+WallTime wall_now();
 /// Wall clock: seconds since 1970, for log lines, metrics and panels' clocks; never for timing.
 double wall_seconds();
 /// The same as local time, as if it were UTC: what a clock on the wall shows.

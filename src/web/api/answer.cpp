@@ -1,12 +1,12 @@
 #include "answer.hpp"
 
 #include <boost/json/object.hpp>
-#include <boost/json/serialize.hpp>
 #include <chrono>
 #include <cstdlib>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "refusal.hpp"
 
 namespace panelgate::web {
@@ -49,7 +49,7 @@ const char* detail_of(Fault fault) {
         case Fault::expired:
             return "the line could not take the request before its deadline";
         case Fault::line_down:
-            return "the line's device is not there";
+            return "the line is down";
         case Fault::line_lost:
             return "the line was lost while the request was on its way";
         case Fault::timeout:
@@ -77,7 +77,7 @@ std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) 
 HttpResponse json_response(unsigned status, const json::value& body) {
     HttpResponse response;
     response.status = status;
-    response.body = json::serialize(body) + "\n";
+    response.body = json_text(body) + "\n";
     return response;
 }
 
@@ -104,11 +104,13 @@ Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& pro
 
 Problem problem_of(const bus::Answer& answer) {
     if (answer.refusal) return problem_of(*answer.refusal);
-    return problem_of(answer.pdu.error(), answer.transmitted);
+    Problem made = problem_of(answer.pdu.error(), answer.transmitted);
+    if (!answer.why.empty()) made.detail = "the line is down: " + answer.why;
+    return made;
 }
 
 std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile) {
-    if (!answer.pdu) return problem_of(answer);
+    if (answer.refusal || !answer.pdu) return problem_of(answer);
     const auto code = modbus::exception_of(*answer.pdu);
     if (code) return problem_of_exception(*code, profile);
     return std::nullopt;

@@ -22,7 +22,7 @@ HttpResponse json_response(unsigned status, const boost::json::value& body);
 Problem problem_of(Fault fault, bool transmitted);
 /// A panel's exception reply, with its manual's word: 422 for codes 1-4, 502 above.
 Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& profile);
-/// Of an answer without a reply: what the rights forbid, or a fault.
+/// Of an answer without a reply of a panel: refused here, or a fault.
 Problem problem_of(const bus::Answer& answer);
 /// What is wrong with an answer: that, or an exception. Nothing when it carries what was asked.
 std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile);

@@ -9,6 +9,9 @@
 #include <boost/system/system_error.hpp>
 #include <utility>
 
+#include "answer.hpp"
+#include "panelgate/modbus/request.hpp"
+
 namespace panelgate::web {
 namespace asio = boost::asio;
 namespace {
@@ -35,12 +38,19 @@ asio::awaitable<bus::Answer> start_transact(bus::BusClient* bus, bus::Request re
 
 }  // namespace
 
+Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu) {
+    auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
+    if (!request) return problem_of(request.error(), false);
+    return bus::Request{.station = station, .request = std::move(*request)};
+}
+
 asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
                                  bus::Request request) {
     if (!caller->has_left()) {
         const bus::ClientId client = caller->id();
         const auto cancel = [bus, client] { bus->cancel(client); };
-        if (caller->at_leaving(bus, cancel)) bus->name_client(client, "http");
+        caller->at_leaving(bus, cancel);
+        bus->name_client(client, caller->name());
         request.client = client;
         if (!caller->address().empty()) request.host = bus::host_of(caller->address());
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));

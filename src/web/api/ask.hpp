@@ -1,12 +1,18 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <cstdint>
 #include <memory>
 
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/web/http/caller.hpp"
+#include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
+
+/// What REST asks of a station (0: of all of a line), or why it may not be transmitted.
+Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu);
 
 /// One transaction, as one of the caller's: when it leaves, what still waits in a queue is never
 /// transmitted. Throws boost::system::system_error(operation_aborted) when the caller has left

@@ -2,22 +2,28 @@
 
 #include <algorithm>
 #include <boost/json/array.hpp>
-#include <boost/json/serialize.hpp>
 #include <boost/json/stream_parser.hpp>
 #include <cmath>
 #include <optional>
+
+#include "panelgate/web/http/json_text.hpp"
+#include "repeated_member.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
-Problem bad_json(std::string_view body, std::size_t at, const std::string& what) {
+/// "line 2, column 5"
+std::string place_of(std::string_view body, std::size_t at) {
     const std::string_view before = body.substr(0, std::min(at, body.size()));
     const auto line = 1 + std::ranges::count(before, '\n');
     const auto line_start = before.rfind('\n');
     const auto column = before.size() - (line_start == before.npos ? 0 : line_start + 1) + 1;
-    return problem(400, "the body is not JSON: line " + std::to_string(line) + ", column " +
-                            std::to_string(column) + ": " + what);
+    return "line " + std::to_string(line) + ", column " + std::to_string(column);
+}
+
+Problem bad_json(std::string_view body, std::size_t at, const std::string& what) {
+    return problem(400, "the body is not JSON: " + place_of(body, at) + ": " + what);
 }
 
 /// The number when it is whole and fits; JSON has no integers of its own.
@@ -34,14 +40,14 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
         if (value.is_bool()) return static_cast<std::uint16_t>(value.get_bool() ? 1 : 0);
         const auto bit = as_whole(value);
         if (bit && (*bit == 0 || *bit == 1)) return static_cast<std::uint16_t>(*bit);
-        return problem(400, "a bit is true, false, 1 or 0, not " + json::serialize(value));
+        return problem(400, "a bit is true, false, 1 or 0, not " + excerpt(json_text(value)));
     }
     const auto number = as_whole(value);
     if (number && *number >= -32768 && *number <= 65535) {
         return static_cast<std::uint16_t>(*number & 0xFFFF);
     }
     return problem(400, "a register is a whole number from 0 to 65535, or from -32768, not " +
-                            json::serialize(value));
+                            excerpt(json_text(value)));
 }
 
 }  // namespace
@@ -54,9 +60,22 @@ Parsed<json::object> parse_object(std::string_view body) {
     if (!parser.done()) parser.finish(error);
     if (error) return bad_json(body, body.size(), error.message());
     if (used < body.size()) return bad_json(body, used, "something follows the value");
+    if (const auto twice = find_repeated_member(body))
+        return problem(400, "the member '" + excerpt(twice->name) +
+                                "' comes a second time: " + place_of(body, twice->at));
     const json::value value = parser.release();
     if (!value.is_object()) return problem(400, "the body must be a JSON object");
     return value.get_object();
+}
+
+Parsed<json::object> parse_object(std::string_view body, Members known) {
+    auto object = parse_object(body);
+    if (!object) return object;
+    for (const auto& [name, value] : *object) {
+        if (std::ranges::find(known, std::string_view(name)) == known.end())
+            return unknown_name("member", name, {known.begin(), known.size()});
+    }
+    return object;
 }
 
 Parsed<std::int64_t> whole_number(const json::value& value, std::string_view name, std::int64_t low,
@@ -64,7 +83,7 @@ Parsed<std::int64_t> whole_number(const json::value& value, std::string_view nam
     const auto number = as_whole(value);
     if (number && *number >= low && *number <= high) return *number;
     return problem(400, std::string(name) + " must be a whole number from " + std::to_string(low) +
-                            " to " + std::to_string(high) + ", not " + json::serialize(value));
+                            " to " + std::to_string(high) + ", not " + excerpt(json_text(value)));
 }
 
 Parsed<std::int64_t> number_member(const json::object& object, std::string_view name,
@@ -96,13 +115,13 @@ Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, mod
 }
 
 Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
-    const auto object = parse_object(body);
+    const auto object = parse_object(body, {"values"});
     if (!object) return object.error();
     return values_member(*object, table);
 }
 
 Parsed<points::Value> value_of(std::string_view text) {
-    const auto body = parse_object(text);
+    const auto body = parse_object(text, {"value"});
     if (!body) return body.error();
     const json::value* value = body->if_contains("value");
     if (value == nullptr) return problem(400, "the body needs \"value\"");

@@ -3,6 +3,7 @@
 #include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,8 +14,14 @@
 
 namespace panelgate::web {
 
-/// The body as an object; 400 with line and column of what is wrong.
+/// The names of members that a body may have; they are told apart by case, too.
+using Members = std::initializer_list<std::string_view>;
+
+/// The body as an object; 400 with line and column of what is wrong, a member that comes twice
+/// included, at any depth.
 Parsed<boost::json::object> parse_object(std::string_view body);
+/// The same of one that has no other members: 400 for the first that nobody knows.
+Parsed<boost::json::object> parse_object(std::string_view body, Members known);
 
 /// A whole number in [low, high]; `name` is for the 400's text. 10.0 is whole.
 Parsed<std::int64_t> whole_number(const boost::json::value& value, std::string_view name,

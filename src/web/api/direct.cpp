@@ -3,7 +3,6 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
-#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -90,15 +89,16 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
 }
 
 HttpResponse broadcast_answer(const bus::Answer& answer) {
-    if (!answer.pdu) return to_response(problem_of(answer));
+    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
     json::object body;
     body["transmitted"] = true;
     body["confirmed"] = false;
     return json_response(202, body);
 }
 
+/// A panel's exception is an answer, too.
 HttpResponse raw_answer(const bus::Answer& answer) {
-    if (!answer.pdu) return to_response(problem_of(answer));
+    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
     json::object body;
     body["pdu"] = upper_hex(*answer.pdu, "");
     if (const auto code = modbus::exception_of(*answer.pdu)) body["exception"] = *code;
@@ -110,7 +110,7 @@ HttpResponse raw_answer(const bus::Answer& answer) {
 Handling post_broadcast(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body);
+    const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
     if (!body) co_return to_response(body.error());
     auto planned = broadcast_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
@@ -122,13 +122,14 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
 Handling post_raw(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body);
+    const auto body = parse_object(request.body, {"station", "pdu"});
     if (!body) co_return to_response(body.error());
     auto planned = raw_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
+    const bool broadcast = made.station == 0;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
-    co_return raw_answer(answer);
+    co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }
 
 }  // namespace panelgate::web

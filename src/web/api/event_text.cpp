@@ -1,7 +1,6 @@
 #include "panelgate/web/api/event_text.hpp"
 
-#include <boost/json/serialize.hpp>
-
+#include "panelgate/web/http/json_text.hpp"
 #include "point_json.hpp"
 
 namespace panelgate::web {
@@ -12,17 +11,17 @@ std::string point_event(const bus::StationRef& station, const points::Point& poi
     json::object object = point_json(point, reading);
     object["line"] = station.line;
     object["station"] = station.name;
-    return json::serialize(object);
+    return json_text(object);
 }
 
 std::string line_event(std::string_view line, std::string_view state, std::string_view why) {
     json::object object{{"line", line}, {"state", state}};
     if (!why.empty()) object["why"] = why;
-    return json::serialize(object);
+    return json_text(object);
 }
 
 std::string station_event(std::string_view line, std::string_view station, std::string_view what) {
-    return json::serialize(json::object{{"line", line}, {"station", station}, {"event", what}});
+    return json_text(json::object{{"line", line}, {"station", station}, {"event", what}});
 }
 
 std::string transaction_event(std::string_view line, std::string_view station,
@@ -33,7 +32,7 @@ std::string transaction_event(std::string_view line, std::string_view station,
                         {"outcome", outcome},
                         {"duration_ms", to_milliseconds(took)}};
     if (!station.empty()) object["station"] = station;
-    return json::serialize(object);
+    return json_text(object);
 }
 
 }  // namespace panelgate::web

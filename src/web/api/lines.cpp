@@ -1,17 +1,23 @@
 #include <boost/json/array.hpp>
+#include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <string>
+#include <system_error>
 
 #include "answer.hpp"
 #include "handlers.hpp"
+#include "long_answer.hpp"
 #include "panelgate/web/http/query.hpp"
 #include "station_path.hpp"
+#include "trace_page.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
 constexpr unsigned kDefaultTrace = 100;  ///< frames
-constexpr unsigned kMaxTrace = 10'000;
+constexpr unsigned kMaxTrace = 500;
 
 /// In the list of lines a finding is only its cause.
 json::object describe(const LineEntry& line, const bus::LineStatus& status) {
@@ -47,6 +53,7 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
 json::object describe(const bus::TraceFrame& frame) {
     json::object object;
     object["sequence"] = frame.sequence;
+    object["time"] = rfc3339(frame.time);
     object["at"] = to_seconds(frame.at.time_since_epoch());
     object["direction"] = label(direction_of(frame.kind));
     object["station"] = nullptr;
@@ -60,6 +67,7 @@ json::object describe(const bus::TraceFrame& frame) {
 json::object describe(const bus::TraceDecision& decision) {
     json::object object;
     object["sequence"] = decision.sequence;
+    object["time"] = rfc3339(decision.time);
     object["at"] = to_seconds(decision.at.time_since_epoch());
     object["text"] = decision.text;
     return object;
@@ -78,15 +86,37 @@ json::array describe(const std::vector<bus::ClientShare>& clients) {
     return list;
 }
 
+/// The page that a query asks for.
+Parsed<TracePage> page_of(const HttpRequest& request, const bus::BusClient& bus) {
+    const auto since = request.query.find("since");
+    const bool follows = since != request.query.end();
+    const auto most =
+        query_number(request, "last", 1, kMaxTrace, follows ? kMaxTrace : kDefaultTrace);
+    if (!most) return most.error();
+    if (!follows) return last_of_trace(bus, *most);
+    std::uint64_t number = 0;
+    const std::string& text = since->second;
+    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (wrong != std::errc() || end != text.data() + text.size())
+        return problem(400, "since must be a sequence number: what `next` said, or 0");
+    return trace_since(bus, number, *most);
+}
+
 }  // namespace
 
-Handling get_lines(HttpRequest, const Api* api) {
-    json::array lines;
-    for (const LineEntry& line : api->directory->lines)
-        lines.push_back(describe(line, line.bus->status()));
-    json::object body;
-    body["lines"] = std::move(lines);
-    co_return json_response(200, body);
+Handling get_lines(HttpRequest request, const Api* api) {
+    LongAnswer body;
+    body.begin_list("lines");
+    for (std::size_t i = 0; i < api->directory->lines.size(); ++i) {
+        const LineEntry& line = api->directory->lines[i];
+        body.add(describe(line, line.bus->status()));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
+    }
+    body.end_list();
+    co_return body.response();
 }
 
 Handling get_line(HttpRequest request, const Api* api) {
@@ -102,20 +132,25 @@ Handling get_line(HttpRequest request, const Api* api) {
 Handling get_trace(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
-    const auto last = query_number(request, "last", 1, kMaxTrace, kDefaultTrace);
-    if (!last) co_return to_response(last.error());
-    json::array frames;
-    for (const bus::TraceFrame& frame : (*line)->bus->trace(*last)) {
-        frames.push_back(describe(frame));
+    const auto page = page_of(request, *(*line)->bus);
+    if (!page) co_return to_response(page.error());
+    LongAnswer body;
+    body.begin_list("frames");
+    for (const bus::TraceFrame& frame : page->frames) {
+        body.add(describe(frame));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
     }
-    json::object body;
-    body["frames"] = std::move(frames);
-    json::array decisions;
-    for (const bus::TraceDecision& decision : (*line)->bus->decisions(*last)) {
-        decisions.push_back(describe(decision));
+    body.end_list().begin_list("decisions");
+    for (const bus::TraceDecision& decision : page->decisions) {
+        body.add(describe(decision));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
     }
-    body["decisions"] = std::move(decisions);
-    co_return json_response(200, body);
+    body.end_list().member("next", page->next);
+    co_return body.response();
 }
 
 }  // namespace panelgate::web

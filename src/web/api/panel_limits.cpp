@@ -3,6 +3,7 @@
 #include <string>
 
 #include "panelgate/profile/notation.hpp"
+#include "refusal.hpp"
 
 namespace panelgate::web {
 
@@ -12,10 +13,10 @@ Parsed<void> check_range(const Items& items, const profile::AddressRange& range,
     const auto first =
         profile::format_notation(*items.area, static_cast<std::uint16_t>(range.first));
     const auto last = profile::format_notation(*items.area, static_cast<std::uint16_t>(range.last));
-    return problem(422, std::to_string(items.span.count) + " from " + items.area->name +
-                            " address " + std::to_string(items.span.first) +
-                            " is outside what is " + std::string(what) + ": " + first + " to " +
-                            last);
+    return ruled_out(bus::Rule::range,
+                     std::to_string(items.span.count) + " from " + items.area->name + " address " +
+                         std::to_string(items.span.first) + " is outside what is " +
+                         std::string(what) + ": " + first + " to " + last);
 }
 
 Parsed<modbus::Table> table_to_read(const Items& items) {
@@ -26,7 +27,8 @@ Parsed<modbus::Table> table_to_read(const Items& items) {
     for (const modbus::Table table : items.area->also) {
         if (items.station.profile->has_function(read_function(table))) return table;
     }
-    return problem(422, "the panel has no function that reads " + items.area->name);
+    return ruled_out(bus::Rule::function,
+                     "the panel has no function that reads " + items.area->name);
 }
 
 }  // namespace panelgate::web

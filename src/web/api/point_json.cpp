@@ -7,12 +7,15 @@
 namespace panelgate::web {
 namespace json = boost::json;
 
+json::value json_of(const points::Value& value) {
+    return std::visit([](const auto& v) { return json::value(v); }, value);
+}
+
 json::object point_json(const points::Point& point, const points::PointReading& reading) {
     json::object object;
     object["name"] = point.name;
     object["value"] = nullptr;
-    if (reading.value)
-        object["value"] = std::visit([](const auto& v) { return json::value(v); }, *reading.value);
+    if (reading.value) object["value"] = json_of(*reading.value);
     if (reading.label) object["label"] = *reading.label;
     object["unit"] = point.unit;
     object["quality"] = label(reading.quality);

@@ -3,8 +3,8 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
-#include "bus_request.hpp"
 #include "handlers.hpp"
+#include "long_answer.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -43,14 +43,35 @@ Parsed<Found> find_point(const HttpRequest& request, const Directory& directory)
     return Found{std::move(*station), point};
 }
 
-Parsed<bus::Request> write_of(const Found& found, const std::string& body) {
+/// The query `round`: true or false, the default.
+Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
+    const auto given = request.query.find("round");
+    if (given == request.query.end() || given->second == "false") return points::Rounding::exact;
+    if (given->second == "true") return points::Rounding::nearest;
+    return problem(400, "round is true or false, not '" + given->second + '\'');
+}
+
+Parsed<points::PointWrite> write_of(const Found& found, const HttpRequest& request) {
     const auto allowed = check_may_write(*found.station.bus, found.station.id);
     if (!allowed) return allowed.error();
-    const auto value = value_of(body);
+    const auto rounding = rounding_of(request);
+    if (!rounding) return rounding.error();
+    const auto value = value_of(request.body);
     if (!value) return value.error();
-    auto pdu = points::write_request(*found.station.profile, *found.point, *value);
-    if (!pdu) return problem(422, pdu.error().message);
-    return request_to(found.station.id, std::move(*pdu));
+    auto write = points::write_request(*found.station.profile, *found.point, *value, *rounding);
+    if (write) return std::move(*write);
+    const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
+    return problem(422, write.error().message + hint);
+}
+
+/// Confirmed: and what the point is now, which its next read will show.
+HttpResponse write_answer(const points::PointWrite& write) {
+    json::object body;
+    body["transmitted"] = true;
+    body["confirmed"] = true;
+    body["value"] = json_of(write.value);
+    if (write.label) body["label"] = *write.label;
+    return json_response(200, body);
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -73,14 +94,18 @@ json::array describe(const std::vector<points::Interpretation>& all) {
 Handling get_points(HttpRequest request, const Api* api) {
     const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
-    json::array list;
-    if (station->points != nullptr) {
-        for (const Point& point : station->points->points())
-            list.push_back(describe(*api, *station->points, point));
+    LongAnswer body;
+    body.begin_list("points");
+    const std::size_t count = station->points == nullptr ? 0 : station->points->points().size();
+    for (std::size_t i = 0; i < count; ++i) {
+        body.add(describe(*api, *station->points, station->points->points()[i]));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
     }
-    json::object body;
-    body["points"] = std::move(list);
-    co_return json_response(200, body);
+    body.end_list();
+    co_return body.response();
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
@@ -92,11 +117,15 @@ Handling get_point(HttpRequest request, const Api* api) {
 Handling put_point(HttpRequest request, const Api* api) {
     const auto found = find_point(request, *api->directory);
     if (!found) co_return to_response(found.error());
-    auto planned = write_of(*found, request.body);
+    const auto write = write_of(*found, request);
+    if (!write) co_return to_response(write.error());
+    auto planned = request_to(found->station.id, write->pdu);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
-    co_return write_answer(answer, *found->station.profile);
+    const auto failed = problem_of(answer, *found->station.profile);
+    if (failed) co_return to_response(*failed);
+    co_return write_answer(*write);
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {

@@ -7,7 +7,6 @@
 
 #include "answer.hpp"
 #include "ask.hpp"
-#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"

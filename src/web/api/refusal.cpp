@@ -2,26 +2,48 @@
 
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 namespace panelgate::web {
 namespace {
 
 std::string detail_of(const bus::Refusal& refusal) {
+    const std::string station = "station '" + refusal.station + "'";
     switch (refusal.rule) {
-        case bus::Refusal::Rule::read_only:
-            return "station '" + refusal.station + "' is read-only";
-        case bus::Refusal::Rule::broadcast_over_read_only:
-            return "a broadcast would write to station '" + refusal.station +
-                   "', which is read-only";
-        case bus::Refusal::Rule::guard:
-            return "the profile of station '" + refusal.station + "' rules this request out";
+        case bus::Rule::read_only:
+            return station + " is read-only";
+        case bus::Rule::broadcast_over_read_only:
+            return "a broadcast would write to " + station + ", which is read-only";
+        case bus::Rule::function:
+        case bus::Rule::quantity:
+        case bus::Rule::range:
+        case bus::Rule::write_protected:
+            return "the guard of " + station + " refuses it" +
+                   (refusal.why.empty() ? "" : ": " + refusal.why);
     }
     std::abort();
 }
 
+Problem refused(unsigned status, bus::Rule rule, std::string detail) {
+    Problem made = problem(status, std::move(detail));
+    made.kind = "refused";
+    made.extensions["rule"] = label(rule);
+    made.extensions["transmitted"] = false;
+    return made;
+}
+
 }  // namespace
 
-Problem problem_of(const bus::Refusal& refusal) { return problem(403, detail_of(refusal)); }
+Problem problem_of(const bus::Refusal& refusal) {
+    Problem made = refused(bus::is_access(refusal.rule) ? 403 : 422, refusal.rule,
+                           "refused here, nothing was sent: " + detail_of(refusal));
+    made.extensions["modbus_exception"] = static_cast<std::uint8_t>(refusal.code);
+    return made;
+}
+
+Problem ruled_out(bus::Rule rule, std::string detail) {
+    return refused(422, rule, std::move(detail));
+}
 
 Parsed<void> check_may_write(const bus::BusClient& bus, std::uint8_t station) {
     if (const auto refusal = bus.refusal_of_write(station)) return problem_of(*refusal);

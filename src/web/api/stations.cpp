@@ -2,6 +2,7 @@
 
 #include "answer.hpp"
 #include "handlers.hpp"
+#include "long_answer.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "station_path.hpp"
 
@@ -53,14 +54,18 @@ json::array describe_polls(const points::StationPoints* points, TimePoint now) {
 
 }  // namespace
 
-Handling get_stations(HttpRequest, const Api* api) {
-    json::array stations;
-    for (const StationEntry& station : api->directory->stations) {
-        stations.push_back(describe(station));
+Handling get_stations(HttpRequest request, const Api* api) {
+    LongAnswer body;
+    body.begin_list("stations");
+    for (std::size_t i = 0; i < api->directory->stations.size(); ++i) {
+        body.add(describe(api->directory->stations[i]));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
     }
-    json::object body;
-    body["stations"] = std::move(stations);
-    co_return json_response(200, body);
+    body.end_list();
+    co_return body.response();
 }
 
 Handling get_station(HttpRequest request, const Api* api) {

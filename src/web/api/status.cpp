@@ -2,6 +2,9 @@
 #include <utility>
 
 #include "handlers.hpp"
+#include "panelgate/web/http/gzip.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "scrape.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -38,11 +41,25 @@ Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok
 
 Handling get_readyz(HttpRequest, const Api* api) {
     if (api->providers.ready()) co_return text_response(200, "ready\n");
-    co_return text_response(503, "not ready\n");
+    const std::string missing = api->providers.missing();
+    co_return text_response(503, missing.empty() ? "not ready\n" : "not ready: " + missing + '\n');
 }
 
-Handling get_metrics(HttpRequest, const Api* api) {
-    co_return text_response(200, api->providers.metrics_text(), api->providers.metrics_type);
+Handling get_metrics(HttpRequest request, const Api* api) {
+    const bool gzip = accepts_gzip(request.headers["accept-encoding"]);
+    boost::asio::awaitable<SharedText> making =
+        scrape(request.caller, api->providers.metrics, gzip);
+    SharedText text = co_await std::move(making);
+    if (!text) {
+        Problem busy = problem(503, "the metrics cannot be made now; try again");
+        busy.headers.emplace_back("Retry-After", "1");
+        co_return to_response(busy);
+    }
+    HttpResponse response = text_response(200, {}, api->providers.metrics_type);
+    response.shared_body = std::move(text);
+    response.headers.emplace_back("Vary", "Accept-Encoding");
+    if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
+    co_return response;
 }
 
 }  // namespace panelgate::web

@@ -6,7 +6,6 @@
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
-#include "bus_request.hpp"
 #include "handlers.hpp"
 #include "refusal.hpp"
 #include "station_path.hpp"
@@ -50,7 +49,8 @@ Parsed<Items> device_to_write(const HttpRequest& request, const Directory& direc
     const auto writable = std::ranges::find_if(also, is_writable);
     if (!is_writable(items->span.table) && writable != also.end()) items->span.table = *writable;
     if (is_writable(items->span.table) && !items->area->writable) {
-        return problem(422, items->area->name + " is read-only in this panel");
+        return ruled_out(bus::Rule::write_protected,
+                         items->area->name + " is read-only in this panel");
     }
     return items;
 }

@@ -5,6 +5,7 @@
 #include "answer.hpp"
 #include "panel_limits.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "refusal.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -30,14 +31,15 @@ Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& c
         if (!panel.has_function(function)) continue;
         const unsigned limit = panel.max_count(function);
         if (cells.size() > limit) {
-            return problem(422, "at most " + std::to_string(limit) +
-                                    " values in one write; writes are not split");
+            return ruled_out(bus::Rule::quantity, "at most " + std::to_string(limit) +
+                                                      " values in one write; writes are not split");
         }
         return encode_write(function, items.address(), cells);
     }
-    return problem(422, "the panel has no function " + upper_hex({&functions.back(), 1}) + " for " +
-                            std::to_string(cells.size()) + " of its " +
-                            std::string(label(items.span.table)));
+    return ruled_out(bus::Rule::function, "the panel has no function " +
+                                              upper_hex({&functions.back(), 1}) + " for " +
+                                              std::to_string(cells.size()) + " of its " +
+                                              std::string(label(items.span.table)));
 }
 
 std::vector<std::uint8_t> write_functions(modbus::Table table, std::size_t count) {

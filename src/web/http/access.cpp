@@ -29,13 +29,15 @@ std::optional<std::string_view> bearer_token(std::string_view authorization) {
     return authorization.substr(kScheme.size());
 }
 
-/// The role of a token; nothing for a token that nobody has. All are compared, whichever matches.
-std::optional<Role> role_of(std::string_view token, const Settings& settings) {
-    std::optional<Role> role;
+/// The token that it carries; null for one that nobody has. All are compared, whichever matches.
+const Token* token_of(const HttpRequest& request, const Settings& settings) {
+    const auto given = bearer_token(header(request, "authorization"));
+    if (!given) return nullptr;
+    const Token* found = nullptr;
     for (const Token& known : settings.tokens) {
-        if (same_secret(token, known.secret) && !known.secret.empty()) role = known.role;
+        if (same_secret(*given, known.secret) && !known.secret.empty()) found = &known;
     }
-    return role;
+    return found;
 }
 
 Problem unauthorized(std::string detail) {
@@ -62,16 +64,19 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
                                     const Settings& settings) {
     if (needed == Role::none) return std::nullopt;
     if (is_foreign_form(request)) return problem(415, "send the body as application/json");
-    const std::string_view authorization = header(request, "authorization");
-    if (authorization.empty()) {
+    if (header(request, "authorization").empty()) {
         if (settings.anonymous >= needed) return std::nullopt;
         return unauthorized("this needs a token");
     }
-    const auto token = bearer_token(authorization);
-    const auto role = token ? role_of(*token, settings) : std::nullopt;
-    if (!role) return unauthorized("this token is not known");
-    if (*role < needed) return problem(403, "this needs the role operator");
+    const Token* token = token_of(request, settings);
+    if (token == nullptr) return unauthorized("this token is not known");
+    if (token->role < needed) return problem(403, "this needs the role operator");
     return std::nullopt;
+}
+
+std::string token_name(const HttpRequest& request, const Settings& settings) {
+    const Token* token = token_of(request, settings);
+    return token == nullptr ? std::string() : token->name;
 }
 
 }  // namespace panelgate::web

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
@@ -13,5 +14,8 @@ namespace panelgate::web {
 /// a browser (Origin) must say application/json (415): a foreign page cannot do that unasked.
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
                                     const Settings& settings);
+
+/// The name of the token that it carries, "" without one that is known.
+std::string token_name(const HttpRequest& request, const Settings& settings);
 
 }  // namespace panelgate::web

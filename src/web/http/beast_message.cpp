@@ -43,7 +43,7 @@ HttpRequest to_request(BeastRequest&& message, Target target, std::string host) 
 
 bool is_parse_error(boost::system::error_code why) {
     return why.category() == http::make_error_code(http::error::bad_method).category() &&
-           why != http::error::end_of_stream && why != http::error::partial_message;
+           why != http::error::end_of_stream;
 }
 
 Problem problem_of_parse(boost::system::error_code why, std::size_t max_body) {
@@ -52,6 +52,9 @@ Problem problem_of_parse(boost::system::error_code why, std::size_t max_body) {
     }
     if (why == http::error::header_limit || why == http::error::buffer_overflow) {
         return problem(431, "a header has at most " + std::to_string(kHeaderLimit) + " bytes");
+    }
+    if (why == http::error::partial_message) {
+        return problem(400, "the request ends before it is whole; a blank line ends its header");
     }
     return problem(400, "this is not an HTTP/1.1 request: " + why.message());
 }

@@ -38,12 +38,13 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     for (const auto& [name, value] : response.headers) message.set(name, value);
     if (response.status != 204) {  // it has no body, and must not say so (RFC 9110 8.6)
         message.set(field::content_type, response.content_type);
-        message.content_length(response.body.size());
+        message.content_length(response.shared_body ? response.shared_body->size()
+                                                    : response.body.size());
     }
     message.keep_alive(keep_alive);
 }
 
-/// Is it the client's fault, and not the end of its connection?
+/// Is it the client's fault, and not the end of its connection between two requests?
 bool is_parse_error(boost::system::error_code why);
 Problem problem_of_parse(boost::system::error_code why, std::size_t max_body);
 

@@ -24,7 +24,8 @@ HttpListener::HttpListener(asio::any_io_executor executor, std::shared_ptr<const
           }) {}
 
 error_code HttpListener::open() {
-    return acceptor_.open(shared_->site->settings.address, shared_->site->settings.port);
+    const Settings& settings = shared_->site->settings;
+    return acceptor_.open(settings.address, settings.port, settings.ipv6_only);
 }
 
 const Counters& HttpListener::counters() const { return shared_->counters; }

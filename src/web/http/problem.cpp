@@ -1,6 +1,7 @@
 #include "panelgate/web/http/problem.hpp"
 
-#include <boost/json/serialize.hpp>
+#include "panelgate/base/suggest.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -43,6 +44,19 @@ std::string title_of(unsigned status) {
 
 Problem problem(unsigned status, std::string detail) { return {status, std::move(detail)}; }
 
+Problem unknown_name(const std::string& what, const std::string& name,
+                     std::span<const std::string_view> known) {
+    std::string text = "unknown " + what + " '" + excerpt(name) + '\'';
+    const std::string near = nearest(excerpt(name), known);
+    if (!near.empty()) return problem(400, text + "; did you mean '" + near + "'?");
+    text += known.empty() ? "; there is none here" : "; known here: ";
+    for (const std::string_view& word : known) {
+        if (&word != &known.front()) text += ", ";
+        text += word;
+    }
+    return problem(400, std::move(text));
+}
+
 HttpResponse to_response(const Problem& problem) {
     boost::json::object body;
     body["type"] = problem.kind.empty() ? "about:blank" : "urn:panelgate:problem:" + problem.kind;
@@ -53,7 +67,7 @@ HttpResponse to_response(const Problem& problem) {
     HttpResponse response;
     response.status = problem.status;
     response.content_type = "application/problem+json";
-    response.body = boost::json::serialize(body) + "\n";
+    response.body = json_text(body) + "\n";
     response.headers = problem.headers;
     return response;
 }

@@ -1,6 +1,8 @@
 #include "panelgate/web/http/query.hpp"
 
+#include <algorithm>
 #include <charconv>
+#include <string>
 #include <system_error>
 
 namespace panelgate::web {
@@ -10,6 +12,17 @@ std::optional<unsigned> to_number(std::string_view text, int base) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
     if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
     return number;
+}
+
+std::optional<Problem> check_queries(const HttpRequest& request,
+                                     std::span<const std::string_view> known) {
+    for (const auto& [name, value] : request.query) {
+        if (std::ranges::find(known, name) == known.end())
+            return unknown_name("query", name, known);
+        if (request.query.count(name) > 1)
+            return problem(400, "the query '" + name + "' is given twice");
+    }
+    return std::nullopt;
 }
 
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,

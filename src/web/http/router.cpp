@@ -13,6 +13,8 @@
 
 #include "access.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 namespace asio = boost::asio;
@@ -128,6 +130,9 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     const auto refused = co_await admit(&request, found.route->needed, shared);
     if (request.caller->has_left()) co_return HttpResponse();
     if (refused) co_return to_response(*refused);
+    const auto mistaken = check_queries(request, found.route->queries);
+    if (mistaken) co_return to_response(*mistaken);
+    if (request.caller) request.caller->uses_token(token_name(request, site->settings));
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);

@@ -192,11 +192,18 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     departure_.request_ends();
     ++shared_->counters.requests[response.status];
     stream_.expires_after(shared_->site->settings.request_timeout);
-    if (head) {
+    if (head || response.shared_body) {
         http::response<http::empty_body> message;
         set_head(message, response, keep_alive, shared_->site->product);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
+        // In pieces of 64 KB, between which the loop serves others: Beast would hand the kernel all
+        // of it at once.
+        if (!error && !head) {
+            const asio::const_buffer body = asio::buffer(*response.shared_body);
+            co_await asio::async_write(stream_, body,
+                                       asio::redirect_error(asio::use_awaitable, error));
+        }
     } else {
         http::response<http::string_body> message;
         set_head(message, response, keep_alive, shared_->site->product);

@@ -60,10 +60,11 @@ std::optional<Target> parse_target(std::string_view target) {
     }
     while (!target.empty()) {
         std::string_view pair = next_part(target, '&');
+        if (pair.empty()) continue;
         const auto name = decode(next_part(pair, '='), true);
         auto value = decode(pair, true);
         if (!name || !value) return std::nullopt;
-        if (!name->empty()) parsed.query[*name] = std::move(*value);
+        parsed.query.emplace(*name, std::move(*value));
     }
     return parsed;
 }

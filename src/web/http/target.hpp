@@ -12,8 +12,8 @@ namespace panelgate::web {
 /// 9112 3.2).
 struct Target {
     std::vector<std::string> path;
-    std::map<std::string, std::string> query;
-    std::optional<std::string> authority;  ///< of an absolute one: "host:80"
+    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
+    std::optional<std::string> authority;           ///< of an absolute one: "host:80"
 };
 /// Nothing when it has another form, a broken percent-encoding, or decodes to what is not UTF-8.
 std::optional<Target> parse_target(std::string_view target);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <deque>
 #include <memory>
 
 #include "support/fake_bus.hpp"
@@ -91,8 +92,16 @@ TEST_F(ShowingTest, AStationThatNobodyHasListedIsAPanelOfAnyKind) {
     EXPECT_FALSE(directory_of(plant, generic).find_station("floor1:9"));
 }
 
+std::deque<points::PointSample> all_points(const Plant& plant, TimePoint now) {
+    std::deque<points::PointSample> samples;
+    PointCopy copy(plant);
+    while (copy.next(samples, now)) {
+    }
+    return samples;
+}
+
 TEST_F(ShowingTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
-    auto samples = point_samples(plant, now);
+    auto samples = all_points(plant, now);
     ASSERT_EQ(samples.size(), 1u);
     EXPECT_EQ(samples[0].line, "floor1");
     EXPECT_EQ(samples[0].station, "press");
@@ -101,10 +110,29 @@ TEST_F(ShowingTest, P10AScrapeHasEveryPointButNoValueThatWasNeverRead) {
     EXPECT_FALSE(samples[0].value);
     EXPECT_FALSE(samples[0].age);
     poll();
-    samples = point_samples(plant, now + 1s);
+    samples = all_points(plant, now + 1s);
     EXPECT_EQ(samples[0].value, 215);
     EXPECT_EQ(samples[0].age, 1);
     EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ShowingTest, AScrapeCopiesManyPointsSomeAtATime) {
+    Plant wide;
+    floor.stations[0].points.resize(2 * PointCopy::kPiece + 1);
+    for (std::size_t i = 0; i < floor.stations[0].points.size(); ++i)
+        floor.stations[0].points[i].name = std::to_string(i);
+    wide.add(floor, bus, nullptr);
+    const points::StationPolls polled(points::wants_of(floor.stations[0].points, {}),
+                                      points::make_plan_limits(panel, SerialFormat{}, 2ms), now);
+    wide.at("floor1", 31).points.emplace(floor.stations[0].points, floor.stations[0].polls, polled);
+    std::deque<points::PointSample> samples;
+    PointCopy copy(wide);
+    EXPECT_TRUE(copy.next(samples, now));
+    EXPECT_EQ(samples.size(), PointCopy::kPiece);
+    EXPECT_TRUE(copy.next(samples, now));
+    EXPECT_FALSE(copy.next(samples, now));
+    ASSERT_EQ(samples.size(), 2 * PointCopy::kPiece + 1);
+    EXPECT_EQ(samples.back().point, std::to_string(2 * PointCopy::kPiece));
 }
 
 TEST_F(ShowingTest, TellsOfStationsByTheirNames) {

@@ -41,12 +41,27 @@ TEST_F(WiringTest, ABusIsToldWhatMayBeDoneToItsStations) {
     EXPECT_FALSE(stations.at(5).guard);
 }
 
+TEST_F(WiringTest, WhatAPanelHasIsCountedFromTheStart) {
+    floor.stations[0].profile = shipped.find("autonics-arm");
+    std::vector<std::uint8_t> expected{1, 2, 3, 4, 5, 6, 15, 16};
+    std::erase_if(expected, [&](std::uint8_t code) {
+        return !floor.stations[0].profile->has_function(code);
+    });
+    const bus::Stations stations = bus_settings(floor).stations;
+    EXPECT_EQ(stations.at(31).functions, expected);
+    EXPECT_EQ(stations.at(5).functions.size(), 8u) << "generic: all that read and write values";
+}
+
 TEST_F(WiringTest, AGuardRefusesAsThePanelWould) {
     const bus::Guard guard = bus_settings(floor).stations.at(31).guard;
     ASSERT_TRUE(guard);
-    EXPECT_EQ(guard(test::request_of("03 0000 0001"_hex)), std::nullopt);
-    EXPECT_EQ(guard(test::request_of("41"_hex)), 1) << "no function of its profile";
-    EXPECT_EQ(guard(test::request_of("05 0000 1234"_hex)), 3) << "no value of a coil";
+    EXPECT_FALSE(guard(test::request_of("03 0000 0001"_hex)));
+    const auto function = guard(test::request_of("41"_hex));
+    ASSERT_TRUE(function);
+    EXPECT_EQ(function->rule, bus::Rule::function);
+    EXPECT_EQ(function->why, "generic has no function 65");
+    EXPECT_EQ(guard(test::request_of("05 0000 1234"_hex)).value().rule, bus::Rule::quantity)
+        << "no value of a coil";
 }
 
 TEST_F(WiringTest, OnlyStationsWithPointsOrPollBlocksArePolled) {

@@ -32,6 +32,29 @@ TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationSaysSo) {
     EXPECT_EQ(script.sent.size(), 2u);
 }
 
+TEST_F(ArbiterTest, P6SaysWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOver) {
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.written.empty()) << "a read";
+    bus.submit(17, "10 00 64 00 02 04 00 0A 01 02"_hex);
+    ASSERT_TRUE(bus.next_sent());
+    ASSERT_EQ(bus.written.size(), 1u);
+    EXPECT_EQ(bus.written[0].station, 17);
+    EXPECT_EQ(bus.written[0].items, (modbus::Span{modbus::Table::holding_registers, 100, 2}));
+    EXPECT_FALSE(bus.written[0].ended);
+    bus.run_for(5s);
+    ASSERT_EQ(bus.written.size(), 2u) << "nobody answered";
+    EXPECT_TRUE(bus.written[1].ended);
+    bus.submit(0, kWrite);
+    bus.run_for(1s);
+    ASSERT_EQ(bus.written.size(), 4u);
+    EXPECT_EQ(bus.written[3].station, 0);
+    bus.submit(17, "41 01 02"_hex);
+    bus.run_for(5s);
+    EXPECT_FALSE(bus.written.back().items) << "nobody knows what it does";
+}
+
 TEST_F(ArbiterTest, BroadcastIsAnsweredWhenItHasLeftAndTheLineRestsForTheTurnaround) {
     const Ticket broadcast = bus.submit(0, kWrite, 1, PriorityClass::write);
     bus.submit(17, kRead, 2);

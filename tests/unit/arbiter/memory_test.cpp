@@ -110,15 +110,17 @@ TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
     settings.queue.per_client = 1;
     settings.unlisted.retries = 0;
     BusScript bus(settings);
+    bus.arbiter().name_client(1, "modbus_tcp 10.0.0.5:50012");
     bus.submit(17, kRead, 1);
     bus.submit(18, kRead, 2);
     EXPECT_FALSE(bus.try_submit(18, "03 00 00 00 03"_hex, 2));
     EXPECT_EQ(bus.notes[0].why,
-              "read of client 1 to station 17: next in turn after 0.0 ms, 0 wait");
+              "read of modbus_tcp 10.0.0.5:50012 to station 17: next in turn after 0.0 ms, 0 wait");
     ASSERT_EQ(bus.decisions.size(), 1u);
-    EXPECT_EQ(bus.decisions[0].text,
-              "read of client 2 to station 18 refused: 1 of 256 wait on this line, at most 1 of "
-              "one client");
+    EXPECT_EQ(
+        bus.decisions[0].text,
+        "read of a client without a name to station 18 refused: 1 of 256 wait on this line, at "
+        "most 1 of one client");
     bus.run_for(3s);
     ASSERT_GE(bus.decisions.size(), 2u);
     EXPECT_EQ(bus.decisions[1].text,

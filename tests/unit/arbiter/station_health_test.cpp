@@ -48,6 +48,21 @@ TEST_F(StationHealthTest, P4AnythingHeardStartsTheCountAnew) {
     EXPECT_TRUE(miss());
 }
 
+TEST_F(StationHealthTest, EachReturnFromASilenceMayHaveBeenARestart) {
+    health.on_reply(now);
+    EXPECT_EQ(health.returns(), 0u);
+    miss();
+    health.on_reply(now);
+    health.on_reply(now);
+    EXPECT_EQ(health.returns(), 1u);
+    miss();
+    health.on_damaged();
+    EXPECT_EQ(health.returns(), 2u) << "damaged, but heard";
+    go_offline();
+    health.on_reply(now);
+    EXPECT_EQ(health.returns(), 3u);
+}
+
 TEST_F(StationHealthTest, OneThatNobodyWaitsForAgainGoesAtTheFirstSilence) {
     EXPECT_TRUE(health.on_silence(now, true));
     EXPECT_TRUE(health.offline());

@@ -1,10 +1,12 @@
 #include "panelgate/bus/bus.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
 #include <functional>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
@@ -34,7 +36,8 @@ class BusTest : public testing::Test {
         settings.stations[17].name = "press";
         settings.stations[18].name = "oven";
         settings.stations[18].guard = [](const modbus::Request& request) {
-            return request.function() == 6 ? std::optional<std::uint8_t>(2) : std::nullopt;
+            return request.function() == 6 ? std::optional(Objection{Rule::range, "no memory"})
+                                           : std::nullopt;
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
@@ -76,8 +79,8 @@ TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     EXPECT_FALSE(refused.transmitted);
     EXPECT_TRUE(line->written.empty());
     EXPECT_EQ(bus->report().stations.back().requests.at(6)[Outcome::refused], 1u);
-    const Refusal guarded{Refusal::Rule::guard, "oven",
-                          modbus::ExceptionCode::illegal_data_address};
+    const Refusal guarded{Rule::range, "oven", modbus::ExceptionCode::illegal_data_address,
+                          "no memory"};
     EXPECT_EQ(refused.refusal, guarded);
     EXPECT_TRUE(ask(18, kRead).pdu.has_value());
 }
@@ -90,11 +93,11 @@ TEST_F(BusTest, WhatARightForbidsIsRefusedWhoeverAsks) {
     EXPECT_EQ(write.pdu.error(), Fault::denied);
     EXPECT_FALSE(write.transmitted);
     ASSERT_TRUE(write.refusal);
-    EXPECT_EQ(write.refusal->rule, Refusal::Rule::read_only);
+    EXPECT_EQ(write.refusal->rule, Rule::read_only);
     EXPECT_EQ(write.refusal->station, "press");
     const Answer broadcast = ask(0, kWrite);
     EXPECT_EQ(broadcast.pdu.error(), Fault::denied);
-    EXPECT_EQ(broadcast.refusal.value().rule, Refusal::Rule::broadcast_over_read_only);
+    EXPECT_EQ(broadcast.refusal.value().rule, Rule::broadcast_over_read_only);
     EXPECT_TRUE(line->written.empty());
     EXPECT_EQ(bus->report().stations[1].requests.at(6)[Outcome::refused], 1u);
     EXPECT_TRUE(ask(17, kRead).pdu.has_value());
@@ -105,7 +108,7 @@ TEST_F(BusTest, SaysEarlyWhatItWouldRefuse) {
     EXPECT_EQ(bus->refusal_of_write(17), std::nullopt);
     settings.stations[17].access = Access::read_only;
     make_bus();
-    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Refusal::Rule::read_only);
+    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Rule::read_only);
     EXPECT_EQ(bus->refusal_of_write(18), std::nullopt) << "its guard wants to see the write";
     EXPECT_EQ(bus->refusal_of_write(0).value().station, "press");
     EXPECT_TRUE(bus->idle());
@@ -158,7 +161,8 @@ TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
     ask(17, kRead);
     const auto frames = bus->trace(10);
     ASSERT_FALSE(frames.empty());
-    EXPECT_EQ(frames[0].why.substr(0, 36), "read of client 1 to station 17: next");
+    EXPECT_THAT(frames[0].why,
+                ::testing::StartsWith("read of modbus_tcp 10.0.0.7:5000 to station 17: next"));
     const auto clients = bus->clients();
     ASSERT_EQ(clients.size(), 1u);
     EXPECT_EQ(clients[0].name, "modbus_tcp 10.0.0.7:5000");
@@ -166,6 +170,24 @@ TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
     EXPECT_EQ(clients[0].percent, 100);
     bus->cancel(1);
     EXPECT_TRUE(bus->clients().empty());
+}
+
+TEST_F(BusTest, TellsInTheTraceWhenByTheClockOnTheWall) {
+    bus->start();
+    const WallTime before = rt::wall_now();
+    ask(17, kRead);
+    for (const TraceFrame& frame : bus->trace(2)) {
+        EXPECT_GE(frame.time, before - 1s);
+        EXPECT_LE(frame.time, rt::wall_now() + 1s);
+    }
+}
+
+TEST_F(BusTest, ALineThatIsDownSaysWhy) {
+    bus->start();
+    line->events()->on_down("Permission denied");
+    const Answer answer = ask(17, kRead);
+    EXPECT_EQ(answer.pdu.error(), Fault::line_down);
+    EXPECT_EQ("down: " + answer.why, bus->status().state);
 }
 
 TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
@@ -180,6 +202,21 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
     EXPECT_EQ(bus->station_status(17).state, Health::online);
+}
+
+TEST_F(BusTest, NumbersFramesAndDecisionsOfALineTogether) {
+    bus->start();
+    ask(17, kRead);
+    std::set<std::uint64_t> numbers;
+    for (const TraceFrame& frame : bus->trace(100)) numbers.insert(frame.sequence);
+    for (const TraceDecision& decision : bus->decisions(100)) numbers.insert(decision.sequence);
+    EXPECT_EQ(numbers.size(), bus->trace(100).size() + bus->decisions(100).size());
+    EXPECT_EQ(*numbers.begin(), 1u);
+    EXPECT_EQ(*numbers.rbegin(), numbers.size());
+    ASSERT_GE(bus->trace(100).size(), 2u);
+    const auto later = bus->trace_since(bus->trace(100)[0].sequence, 1);
+    ASSERT_EQ(later.size(), 1u);
+    EXPECT_EQ(later[0].sequence, bus->trace(100)[1].sequence);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {

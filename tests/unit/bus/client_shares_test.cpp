@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
 #include <string>
 #include <vector>
 
@@ -14,9 +13,11 @@ TEST(ClientShares, TheGreediestComesFirstWithItsName) {
     used.add(7, 1s);
     used.add(8, 2s);
     used.add(8, 1s);
-    const std::vector<ClientShare> shares = client_shares(used, {{7, "http 10.0.0.7"}});
+    arbiter::ClientNames names;
+    names.set(7, "http 10.0.0.7");
+    const std::vector<ClientShare> shares = client_shares(used, names);
     ASSERT_EQ(shares.size(), 2u);
-    EXPECT_EQ(shares[0].name, "client 8") << "nobody named it";
+    EXPECT_EQ(shares[0].name, "a client without a name");
     EXPECT_EQ(shares[0].busy, Duration(3s));
     EXPECT_EQ(shares[0].transactions, 2u);
     EXPECT_EQ(shares[0].percent, 75);
@@ -25,7 +26,9 @@ TEST(ClientShares, TheGreediestComesFirstWithItsName) {
 }
 
 TEST(ClientShares, WhoIsNamedAndHasAskedForNothingIsNotShown) {
-    EXPECT_TRUE(client_shares({}, {{7, "idle"}}).empty());
+    arbiter::ClientNames names;
+    names.set(7, "idle");
+    EXPECT_TRUE(client_shares({}, names).empty());
 }
 
 TEST(ClientShares, WhereNoTimeWasUsedNobodyHasAShareOfIt) {
@@ -38,8 +41,12 @@ TEST(ClientShares, WhereNoTimeWasUsedNobodyHasAShareOfIt) {
 
 TEST(ClientShares, OfMoreThanAHundredTheGreediestAreShownWithTheirShareOfAll) {
     arbiter::BusShares used;
-    for (ClientId client = 1; client <= 200; ++client) used.add(client, client * Duration(1ms));
-    const std::vector<ClientShare> shares = client_shares(used, {});
+    arbiter::ClientNames names;
+    for (ClientId client = 1; client <= 200; ++client) {
+        used.add(client, client * Duration(1ms));
+        names.set(client, "client " + std::to_string(client));
+    }
+    const std::vector<ClientShare> shares = client_shares(used, names);
     ASSERT_EQ(shares.size(), 100u);
     EXPECT_EQ(shares.front().name, "client 200");
     EXPECT_EQ(shares.back().name, "client 101");

@@ -11,13 +11,16 @@
 namespace panelgate::bus {
 namespace {
 
-TraceDecision decision(std::string text) {
-    return {.sequence = 99, .at = {}, .text = std::move(text)};
+TraceDecision decision(std::uint64_t sequence) {
+    TraceDecision made;
+    made.sequence = sequence;
+    made.text = std::to_string(sequence);
+    return made;
 }
 
 DecisionRecorder with(std::size_t limit, std::size_t entries) {
     DecisionRecorder recorder(limit);
-    for (std::size_t i = 1; i <= entries; ++i) recorder.add(decision(std::to_string(i)));
+    for (std::size_t i = 1; i <= entries; ++i) recorder.add(decision(i));
     return recorder;
 }
 
@@ -27,10 +30,6 @@ std::string told(const std::vector<TraceDecision>& entries) {
     for (const TraceDecision& entry : entries)
         text += (text.empty() ? "" : " ") + std::to_string(entry.sequence) + ':' + entry.text;
     return text;
-}
-
-TEST(Recorder, NumbersFromOneWhateverTheEntrySays) {
-    EXPECT_EQ(told(with(8, 3).last(8)), "1:1 2:2 3:3");
 }
 
 TEST(Recorder, GivesTheLastOnesTheOldestFirst) {
@@ -50,9 +49,21 @@ TEST(Recorder, ForgetsTheOldestWhenItIsFullAndCountsOn) {
 TEST(Recorder, WhatWasGivenDoesNotChangeWithIt) {
     DecisionRecorder recorder = with(2, 2);
     const std::vector<TraceDecision> before = recorder.last(2);
-    recorder.add(decision("3"));
+    recorder.add(decision(3));
     EXPECT_EQ(told(before), "1:1 2:2");
     EXPECT_EQ(told(recorder.last(2)), "2:2 3:3");
+}
+
+TEST(Recorder, GivesTheFirstOnesBehindANumber) {
+    const DecisionRecorder recorder = with(3, 6);
+    EXPECT_EQ(told(recorder.since(4, 8)), "5:5 6:6");
+    EXPECT_EQ(told(recorder.since(0, 2)), "4:4 5:5") << "what it has forgotten is not there";
+    EXPECT_EQ(told(recorder.since(6, 8)), "");
+    EXPECT_EQ(told(recorder.since(99, 8)), "");
+    EXPECT_EQ(told(recorder.since(4, 0)), "");
+    DecisionRecorder gaps(8);
+    for (const std::uint64_t sequence : {2u, 5u, 9u}) gaps.add(decision(sequence));
+    EXPECT_EQ(told(gaps.since(3, 8)), "5:5 9:9") << "others have numbers, too";
 }
 
 TEST(Recorder, OneThatKeepsNothingStaysEmpty) { EXPECT_EQ(told(with(0, 5).last(8)), ""); }

@@ -75,6 +75,14 @@ TEST_F(RequestCountersTest, AStationThatWasNeverAskedIsReportedAllTheSame) {
     EXPECT_FALSE(of("other").configured);
 }
 
+TEST_F(RequestCountersTest, WhatAPanelIsLikelyToBeAskedIsCountedFromTheStart) {
+    counters = RequestCounters({{17, {.name = "press", .functions = {3, 16}}}});
+    const StationReport press = of("press");
+    ASSERT_EQ(press.requests.size(), 2u);
+    EXPECT_EQ(press.requests.at(3)[Outcome::ok], 0u);
+    EXPECT_TRUE(press.requests.contains(16));
+}
+
 TEST_F(RequestCountersTest, EachFunctionAndEachOutcomeCountsByItself) {
     ask(17, 3, 2ms);
     ask(17, 3, 4ms);

@@ -2,13 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::bus {
 namespace {
-
-using Rule = Refusal::Rule;
 
 const Bytes kRead = "03 0000 0001"_hex;
 const Bytes kWrite = "06 0000 0001"_hex;
@@ -20,7 +20,8 @@ Rights plant() {
     stations[5] = {"meter", Access::read_only, {}};
     stations[20].name = "oven";
     stations[20].guard = [](const modbus::Request& request) {
-        return request.function() > 6 ? std::optional<std::uint8_t>(1) : std::nullopt;
+        return request.function() > 6 ? std::optional(Objection{Rule::function, "too new"})
+                                      : std::nullopt;
     };
     return Rights(std::move(stations));
 }
@@ -48,14 +49,15 @@ TEST(Rights, ABroadcastOverAStationThatMayOnlyBeReadIsRefused) {
 }
 
 TEST(Rights, AGuardSaysWithWhatCodeItRefuses) {
-    const Refusal refusal{Rule::guard, "oven", modbus::ExceptionCode::illegal_function};
+    const Refusal refusal{Rule::function, "oven", modbus::ExceptionCode::illegal_function,
+                          "too new"};
     EXPECT_EQ(plant().judge(20, test::request_of("10 0000 0001 02 0001"_hex)), refusal);
     EXPECT_EQ(plant().judge(20, test::request_of(kWrite)), std::nullopt);
     EXPECT_EQ(plant().judge(20, test::request_of(kRead)), std::nullopt);
 }
 
 TEST(Rights, AGuardAnswersAsItsPanelWould) {
-    const Refusal guarded{Rule::guard, "oven", modbus::ExceptionCode::illegal_data_address};
+    const Refusal guarded{Rule::range, "oven", modbus::ExceptionCode::illegal_data_address};
     EXPECT_EQ(answer_to(guarded, 6).value(), (Bytes{0x86, 2}));
     EXPECT_EQ(answer_to({Rule::read_only, "meter"}, 6).error(), Fault::denied);
     EXPECT_EQ(answer_to({Rule::broadcast_over_read_only, "meter"}, 6).error(), Fault::denied);
@@ -64,10 +66,24 @@ TEST(Rights, AGuardAnswersAsItsPanelWould) {
 TEST(Rights, AccessIsJudgedBeforeTheGuardIsAsked) {
     Stations stations;
     stations[5] = {"meter", Access::read_only,
-                   [](const modbus::Request&) { return std::optional<std::uint8_t>(2); }};
+                   [](const modbus::Request&) { return std::optional(Objection{Rule::range}); }};
     const Rights rights(std::move(stations));
     EXPECT_EQ(rights.judge(5, test::request_of(kWrite)).value().rule, Rule::read_only);
-    EXPECT_EQ(rights.judge(5, test::request_of(kRead)).value().rule, Rule::guard);
+    EXPECT_EQ(rights.judge(5, test::request_of(kRead)).value().rule, Rule::range);
+}
+
+TEST(Rights, AGuardsRuleGivesTheCodeThatThePanelWouldAnswer) {
+    for (const auto& [rule, code] :
+         {std::pair(Rule::function, 1), std::pair(Rule::range, 2),
+          std::pair(Rule::write_protected, 2), std::pair(Rule::quantity, 3)}) {
+        Stations stations;
+        stations[20].guard = [rule](const modbus::Request&) {
+            return std::optional(Objection{rule});
+        };
+        const Refusal refusal =
+            Rights(std::move(stations)).judge(20, test::request_of(kRead)).value();
+        EXPECT_EQ(static_cast<int>(refusal.code), code) << label(rule);
+    }
 }
 
 TEST(Rights, TellOfEveryWriteWhatTheyTellOfEach) {

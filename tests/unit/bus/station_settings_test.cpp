@@ -12,5 +12,14 @@ TEST(StationSettings, AStationIsCalledByItsNameAndAStrangerByItsId) {
     EXPECT_EQ(name_of(stations, 18), "18");
 }
 
+TEST(StationSettings, ARuleIsToldInAStableWord) {
+    EXPECT_EQ(label(Rule::read_only), "access");
+    EXPECT_EQ(label(Rule::broadcast_over_read_only), "access");
+    EXPECT_EQ(label(Rule::function), "function");
+    EXPECT_EQ(label(Rule::quantity), "quantity");
+    EXPECT_EQ(label(Rule::range), "range");
+    EXPECT_EQ(label(Rule::write_protected), "read-only");
+}
+
 }  // namespace
 }  // namespace panelgate::bus

@@ -36,7 +36,7 @@ TEST(ConfigRelays, AreReadWithTheirDefaults) {
     const MemoryFiles files({});
     const auto config = load(
         with_relays(relay("a", 100, "b", 200, 8) + "  - {from: b/400300, to: a/400400, every: 5s, "
-                                                   "on_change: true}\n"),
+                                                   "on_change: true, refresh: 5min}\n"),
         files, problems);
     ASSERT_TRUE(config) << problems.text();
     ASSERT_EQ(config->relays.size(), 2U);
@@ -51,6 +51,22 @@ TEST(ConfigRelays, AreReadWithTheirDefaults) {
     EXPECT_EQ(config->relays[1].count, 1U);
     EXPECT_EQ(config->relays[1].every, 5s);
     EXPECT_TRUE(config->relays[1].on_change);
+    EXPECT_EQ(first.refresh, 60s);
+    EXPECT_EQ(config->relays[1].refresh, 5min);
+    EXPECT_TRUE(config->warnings.empty());
+}
+
+TEST(ConfigRelays, ARefreshOfOneThatWritesEveryTurnHasNoEffectAndIsSaid) {
+    yaml::Problems problems("relays.yaml");
+    const MemoryFiles files({});
+    const auto config =
+        load(with_relays("  - {from: a/400101, to: b/400201, refresh: 5s}\n"), files, problems);
+    ASSERT_TRUE(config) << problems.text();
+    ASSERT_EQ(config->warnings.size(), 1U);
+    EXPECT_NE(config->warnings[0].find("refresh has no effect without on_change: true"),
+              std::string::npos)
+        << config->warnings[0];
+    EXPECT_NE(problems_of("  - {from: a/400101, to: b/400201, on_change: true, refresh: 5}\n"), "");
 }
 
 TEST(ConfigRelays, AChainMayVisitAStationAgainElsewhere) {

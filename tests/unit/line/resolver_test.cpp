@@ -1,4 +1,5 @@
 // P7: a name server that does not answer keeps only those lines waiting that need it.
+#include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <netdb.h>
 
@@ -7,22 +8,29 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "line_events.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/rt/asio_clock.hpp"
+#include "support/manual_clock.hpp"
 
 namespace {
 
 std::atomic<int> asked;
 std::atomic<bool> silent;
 
+using GetAddrInfo = int (*)(const char*, const char*, const addrinfo*, addrinfo**);
+
 }  // namespace
 
-/// In place of the system's, for this whole program: the name server is silent until a test ends.
-int getaddrinfo(const char*, const char*, const addrinfo*, addrinfo**) {
+/// In place of the system's, for this whole program. The server of names that end in ".invalid" is
+/// silent until a test ends; other names are the loopback's.
+int getaddrinfo(const char* host, const char* port, const addrinfo* hints, addrinfo** found) {
+    static const auto real = reinterpret_cast<GetAddrInfo>(::dlsym(RTLD_NEXT, "getaddrinfo"));
     ++asked;
     asked.notify_all();
+    if (!std::string_view(host).ends_with(".invalid")) return real("127.0.0.1", port, hints, found);
     silent.wait(true);
     return EAI_AGAIN;
 }
@@ -39,9 +47,70 @@ std::unique_ptr<Line> make(boost::asio::io_context& io, rt::Clock& clock, const 
     return make_tcp_line(io.get_executor(), clock, settings);
 }
 
+/// Ends the silence when a test ends, however it ends.
+struct Silence {
+    Silence() {
+        asked = 0;
+        silent = true;
+    }
+    ~Silence() {
+        silent = false;
+        silent.notify_all();
+    }
+};
+
+TEST(Resolver, P7ASilentNameServerKeepsNoLineWaitingWhoseNameIsKnown) {
+    const Silence silence;
+    boost::asio::io_context io{1};
+    rt::AsioClock clock(io.get_executor());
+    tcp::acceptor acceptor(io, {boost::asio::ip::address_v4::loopback(), 0});
+    Heard unknown_heard;
+    Heard known_heard;
+    const auto unknown = make(io, clock, "moxa.invalid", acceptor);
+    const auto known = make(io, clock, "moxa.plant", acceptor);
+    unknown->start(unknown_heard);
+    asked.wait(0);
+    known->start(known_heard);
+    while (known_heard.ups == 0 && unknown_heard.downs.empty()) io.run_one();
+    EXPECT_EQ(known_heard.ups, 1);
+    EXPECT_TRUE(unknown_heard.downs.empty()) << unknown_heard.downs[0];
+}
+
+TEST(Resolver, P7ALineIsGivenUpWhileItsNameServerIsSilent) {
+    const Silence silence;
+    Heard heard;
+    {
+        boost::asio::io_context io{1};
+        rt::AsioClock clock(io.get_executor());
+        tcp::acceptor acceptor(io, {boost::asio::ip::address_v4::loopback(), 0});
+        const auto line = make(io, clock, "moxa.invalid", acceptor);
+        line->start(heard);
+        asked.wait(0);
+        line->stop();
+        io.run();  // nothing is left to wait for
+    }
+    EXPECT_EQ(heard.ups, 0);
+    EXPECT_TRUE(heard.downs.empty());
+}
+
+TEST(Resolver, ALineSaysThatItsNameServerIsSilentAndAsksItOnce) {
+    Heard heard;
+    const Silence silence;
+    test::ManualClock clock;
+    boost::asio::io_context io{1};
+    tcp::acceptor acceptor(io, {boost::asio::ip::address_v4::loopback(), 0});
+    const auto line = make(io, clock, "moxa.invalid", acceptor);
+    line->start(heard);
+    asked.wait(0);
+    for (int attempt = 0; attempt < 5; ++attempt) clock.advance(6s);
+    ASSERT_EQ(heard.downs.size(), 1u);
+    EXPECT_NE(heard.downs[0].find("no name server tells its address"), std::string::npos);
+    EXPECT_EQ(asked, 1);
+    line->stop();
+}
+
 TEST(Resolver, P7ALineWithANumericAddressDoesNotWaitForADeadNameServer) {
-    asked = 0;
-    silent = true;
+    Silence silence;
     boost::asio::io_context io{1};
     rt::AsioClock clock(io.get_executor());
     tcp::acceptor acceptor(io, {boost::asio::ip::address_v4::loopback(), 0});
@@ -50,7 +119,7 @@ TEST(Resolver, P7ALineWithANumericAddressDoesNotWaitForADeadNameServer) {
     const auto name = make(io, clock, "moxa.invalid", acceptor);
     const auto number = make(io, clock, "127.0.0.1", acceptor);
     name->start(by_name);
-    asked.wait(0);  // all further questions would wait behind this one
+    asked.wait(0);
     number->start(by_number);
     while (by_number.ups == 0 && by_name.downs.empty()) io.run_one();
     EXPECT_EQ(by_number.ups, 1);

@@ -6,6 +6,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <string>
+#include <string_view>
+#include <vector>
 
 namespace panelgate::metrics {
 namespace {
@@ -113,13 +116,66 @@ TEST(Exposition, CumulatesTheBucketsOfAHistogram) {
             "panelgate_request_duration_seconds_count{line=\"floor1\",station=\"press\"} 3\n"));
 }
 
+/// The series of requests_total of this station.
+std::size_t request_series(const Snapshot& snapshot, const std::string& station) {
+    const std::string head =
+        "panelgate_requests_total{line=\"floor1\",station=\"" + station + "\",";
+    const std::string text = exposition(snapshot);
+    std::size_t count = 0;
+    for (std::size_t at = 0; (at = text.find(head, at)) != std::string::npos; ++at) ++count;
+    return count;
+}
+
 TEST(Exposition, ShowsSeriesFromTheStartWithZero) {
+    expect_lines(exposition(filled()),
+                 {R"(panelgate_exceptions_total{line="floor1",station="other",code="2"} 0)",
+                  R"(panelgate_retries_total{line="floor1",station="other"} 0)"});
+}
+
+TEST(Exposition, ShowsTheFunctionsOfAPanelWithZeroBeforeTheyAreUsed) {
+    Snapshot snapshot = filled();
+    snapshot.lines[0].stations[0].requests.clear();
+    for (const int function : {1, 2, 3, 4, 5, 6, 15, 16})
+        snapshot.lines[0].stations[0].requests[static_cast<std::uint8_t>(function)];
     expect_lines(
-        exposition(filled()),
-        {R"(panelgate_requests_total{line="floor1",station="other",function="16",outcome="timeout"} 0)",
-         R"(panelgate_requests_total{line="floor1",station="press",function="43",outcome="busy"} 0)",
-         R"(panelgate_exceptions_total{line="floor1",station="other",code="2"} 0)",
-         R"(panelgate_retries_total{line="floor1",station="other"} 0)"});
+        exposition(snapshot),
+        {R"(panelgate_requests_total{line="floor1",station="press",function="16",outcome="ok"} 0)"});
+    EXPECT_EQ(request_series(snapshot, "press"), 8u);
+    EXPECT_EQ(request_series(snapshot, "other"), 0u) << "nobody knows what those are asked";
+}
+
+TEST(Exposition, ShowsHowAFunctionEndsOnAnyDayFromItsFirstUseAndTheRestWhenItHappens) {
+    Snapshot snapshot = filled();
+    expect_lines(
+        exposition(snapshot),
+        {R"(panelgate_requests_total{line="floor1",station="press",function="3",outcome="exception"} 0)",
+         R"(panelgate_requests_total{line="floor1",station="press",function="3",outcome="timeout"} 0)",
+         R"(panelgate_requests_total{line="floor1",station="press",function="43",outcome="ok"} 0)",
+         R"(panelgate_requests_total{line="floor1",station="press",function="43",outcome="shared"} 2)"});
+    EXPECT_EQ(request_series(snapshot, "press"), 3u + 4u);
+    snapshot.lines[0].stations[0].requests[3][Outcome::busy] = 1;
+    EXPECT_EQ(request_series(snapshot, "press"), 4u + 4u);
+}
+
+TEST(Exposition, ShowsHowLateTheLoopCame) {
+    Snapshot snapshot;
+    snapshot.runtime.loop_lag.observe(3ms);
+    expect_lines(exposition(snapshot), {R"(panelgate_loop_lag_seconds_bucket{le="0.002"} 0)",
+                                        R"(panelgate_loop_lag_seconds_bucket{le="0.005"} 1)",
+                                        "panelgate_loop_lag_seconds_count 1"});
+}
+
+TEST(Exposition, GivesEachFamilyAsOneTextAndStopsWhenNoMoreIsWanted) {
+    std::vector<std::string> pieces;
+    exposition(filled(), [&](std::string_view piece) {
+        pieces.emplace_back(piece);
+        return pieces.size() < 3;
+    });
+    ASSERT_EQ(pieces.size(), 3u);
+    for (const std::string& piece : pieces) {
+        EXPECT_THAT(piece, ::testing::StartsWith("# HELP panelgate_"));
+        EXPECT_EQ(piece.find("# HELP", 1), std::string::npos);
+    }
 }
 
 TEST(Exposition, P10LeavesOutTheLastSuccessOfAStationThatNeverAnswered) {

@@ -57,6 +57,44 @@ TEST(PollSchedule, KeepsIntervalsThatDivideEachOtherApart) {
     EXPECT_EQ(schedule.counters().missed, 0u);
 }
 
+TEST(PollSchedule, ATurnOutOfTurnMovesNoOther) {
+    PollSchedule schedule = make_schedule({10s, 10s});
+    run(schedule, 10s);
+    schedule.hasten(1, kStart + 11s);
+    schedule.hasten(1, kStart + 11s);
+    const auto begun = run(schedule, 30s);
+    EXPECT_THAT(begun.at(0), ElementsAre(10s, 20s));
+    EXPECT_THAT(begun.at(1), ElementsAre(11s, 15s, 25s));
+    EXPECT_EQ(schedule.counters().missed + schedule.counters().skipped, 0u);
+}
+
+TEST(PollSchedule, TurnsOutOfTurnComeInTheirOrderAndAreLimited) {
+    const PollSchedule::Settings settings{
+        .max_outstanding = 1, .first_within = 1s, .extra_burst = 2, .extra_every = 1s};
+    PollSchedule schedule(std::vector<Duration>(5, 1h), kStart, settings);
+    run(schedule, 2s);
+    for (const std::size_t entry : {4u, 0u, 3u, 1u}) schedule.hasten(entry, kStart + 10s);
+    const auto begun = run(schedule, 1min, 1ms);
+    EXPECT_EQ(begun.at(4)[0], 10s);
+    EXPECT_EQ(begun.at(0)[0], 10s + 1ms);
+    EXPECT_EQ(begun.at(3)[0], 11s);
+    EXPECT_EQ(begun.at(1)[0], 12s);
+    EXPECT_EQ(begun.count(2), 0u);
+    schedule.hasten(4, kStart + 2h);
+    schedule.hasten(3, kStart + 2h);
+    EXPECT_EQ(schedule.take_due(kStart + 2h).size(), 1u) << "the burst is there again";
+}
+
+TEST(PollSchedule, OneThatIsUnderWayIsNotHastened) {
+    PollSchedule schedule = make_schedule({10s});
+    ASSERT_THAT(schedule.take_due(kStart), SizeIs(1));
+    schedule.hasten(0, kStart + 1s);
+    schedule.on_done(0, kStart + 2s);
+    EXPECT_EQ(schedule.next_due(), kStart + 10s);
+    schedule.hasten(0, kStart + 2s);
+    EXPECT_EQ(schedule.next_due(), kStart + 2s);
+}
+
 TEST(PollSchedule, PollsEveryIntervalAtItsOwnRate) {
     PollSchedule schedule = make_schedule({100ms, 1s, 7s});
     const auto begun = run(schedule, 70s);

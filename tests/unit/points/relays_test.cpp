@@ -18,7 +18,7 @@ class RelaysTest : public testing::Test {
         route.relay.from = {"press", "UW100", modbus::Table::holding_registers, 100};
         route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, 200};
         route.relay.count = count;
-        route.relay.every = 1ms;
+        route.relay.every = every;
         route.relay.on_change = on_change;
         route.from = &from;
         route.to = &to;
@@ -33,8 +33,16 @@ class RelaysTest : public testing::Test {
     void run_until(const std::function<bool()>& done) {
         ASSERT_TRUE(test::run_until(io, clock, done)) << "nothing is left to happen";
     }
+    /// So many turns are over.
+    void turns(std::uint64_t more) {
+        const std::uint64_t enough = status().reads + more;
+        run_until([&] { return status().reads >= enough; });
+        io.restart();
+        io.poll();
+    }
     RelayStatus status() { return relays->status().at(0); }
 
+    Duration every = 1ms;
     boost::asio::io_context io{1};
     test::ManualClock clock;
     test::FakeBus from{io.get_executor()};
@@ -70,6 +78,36 @@ TEST_F(RelaysTest, OnChangeWritesOnlyWhatIsNew) {
     source = test::FakeBus::reply("03 04 00 01 00 03"_hex);
     run_until([&] { return to.requests.size() == 2; });
     EXPECT_EQ(to.requests[1].request.pdu(), "10 00 C8 00 02 04 00 01 00 03"_hex);
+}
+
+TEST_F(RelaysTest, OnChangeWritesAgainEveryRefreshThoughNothingChanges) {
+    every = 1s;
+    make(true);
+    turns(60);
+    EXPECT_EQ(to.requests.size(), 1u);
+    turns(1);
+    EXPECT_EQ(to.requests.size(), 2u) << "the target may have lost its memory";
+    turns(59);
+    EXPECT_EQ(to.requests.size(), 2u);
+    turns(1);
+    EXPECT_EQ(to.requests.size(), 3u);
+    EXPECT_EQ(states, std::vector<std::string>{"ok"});
+}
+
+TEST_F(RelaysTest, OnChangeWritesAgainWhenTheTargetMayHaveBeenRestartedUnseen) {
+    make(true);
+    turns(5);
+    EXPECT_EQ(to.requests.size(), 1u);
+    to.stations[20] = {Health::online, {}, 1};
+    turns(5);
+    EXPECT_EQ(to.requests.size(), 2u) << "it was silent between two turns";
+    to.stations[20].returns = 2;
+    target = test::FakeBus::fault(Fault::timeout, true);
+    turns(3);
+    EXPECT_EQ(to.requests.size(), 5u) << "until it is confirmed";
+    target = test::FakeBus::reply("10 00 C8 00 02"_hex);
+    turns(5);
+    EXPECT_EQ(to.requests.size(), 6u);
 }
 
 TEST_F(RelaysTest, ATargetThatHasGoneIsSeenThoughNothingChangesAndWrittenWhenItIsBack) {

@@ -103,6 +103,93 @@ TEST(StationPolls, AWantThatTakesSeveralReadsIsAsOldAsItsOldestPart) {
     EXPECT_EQ(polls.reading(0).values[199], 199);
 }
 
+TEST(StationPolls, P10WhatSomebodyWritesIsStaleAtOnceAndReadOutOfTurn) {
+    StationPolls polls({registers(100, 2, 60s), registers(300, 2, 60s)}, limits(), kStart);
+    const auto good = [](const Bytes& pdu) { return Result<Bytes>(reply_to(pdu)); };
+    play(polls, kStart, 10s, good);
+    const TimePoint left = kStart + 10s;
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 101, 1};
+    EXPECT_EQ(polls.on_write(left, items), std::vector<std::size_t>{0});
+    EXPECT_EQ(quality_of(polls.reading(0), 60s, left), Quality::stale);
+    EXPECT_EQ(quality_of(polls.reading(1), 60s, left), Quality::good);
+    EXPECT_TRUE(polls.on_write(left, items).empty()) << "told once";
+    EXPECT_TRUE(play(polls, left, 1s, good).empty()) << "the write is still under way";
+    polls.on_written(left + 1s, items);
+    EXPECT_EQ(play(polls, left + 1s, 5s, good).size(), 1u);
+    EXPECT_EQ(quality_of(polls.reading(0), 60s, left + 2s), Quality::good);
+    play(polls, left + 6s, 4min, good);
+    EXPECT_EQ(polls.reading(0).good, polls.reading(1).good + 1) << "its own turns are as before";
+}
+
+TEST(StationPolls, P10AWriteToAnotherTableMakesEverythingStaleAndTheItemsThemselvesGoFirst) {
+    std::vector<Want> wants{registers(7, 1, 1h)};
+    for (std::uint32_t i = 0; i < 40; ++i) wants.push_back({{Table::coils, 1000 * i, 1}, 1h});
+    StationPolls polls(wants, limits(), kStart);
+    const auto good = [](const Bytes& pdu) {
+        return Result<Bytes>(pdu[0] == 1 ? Bytes{1, 1, 0} : reply_to(pdu));
+    };
+    play(polls, kStart, 10s, good);
+    const TimePoint left = kStart + 10s;
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
+    EXPECT_EQ(polls.on_write(left, items).size(), wants.size());
+    polls.on_written(left, items);
+    const auto at_once = play(polls, left, 1ms, good);
+    ASSERT_EQ(at_once.size(), 16u) << "not all of a station at once";
+    EXPECT_EQ(at_once[0][0], 3) << "the register that was written";
+    const auto later = play(polls, left + 1ms, 1min, good);
+    EXPECT_EQ(later.size(), wants.size() - 16) << "the others a few a second, each once";
+    for (std::size_t i = 0; i < wants.size(); ++i)
+        EXPECT_EQ(quality_of(polls.reading(i), 1h, left + 1min), Quality::good) << i;
+    EXPECT_EQ(polls.on_write(left + 1min, std::nullopt).size(), wants.size()) << "of no items: all";
+}
+
+TEST(StationPolls, P10AReadThatAWriteOvertakesIsOldAndAskedAgain) {
+    StationPolls polls({registers(7, 1, 60s)}, limits(), kStart);
+    const auto first = polls.take_due(*polls.next_due());
+    const TimePoint asked = kStart + 5s;
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
+    polls.on_write(asked + 1ms, items);
+    polls.on_written(asked + 2ms, items);
+    ASSERT_EQ(first.size(), 1u);
+    polls.on_answer(asked + 3ms, first[0].read, Bytes{3, 2, 0, 1}, asked);
+    EXPECT_EQ(quality_of(polls.reading(0), 60s, asked + 3ms), Quality::stale);
+    EXPECT_LE(*polls.next_due(), asked + 3ms);
+    const auto again = polls.take_due(asked + 3ms);
+    ASSERT_EQ(again.size(), 1u);
+    polls.on_answer(asked + 9ms, again[0].read, Bytes{3, 2, 0, 2}, asked + 3ms);
+    EXPECT_EQ(quality_of(polls.reading(0), 60s, asked + 9ms), Quality::good);
+    EXPECT_GT(*polls.next_due(), asked + 1s);
+}
+
+TEST(StationPolls, P10WhatCannotBeReadBehindAWriteIsAskedForAgainSoon) {
+    StationPolls polls({registers(7, 1, 1h)}, limits(), kStart);
+    const auto good = [](const Bytes& pdu) { return Result<Bytes>(reply_to(pdu)); };
+    const auto silent = [](const Bytes&) { return Result<Bytes>(Fault::timeout); };
+    play(polls, kStart, 10s, good);
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
+    polls.on_write(kStart + 10s, items);
+    polls.on_written(kStart + 11s, items);
+    EXPECT_EQ(play(polls, kStart + 11s, 59s, silent).size(), 12u) << "at once, then every 5 s";
+    EXPECT_EQ(play(polls, kStart + 70s, 10s, good).size(), 1u);
+    EXPECT_EQ(quality_of(polls.reading(0), 1h, kStart + 80s), Quality::good);
+    EXPECT_EQ(play(polls, kStart + 80s, 10min, silent).size(), 0u);
+}
+
+TEST(StationPolls, WhoWritesWithoutPauseGetsNoMoreThanAFewReadsASecond) {
+    StationPolls polls({registers(7, 1, 60s)}, limits(), kStart);
+    const std::optional<modbus::Span> items = modbus::Span{Table::holding_registers, 7, 1};
+    const auto good = [](const Bytes& pdu) { return Result<Bytes>(reply_to(pdu)); };
+    play(polls, kStart, 10s, good);
+    std::size_t reads = 0;
+    for (TimePoint now = kStart + 10s; now < kStart + 30s; now += 10ms) {
+        polls.on_write(now, items);
+        polls.on_written(now + 1ms, items);
+        reads += play(polls, now + 1ms, 9ms, good).size();
+    }
+    EXPECT_GE(reads, 80u);
+    EXPECT_LE(reads, 16u + 4u * 20u + 1u) << "of 2000 writes";
+}
+
 TEST(StationPolls, BitsAreZeroOrOne) {
     StationPolls polls({{{Table::coils, 0, 3}, 1s}}, limits(), kStart);
     play(polls, kStart, 2s, [](const Bytes&) { return Result<Bytes>(Bytes{1, 1, 0x05}); });

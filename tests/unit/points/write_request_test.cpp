@@ -18,8 +18,8 @@ const profile::Catalogue& shipped() {
 }
 
 std::string write(const char* profile, const Point& point, const Value& value) {
-    const auto pdu = write_request(*shipped().find(profile), point, value);
-    return pdu ? to_hex(*pdu) : pdu.error().message;
+    const auto write = write_request(*shipped().find(profile), point, value);
+    return write ? to_hex(write->pdu) : write.error().message;
 }
 
 TEST(WriteRequest, TakesTheFunctionThatThePanelHas) {
@@ -60,8 +60,8 @@ profile::PanelProfile panel_with(std::initializer_list<std::uint8_t> codes) {
 }
 
 std::string write(const profile::PanelProfile& panel, const Point& point, const Value& value) {
-    const auto pdu = write_request(panel, point, value);
-    return pdu ? to_hex(*pdu) : pdu.error().message;
+    const auto write = write_request(panel, point, value);
+    return write ? to_hex(write->pdu) : write.error().message;
 }
 
 TEST(WriteRequest, OneRegisterGoesByTheFunctionForSeveralWhereThereIsNoOther) {
@@ -114,6 +114,28 @@ TEST(WriteRequest, ABitViewThatCannotBeWrittenIsNoWay) {
     EXPECT_EQ(why_unwritable(panel, point).value_or("can be"),
               "panel can write no single bit of D0: it has neither function 22 nor a bit view of "
               "it, and reading, changing and writing the word would undo what changes in between");
+}
+
+TEST(WriteRequest, TellsWhatThePointIsThen) {
+    const auto written = [](const Point& point, const Value& value) {
+        const auto write =
+            write_request(*shipped().find("generic"), point, value, Rounding::nearest);
+        return write ? to_string(write->value) + write->label.value_or("") : write.error().message;
+    };
+    Point point = point_of(Type::i16);
+    point.scale = 0.1;
+    EXPECT_EQ(written(point, 21.46), "21.5");
+    point = point_of(Type::u16);
+    point.labels = {{1, " running"}};
+    EXPECT_EQ(written(point, std::string(" running")), "1 running");
+    EXPECT_EQ(written(point_of(Type::f32), 0.1), "0.1");
+    EXPECT_EQ(written(point_of(Type::string), std::string("ab")), "ab");
+    point = point_of(Type::boolean);
+    point.bit = 9;
+    EXPECT_EQ(written(point, true), "true");
+    point.bit.reset();
+    point.table = modbus::Table::coils;
+    EXPECT_EQ(written(point, std::int64_t{0}), "false");
 }
 
 TEST(WriteRequest, WhatTheValueLacksIsToldWhenThereIsAWay) {

@@ -4,6 +4,7 @@
 
 #include "panelgate/profile/load_profile.hpp"
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::profile {
 namespace {
@@ -38,6 +39,17 @@ TEST_P(Judge, SaysWhatTheManualSays) {
 }
 INSTANTIATE_TEST_SUITE_P(Requests, Judge, testing::ValuesIn(kCases),
                          [](const auto& info) { return info.param.name; });
+
+TEST(Judge, ExplainsItselfInWordsOfThePanel) {
+    static const Catalogue shipped = Catalogue::shipped();
+    const auto why = [&](const char* profile, const Bytes& pdu) {
+        return explain(*shipped.find(profile), test::request_of(pdu));
+    };
+    EXPECT_EQ(why("autonics-gplp-s", "03 00 00 00 05"_hex), "");
+    EXPECT_EQ(why("autonics-gplp-s", "17 00 00 00 01 00 00 00 01 02 00 00"_hex),
+              "autonics-gplp-s has no function 23");
+    EXPECT_EQ(why("generic", "05 00 00 12 34"_hex), "function 5 does not take these values");
+}
 
 TEST(Judge, KnowsWhatCanBeReadAndNotWritten) {
     static const Catalogue shipped = Catalogue::shipped();

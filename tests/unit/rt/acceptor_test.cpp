@@ -4,6 +4,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/address.hpp>
+#include <system_error>
 #include <vector>
 
 namespace panelgate::rt {
@@ -43,6 +44,30 @@ TEST_F(AcceptorTest, SaysWhatIsWrongAndStaysClosed) {
     EXPECT_EQ(second.open("127.0.0.1", acceptor.port()), asio::error::address_in_use);
     EXPECT_EQ(second.port(), 0);
     EXPECT_EQ(second.open("no address", 0), asio::error::invalid_argument);
+}
+
+/// As a gateway does that listens on "0.0.0.0:502" and "[::]:502", in this order or the other.
+TEST_F(AcceptorTest, AllAddressesOfBothKindsHaveRoomOnOnePort) {
+    Acceptor six(io.get_executor(), [](tcp::socket) {}, [](const error_code&) {});
+    if (six.open("::", 0, true)) GTEST_SKIP() << "no IPv6 here";
+    EXPECT_FALSE(acceptor.open("0.0.0.0", six.port()));
+    const std::uint16_t port = acceptor.port();
+    six.close();
+    EXPECT_FALSE(six.open("::", port, true));
+}
+
+TEST_F(AcceptorTest, AllAddressesOfIpv6AreThoseOfIpv4AsWell) {
+    if (acceptor.open("::", 0)) GTEST_SKIP() << "no IPv6 here";
+    const tcp::socket client = connect(acceptor.port());
+    while (accepted.empty()) io.run_one();
+}
+
+TEST_F(AcceptorTest, CanBeOpenedOnceItsAddressIsThere) {
+    EXPECT_EQ(acceptor.open("192.0.2.7", 0), std::errc::address_not_available);
+    EXPECT_EQ(acceptor.port(), 0);
+    EXPECT_FALSE(acceptor.open("127.0.0.1", 0));
+    const tcp::socket client = connect(acceptor.port());
+    while (accepted.empty()) io.run_one();
 }
 
 TEST_F(AcceptorTest, HandsOverNobodyOnceItIsClosed) {

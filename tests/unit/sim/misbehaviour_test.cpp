@@ -67,9 +67,11 @@ TEST(Misbehaviour, IsGivenAndToldInNumbers) {
     EXPECT_EQ(told.size(), 9u);
     for (const auto& [name, value] : numbers) EXPECT_EQ(told.at(name), value) << name;
     EXPECT_EQ(from_numbers({{"drop", 1.5}}, faults), "drop must be from 0 to 1, not 1.5");
+    EXPECT_EQ(from_numbers({{"dread", 1}}, faults),
+              "there is no fault 'dread'; did you mean 'dead'?");
     EXPECT_EQ(
-        from_numbers({{"dread", 1}}, faults),
-        "there is no fault 'dread'; faults are dead, slow_ms, late_by_ms, late, drop, damage, "
+        from_numbers({{"asleep", 1}}, faults),
+        "there is no fault 'asleep'; faults are dead, slow_ms, late_by_ms, late, drop, damage, "
         "truncate, foreign_id, duplicate");
     EXPECT_TRUE(faults.dead) << "a bad set changes nothing";
 }

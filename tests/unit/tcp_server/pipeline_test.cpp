@@ -37,8 +37,9 @@ class SmallPipeline : public ::testing::Test {
     HeldBus bus{context};
     std::uint16_t taken = 0;
     int told = 0;
-    std::shared_ptr<Shared> shared = std::make_shared<Shared>(
-        Shared{small(), UnitMap(small(), {{"floor1", &bus, {1}, true}}), {}, clock, {}, {}});
+    std::shared_ptr<OwnAnswers> own_answers = std::make_shared<OwnAnswers>(clock, 1, 1ms);
+    std::shared_ptr<Shared> shared = std::make_shared<Shared>(Shared{
+        small(), UnitMap(small(), {{"floor1", &bus, {1}, true}}), {}, clock, {}, {}, own_answers});
     std::shared_ptr<Pipeline> pipeline = std::make_shared<Pipeline>(
         shared, Caller("10.0.0.7:5000", bus::host_of("10.0.0.7")), [this] { ++told; });
 };
@@ -77,6 +78,19 @@ TEST_F(SmallPipeline, ARequestWithoutAReplyGivesItsPlaceBackAtOnce) {
         ASSERT_FALSE(bus.held.empty());
         bus.answer(0, "06 0000 0001"_hex);
     }
+    EXPECT_TRUE(pipeline->empty());
+}
+
+TEST_F(SmallPipeline, P5WhatNeedsNoLineIsAnsweredAFewTimesAMillisecond) {
+    for (std::uint16_t n = 1; n <= 2; ++n) pipeline->take({n, 255, "03 0000 0001"_hex});
+    ASSERT_NE(pipeline->front(), nullptr);
+    pipeline->pop();
+    EXPECT_EQ(pipeline->front(), nullptr) << "the next one is not due";
+    EXPECT_EQ(told, 0);
+    clock.advance(1ms);
+    ASSERT_NE(pipeline->front(), nullptr);
+    EXPECT_EQ(told, 1);
+    pipeline->pop();
     EXPECT_TRUE(pipeline->empty());
 }
 

@@ -12,6 +12,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/api/metrics_source.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/settings.hpp"
@@ -22,9 +23,10 @@ class HttpListener;
 
 /// What the server shows besides the directory. The functions are called in the one thread.
 struct Providers {
-    std::function<std::string()> metrics_text;
-    std::string metrics_type;     ///< the content type of that text
-    std::function<bool()> ready;  ///< do configuration and listeners stand?
+    MetricsSource* metrics = nullptr;      ///< never null; outlives the server
+    std::string metrics_type;              ///< the content type of its text
+    std::function<bool()> ready;           ///< do configuration and listeners stand?
+    std::function<std::string()> missing;  ///< what does not stand yet, in words
     std::string version;
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<std::vector<points::RelayStatus>()> relays;

@@ -16,6 +16,15 @@ class Caller {
 
     std::uint64_t id() const { return id_; }
     const std::string& address() const { return address_; }
+    /// What people are told of it: "http 10.0.0.9", "http 10.0.0.9 token ops".
+    std::string name() const {
+        std::string text = "http";
+        if (!address_.empty()) text += ' ' + address_;
+        if (!token_.empty()) text += " token " + token_;
+        return text;
+    }
+    /// The name of the token that its request of now carries; "" for none.
+    void uses_token(std::string token) { token_ = std::move(token); }
     /// The connection is over: nobody waits for an answer, and what the site is made of may be
     /// gone.
     bool has_left() const { return left_; }
@@ -32,6 +41,7 @@ class Caller {
   private:
     std::uint64_t id_;
     std::string address_;
+    std::string token_;
     bool left_ = false;
     std::map<const void*, std::function<void()>> farewells_;
 };

@@ -14,23 +14,27 @@ namespace panelgate::web {
 /// A request as handlers see it; nothing of Beast.
 struct HttpRequest {
     std::string method;
-    std::string host;                            ///< lower case; empty: HTTP/1.0 without one
-    std::vector<std::string> path;               ///< segments, percent-decoded
-    std::map<std::string, std::string> query;    ///< decoded; of equal names the last
-    std::map<std::string, std::string> headers;  ///< those of kHeadersRead, names in lower case
+    std::string host;                               ///< lower case; empty: HTTP/1.0 without one
+    std::vector<std::string> path;                  ///< segments, percent-decoded
+    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
+    std::map<std::string, std::string> headers;     ///< those of kHeadersRead, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for
     std::shared_ptr<Caller> caller;
 };
 /// The request headers that anything here looks at.
-inline constexpr const char* kHeadersRead[] = {"authorization",  "origin",
-                                               "content-type",   "sec-fetch-site",
-                                               "sec-fetch-mode", "sec-fetch-dest"};
+inline constexpr const char* kHeadersRead[] = {
+    "accept-encoding", "authorization",  "origin",        "content-type",
+    "sec-fetch-site",  "sec-fetch-mode", "sec-fetch-dest"};
+
+/// A body that several are sent, so that it is in memory once.
+using SharedText = std::shared_ptr<const std::string>;
 
 struct HttpResponse {
     unsigned status = 200;
     std::string content_type = "application/json";
     std::string body;
+    SharedText shared_body;  ///< not null: sent in place of `body`
     std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
     /// Not null: there is no body, events follow for as long as the client listens.
     std::shared_ptr<EventHub::Listener> events;

@@ -2,7 +2,9 @@
 
 #include <boost/json/object.hpp>
 #include <boost/system/result.hpp>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,6 +28,10 @@ template <class T>
 using Parsed = boost::system::result<T, Problem>;
 
 Problem problem(unsigned status, std::string detail);
+/// 400 for what nobody knows here; names the nearest of what is known, or all of it. `what` is
+/// "member", "query".
+Problem unknown_name(const std::string& what, const std::string& name,
+                     std::span<const std::string_view> known);
 HttpResponse to_response(const Problem& problem);
 
 }  // namespace panelgate::web

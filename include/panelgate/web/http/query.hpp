@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -11,6 +12,10 @@ namespace panelgate::web {
 
 /// The whole text as a number of this base, without sign, or nothing.
 std::optional<unsigned> to_number(std::string_view text, int base = 10);
+
+/// 400 for a query that is not one of these, or that is given twice: what was meant nobody knows.
+std::optional<Problem> check_queries(const HttpRequest& request,
+                                     std::span<const std::string_view> known);
 
 /// A query value as a whole number in [low, high]; `fallback` when it is not given.
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 
@@ -30,6 +31,7 @@ struct LoginSettings {
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 8080;  ///< 0: any free one
+    bool ipv6_only = false;     ///< of "::": another listener has this port for IPv4
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
     LoginSettings logins;
@@ -46,7 +48,7 @@ struct Settings {
     /// it is still there, and how long between two such questions.
     Duration half_close_grace = 2s;
 
-    std::string name() const { return address + ":" + std::to_string(port); }
+    std::string name() const { return endpoint_text(address, port); }
 };
 
 }  // namespace panelgate::web

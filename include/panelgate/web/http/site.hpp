@@ -21,6 +21,7 @@ struct Route {
     std::string_view pattern;  ///< {} stands for any one segment
     Role needed = Role::none;  ///< none: free, also when everything else is barred
     std::function<Handling(HttpRequest)> handler;
+    std::vector<std::string_view> queries{};  ///< that it understands; any other is refused
 };
 
 /// What a server serves. Shared by its sessions; the first route that fits is taken.

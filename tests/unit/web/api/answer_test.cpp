@@ -48,21 +48,45 @@ TEST(Answer, BlamesTheRequestForExceptionsOneToFourOnly) {
 
 TEST(Answer, TellsWhatTheRightsForbid) {
     bus::Answer refused = test::FakeBus::fault(Fault::denied, false);
-    refused.refusal = bus::Refusal{bus::Refusal::Rule::read_only, "meter"};
+    refused.refusal = bus::Refusal{bus::Rule::read_only, "meter"};
     const Problem problem = problem_of(refused);
     EXPECT_EQ(problem.status, 403u);
-    EXPECT_EQ(problem.detail, "station 'meter' is read-only");
+    EXPECT_EQ(problem.detail, "refused here, nothing was sent: station 'meter' is read-only");
+    EXPECT_EQ(told(problem).at("type"), "urn:panelgate:problem:refused");
+    EXPECT_EQ(told(problem).at("rule"), "access");
+    EXPECT_EQ(told(problem).at("transmitted"), false);
     EXPECT_EQ(problem_of(refused, {}).value().detail, problem.detail);
-    refused.refusal->rule = bus::Refusal::Rule::broadcast_over_read_only;
+    refused.refusal->rule = bus::Rule::broadcast_over_read_only;
     EXPECT_EQ(problem_of(refused).detail,
-              "a broadcast would write to station 'meter', which is read-only");
+              "refused here, nothing was sent: a broadcast would write to station 'meter', which "
+              "is read-only");
 }
 
-TEST(Answer, OfAGuardedStationIsTheExceptionOfItsPanel) {
+TEST(Answer, OfAGuardSaysThatItWasRefusedHereAndByWhichRule) {
     bus::Answer guarded = test::FakeBus::reply({0x86, 2});
     guarded.transmitted = false;
-    guarded.refusal = bus::Refusal{bus::Refusal::Rule::guard, "oven"};
-    EXPECT_EQ(problem_of(guarded, {}).value().status, 422u);
+    guarded.refusal =
+        bus::Refusal{bus::Rule::range, "oven", modbus::ExceptionCode::illegal_data_address,
+                     "coils 9 is no memory of x"};
+    const Problem problem = problem_of(guarded, {}).value();
+    EXPECT_EQ(problem.status, 422u);
+    EXPECT_EQ(problem.detail,
+              "refused here, nothing was sent: the guard of station 'oven' refuses it: coils 9 is "
+              "no memory of x");
+    EXPECT_EQ(told(problem).at("type"), "urn:panelgate:problem:refused");
+    EXPECT_EQ(told(problem).at("rule"), "range");
+    EXPECT_EQ(told(problem).at("modbus_exception"), 2);
+    EXPECT_EQ(told(problem).at("transmitted"), false);
+    EXPECT_EQ(write_answer(guarded, {}).status, 422u);
+}
+
+TEST(Answer, OfALineThatIsDownSaysWhatIsWrongWithIt) {
+    bus::Answer down = test::FakeBus::fault(Fault::line_down, false);
+    EXPECT_EQ(problem_of(down).detail, "the line is down");
+    down.why = "cannot open /dev/ttyS0: Permission denied";
+    const Problem problem = problem_of(down);
+    EXPECT_EQ(problem.status, 502u);
+    EXPECT_EQ(problem.detail, "the line is down: cannot open /dev/ttyS0: Permission denied");
 }
 
 TEST(Answer, OfAWriteSaysWhatIsSure) {

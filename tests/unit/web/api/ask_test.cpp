@@ -52,6 +52,7 @@ TEST_F(Ask, AsksAsTheCaller) {
     ask_once();
     ASSERT_EQ(bus.requests.size(), 1u);
     EXPECT_EQ(bus.requests[0].client, 12u);
+    EXPECT_EQ(bus.names[12], "http 10.0.0.7");
     EXPECT_EQ(bus.requests[0].host, bus::host_of("10.0.0.7"));
     EXPECT_EQ(bus.requests[0].station, 5u);
     bus.release(test::FakeBus::reply({3, 2, 0, 7}));

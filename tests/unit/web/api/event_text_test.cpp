@@ -34,9 +34,9 @@ TEST(EventText, SaysWhyALineIsDownOnlyWhereThereIsAReason) {
 TEST(EventText, NamesTheStationOfATransactionUnlessItIsABroadcast) {
     EXPECT_EQ(transaction_event("floor1", "press", 3, "ok", 1500us),
               R"({"line":"floor1","station":"press","function":3,"outcome":"ok",)"
-              R"("duration_ms":1.5E0})");
+              R"("duration_ms":1.5})");
     EXPECT_EQ(transaction_event("floor1", "", 6, "ok", 2ms),
-              R"({"line":"floor1","station":null,"function":6,"outcome":"ok","duration_ms":2E0})");
+              R"({"line":"floor1","station":null,"function":6,"outcome":"ok","duration_ms":2})");
     EXPECT_EQ(station_event("floor1", "press", "offline"),
               R"({"line":"floor1","station":"press","event":"offline"})");
 }

@@ -2,7 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -53,6 +57,35 @@ inline profile::PanelProfile test_profile() {
     return profile;
 }
 
+/// The same text for everybody; `null` when it is told so.
+class FixedMetrics final : public MetricsSource {
+  public:
+    explicit FixedMetrics(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
+
+    void scrape(std::uint64_t caller, bool gzip, Handler handler) override {
+        waiting[caller] = std::move(handler);
+        asked_gzip = gzip;
+        if (!held) hand_over(caller, text);
+    }
+    void cancel(std::uint64_t caller) override {
+        ++cancelled;
+        hand_over(caller, nullptr);
+    }
+
+    SharedText text = std::make_shared<const std::string>("up 1\n");
+    std::map<std::uint64_t, Handler> waiting;
+    bool held = false;  ///< nobody gets anything yet
+    bool asked_gzip = false;
+    int cancelled = 0;
+
+  private:
+    void hand_over(std::uint64_t caller, SharedText what) {
+        const auto found = waiting.extract(caller);
+        if (found) boost::asio::post(executor_, std::bind(found.mapped(), std::move(what)));
+    }
+    boost::asio::any_io_executor executor_;
+};
+
 /// A server on loopback with a line floor1: press (31, with test_profile), meter (5, read-only, of
 /// which nobody knows what panel it is). Line floor2 has the same bus and refuses unlisted
 /// stations.
@@ -88,9 +121,10 @@ class HttpRig : public ::testing::Test {
     }
     Server& start() {
         Providers providers;
-        providers.metrics_text = [] { return "up 1\n"; };
+        providers.metrics = &metrics;
         providers.metrics_type = "text/plain; version=0.0.4; charset=utf-8";
         providers.ready = [this] { return ready; };
+        providers.missing = [this] { return missing; };
         providers.version = "1.2.3";
         providers.now = [this] { return now; };
         providers.relays = [this] { return relays; };
@@ -141,7 +175,9 @@ class HttpRig : public ::testing::Test {
     TimePoint now{1h};
     std::vector<points::RelayStatus> relays;
     EventHub events;
+    FixedMetrics metrics{io.get_executor()};
     bool ready = true;
+    std::string missing;
     std::unique_ptr<Server> server;
 };
 

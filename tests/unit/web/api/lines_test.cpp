@@ -1,3 +1,9 @@
+#include <boost/asio/post.hpp>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
 #include "http_rig.hpp"
 
 namespace panelgate::web {
@@ -12,7 +18,7 @@ TEST_F(ApiLines, ListsTheLines) {
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
     EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
-        "load_percent":50.0,"queue_depth":3,"echo":"absent","findings":[]})"));
+        "load_percent":50,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
 }
@@ -33,7 +39,7 @@ TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
     bus.shares = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
-              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75.0,
+              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75,
         "transactions":12}])"));
 }
 
@@ -58,15 +64,98 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
                           TimePoint(2500ms),
                           FrameKind::request,
                           {0x1F, 0x01, 0x01, 0x20, 0x00, 0x05, 0xFF, 0x81},
-                          "next in turn"});
+                          "next in turn",
+                          WallTime(2500ms)});
     bus.frames.push_back({3, TimePoint(3s), FrameKind::damaged, {}, {}});
     bus.made.push_back({7, TimePoint(2s), "refused"});
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
-        {"sequence":2,"at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
-        {"sequence":3,"at":3.0,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
-        "decisions":[{"sequence":7,"at":2.0,"text":"refused"}]})"));
+        {"sequence":2,"time":"1970-01-01T00:00:02.500000Z","at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
+        {"sequence":3,"time":"1970-01-01T00:00:00.000000Z","at":3,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
+        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}],"next":7})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
+}
+
+/// "1 2 | 3 next 3": frames, decisions, next.
+std::string told(const Reply& reply) {
+    std::string text;
+    for (const char* list : {"frames", "decisions"}) {
+        const boost::json::value entries = reply.at(list);
+        for (const auto& entry : entries.as_array())
+            text += std::to_string(entry.at("sequence").to_number<int>()) + ' ';
+        if (std::string_view(list) == "frames") text += "| ";
+    }
+    return text + "next " + std::to_string(reply.at("next").to_number<int>());
+}
+
+TEST_F(ApiLines, GivesWhatFollowsASequenceNumber) {
+    const std::string trace = "/api/v1/lines/floor1/trace";
+    EXPECT_EQ(told(get(trace + "?since=0")), "| next 0");
+    for (const int number : {1, 2, 4, 6})
+        bus.frames.emplace_back().sequence = static_cast<std::uint64_t>(number);
+    for (const int number : {3, 5})
+        bus.made.emplace_back().sequence = static_cast<std::uint64_t>(number);
+    EXPECT_EQ(told(get(trace + "?since=0")), "1 2 4 6 | 3 5 next 6");
+    EXPECT_EQ(told(get(trace + "?since=4")), "6 | 5 next 6");
+    EXPECT_EQ(told(get(trace + "?since=6")), "| next 6");
+    EXPECT_EQ(told(get(trace + "?since=99")), "| next 6") << "the gateway was started anew";
+    EXPECT_EQ(told(get(trace + "?since=1&last=2")), "2 | 3 next 3");
+    for (const char* wrong : {"?since=", "?since=-1", "?since=x", "?since=99999999999999999999"})
+        EXPECT_EQ(get(trace + wrong).status(), 400u) << wrong;
+}
+
+TEST_F(ApiLines, GivesAtMostAPageOfATrace) {
+    for (std::uint64_t number = 1; number <= 1200; ++number) {
+        if (number % 2 == 0) {
+            bus.frames.emplace_back().sequence = number;
+        } else {
+            bus.made.emplace_back().sequence = number;
+        }
+    }
+    EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=501").status(), 400u);
+    std::size_t entries = 0;
+    std::uint64_t next = 0;
+    for (int pages = 0; pages < 3; ++pages) {
+        const Reply page = get("/api/v1/lines/floor1/trace?since=" + std::to_string(next));
+        const std::size_t size =
+            page.at("frames").as_array().size() + page.at("decisions").as_array().size();
+        EXPECT_LE(size, 500u);
+        entries += size;
+        next = page.at("next").to_number<std::uint64_t>();
+    }
+    EXPECT_EQ(entries, 1200u);
+    EXPECT_EQ(next, 1200u);
+}
+
+TEST_F(ApiLines, AListOfManyStationsLetsOthersHaveTheirTurn) {
+    for (int i = 0; i < 1000; ++i) {
+        directory.stations.push_back(directory.stations[0]);
+        directory.stations.back().name = "s" + std::to_string(i);
+    }
+    Client client = connect();
+    client.send("GET /api/v1/stations HTTP/1.1\r\nHost: x\r\n\r\n");
+    std::size_t turns = 0;
+    const std::function<void()> turn = [&] {
+        ++turns;
+        if (turns < 10'000) boost::asio::post(io, turn);
+    };
+    boost::asio::post(io, turn);
+    const Reply reply = client.receive();
+    EXPECT_EQ(reply.at("stations").as_array().size(), 1001u);
+    EXPECT_GT(turns, 30u);
+}
+
+TEST_F(ApiLines, AListWhoseCallerLeavesIsNotMadeToItsEnd) {
+    for (int i = 0; i < 1000; ++i) directory.stations.push_back(directory.stations[0]);
+    start();
+    {
+        Client client = connect();
+        client.send("GET /api/v1/stations HTTP/1.1\r\nHost: x\r\n\r\n");
+        for (int i = 0; i < 8; ++i) io.run_one();
+    }
+    server.reset();
+    directory.stations.clear();
+    io.poll();
 }
 
 TEST_F(ApiLines, SendsABroadcastAndDoesNotCallItConfirmed) {
@@ -115,6 +204,18 @@ TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
         403u);
 }
 
+TEST_F(ApiLines, P2WhatMayBeAMistakeInABodyIsNotExecuted) {
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast",
+                  R"({"table":"coils","address":1,"values":[1],"verfy":true})")
+                  .at("detail"),
+              "unknown member 'verfy'; did you mean 'verify'?");
+    EXPECT_EQ(
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"station":6,"pdu":"0500010000"})")
+            .status(),
+        400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiLines, SaysWhyABroadcastDidNotLeave) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::line_down, false); };
     const Reply reply = ask("POST", "/api/v1/lines/floor1/broadcast",
@@ -137,6 +238,28 @@ TEST_F(ApiLines, GivesAPanelsExceptionToARawRequestAsAnAnswer) {
     const Reply reply = ask("POST", "/api/v1/lines/floor1/raw", R"({"station":5,"pdu":"0b"})");
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(), json_of(R"({"pdu":"8B01","exception":1})"));
+}
+
+TEST_F(ApiLines, P2ARawRequestToStation0IsABroadcastAndNobodyHasReplied) {
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"06000A0001"})");
+    EXPECT_EQ(reply.status(), 202u);
+    EXPECT_EQ(reply.json(), json_of(R"({"transmitted":true,"confirmed":false})"));
+    EXPECT_EQ(bus.requests[0].station, 0);
+}
+
+TEST_F(ApiLines, ARawRequestThatAGuardRefusesWasNotAnsweredByThePanel) {
+    bus.script = [](const bus::Request&) {
+        bus::Answer answer = test::FakeBus::reply({0x83, 2});
+        answer.transmitted = false;
+        answer.refusal = bus::Refusal{bus::Rule::range, "press"};
+        return answer;
+    };
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":31,"pdu":"0300640002"})");
+    EXPECT_EQ(reply.status(), 422u);
+    EXPECT_EQ(reply.at("transmitted"), false);
+    EXPECT_EQ(reply.at("rule"), "range");
 }
 
 TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {

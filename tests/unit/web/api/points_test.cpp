@@ -68,7 +68,8 @@ TEST_F(ApiPoints, ShowsWhatPollsHaveBroughtWithoutTouchingTheBus) {
 }
 
 TEST_F(ApiPoints, WritesAValueByOneRequest) {
-    EXPECT_EQ(put(R"({"value":42})").json(), json_of(R"({"transmitted":true,"confirmed":true})"));
+    EXPECT_EQ(put(R"({"value":42})").json(),
+              json_of(R"({"transmitted":true,"confirmed":true,"value":42})"));
     ASSERT_EQ(bus.requests.size(), 1u);
     EXPECT_EQ(last_pdu(), "06 00 07 00 2a");
     EXPECT_EQ(bus.requests[0].station, 31u);
@@ -81,6 +82,26 @@ TEST_F(ApiPoints, RefusesAValueThatThePointCannotTake) {
     EXPECT_EQ(put(R"({"values":[1]})").status(), 400u);
     EXPECT_EQ(ask("PUT", "/api/v1/stations/press/points/serial", R"({"value":1})").status(), 422u);
     EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiPoints, WritesWhatIsExactUnlessItMayRoundAndTellsWhatWasWritten) {
+    points[0].scale = 10;
+    points[0].max = 25;
+    points[0].labels = {{2, "low"}};
+    const Reply exact = put(R"({"value":17})");
+    EXPECT_EQ(exact.status(), 422u);
+    EXPECT_THAT(exact.body(),
+                HasSubstr("oil cannot be exactly 17 (u16, scale 10); the nearest that it can be "
+                          "are 10 and 20; ?round=true writes the nearest"));
+    EXPECT_EQ(ask("PUT", std::string(kOil) + "?round=yes", R"({"value":17})").status(), 400u);
+    const Reply beyond = ask("PUT", std::string(kOil) + "?round=true", R"({"value":25})");
+    EXPECT_EQ(beyond.status(), 422u);
+    EXPECT_THAT(beyond.body(), HasSubstr("25 would be written as 30"));
+    EXPECT_TRUE(bus.requests.empty());
+    const Reply rounded = ask("PUT", std::string(kOil) + "?round=true", R"({"value":17})");
+    EXPECT_EQ(rounded.json(),
+              json_of(R"({"transmitted":true,"confirmed":true,"value":20,"label":"low"})"));
+    EXPECT_EQ(last_pdu(), "06 00 07 00 02");
 }
 
 TEST_F(ApiPoints, KnowsNoOtherPoints) {

@@ -80,6 +80,13 @@ TEST_F(Access, TakesNoOtherSchemeAndNoEmptyToken) {
     EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: bearer let-me\r\n").status(), 200u);
 }
 
+TEST_F(Access, WhoAsksIsCalledByItsAddressAndItsToken) {
+    EXPECT_EQ(write("let-me"), 200u);
+    EXPECT_EQ(bus.names[bus.requests.back().client], "http 127.0.0.1 token ops");
+    EXPECT_EQ(write(""), 200u);
+    EXPECT_EQ(bus.names[bus.requests.back().client], "http 127.0.0.1");
+}
+
 TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
     const char* body = R"({"station":5,"pdu":"0500010000"})";
     const std::string origin = "Origin: http://evil.example\r\nContent-Type: ";
@@ -93,6 +100,25 @@ TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
         ask("OPTIONS", "/api/v1/lines/floor1/raw", "", origin + "text/plain\r\n");
     EXPECT_EQ(preflight.status(), 204u);
     EXPECT_EQ(preflight.header("Access-Control-Allow-Origin"), "");
+}
+
+TEST_F(Access, AQueryThatNobodyKnowsIsRefusedOnEveryPath) {
+    for (const char* path :
+         {"/", "/healthz", "/readyz", "/metrics", "/api/v1/lines", "/api/v1/lines/floor1",
+          "/api/v1/lines/floor1/trace", "/api/v1/stations", "/api/v1/stations/press",
+          "/api/v1/events", "/api/v1/relays", "/api/v1/stations/press/points",
+          "/api/v1/stations/press/coils/1", "/api/v1/stations/press/coils/1/interpretations",
+          "/api/v1/stations/press/devices/UW1"}) {
+        const Reply reply = get(std::string(path) + "?cuont=9");
+        EXPECT_EQ(reply.status(), 400u) << path;
+        EXPECT_EQ(std::string(reply.at("detail").as_string()).substr(0, 21),
+                  "unknown query 'cuont'")
+            << path;
+    }
+    EXPECT_EQ(get("/api/v1/stations/press/coils/1?count=1&count=2").at("detail"),
+              "the query 'count' is given twice");
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/raw?count=1", "{}").status(), 400u);
+    EXPECT_TRUE(bus.requests.empty());
 }
 
 }  // namespace

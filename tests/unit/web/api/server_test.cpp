@@ -15,6 +15,8 @@ TEST_F(WebServer, AnswersProbesMetricsAndTheIndex) {
     EXPECT_EQ(get("/readyz").status(), 200u);
     ready = false;
     EXPECT_EQ(get("/readyz").status(), 503u);
+    missing = "modbus_tcp 192.0.2.7:502 (late)";
+    EXPECT_EQ(get("/readyz").body(), "not ready: modbus_tcp 192.0.2.7:502 (late)\n");
     const Reply metrics = get("/metrics");
     EXPECT_EQ(metrics.body(), "up 1\n");
     EXPECT_EQ(metrics.header("Content-Type"), "text/plain; version=0.0.4; charset=utf-8");
@@ -163,6 +165,14 @@ TEST_F(WebServer, P3AnswersAClientThatHasClosedItsSendingSide) {
     EXPECT_EQ(client.receive().error, http::error::end_of_stream);
 }
 
+TEST_F(WebServer, TellsAClientThatClosesItsSendingSideTooEarly) {
+    Client client = connect();
+    client.send("GET /healthz HTTP/1.1\r\nHost: x\r\n");
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    EXPECT_EQ(client.receive().status(), 400u);
+    EXPECT_EQ(client.receive().error, http::error::end_of_stream);
+}
+
 TEST_F(WebServer, P3AsksAClientThatHasClosedItsSendingSideWhetherItIsStillThere) {
     settings.half_close_grace = 1ms;
     bus.script = [](const bus::Request&) { return std::nullopt; };
@@ -271,13 +281,55 @@ TEST_F(WebServer, SaysWhyItCannotListen) {
 
 TEST_F(WebServer, AnswersAHandlerThatThrowsWith500) {
     Providers providers;
-    providers.metrics_text = []() -> std::string { throw std::runtime_error("no"); };
-    providers.ready = [] { return true; };
+    providers.ready = []() -> bool { throw std::runtime_error("no"); };
+    providers.missing = [] { return std::string(); };
     server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
     ASSERT_FALSE(server->start());
     Client client = connect();
-    EXPECT_EQ(client.ask("GET", "/metrics").status(), 500u);
+    EXPECT_EQ(client.ask("GET", "/readyz").status(), 500u);
     EXPECT_EQ(client.ask("GET", "/healthz").status(), 200u);
+}
+
+TEST_F(WebServer, SendsMetricsInTheCodingThatTheClientTakes) {
+    const Reply packed = ask("GET", "/metrics", "", "Accept-Encoding: br, gzip\r\n");
+    EXPECT_TRUE(metrics.asked_gzip);
+    EXPECT_EQ(packed.header("Content-Encoding"), "gzip");
+    EXPECT_EQ(packed.header("Vary"), "Accept-Encoding");
+    const Reply plain = get("/metrics");
+    EXPECT_FALSE(metrics.asked_gzip);
+    EXPECT_EQ(plain.header("Content-Encoding"), "");
+    EXPECT_EQ(plain.header("Vary"), "Accept-Encoding");
+}
+
+TEST_F(WebServer, SendsALongBodyWholeAndItsHeadAlone) {
+    metrics.text = std::make_shared<const std::string>(5'000'000, 'x');
+    Client client = connect();
+    const Reply reply = client.ask("GET", "/metrics");
+    EXPECT_EQ(reply.body().size(), 5'000'000u);
+    const Reply head = client.ask("HEAD", "/metrics");
+    EXPECT_EQ(head.status(), 200u);
+    EXPECT_EQ(head.header("Content-Length"), "5000000");
+    EXPECT_EQ(metrics.text.use_count(), 1) << "what was sent is kept by nobody";
+}
+
+TEST_F(WebServer, RefusesMetricsWhenTooManyAreUnderWay) {
+    metrics.text = nullptr;
+    const Reply reply = get("/metrics");
+    EXPECT_EQ(reply.status(), 503u);
+    EXPECT_EQ(reply.header("Retry-After"), "1");
+    EXPECT_EQ(reply.header("Content-Type"), "application/problem+json");
+}
+
+TEST_F(WebServer, TellsTheMetricsOfACallerThatLeaves) {
+    metrics.held = true;
+    {
+        Client client = connect();
+        client.send("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+        while (metrics.waiting.empty()) io.run_one();
+    }
+    while (metrics.cancelled == 0) io.run_one();
+    EXPECT_TRUE(metrics.waiting.empty());
+    while (server->connections() > 0) io.run_one();
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ class Paths : public ::testing::Test {
     static HttpRequest path(std::vector<std::string> arguments, std::string count = "") {
         HttpRequest request;
         request.arguments = std::move(arguments);
-        if (!count.empty()) request.query["count"] = std::move(count);
+        if (!count.empty()) request.query.emplace("count", std::move(count));
         return request;
     }
     unsigned refusal(const Parsed<Items>& items) { return items ? 0 : items.error().status; }

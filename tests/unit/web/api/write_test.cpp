@@ -45,6 +45,8 @@ TEST_F(ApiWrite, NeverSplitsAWrite) {
     const Reply reply = put("press/holding-registers/0", R"({"values":[1,2,3,4,5]})");
     EXPECT_EQ(reply.status(), 422u);
     EXPECT_EQ(reply.at("detail"), "at most 4 values in one write; writes are not split");
+    EXPECT_EQ(reply.at("rule"), "quantity");
+    EXPECT_EQ(reply.at("transmitted"), false);
     EXPECT_EQ(bus.requests.size(), 1u);
 }
 
@@ -96,6 +98,18 @@ TEST_F(ApiWrite, RefusesValuesThatDoNotFit) {
     }
     EXPECT_EQ(put("press/coils/1", R"({"values":[2]})").status(), 400u);
     EXPECT_EQ(put("press/holding-registers/65535", R"({"values":[1,2]})").status(), 422u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiWrite, P2WhatMayBeAMistakeIsNotExecuted) {
+    for (const char* body : {R"({"values":[1],"values":[2]})", R"({"values":[1],"valeus":[3]})",
+                             R"({"values":[1],"Values":[1]})", R"({"Values":[1]})"}) {
+        EXPECT_EQ(put("press/holding-registers/1", body).status(), 400u) << body;
+    }
+    for (const char* query : {"count=7", "cuont=1", "=1"}) {
+        const std::string path = std::string("press/holding-registers/1?") + query;
+        EXPECT_EQ(put(path, R"({"values":[1]})").status(), 400u) << query;
+    }
     EXPECT_TRUE(bus.requests.empty());
 }
 

@@ -20,5 +20,15 @@ TEST(Caller, TellsWhoeverWorksForItOnceThatItHasLeft) {
     EXPECT_EQ(second, 1);
 }
 
+TEST(Caller, IsCalledByItsAddressAndTheTokenOfItsLastRequest) {
+    Caller caller(7, "10.0.0.9");
+    EXPECT_EQ(caller.name(), "http 10.0.0.9");
+    caller.uses_token("ops");
+    EXPECT_EQ(caller.name(), "http 10.0.0.9 token ops");
+    caller.uses_token("");
+    EXPECT_EQ(caller.name(), "http 10.0.0.9");
+    EXPECT_EQ(Caller(8, "").name(), "http");
+}
+
 }  // namespace
 }  // namespace panelgate::web

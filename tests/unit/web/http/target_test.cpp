@@ -16,9 +16,15 @@ TEST(Target, CutsAPathIntoSegmentsAndDecodesThem) {
 }
 
 TEST(Target, ReadsAQuery) {
-    EXPECT_THAT(
-        parse_target("/a?count=2&type=i16&count=3&x&=y&z=1+2%3d")->query,
-        ElementsAre(Pair("count", "3"), Pair("type", "i16"), Pair("x", ""), Pair("z", "1 2=")));
+    EXPECT_THAT(parse_target("/a?count=2&type=i16&&x&=y&z=1+2%3d")->query,
+                ElementsAre(Pair("", "y"), Pair("count", "2"), Pair("type", "i16"), Pair("x", ""),
+                            Pair("z", "1 2=")));
+    EXPECT_THAT(parse_target("/a?&")->query, IsEmpty());
+}
+
+TEST(Target, KeepsAQueryThatComesTwice) {
+    EXPECT_THAT(parse_target("/a?count=2&type=i16&co%75nt=3")->query,
+                ElementsAre(Pair("count", "2"), Pair("count", "3"), Pair("type", "i16")));
 }
 
 TEST(Target, RefusesWhatItCannotDecode) {

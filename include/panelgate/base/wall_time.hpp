@@ -1,0 +1,21 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "panelgate/base/time.hpp"
+
+namespace panelgate {
+
+/// Time by the clock on the wall: for people and logs, never for timing.
+using WallTime = std::chrono::sys_time<std::chrono::microseconds>;
+
+/// RFC 3339 in UTC: "2026-11-22T07:15:19.000250Z".
+std::string rfc3339(WallTime time);
+
+/// What the wall showed at `then`, when it shows `wall` at `now`.
+inline WallTime wall_time_of(TimePoint then, TimePoint now, WallTime wall) {
+    return wall - std::chrono::floor<std::chrono::microseconds>(now - then);
+}
+
+}  // namespace panelgate

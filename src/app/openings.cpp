@@ -1,0 +1,97 @@
+#include "openings.hpp"
+
+#include <boost/system/errc.hpp>
+
+#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/rt/log.hpp"
+
+namespace panelgate::app {
+namespace {
+
+using boost::system::error_code;
+namespace errc = boost::system::errc;
+
+constexpr std::uint16_t kFirstFreePort = 1024;  // below, a right is needed
+
+std::string where(const Door& door) { return endpoint_text(door.address, door.port); }
+
+std::string words(const error_code& why) {
+    if (why == errc::address_not_available) return "this machine does not have the address yet";
+    return why.message();
+}
+
+error_code open(const Door& door) {
+    const error_code error = door.open();
+    if (!error) {
+        rt::log(rt::LogLevel::info, "listening",
+                {{door.kind, endpoint_text(door.address, door.opened_port())}});
+    }
+    return error;
+}
+
+void tell_wait(const Door& door, const error_code& why) {
+    rt::log(rt::LogLevel::warn, "listener waits", {{door.kind, where(door)}, {"why", words(why)}});
+}
+
+}  // namespace
+
+Openings::Openings(rt::Clock& clock) : clock_(clock), again_(clock.make_alarm()) {}
+
+void Openings::start() {
+    for (Waiting& waiting : waiting_) {
+        waiting.why = open(waiting.door);
+        if (!waiting.why) continue;
+        if (waiting.why != errc::address_not_available) {
+            const std::string advice = listening_advice(waiting.why, waiting.door.port);
+            throw CannotListen("cannot listen on " + where(waiting.door) + ": " +
+                               waiting.why.message() + (advice.empty() ? "" : "; " + advice));
+        }
+        tell_wait(waiting.door, waiting.why);
+    }
+    later();
+}
+
+/// The gateway serves meanwhile: nothing that happens here ends it any more.
+void Openings::try_again() {
+    for (Waiting& waiting : waiting_) {
+        const error_code why = open(waiting.door);
+        if (why && why != waiting.why) tell_wait(waiting.door, why);
+        waiting.why = why;
+    }
+    later();
+}
+
+void Openings::later() {
+    std::erase_if(waiting_, [](const Waiting& waiting) { return !waiting.why; });
+    if (!waiting_.empty()) again_->arm(clock_.now() + kPause, [this] { try_again(); });
+}
+
+void Openings::stop() {
+    again_->cancel();
+    waiting_.clear();
+}
+
+std::string Openings::missing() const {
+    std::string text;
+    for (const auto& [door, why] : waiting_) {
+        if (!text.empty()) text += ", ";
+        text += door.kind + ' ' + where(door) + " (" + words(why) + ')';
+    }
+    return text;
+}
+
+std::string listening_advice(const boost::system::error_code& why, std::uint16_t port) {
+    const std::string number = std::to_string(port);
+    if (why == errc::permission_denied && port < kFirstFreePort) {
+        return "ports below 1024 want CAP_NET_BIND_SERVICE (deploy/systemd gives it; or: setcap "
+               "cap_net_bind_service=+ep on the program), or sysctl "
+               "net.ipv4.ip_unprivileged_port_start=" +
+               number + ", or a port from 1024 on";
+    }
+    if (why == errc::address_in_use)
+        return "another program listens there: ss -ltnp 'sport = :" + number + "' tells which";
+    if (why == errc::address_family_not_supported) return "IPv6 is off on this machine";
+    return {};
+}
+
+}  // namespace panelgate::app

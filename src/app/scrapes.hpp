@@ -1,0 +1,66 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "panelgate/metrics/exposition.hpp"
+#include "panelgate/rt/worker.hpp"
+#include "panelgate/web/api/metrics_source.hpp"
+
+namespace panelgate::app {
+
+/// What /metrics answers. The loop only copies the figures, in pieces between which it serves
+/// others; a worker makes the text and packs it. Whoever asks while figures are copied or written
+/// gets the next text, whose figures are all copied after that, together with the others who wait.
+class Scrapes final : public web::MetricsSource {
+  public:
+    /// Copies one piece; false: it was the last.
+    using Copy = std::function<bool(metrics::Snapshot&)>;
+    struct Settings {
+        std::size_t waiting = 256;                  ///< who may wait for a text
+        std::size_t held_bytes = 64 * 1024 * 1024;  ///< of texts that are being sent
+    };
+
+    /// `begin` starts a copy; what that refers to outlives the scrapes.
+    Scrapes(boost::asio::any_io_executor executor, std::function<Copy()> begin, Settings settings);
+    ~Scrapes() override;
+    Scrapes(const Scrapes&) = delete;
+    Scrapes& operator=(const Scrapes&) = delete;
+
+    void scrape(std::uint64_t caller, bool gzip, Handler handler) override;
+    void cancel(std::uint64_t caller) override;
+
+  private:
+    struct Job;
+    struct Waiter {
+        std::uint64_t caller = 0;
+        bool gzip = false;
+        Handler handler;
+    };
+
+    void begin();
+    void step();
+    void write();
+    void end();
+    void drop(std::vector<Waiter>& waiters, std::uint64_t caller);
+    void hand_over(Handler handler, web::SharedText text);
+    std::size_t held_bytes();
+
+    boost::asio::any_io_executor executor_;
+    std::function<Copy()> begin_;
+    Settings settings_;
+    std::vector<Waiter> waiting_;  ///< for the next text
+    std::vector<Waiter> served_;   ///< by the one under way
+    Copy copy_;                    ///< while figures are copied
+    std::shared_ptr<Job> job_;     ///< the one under way
+    std::vector<std::weak_ptr<const std::string>> sent_;
+    std::size_t last_size_ = 0;
+    std::shared_ptr<Scrapes*> self_ = std::make_shared<Scrapes*>(this);  ///< for what is posted
+    rt::Worker worker_;
+};
+
+}  // namespace panelgate::app

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <memory>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::tcp_server {
+
+/// Paces what a listener answers by itself: refusals, and the registers of the gateway. No line
+/// slows that down, so whoever asks again at once would keep the loop from the lines. So many are
+/// given in a period, at once; the others wait for the next one, in their order. Those that wait
+/// are bounded by what their connections may have in flight. One thread.
+class OwnAnswers : public std::enable_shared_from_this<OwnAnswers> {
+  public:
+    /// Gives one; false: nobody wants it any more.
+    using Give = std::function<bool()>;
+
+    OwnAnswers(rt::Clock& clock, std::size_t most, Duration period);
+
+    /// Whether one may be given now; it counts as given then.
+    bool may_give();
+    /// Later, from the loop. Never called after the end of this object.
+    void wait(Give give);
+
+  private:
+    void begin_period();
+    void give_waiting();
+    void arm();
+
+    rt::Clock& clock_;
+    std::size_t most_;
+    Duration period_;
+    TimePoint end_{};        ///< of the period
+    std::size_t given_ = 0;  ///< in it
+    std::deque<Give> waiting_;
+    std::unique_ptr<rt::Alarm> next_;
+};
+
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,99 @@
+#include "panelgate/web/http/gzip.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <limits>
+#include <new>
+#include <utility>
+
+namespace panelgate::web {
+namespace {
+
+/// zlib.h, deflateInit2: a window of 2^15, and 16 for a gzip header and trailer.
+constexpr int kGzipWindow = 15 + 16;
+/// A text that repeats itself as that of /metrics: 9 would take four times as long for a third
+/// less.
+constexpr int kLevel = 1;
+constexpr int kMemory = 8;  // zlib's default
+
+std::string_view trimmed(std::string_view text) {
+    const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
+    while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+    while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+    return text;
+}
+
+bool same_word(std::string_view a, std::string_view b) {
+    return std::ranges::equal(a, b, [](char x, char y) {
+        return std::tolower(static_cast<unsigned char>(x)) ==
+               std::tolower(static_cast<unsigned char>(y));
+    });
+}
+
+/// "q=0", "q=0.000": not acceptable (RFC 9110 12.4.2).
+bool is_refused(std::string_view weight) {
+    weight = trimmed(weight);
+    if (weight.size() < 3 || !same_word(weight.substr(0, 2), "q=")) return false;
+    return weight.find_first_not_of("0.", 2) == weight.npos;
+}
+
+}  // namespace
+
+bool accepts_gzip(std::string_view accept_encoding) {
+    while (!accept_encoding.empty()) {
+        const auto comma = accept_encoding.find(',');
+        const std::string_view item = accept_encoding.substr(0, comma);
+        accept_encoding.remove_prefix(comma == item.npos ? accept_encoding.size() : comma + 1);
+        const auto semicolon = item.find(';');
+        if (!same_word(trimmed(item.substr(0, semicolon)), "gzip")) continue;
+        return semicolon == item.npos || !is_refused(item.substr(semicolon + 1));
+    }
+    return false;
+}
+
+struct Gzip::Stream {
+    Stream() {
+        if (deflateInit2(&z, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
+            throw std::bad_alloc();
+    }
+    ~Stream() { deflateEnd(&z); }
+
+    /// Puts in all of what z has, as far as `flush` says.
+    void run(int flush) {
+        std::array<char, 64 * 1024> space;
+        do {
+            z.next_out = reinterpret_cast<Bytef*>(space.data());
+            z.avail_out = static_cast<uInt>(space.size());
+            deflate(&z, flush);  // Z_BUF_ERROR: there was nothing to do
+            body.append(space.data(), space.size() - z.avail_out);
+        } while (z.avail_out == 0);
+    }
+
+    z_stream z{};
+    std::string body;
+};
+
+Gzip::Gzip() : stream_(std::make_unique<Stream>()) {}
+
+Gzip::~Gzip() = default;
+
+void Gzip::add(std::string_view piece) {
+    while (!piece.empty()) {
+        const auto size = std::min<std::size_t>(piece.size(), std::numeric_limits<uInt>::max());
+        // zlib reads only, and takes no const.
+        stream_->z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(piece.data()));
+        stream_->z.avail_in = static_cast<uInt>(size);
+        stream_->run(Z_NO_FLUSH);
+        piece.remove_prefix(size);
+    }
+}
+
+std::string Gzip::finish() {
+    stream_->run(Z_FINISH);
+    return std::move(stream_->body);
+}
+
+}  // namespace panelgate::web

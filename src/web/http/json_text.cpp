@@ -1,0 +1,87 @@
+#include "panelgate/web/http/json_text.hpp"
+
+#include <algorithm>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+#include <boost/json/serialize.hpp>
+#include <boost/json/string.hpp>
+#include <cstddef>
+
+#include "panelgate/base/number_text.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+void append(std::string& text, const json::value& value);
+
+/// Most texts need no escape; a trace has thousands of them.
+void append(std::string& text, json::string_view words) {
+    const bool plain = std::ranges::none_of(words, [](char c) {
+        return static_cast<unsigned char>(c) < 0x20 || c == '"' || c == '\\';
+    });
+    if (!plain) {
+        text += json::serialize(words);
+        return;
+    }
+    text += '"';
+    text += words;
+    text += '"';
+}
+
+void append(std::string& text, const json::array& array) {
+    text += '[';
+    bool first = true;
+    for (const json::value& value : array) {
+        if (!first) text += ',';
+        first = false;
+        append(text, value);
+    }
+    text += ']';
+}
+
+void append(std::string& text, const json::object& object) {
+    text += '{';
+    bool first = true;
+    for (const auto& [name, value] : object) {
+        if (!first) text += ',';
+        first = false;
+        append(text, name);
+        text += ':';
+        append(text, value);
+    }
+    text += '}';
+}
+
+/// As deep as a value is nested: what is parsed has a limit, what is made here is flat.
+void append(std::string& text, const json::value& value) {
+    if (const json::array* array = value.if_array()) return append(text, *array);
+    if (const json::object* object = value.if_object()) return append(text, *object);
+    if (const json::string* words = value.if_string())
+        return append(text, json::string_view(*words));
+    const double* number = value.if_double();
+    if (number == nullptr) {
+        text += json::serialize(value);
+        return;
+    }
+    const std::string digits = number_text(*number);
+    text += digits.empty() ? "null" : digits;
+}
+
+}  // namespace
+
+std::string json_text(const json::value& value) {
+    std::string text;
+    append(text, value);
+    return text;
+}
+
+std::string excerpt(std::string text) {
+    constexpr std::size_t kMost = 80;
+    if (text.size() <= kMost) return text;
+    std::size_t end = kMost;
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0) == 0x80) --end;
+    return text.substr(0, end) + "...";
+}
+
+}  // namespace panelgate::web

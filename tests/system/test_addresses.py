@@ -1,0 +1,135 @@
+"""Where the gateway listens: addresses that come late, both kinds of them, ports without a right.
+
+Addresses are added to a machine of the test's own (a network namespace), in which this file runs
+again."""
+import ctypes
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import config
+import harness
+from harness import read_registers
+
+LATE, LATE_SIX = "192.0.2.7", "2001:db8::7"  # of documentation: nobody has them
+OWN_MACHINE = "PANELGATE_TEST_OWN_MACHINE"
+PR_CAPBSET_DROP, CAP_NET_BIND_SERVICE = 24, 10
+
+
+def ip(*words):
+    subprocess.run(["ip", *words], check=True, capture_output=True)
+
+
+def setUpModule():
+    if OWN_MACHINE not in os.environ:
+        raise unittest.SkipTest("no network of one's own here (unshare, iproute2)")
+    ip("link", "set", "lo", "up")
+
+
+def free_port():
+    """Free for both kinds of addresses; in here nobody else takes it."""
+    with socket.create_server(("::", 0), family=socket.AF_INET6, dualstack_ipv6=True) as server:
+        return server.getsockname()[1]
+
+
+def listening(address):
+    return rf"listening modbus_tcp={address}:(\d+)$"
+
+
+def connected(address, port):
+    socket.create_connection((address, port), harness.PATIENCE).close()
+
+
+class LateAddresses(unittest.TestCase):
+    def test_P7_an_address_that_is_not_there_at_boot_is_listened_on_when_it_comes(self):
+        text = config.gateway(config.line(), modbus=f'listen: "{LATE}:0"')
+        with harness.configured(text) as program:
+            program.log.wait_for(rf"warn listener waits modbus_tcp={LATE}:0 why=")
+            status, body = program.get("/readyz")
+            self.assertEqual(status, 503)
+            self.assertIn(f"modbus_tcp {LATE}:0", body)
+            self.assertEqual(program.get("/healthz")[0], 200)
+            ip("address", "add", f"{LATE}/32", "dev", "lo")
+            self.addCleanup(ip, "address", "del", f"{LATE}/32", "dev", "lo")
+            port = int(program.log.wait_for(listening(LATE)).group(1))
+            connected(LATE, port)
+            self.assertEqual(program.get("/readyz")[0], 200)
+
+    def test_P7_http_waits_as_well(self):
+        text = config.gateway(config.line(), http=f'listen: "[{LATE_SIX}]:0"')
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(text)
+            with harness.Program("run", "-c", str(file)) as program:
+                program.log.wait_for(rf"listener waits http=\[{LATE_SIX}\]:0 ")
+                with program.client() as client:
+                    self.assertEqual(client.ask(31, read_registers(0))[0], 3)
+                ip("-6", "address", "add", f"{LATE_SIX}/128", "dev", "lo")
+                self.addCleanup(ip, "-6", "address", "del", f"{LATE_SIX}/128", "dev", "lo")
+                connected(LATE_SIX, program.http_port())
+
+
+class BothKinds(unittest.TestCase):
+    def test_all_addresses_of_both_kinds_on_one_port(self):
+        port = free_port()
+        for first, second in (("0.0.0.0", "[::]"), ("[::]", "0.0.0.0")):
+            with self.subTest(first=first):
+                listeners = (f'listen: "{first}:{port}"}}, {{listen: "{second}:{port}"')
+                with harness.configured(config.gateway(config.line(), modbus=listeners)) as program:
+                    program.log.wait_for(rf"listening modbus_tcp=\[::\]:{port}$")
+                    for address in ("127.0.0.1", "::1"):
+                        connected(address, port)
+                    self.assertRegex(program.get("/metrics")[1],
+                                     rf'tcp_connections{{listener="\[::\]:{port}"}}')
+
+    def test_all_addresses_of_ipv6_alone_are_those_of_ipv4_as_well(self):
+        with harness.configured(config.gateway(config.line(), modbus='listen: "[::]:0"')) as program:
+            for address in ("127.0.0.1", "::1"):
+                connected(address, program.modbus_port())
+
+
+class Refusals(unittest.TestCase):
+    def refused(self, text, **options):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(text)
+            ended = harness.run("run", "-c", str(file), **options)
+        self.assertEqual(ended.returncode, 69, ended.stderr)
+        return ended.stderr
+
+    def test_port_502_without_a_right_is_told_with_what_helps(self):
+        def without_the_right():
+            ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_NET_BIND_SERVICE, 0, 0, 0)
+
+        told = self.refused(config.gateway(config.line(), modbus="listen: 127.0.0.1:502"),
+                            preexec_fn=without_the_right)
+        for help_ in ("CAP_NET_BIND_SERVICE", "setcap", "ip_unprivileged_port_start=502"):
+            self.assertIn(help_, told)
+
+    def test_a_port_that_another_program_has_is_told_at_once(self):
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            port = taken.getsockname()[1]
+            told = self.refused(config.gateway(config.line(), modbus=f"listen: 127.0.0.1:{port}"))
+        self.assertIn(f"ss -ltnp 'sport = :{port}'", told)
+
+
+def in_an_own_machine():
+    """Runs this file once more where addresses may be added; comes back where that is not possible."""
+    if OWN_MACHINE in os.environ or not shutil.which("unshare"):
+        return
+    mine = ["unshare", "--map-root-user", "--net"]
+    tried = subprocess.run([*mine, "ip", "link", "set", "lo", "up"], check=False,
+                           capture_output=True)
+    if tried.returncode == 0:
+        os.environ[OWN_MACHINE] = "1"
+        os.execvp(mine[0], [*mine, sys.executable, "-B", *sys.argv])
+
+
+if __name__ == "__main__":
+    in_an_own_machine()
+    unittest.main()

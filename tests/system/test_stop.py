@@ -1,0 +1,33 @@
+"""P3: who ends the gateway waits for the answers that it owes."""
+import pathlib
+import tempfile
+import unittest
+
+import config
+import harness
+from harness import read_registers
+from rtu_bus import Pieces, RtuBus
+
+SLOW = 11  # seconds of a panel: longer than the ten that were given to every answer
+
+
+class Stop(unittest.TestCase):
+    def test_P3_sigterm_waits_for_as_long_as_the_longest_deadline(self):
+        reply = harness.rtu(1, b"\x03\x02\x00\x2a")
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            slow = config.line("slow", link, "{id: 1, name: one}", timing="{response_timeout: 15s}",
+                               queue="{deadline: 20s}")
+            with RtuBus(link, {1: lambda frame: Pieces([(SLOW, reply)])}) as bus:
+                with harness.configured(config.gateway(slow)) as program, \
+                        program.client() as client:
+                    program.log.wait_for("line up")
+                    client.send(1, read_registers(0))
+                    bus.wait_for(1)
+                    program.process.terminate()
+                    self.assertEqual(client.receive()[2], b"\x03\x02\x00\x2a")
+                    self.assertEqual(program.wait(), 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

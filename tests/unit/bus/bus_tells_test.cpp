@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "support/hex.hpp"
+#include "support/manual_clock.hpp"
+#include "support/memory_line.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::bus {
+namespace {
+
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+const Bytes kWrite = "06 00 01 00 03"_hex;
+
+/// What a bus tells of its line besides answers.
+class BusTellsTest : public testing::Test {
+  protected:
+    BusTellsTest() {
+        settings.name = "floor1";
+        settings.arbiter.serial = {1000000, 8, Parity::none, 1};
+        settings.arbiter.unlisted.response_timeout = 5ms;
+        settings.arbiter.stations = {settings.arbiter.unlisted};
+        settings.arbiter.stations[0].id = 17;
+        make_bus();
+    }
+    void make_bus() {
+        auto memory = std::make_unique<test::MemoryLine>(clock);
+        line = memory.get();
+        line->reply = kReply;
+        bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
+    }
+    /// Asks and runs the loop until answered.
+    void ask(std::uint8_t station, const Bytes& pdu) {
+        std::optional<Answer> got;
+        bus->transact({.station = station, .request = test::request_of(pdu), .client = 1},
+                      [&](Answer answer) { got = std::move(answer); });
+        EXPECT_TRUE(test::run_until(io, clock, [&] { return got.has_value(); }));
+    }
+
+    boost::asio::io_context io{1};
+    test::ManualClock clock;
+    Settings settings;
+    test::MemoryLine* line = nullptr;
+    std::unique_ptr<Bus> bus;
+};
+
+TEST_F(BusTellsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
+    std::vector<WriteEvent> told;
+    settings.observe = [&](const BusEvent& event) {
+        if (const auto* write = std::get_if<WriteEvent>(&event)) told.push_back(*write);
+    };
+    make_bus();
+    bus->start();
+    ask(17, kRead);
+    EXPECT_TRUE(told.empty());
+    line->reply = kWrite;
+    ask(17, kWrite);
+    ASSERT_EQ(told.size(), 2u);
+    EXPECT_EQ(told[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
+    EXPECT_FALSE(told[0].ended);
+    EXPECT_TRUE(told[1].ended);
+    line->fail_writes = true;
+    ask(0, kWrite);
+    ASSERT_EQ(told.size(), 4u) << "lost on its way: nobody knows what has come of it";
+    EXPECT_EQ(told[3].station, 0);
+}
+
+TEST_F(BusTellsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
+    bus->start();
+    for (int i = 0; i < 20; ++i) {
+        ask(17, kRead);
+        clock.advance(100ms);
+    }
+    EXPECT_GT(bus->status().load_percent, 0);
+    EXPECT_EQ(bus->status().load_percent, bus->status().load_percent);
+    clock.advance(25s);
+    EXPECT_EQ(bus->status().load_percent, 0) << "idle since, and nobody has asked";
+}
+
+TEST_F(BusTellsTest, CountsHowOftenAStationMayHaveBeenRestarted) {
+    bus->start();
+    ask(17, kRead);
+    const std::uint64_t before = bus->station_status(17).returns;
+    line->reply.clear();
+    ask(17, kRead);
+    line->reply = kReply;
+    ask(17, kRead);
+    EXPECT_EQ(bus->station_status(17).returns, before + 1) << "it was silent";
+    line->events()->on_down("pulled");
+    line->events()->on_up();
+    EXPECT_EQ(bus->station_status(17).returns, before + 2) << "the line was away";
+}
+
+}  // namespace
+}  // namespace panelgate::bus

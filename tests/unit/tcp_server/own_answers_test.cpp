@@ -1,0 +1,66 @@
+#include "own_answers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "support/manual_clock.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+class OwnAnswersTest : public testing::Test {
+  protected:
+    void wait(char name, bool wanted = true) {
+        answers->wait([this, name, wanted] {
+            if (wanted) given += name;
+            return wanted;
+        });
+    }
+
+    test::ManualClock clock;
+    std::shared_ptr<OwnAnswers> answers = std::make_shared<OwnAnswers>(clock, 2, 1ms);
+    std::string given;
+};
+
+TEST_F(OwnAnswersTest, P5AFewAreGivenAtOnceTheOthersInTheNextPeriods) {
+    EXPECT_TRUE(answers->may_give());
+    EXPECT_TRUE(answers->may_give());
+    EXPECT_FALSE(answers->may_give());
+    for (const char name : {'a', 'b', 'c'}) wait(name);
+    EXPECT_EQ(given, "");
+    clock.advance(1ms);
+    EXPECT_EQ(given, "ab");
+    EXPECT_FALSE(answers->may_give()) << "one waits";
+    clock.advance(1ms);
+    EXPECT_EQ(given, "abc");
+    EXPECT_TRUE(answers->may_give());
+    EXPECT_EQ(clock.armed(), 0u);
+}
+
+TEST_F(OwnAnswersTest, WhoAsksNowAndThenNeverWaits) {
+    for (int n = 0; n < 10; ++n) {
+        EXPECT_TRUE(answers->may_give());
+        clock.pass(1ms);
+    }
+}
+
+TEST_F(OwnAnswersTest, P9ClientsThatHaveLeftCostTheOthersNoTurn) {
+    answers->may_give();
+    answers->may_give();
+    for (int n = 0; n < 1000; ++n) wait('x', false);
+    wait('a');
+    clock.advance(1ms);
+    EXPECT_EQ(given, "a");
+}
+
+TEST_F(OwnAnswersTest, NobodyIsAskedAfterTheEnd) {
+    answers->may_give();
+    wait('a');
+    answers.reset();
+    clock.advance(1s);
+    EXPECT_EQ(given, "");
+}
+
+}  // namespace
+}  // namespace panelgate::tcp_server
