@@ -1,6 +1,7 @@
 #include "panelgate/base/suggest.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <numeric>
 #include <vector>
@@ -28,14 +29,124 @@ std::size_t distance(std::string_view a, std::string_view b) {
     return above[b.size()];
 }
 
+/// Letters and digits, lower case: "Panasonic GT" is panasonic-gt.
+std::string plain(std::string_view text) {
+    std::string all;
+    for (const char c : text) {
+        if (c >= 'A' && c <= 'Z') {
+            all += static_cast<char>(c - 'A' + 'a');
+        } else if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) {
+            all += c;
+        }
+    }
+    return all;
+}
+
+struct Synonym {
+    std::string_view word;
+    std::string_view meant;
+};
+/// What other programs and other trades call it.
+constexpr std::array<Synonym, 77> kSynonyms{{{"baudrate", "baud"},
+                                             {"speed", "baud"},
+                                             {"bitrate", "baud"},
+                                             {"bps", "baud"},
+                                             {"bytesize", "data_bits"},
+                                             {"bits", "data_bits"},
+                                             {"n", "none"},
+                                             {"no", "none"},
+                                             {"e", "even"},
+                                             {"o", "odd"},
+                                             {"int16", "i16"},
+                                             {"int", "i16"},
+                                             {"sint16", "i16"},
+                                             {"signed", "i16"},
+                                             {"uint16", "u16"},
+                                             {"uint", "u16"},
+                                             {"word", "u16"},
+                                             {"unsigned", "u16"},
+                                             {"int32", "i32"},
+                                             {"dint", "i32"},
+                                             {"uint32", "u32"},
+                                             {"dword", "u32"},
+                                             {"int64", "i64"},
+                                             {"uint64", "u64"},
+                                             {"float", "f32"},
+                                             {"float32", "f32"},
+                                             {"real", "f32"},
+                                             {"single", "f32"},
+                                             {"double", "f64"},
+                                             {"float64", "f64"},
+                                             {"lreal", "f64"},
+                                             {"boolean", "bool"},
+                                             {"bit", "bool"},
+                                             {"text", "string"},
+                                             {"bcd", "bcd16"},
+                                             {"warning", "warn"},
+                                             {"err", "error"},
+                                             {"fatal", "error"},
+                                             {"critical", "error"},
+                                             {"plain", "text"},
+                                             {"ro", "read_only"},
+                                             {"rw", "read_write"},
+                                             {"admin", "operator"},
+                                             {"guest", "viewer"},
+                                             {"true", "on"},
+                                             {"yes", "on"},
+                                             {"false", "off"},
+                                             {"no", "off"},
+                                             {"off", "none"},
+                                             {"swap", "CDAB"},
+                                             {"slave", "id"},
+                                             {"slaveid", "id"},
+                                             {"unit", "id"},
+                                             {"unitid", "id"},
+                                             {"address", "id"},
+                                             {"address", "at"},
+                                             {"address", "listen"},
+                                             {"register", "at"},
+                                             {"register", "read"},
+                                             {"bind", "listen"},
+                                             {"port", "device"},
+                                             {"port", "listen"},
+                                             {"tty", "device"},
+                                             {"model", "profile"},
+                                             {"slaves", "stations"},
+                                             {"devices", "stations"},
+                                             {"modbus", "modbus_tcp"},
+                                             {"host", "listen"},
+                                             {"readonly", "access"},
+                                             {"size", "limit"},
+                                             {"size", "count"},
+                                             {"interval", "every"},
+                                             {"period", "every"},
+                                             {"factor", "scale"},
+                                             {"source", "from"},
+                                             {"target", "to"},
+                                             {"timeout", "response_timeout"}}};
+
+std::string synonym(std::string_view typed, std::span<const std::string_view> candidates) {
+    for (const Synonym& synonym : kSynonyms) {
+        const bool known = std::ranges::find(candidates, synonym.meant) != candidates.end();
+        if (synonym.word == typed && known) return std::string(synonym.meant);
+    }
+    return "";
+}
+
 }  // namespace
 
 std::string nearest(std::string_view typed, std::span<const std::string_view> candidates) {
+    const std::string letters = plain(typed);
+    for (const std::string_view candidate : candidates) {
+        if (!letters.empty() && plain(candidate) == letters) return std::string(candidate);
+    }
+    if (std::string meant = synonym(letters, candidates); !meant.empty()) return meant;
     std::string_view best;
     std::size_t least = 3;
     for (const std::string_view candidate : candidates) {
-        const std::size_t edits = distance(typed, candidate);
         const std::size_t longer = std::max(typed.size(), candidate.size());
+        if (longer - std::min(typed.size(), candidate.size()) >= least) continue;
+        const std::size_t edits = distance(typed, candidate);
         if (edits < least && edits * 3 <= longer) {
             least = edits;
             best = candidate;

@@ -12,6 +12,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/profiles_dir.hpp"
 #include "panelgate/yaml/merge_keys.hpp"
+#include "panelgate/yaml/quote.hpp"
 #include "templates.hpp"
 
 namespace panelgate::config {
@@ -29,7 +30,7 @@ constexpr std::array<std::pair<std::string_view, rt::LogFormat>, 2> kFormats{
     {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
 
 void load_log(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("log");
+    const yaml::Node* node = root.map("log", "{level: info}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "log");
     rt::LogSettings& log = loading.config.log;
@@ -106,8 +107,21 @@ bool is_name(std::string_view text) {
 std::optional<std::string> load_name(MapReader& in, bool required) {
     auto name = required ? in.required_text("name") : in.text("name");
     if (!name || is_name(*name)) return name;
-    in.problem("name", "name must be of a-z, 0-9 and '-', not '" + *name + '\'');
+    in.problem("name",
+               "name must be of a-z, 0-9 and '-', not " + yaml::quote(*name) + name_hint(*name));
     return std::nullopt;
+}
+
+std::string name_hint(std::string_view typed) {
+    constexpr std::size_t kLongest = 40;
+    std::string name;
+    for (const char c : typed) {
+        if (c < 0 || name.size() >= kLongest) return "";  // nobody knows its ASCII letters
+        const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+        const std::string one(1, c == ' ' || c == '_' || c == '.' ? '-' : lower);
+        if (is_name(one)) name += one;
+    }
+    return name.empty() ? "" : "; write " + name;
 }
 
 std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
@@ -115,8 +129,10 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
     const std::string near = nearest(typed, known);
     if (!near.empty()) return "; did you mean '" + near + "'?";
     std::string list;
-    for (const std::string_view word : known)
+    constexpr std::size_t kMost = 30;
+    for (const std::string_view word : known.first(std::min(kMost, known.size())))
         list += (list.empty() ? "" : ", ") + std::string(word);
+    if (known.size() > kMost) list += " and " + std::to_string(known.size() - kMost) + " more";
     return "; known " + std::string(noun) + " are " + list;
 }
 

@@ -1,11 +1,15 @@
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/settings.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -13,10 +17,30 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
+/// What `38400 8N1` would be.
+std::string serial_example(MapReader& line) {
+    const Node* node = line.child("serial");
+    const std::string_view typed = node == nullptr ? std::string_view() : node->scalar;
+    const std::size_t digits = std::min(typed.find_first_not_of("0123456789"), typed.size());
+    const auto baud = yaml::parse_integer(typed.substr(0, digits));
+    const std::size_t format = typed.find("8", digits);
+    std::string parity = "none";
+    std::string stop_bits = "1";
+    if (format != std::string_view::npos && format + 2 < typed.size()) {
+        const char letter = typed[format + 1];
+        parity = letter == 'E' || letter == 'e'   ? "even"
+                 : letter == 'O' || letter == 'o' ? "odd"
+                                                  : parity;
+        if (typed[format + 2] == '2') stop_bits = "2";
+    }
+    return "{baud: " + std::to_string(baud.value_or(38400)) + ", parity: " + parity +
+           ", stop_bits: " + stop_bits + '}';
+}
+
 /// False when there was a fault: then nothing may be concluded from the format.
 bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
     const std::size_t before = loading.problems.list().size();
-    const Node* node = line.map("serial");
+    const Node* node = line.map("serial", serial_example(line));
     if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
     format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
@@ -33,28 +57,37 @@ bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
 }
 
 void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue) {
-    const Node* node = line.map("queue");
+    const Node* node = line.map("queue", "{limit: 256}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "queue");
     const auto limit = in.integer("limit", 1, 4096);
     queue.limit = static_cast<std::size_t>(limit.value_or(static_cast<std::int64_t>(queue.limit)));
+    const auto own = in.integer("per_client", 1, 4096);
+    if (own) queue.per_client = static_cast<std::size_t>(*own);
+    if (own && queue.per_client > queue.limit) {
+        in.problem("per_client", "per_client " + std::to_string(*own) + " is above the limit, " +
+                                     std::to_string(queue.limit) +
+                                     "; make it smaller, or the limit larger");
+    }
     queue.per_client = std::min(queue.per_client, queue.limit);
-    const auto own = in.integer("per_client", 1, static_cast<std::int64_t>(queue.limit));
-    queue.per_client =
-        static_cast<std::size_t>(own.value_or(static_cast<std::int64_t>(queue.per_client)));
     queue.deadline = in.duration("deadline", 10ms, 10min).value_or(queue.deadline);
     in.finish();
 }
 
 void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& offline) {
-    const Node* node = line.map("offline");
+    const Node* node = line.map("offline", "{after: 3}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "offline");
     offline.after = static_cast<int>(in.integer("after", 1, 1000).value_or(offline.after));
     offline.probe_min = in.duration("probe_min", 10ms, 1h).value_or(offline.probe_min);
-    offline.probe_max = std::max(offline.probe_max, offline.probe_min);
-    offline.probe_max =
-        in.duration("probe_max", offline.probe_min, 24h).value_or(offline.probe_max);
+    const auto most = in.duration("probe_max", 10ms, 24h);
+    if (most && *most < offline.probe_min) {
+        in.problem("probe_max", "probe_max " + yaml::format_duration(*most) +
+                                    " is below probe_min, " +
+                                    yaml::format_duration(offline.probe_min) +
+                                    "; make it longer, or probe_min shorter");
+    }
+    offline.probe_max = std::max(most.value_or(offline.probe_max), offline.probe_min);
     in.finish();
 }
 
@@ -71,7 +104,7 @@ Duration load_rs485_delay(MapReader& in, std::string_view key, line::Rs485::Mode
 
 void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs485& rs485) {
     using Mode = line::Rs485::Mode;
-    const Node* node = in_line.map("rs485");
+    const Node* node = in_line.map("rs485", "{mode: off}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "rs485");
     constexpr std::array<std::pair<std::string_view, Mode>, 3> kModes{
@@ -115,13 +148,13 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         line.arbiter.may_stall = true;
         if (!line::parse_tcp_device(line.device.device))
             in.problem("device",
-                       "device must be tcp://HOST:PORT with a port from 1 to 65535, not '" +
-                           line.device.device + '\'');
+                       "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
+                           yaml::quote(line.device.device));
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
         in.problem(
             "device",
-            "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT or sim, not '" +
-                line.device.device + '\'');
+            "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT or sim, not " +
+                yaml::quote(line.device.device));
     }
 }
 
@@ -158,7 +191,7 @@ Line load_line(Loading& loading, const Node& node) {
     line.arbiter.quarantine = load_quarantine(in);
     constexpr std::array<std::string_view, 2> kUnlisted{"pass", "refuse"};
     line.refuse_unlisted = in.choice_index("unlisted_stations", kUnlisted) == std::size_t{1};
-    if (const Node* faults = in.map("simulate")) {
+    if (const Node* faults = in.map("simulate", "{echo: true}")) {
         MapReader simulate(*faults, loading.problems, "simulate");
         line.simulated_echo = simulate.boolean("echo").value_or(false);
         simulate.finish();

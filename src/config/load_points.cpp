@@ -7,6 +7,7 @@
 #include "load_stations.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -146,7 +147,7 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
 }
 
 void load_labels(MapReader& in, Point& point) {
-    const Node* labels = in.map("labels");
+    const Node* labels = in.map("labels", "{0: stopped, 1: running}");
     if (labels == nullptr) return;
     if (!is_integer(point.type)) {
         in.problem("labels",
@@ -227,7 +228,8 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     Point point;
     point.name = in.required_text("name").value_or("");
     if (!point.name.empty() && !is_point_name(point.name))
-        in.problem("name", "name must be of a-z, 0-9, '-' and '_', not '" + point.name + '\'');
+        in.problem("name", "name must be of a-z, 0-9, '-' and '_', not " + yaml::quote(point.name) +
+                               name_hint(point.name));
     if (!point.name.empty() &&
         std::ranges::find(station.points, point.name, &Point::name) != station.points.end()) {
         in.problem("name", "there are two points '" + point.name + "' of this station");

@@ -7,6 +7,7 @@
 #include "panelgate/modbus/span.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -53,8 +54,8 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
     if (!text) return std::nullopt;
     const std::size_t slash = text->find('/');
     if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
-        in.problem(key, std::string(key) + " must be STATION/NOTATION such as press/UW100, not '" +
-                            *text + '\'');
+        in.problem(key, std::string(key) + " must be STATION/NOTATION such as press/UW100, not " +
+                            yaml::quote(*text));
         return std::nullopt;
     }
     End end;
@@ -64,7 +65,7 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
     if (end.station == nullptr) {
         std::vector<std::string_view> names(loading.station_names.begin(),
                                             loading.station_names.end());
-        in.problem(key, "there is no station '" + end.end.station + '\'' +
+        in.problem(key, "there is no station " + yaml::quote(end.end.station) +
                             did_you_mean(end.end.station, names, "stations"));
         return std::nullopt;
     }

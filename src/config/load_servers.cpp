@@ -7,6 +7,7 @@
 #include "load_hosts.hpp"
 #include "loader.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -20,8 +21,8 @@ void load_listen(MapReader& in, Settings& settings) {
     if (!text) return;
     const auto endpoint = parse_endpoint(*text);
     if (!endpoint) {
-        in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not '" +
-                                 *text + '\'');
+        in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not " +
+                                 yaml::quote(*text));
         return;
     }
     settings.address = endpoint->address;
@@ -40,8 +41,8 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     std::vector<std::string_view> names;
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
-    loading.problems.add(mark,
-                         "there is no line '" + name + '\'' + did_you_mean(name, names, "lines"));
+    loading.problems.add(
+        mark, "there is no line " + yaml::quote(name) + did_you_mean(name, names, "lines"));
     return nullptr;
 }
 
@@ -78,8 +79,8 @@ std::optional<std::uint8_t> find_station(const Line& line, const std::string& te
 std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& node) {
     const std::size_t slash = node.scalar.find('/');
     if (slash == std::string::npos) {
-        loading.problems.add(node.mark, "a unit points to LINE/STATION such as floor1/31, not '" +
-                                            node.scalar + '\'');
+        loading.problems.add(node.mark, "a unit points to LINE/STATION such as floor1/31, not " +
+                                            yaml::quote(node.scalar));
         return std::nullopt;
     }
     const std::string name = node.scalar.substr(0, slash);
@@ -91,19 +92,19 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
     std::vector<std::string_view> names;
     names.reserve(line->stations.size());
     for (const Station& known : line->stations) names.push_back(known.name);
-    loading.problems.add(node.mark, "line '" + name + "' has no station '" + text + '\'' +
+    loading.problems.add(node.mark, "line '" + name + "' has no station " + yaml::quote(text) +
                                         did_you_mean(text, names, "stations"));
     return std::nullopt;
 }
 
 void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
-    const Node* map = in.map("units");
+    const Node* map = in.map("units", "{101: floor1/31}");
     if (map == nullptr) return;
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
-            loading.problems.add(entry.mark,
-                                 "a unit id is a number from 0 to 255, not '" + entry.key + '\'');
+            loading.problems.add(
+                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -171,8 +172,8 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
         if (cidr) {
             allow.push_back({cidr->address, cidr->prefix});
         } else {
-            loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not '" +
-                                                item.scalar + '\'');
+            loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not " +
+                                                yaml::quote(item.scalar));
         }
     }
     if (list->items.empty())
@@ -268,7 +269,7 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
 }
 
 void load_http(Loading& loading, MapReader& root) {
-    const Node* node = root.map("http");
+    const Node* node = root.map("http", "{listen: 127.0.0.1:8080}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "http");
     web::Settings settings;

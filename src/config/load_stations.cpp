@@ -7,6 +7,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -53,7 +54,7 @@ const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
     std::vector<std::string_view> names;
     for (const auto& [known, profile] : catalogue.all()) names.push_back(known);
     in.problem("profile",
-               "there is no profile '" + name + '\'' + did_you_mean(name, names, "profiles"));
+               "there is no profile " + yaml::quote(name) + did_you_mean(name, names, "profiles"));
     return catalogue.find("generic");
 }
 
@@ -99,7 +100,7 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
 
 /// `simulate` of a station: what its simulated panel does wrong.
 void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults) {
-    const Node* node = station.map("simulate");
+    const Node* node = station.map("simulate", "{dead: true}");
     if (node == nullptr) return;
     MapReader in(*node, loading.problems, "simulate");
     faults.dead = in.boolean("dead").value_or(false);
@@ -108,7 +109,7 @@ void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults
     const auto share = [&](std::string_view key, double& value) {
         value = in.number(key).value_or(0);
         if (value >= 0 && value <= 1) return;
-        in.problem(key, std::string(key) + " must be a share from 0 to 1");
+        in.problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
         value = 0;
     };
     share("late", faults.late);

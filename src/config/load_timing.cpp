@@ -144,7 +144,7 @@ void load_common(MapReader& in, const LineInWork& work, Timing& timing) {
 void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
-    if (const Node* node = in.map("timing")) {
+    if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
         load_common(timing, work, work.timing);
         load_reply_hole(timing, work.line.arbiter.reply_hole);
@@ -164,7 +164,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineI
                                     const Station& station) {
     Timing timing = work.timing;
     std::optional<yaml::Mark> own_gap;
-    if (const Node* node = in.map("timing")) {
+    if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader own(*node, loading.problems, "a station's timing");
         load_common(own, work, timing);
         if (own.has("frame_gap")) own_gap = own.mark("frame_gap");

@@ -32,6 +32,8 @@ struct Loading {
 bool is_name(std::string_view text);
 /// The key `name`; nothing when it is absent or not a name (then a problem).
 std::optional<std::string> load_name(yaml::MapReader& in, bool required);
+/// "; write big-press" for "Big Press"; "" when nothing of it is left.
+std::string name_hint(std::string_view typed);
 /// The key `access`: true for read_only.
 std::optional<bool> load_read_only(yaml::MapReader& in);
 /// "; did you mean 'x'?" when one of `known` is near, else "; known NOUN are a, b, c".

@@ -10,31 +10,20 @@
 #include <algorithm>
 #include <map>
 #include <sstream>
-#include <tuple>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "encoding.hpp"
+#include "lint.hpp"
 #include "masking.hpp"
+#include "panelgate/yaml/quote.hpp"
 #include "panelgate/yaml/settings.hpp"
+#include "refusal.hpp"
+#include "size.hpp"
+#include "source.hpp"
 
 namespace panelgate::yaml {
-
-std::string format(const Problem& problem) {
-    return problem.file + ':' + std::to_string(problem.mark.line) + ':' +
-           std::to_string(problem.mark.column) + ": " + problem.message;
-}
-
-std::string Problems::text() const {
-    std::vector<const Problem*> sorted;
-    sorted.reserve(list_.size());
-    for (const Problem& problem : list_) sorted.push_back(&problem);
-    const auto place = [this](const Problem* problem) {
-        return std::tuple(problem->file != file_, std::string_view(problem->file),
-                          problem->mark.line, problem->mark.column, problem);
-    };
-    std::ranges::sort(sorted, {}, place);  // at one place: in the order found
-    std::string all;
-    for (const Problem* problem : sorted) all += format(*problem) + '\n';
-    return all;
-}
 
 namespace {
 
@@ -50,38 +39,16 @@ struct TooLarge {
     std::string message;
 };
 
-/// yaml-cpp counts from 0.
-Mark mark_of(const YAML::Mark& mark) { return {mark.line + 1, mark.column + 1}; }
-
-struct Size {
-    std::size_t nodes = 1;
-    std::size_t text = 0;   ///< bytes of scalars and keys
-    std::size_t depth = 0;  ///< levels of lists and maps
+/// Text that belongs to nothing above it, though yaml-cpp takes it for another document.
+struct Stray {
+    Mark mark;
 };
-
-Size size_of(const Node& node) {
-    Size size;
-    size.text = node.scalar.size();
-    const auto add = [&size](const Node& child) {
-        const Size inner = size_of(child);
-        size.nodes += inner.nodes;
-        size.text += inner.text;
-        size.depth = std::max(size.depth, inner.depth);
-    };
-    for (const Node& item : node.items) add(item);
-    for (const Entry& entry : node.entries) {
-        size.text += entry.key.size();
-        add(entry.value);
-    }
-    if (node.kind == Node::Kind::sequence || node.kind == Node::Kind::map) ++size.depth;
-    return size;
-}
 
 /// Builds our tree from the parser's events, where marks, duplicate keys and aliases are all at
 /// hand (yaml-cpp's own tree keeps the first of two equal keys silently).
 class Builder final : public YAML::EventHandler {
   public:
-    explicit Builder(Problems& problems) : problems_(problems) {}
+    Builder(const Source& source, Problems& problems) : source_(source), problems_(problems) {}
 
     void OnDocumentStart(const YAML::Mark& mark) override { start_ = mark_of(mark); }
     void OnDocumentEnd() override {}
@@ -129,6 +96,7 @@ class Builder final : public YAML::EventHandler {
     }
     void OnMapEnd() override { close(); }
 
+    Mark mark_of(const YAML::Mark& mark) const { return source_.mark(mark.line, mark.column); }
     Mark start() const { return start_; }
     Node take() { return std::move(root_); }
 
@@ -138,14 +106,17 @@ class Builder final : public YAML::EventHandler {
         YAML::anchor_t anchor = YAML::NullAnchor;
         bool has_key = false;  ///< `pending` has a key and waits for its value
         Entry pending;
-        bool refused = false;             ///< that key: its value is dropped
+        bool refused = false;     ///< that key: its value is dropped
+        bool lacks_dash = false;  ///< its keys repeat: they are another item's, and told once
         std::map<std::string, int> seen;  ///< key -> line
     };
 
     /// "?" is a plain value, "!" a quoted one; anything else was written by hand.
     void check_tag(const YAML::Mark& mark, const std::string& tag) {
         if (tag.empty() || tag == "?" || tag == "!") return;
-        problems_.add(mark_of(mark), "a tag ('" + tag + "') has no meaning here; leave it out");
+        problems_.add(mark_of(mark),
+                      "a tag (" + quote(tag) +
+                          ") has no meaning here; leave it out, or put the text in quotes");
     }
     void open(Node::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
         if (stack_.size() >= kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};
@@ -194,18 +165,49 @@ class Builder final : public YAML::EventHandler {
         level.has_key = true;
         level.refused = true;
         if (node.kind != Node::Kind::scalar) {
-            problems_.add(node.mark, "a key must be a word");
+            const bool is_map = node.kind == Node::Kind::map;  // {{ NAME }}, most likely
+            problems_.add(node.mark,
+                          std::string("a key must be a word") +
+                              (is_map ? ", not a map; a variable is written ${NAME}" : ""));
             return;
         }
         const auto [first, fresh] = level.seen.emplace(node.scalar, node.mark.line);
         level.refused = !fresh;
-        if (fresh) return;
-        problems_.add(node.mark, "duplicate key '" + node.scalar + "', already on line " +
-                                     std::to_string(first->second));
+        if (fresh || level.lacks_dash) return;
+        level.lacks_dash = begins_item(level, node.scalar);
+        problems_.add(node.mark, "duplicate key " + quote(node.scalar) + ", already on line " +
+                                     std::to_string(first->second) +
+                                     (level.lacks_dash ? "; is a '- ' missing before it?" : ""));
+    }
+    /// The map is an item of a list, and this is the key that it began with.
+    bool begins_item(const Open& level, const std::string& key) const {
+        const bool is_item =
+            stack_.size() > 1 && stack_[stack_.size() - 2].node.kind == Node::Kind::sequence;
+        return is_item && !level.node.entries.empty() && level.node.entries.front().key == key;
+    }
+    /// `scale: 0,1` inside brackets is a key with a value, and a key.
+    bool is_decimal_comma(const Open& level, const Node& value) const {
+        if (value.kind != Node::Kind::null || level.node.entries.empty()) return false;
+        const Node& before = level.node.entries.back().value;
+        const Mark key = level.pending.mark;
+        const auto is_number = [](const std::string& text, std::string_view letters) {
+            return !text.empty() && text.find_first_not_of(letters) == std::string::npos;
+        };
+        return is_number(before.scalar, "-0123456789") &&
+               is_number(level.pending.key, "0123456789") && before.mark.line == key.line &&
+               before.mark.column + static_cast<int>(before.scalar.size()) + 1 == key.column;
     }
     void put_value(Open& level, Node node) {
         level.has_key = false;
         if (level.refused) return;
+        if (is_decimal_comma(level, node)) {
+            Node& number = level.node.entries.back().value;
+            const std::string comma = number.scalar + ',' + level.pending.key;
+            number.scalar += '.' + level.pending.key;
+            problems_.add(number.mark, quote(comma) + " is two values here; write " +
+                                           number.scalar + ", with a decimal point");
+            return;
+        }
         Entry entry = std::move(level.pending);
         // An empty value is marked at the next token, maybe lines below.
         if (node.kind == Node::Kind::null) node.mark = entry.mark;
@@ -213,6 +215,7 @@ class Builder final : public YAML::EventHandler {
         level.node.entries.push_back(std::move(entry));
     }
 
+    const Source& source_;
     Problems& problems_;
     Mark start_;
     std::vector<Open> stack_;
@@ -222,28 +225,70 @@ class Builder final : public YAML::EventHandler {
     Node root_;
 };
 
-void refuse_second_document(YAML::Parser& parser, Problems& problems) {
+/// False when there is one. Text behind a document that nobody began as another is no YAML.
+bool refuse_second_document(YAML::Parser& parser, const Source& source, Problems& problems) {
     Problems unused("");
-    Builder second(unused);
-    if (!parser.HandleNextDocument(second)) return;
-    problems.add(second.start(), "a second document; the file must hold one only");
+    Builder second(source, unused);
+    if (!parser.HandleNextDocument(second)) return true;
+    const Mark start = second.start();
+    const bool begun = source.line(start.line).starts_with("---") ||
+                       source.line(start.line - 1).starts_with("...");
+    if (!begun) throw Stray{start};
+    problems.add(start, "a second document; the file must hold one only");
+    return false;
+}
+
+void add(const Source& source, const Findings& findings, Problems& problems) {
+    for (const Finding& finding : findings) {
+        const Mark mark = source.mark(finding.offset);
+        problems.add(mark, finding.message, source.excerpt(mark));
+    }
+}
+
+/// The causes, or `otherwise` at the place where it showed.
+void explain(const Source& source, Mark mark, std::string otherwise, Problems& problems) {
+    const Findings causes = find_causes(Scanned(source));
+    add(source, causes, problems);
+    if (causes.empty()) problems.add(mark, std::move(otherwise), source.excerpt(mark));
+}
+
+/// False when yaml-cpp refused the text, which then has been told.
+bool build(const Source& source, Builder& builder, Problems& problems) {
+    try {
+        std::istringstream in{mask_variables(source.text())};
+        YAML::Parser parser(in);
+        return !parser.HandleNextDocument(builder) ||
+               refuse_second_document(parser, source, problems);
+    } catch (const TooLarge& reason) {
+        problems.add(reason.mark, reason.message);
+    } catch (const YAML::DeepRecursion& error) {
+        problems.add(builder.mark_of(error.mark), kTooDeep);
+    } catch (const Stray& stray) {
+        explain(source, stray.mark,
+                "this belongs to nothing above it; the file must be one map of "
+                "keys, such as 'lines:'",
+                problems);
+    } catch (const YAML::Exception& error) {
+        explain(source, builder.mark_of(error.mark), in_our_words(error.msg), problems);
+    }
+    return false;
 }
 
 }  // namespace
 
 Node parse(std::string_view text, Problems& problems) {
-    Builder builder(problems);
-    try {
-        std::istringstream in{mask_variables(text)};
-        YAML::Parser parser(in);
-        if (parser.HandleNextDocument(builder)) refuse_second_document(parser, problems);
-    } catch (const TooLarge& reason) {
-        problems.add(reason.mark, reason.message);
-    } catch (const YAML::DeepRecursion& error) {
-        problems.add(mark_of(error.mark), kTooDeep);
-    } catch (const YAML::Exception& error) {
-        problems.add(mark_of(error.mark), "not YAML: " + error.msg);
-    }
+    Decoded decoded = decode(text);
+    const Source source(std::move(decoded.text));
+    add(source, decoded.bad, problems);
+    if (!decoded.bad.empty()) return {};  // all that follows may suffer from it
+    Problems found(problems.file());
+    Builder builder(source, found);
+    const bool built = build(source, builder, found);
+    const Findings traps = built ? find_traps(Scanned(source)) : Findings();
+    add(source, traps, problems);
+    if (!traps.empty()) return {};  // what could be read is not what was meant
+    problems.take(found);
+    if (!built) return {};
     return builder.take();
 }
 

@@ -5,7 +5,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "encoding.hpp"
+#include "hints.hpp"
 #include "panelgate/base/suggest.hpp"
+#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::yaml {
 namespace {
@@ -25,14 +28,6 @@ std::string join(std::span<const std::string_view> words) {
     return text;
 }
 
-/// For a message of one line: cut, and without control characters.
-std::string quote(std::string_view text) {
-    constexpr std::size_t kMost = 80;
-    std::string shown(text.substr(0, kMost));
-    std::ranges::replace_if(shown, [](char c) { return c >= 0 && c < ' '; }, ' ');
-    return '\'' + shown + (text.size() > kMost ? "..." : "") + '\'';
-}
-
 std::string shown(const Node& node) {
     if (node.kind == Node::Kind::scalar) return quote(node.scalar);
     if (node.kind == Node::Kind::sequence) return "a list";
@@ -43,7 +38,15 @@ std::string wrong(std::string_view key, std::string_view wanted, const Node& nod
     const std::string name(key);
     if (node.kind == Node::Kind::null)
         return name + " has no value; it must be " + std::string(wanted);
-    return name + " must be " + std::string(wanted) + ", not " + shown(node);
+    return name + " must be " + std::string(wanted) + ", not " + shown(node) +
+           variable_hint(node.scalar);
+}
+
+/// Nobody counts 1440 minutes.
+std::string limit(Duration duration) {
+    const bool hours = duration > 1h && duration % 1h == Duration::zero();
+    return format_duration(duration) +
+           (hours ? " (" + std::to_string(duration / 1h) + " h)" : std::string());
 }
 
 bool has_leading_zero(std::string_view text) {
@@ -85,7 +88,8 @@ std::string format_duration(Duration duration) {
 MapReader::MapReader(const Node& node, Problems& problems, std::string what)
     : node_(&node), problems_(&problems), what_(std::move(what)) {
     if (node.kind != Node::Kind::map) {
-        problems.add(node.mark, what_ + " must be a map of keys, not " + shown(node));
+        problems.add(node.mark, what_ + " must be a map of keys, not " + shown(node) +
+                                    blank_hint(node.scalar));
     }
 }
 
@@ -101,6 +105,12 @@ bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
 
 bool MapReader::require(std::string_view key) {
     if (has(key)) return true;
+    // finish() asks whether this is what was meant.
+    const auto was_meant = [&](const Entry& entry) {
+        return nearest(entry.key, std::span(&key, 1)) == key ||
+               entry.key.starts_with(std::string(key) + ':');
+    };
+    if (std::ranges::any_of(node_->entries, was_meant)) return false;
     // What is no map at all has been told already.
     if (node_->kind == Node::Kind::map)
         problems_->add(node_->mark, what_ + " needs '" + std::string(key) + '\'');
@@ -141,6 +151,7 @@ std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_
     std::string why;
     if (node->quoted && parse_integer(node->scalar)) why = " in quotes";
     if (has_leading_zero(node->scalar)) why = " (no leading zeros)";
+    if (why.empty() && !value) why = number_hint(node->scalar, true);
     problem(key, wrong(key, wanted, *node) + why);
     return std::nullopt;
 }
@@ -161,7 +172,10 @@ std::optional<double> MapReader::number(std::string_view key) {
     const std::size_t sign = node->scalar.starts_with('-') ? 1 : 0;
     const bool zeros = has_leading_zero(std::string_view(node->scalar).substr(sign));
     if (whole && !zeros && !node->quoted) return value;
-    problem(key, wrong(key, "a number", *node) + (zeros ? " (no leading zeros)" : ""));
+    const std::string why = zeros          ? " (no leading zeros)"
+                            : node->quoted ? " in quotes"
+                                           : number_hint(node->scalar, false);
+    problem(key, wrong(key, "a number", *node) + why);
     return std::nullopt;
 }
 
@@ -170,7 +184,7 @@ std::optional<bool> MapReader::boolean(std::string_view key) {
     if (node == nullptr) return std::nullopt;
     if (!node->quoted && node->scalar == "true") return true;
     if (!node->quoted && node->scalar == "false") return false;
-    problem(key, wrong(key, "true or false", *node));
+    problem(key, wrong(key, "true or false", *node) + boolean_hint(*node));
     return std::nullopt;
 }
 
@@ -179,13 +193,11 @@ std::optional<Duration> MapReader::duration(std::string_view key, Duration min, 
     if (node == nullptr) return std::nullopt;
     const auto value = parse_duration(node->scalar);
     if (!value) {
-        const bool bare = parse_integer(node->scalar).has_value();
-        problem(key, wrong(key, "a duration such as 300ms", *node) +
-                         (bare ? " (add a unit: us, ms, s, min)" : ""));
+        problem(key, wrong(key, "a duration such as 300ms", *node) + duration_hint(node->scalar));
         return std::nullopt;
     }
     if (*value >= min && *value <= max) return value;
-    const std::string wanted = "from " + format_duration(min) + " to " + format_duration(max);
+    const std::string wanted = "from " + format_duration(min) + " to " + limit(max);
     problem(key, wrong(key, wanted, *node));
     return std::nullopt;
 }
@@ -208,17 +220,22 @@ const Node* MapReader::child(std::string_view key) {
     return node == nullptr || node->kind == Node::Kind::null ? nullptr : node;
 }
 
-const Node* MapReader::map(std::string_view key) {
+const Node* MapReader::map(std::string_view key, std::string_view example) {
     const Node* node = child(key);
     if (node == nullptr || node->kind == Node::Kind::map) return node;
-    problem(key, wrong(key, "a map of keys", *node));
+    const std::string such = example.empty() ? "" : " such as " + std::string(example);
+    problem(key, wrong(key, "a map of keys" + such, *node) + blank_hint(node->scalar));
     return nullptr;
 }
 
 const Node* MapReader::sequence(std::string_view key) {
     const Node* node = child(key);
     if (node == nullptr || node->kind == Node::Kind::sequence) return node;
-    problem(key, wrong(key, "a list", *node));
+    const bool is_map = node->kind == Node::Kind::map;
+    problem(key, wrong(key, "a list", *node) +
+                     (is_map ? "; begin each item with '- '"
+                             : "; write [" + std::string(clip(node->scalar, 40)) +
+                                   "], or '- ' before each item"));
     return nullptr;
 }
 
@@ -239,7 +256,10 @@ void MapReader::finish() {
         if (std::find(known.begin(), known.end(), entry.key) != known.end()) continue;
         const std::string near = nearest(entry.key, known);
         std::string message = "unknown key " + quote(entry.key) + " in " + what_;
-        if (!near.empty()) {
+        const std::string blank = blank_hint(entry.key);
+        if (!blank.empty()) {
+            message += blank;
+        } else if (!near.empty()) {
             message += "; did you mean '" + near + "'?";
         } else {
             message += "; known keys are ";

@@ -24,10 +24,11 @@ std::string mask_variables(std::string_view text) {
     while (at != std::string::npos) {
         // A quote: the brace behind it belongs to something else.
         const std::size_t end = masked.find_first_of("}\"'\r\n", at);
-        if (end != std::string::npos && masked[end] == '}') {
+        if (end == std::string::npos) break;
+        if (masked[end] == '}') {
             for (std::size_t i = at + 1; i <= end; ++i) exchange(masked[i], kMeaning, kMasks);
         }
-        at = masked.find("${", at + 1);
+        at = masked.find("${", end);  // what stands before it has the same end
     }
     return masked;
 }

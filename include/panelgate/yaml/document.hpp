@@ -7,7 +7,7 @@
 
 namespace panelgate::yaml {
 
-/// A place in a file, 1-based, as editors count.
+/// A place in a file, 1-based, in characters, as editors count.
 struct Mark {
     int line = 1;
     int column = 1;
@@ -18,15 +18,19 @@ struct Problem {
     std::string file;
     Mark mark;
     std::string message;
+    /// The line and a caret below it, where that helps: lines, each ended by '\n'.
+    std::string excerpt = {};
 };
-/// "FILE:LINE:COLUMN: message" (HR-17).
+/// "FILE:LINE:COLUMN: message" (HR-17), without the excerpt.
 std::string format(const Problem& problem);
 
 /// Collects every problem of one file, and of the files it names, in the order found.
 class Problems {
   public:
     explicit Problems(std::string file) : file_(std::move(file)) {}
-    void add(Mark mark, std::string message) { list_.push_back({file_, mark, std::move(message)}); }
+    void add(Mark mark, std::string message, std::string excerpt = {}) {
+        list_.push_back({file_, mark, std::move(message), std::move(excerpt)});
+    }
     /// Keeps the problem's own file.
     void add(Problem problem) { list_.push_back(std::move(problem)); }
     /// Adds those of another file that this one names; they keep their file.
@@ -36,8 +40,8 @@ class Problems {
     bool empty() const { return list_.empty(); }
     const std::vector<Problem>& list() const { return list_; }
     const std::string& file() const { return file_; }
-    /// This file's first, then those of other files; sorted by line and column, one line each, each
-    /// ended by '\n'.
+    /// This file's first, then those of other files; sorted by line and column, one line each, with
+    /// its excerpt behind it. Of many, the first kMaxTold and how many there are more.
     std::string text() const;
 
   private:
@@ -66,9 +70,11 @@ struct Entry {
     Node value;
 };
 
-/// Parses one YAML document. Syntax errors, duplicate keys, non-scalar keys, tags, more than one
-/// document, and what exceeds a limit of settings.hpp (aliases counted as what they stand for) are
-/// added to `problems`; the result is then whatever could be read (a null node if nothing).
+/// Parses one YAML document, in any encoding of Unicode. What is no text, syntax errors (at the
+/// place of their cause, as far as it can be told), quotes that are not closed, duplicate keys,
+/// non-scalar keys, tags, more than one document, and what exceeds a limit of settings.hpp (aliases
+/// counted as what they stand for) are added to `problems`; the result is then whatever could be
+/// read (a null node if nothing).
 Node parse(std::string_view text, Problems& problems);
 
 }  // namespace panelgate::yaml

@@ -56,8 +56,8 @@ class MapReader {
 
     /// The value itself, of any kind but null; nullptr when absent or null.
     const Node* child(std::string_view key);
-    /// As child(), and another kind is a problem.
-    const Node* map(std::string_view key);
+    /// As child(), and another kind is a problem, told with an example such as "{mode: off}".
+    const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key);
 
     /// Where the key's value stands (the map itself when the key is absent), for later problems.

@@ -11,4 +11,7 @@ constexpr std::size_t kMaxNodes = 100'000;
 /// Bytes of all texts and keys of one document, counted in the same way: with the values, what a
 /// file of any size can make of itself.
 constexpr std::size_t kMaxText = 4 * 1024 * 1024;
+/// Problems that are shown of one run; the others are counted.
+constexpr std::size_t kMaxTold = 50;
+
 }  // namespace panelgate::yaml

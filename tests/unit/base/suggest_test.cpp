@@ -36,5 +36,22 @@ TEST(Nearest, TakesTheNearerOfTwo) {
 
 TEST(Nearest, FindsTheWordItself) { EXPECT_EQ(nearest("baud", kKeys), "baud"); }
 
+TEST(Suggest, KnowsOtherWaysToWriteAWord) {
+    constexpr std::array<std::string_view, 3> kWords{"panasonic-gt", "data_bits", "info"};
+    EXPECT_EQ(nearest("Panasonic GT", kWords), "panasonic-gt");
+    EXPECT_EQ(nearest("dataBits", kWords), "data_bits");
+    EXPECT_EQ(nearest("INFO", kWords), "info");
+}
+
+TEST(Suggest, KnowsTheWordsOfOtherTrades) {
+    constexpr std::array<std::string_view, 5> kWords{"baud", "i16", "f32", "none", "warn"};
+    EXPECT_EQ(nearest("baudrate", kWords), "baud");
+    EXPECT_EQ(nearest("int16", kWords), "i16");
+    EXPECT_EQ(nearest("FLOAT", kWords), "f32");
+    EXPECT_EQ(nearest("N", kWords), "none");
+    EXPECT_EQ(nearest("warning", kWords), "warn");
+    EXPECT_EQ(nearest("double", kWords), "") << "nobody here has f64";
+}
+
 }  // namespace
 }  // namespace panelgate

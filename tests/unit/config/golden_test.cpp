@@ -1,4 +1,4 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cctype>
@@ -98,6 +98,18 @@ TEST(ConfigGoldenFolder, HoldsNothingButCasesAndEachNameOnce) {
     for (const Place& place : places()) names.insert(place.name);
     EXPECT_EQ(names.size(), places().size());
     EXPECT_GE(names.size(), 116U);
+}
+
+/// Where to put the cursor; and no words of the parser.
+TEST(ConfigGoldenFolder, EachCaseBeginsWithAPlace) {
+    for (const fs::path& file : files()) {
+        for (const GoldenCase& one : parse_golden(read_text(file)).cases) {
+            if (one.expected.empty()) continue;
+            EXPECT_THAT(one.expected, ::testing::ContainsRegex("^[^ :]+:[0-9]+:[0-9]+: "))
+                << one.name;
+            EXPECT_EQ(one.expected.find("not YAML"), std::string::npos) << one.name;
+        }
+    }
 }
 
 TEST(ConfigGoldenFolder, PutsTheLinesOfACaseIntoItsPrelude) {

@@ -70,8 +70,8 @@ TEST(MapReader, RefusesEveryOtherSpellingOfANumber) {
               "f:1:4: a must be a whole number from 1 to 9, not '10'\n"
               "f:2:4: b must be a whole number from 1 to 9, not '007' (no leading zeros)\n"
               "f:3:4: c must be a whole number from 1 to 9, not '7' in quotes\n"
-              "f:4:4: d must be a whole number from 1 to 9, not '0x7'\n"
-              "f:5:4: e must be a whole number from 1 to 9, not '7.0'\n"
+              "f:4:4: d must be a whole number from 1 to 9, not '0x7'; write 7\n"
+              "f:5:4: e must be a whole number from 1 to 9, not '7.0'; write 7\n"
               "f:6:4: f must be a whole number from 1 to 9, not 'many'\n"
               "f:7:4: g must be a whole number from 1 to 9, not '99999999999999999999'\n"
               "f:8:1: h has no value; it must be a whole number from 1 to 9\n");
@@ -87,8 +87,8 @@ TEST(MapReader, ReadsNumbersWithAFraction) {
     EXPECT_EQ(s.problems(),
               "f:4:4: d must be a number, not '00.5' (no leading zeros)\n"
               "f:5:4: e must be a number, not 'nan'\n"
-              "f:6:4: f must be a number, not '1'\n"
-              "f:7:4: g must be a number, not '1,5'\n"
+              "f:6:4: f must be a number, not '1' in quotes\n"
+              "f:7:4: g must be a number, not '1,5'; write 1.5\n"
               "f:8:4: h must be a number, not '-01' (no leading zeros)\n");
 }
 
@@ -98,9 +98,9 @@ TEST(MapReader, KnowsTrueAndFalseOnly) {
     EXPECT_EQ(s.read().boolean("b"), false);
     for (const char* key : {"c", "d", "e"}) EXPECT_EQ(s.read().boolean(key), std::nullopt);
     EXPECT_EQ(s.problems(),
-              "f:3:4: c must be true or false, not 'yes'\n"
-              "f:4:4: d must be true or false, not 'true'\n"
-              "f:5:4: e must be true or false, not 'True'\n");
+              "f:3:4: c must be true or false, not 'yes'; write true\n"
+              "f:4:4: d must be true or false, not 'true'; write true without quotes\n"
+              "f:5:4: e must be true or false, not 'True'; write true\n");
 }
 
 TEST(MapReader, ReadsDurationsWithTheirUnit) {
@@ -119,9 +119,9 @@ TEST(MapReader, AsksForTheUnitOfABareNumber) {
     EXPECT_EQ(s.problems(),
               "f:1:19: response_timeout must be a duration such as 300ms, not '300' (add a unit: "
               "us, ms, s, min)\n"
-              "f:2:4: b must be a duration such as 300ms, not '3 s'\n"
+              "f:2:4: b must be a duration such as 300ms, not '3 s'; write 3s\n"
               "f:3:4: c must be from 1ms to 10min, not '11min'\n"
-              "f:4:4: d must be a duration such as 300ms, not '1.5s'\n"
+              "f:4:4: d must be a duration such as 300ms, not '1.5s'; write 1500ms\n"
               "f:5:4: e must be a duration such as 300ms, not 'fast'\n");
 }
 
@@ -152,7 +152,7 @@ TEST(MapReader, HandsOutChildren) {
     EXPECT_EQ(s.read().sequence("d"), nullptr);
     EXPECT_EQ(s.problems(),
               "f:2:4: c must be a map of keys, not a list\n"
-              "f:3:4: d must be a list, not '5'\n");
+              "f:3:4: d must be a list, not '5'; write [5], or '- ' before each item\n");
 }
 
 TEST(MapReader, KnowsWhichKeysAreThere) {

@@ -1,0 +1,174 @@
+#include "hints.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "panelgate/yaml/quote.hpp"
+
+namespace panelgate::yaml {
+namespace {
+
+constexpr std::string_view kDigits = "0123456789";
+
+char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+std::string lower(std::string_view text) {
+    std::string all(text);
+    std::ranges::transform(all, all.begin(), lower_of);
+    return all;
+}
+
+struct Word {
+    std::string_view word;
+    Duration length;
+};
+constexpr std::array<Word, 25> kWords{
+    {{"us", 1us},           {"\xC2\xB5s", 1us}, {"usec", 1us},    {"ms", 1ms},
+     {"msec", 1ms},         {"msecs", 1ms},     {"millis", 1ms},  {"millisecond", 1ms},
+     {"milliseconds", 1ms}, {"s", 1s},          {"sec", 1s},      {"secs", 1s},
+     {"second", 1s},        {"seconds", 1s},    {"m", 60s},       {"min", 60s},
+     {"mins", 60s},         {"minute", 60s},    {"minutes", 60s}, {"h", 3600s},
+     {"hr", 3600s},         {"hour", 3600s},    {"hours", 3600s}, {"d", 86400s},
+     {"day", 86400s}}};
+
+std::string_view trim(std::string_view text) {
+    const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
+    return text.substr(begin);
+}
+
+/// "1.5 S" at the begin of `text`, which then begins behind it.
+std::optional<Duration> take_part(std::string_view& text) {
+    const std::size_t number = std::min(text.find_first_not_of("0123456789.,"), text.size());
+    std::string digits(text.substr(0, number));
+    std::ranges::replace(digits, ',', '.');
+    double value = 0;
+    const char* end = digits.data() + digits.size();
+    const auto [stop, error] = std::from_chars(digits.data(), end, value);
+    if (digits.empty() || error != std::errc() || stop != end) return std::nullopt;
+    text = trim(text.substr(number));
+    const std::size_t unit = std::min(text.find_first_of("0123456789 "), text.size());
+    const std::string name = lower(text.substr(0, unit));
+    const auto word = std::ranges::find(kWords, std::string_view(name), &Word::word);
+    if (word == kWords.end()) return std::nullopt;
+    text = trim(text.substr(unit));
+    const double exact = value * static_cast<double>(word->length.count());
+    constexpr double kMost = 1e18;  // of 9.2e18 nanoseconds that a duration has
+    if (!(exact < kMost)) return std::nullopt;
+    return Duration(std::llround(exact));
+}
+
+/// As from_chars reads it.
+std::optional<std::string> plain_number(std::string_view text, bool whole) {
+    double value = 0;
+    const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || stop != text.data() + text.size()) return std::nullopt;
+    if (!std::isfinite(value)) return std::nullopt;
+    if (!whole) return std::string(text);
+    constexpr double kMost = 1e15;  // whole numbers that a double has exactly
+    if (value != std::floor(value) || std::fabs(value) > kMost) return std::nullopt;
+    return std::to_string(static_cast<std::int64_t>(value));
+}
+
+std::optional<std::string> hexadecimal(std::string_view text) {
+    if (!text.starts_with("0x") && !text.starts_with("0X")) return std::nullopt;
+    std::uint32_t value = 0;
+    const char* end = text.data() + text.size();
+    const auto [stop, error] = std::from_chars(text.data() + 2, end, value, 16);
+    if (error != std::errc() || stop != end) return std::nullopt;
+    return std::to_string(value);
+}
+
+/// Without a plus, leading zeros, groups of three and a unit; with a decimal point.
+std::string bare(std::string_view text, bool whole) {
+    std::string all;
+    const std::size_t unit = text.find_last_of(kDigits);
+    text = text.substr(0, unit == text.npos ? text.size() : unit + 1);
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const bool group = text[i] == '_' || text[i] == ' ' || text[i] == '\'' ||
+                           (whole && (text[i] == ',' || text[i] == '.') && text.size() - i == 4);
+        if (!group) all += text[i] == ',' ? '.' : text[i];
+    }
+    if (all.starts_with('+')) all.erase(0, 1);
+    const std::size_t sign = all.starts_with('-') ? 1 : 0;
+    while (all.size() > sign + 1 && all[sign] == '0' && kDigits.find(all[sign + 1]) != kDigits.npos)
+        all.erase(sign, 1);
+    return all;
+}
+
+std::string write(std::string_view text) { return "; write " + std::string(text); }
+
+/// Shares are numbers from 0 to 1.
+std::string percent_hint(std::string_view text) {
+    double value = 0;
+    const char* end = text.data() + text.size() - 1;
+    const auto [stop, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc() || stop != end || !std::isfinite(value)) return "";
+    std::array<char, 32> share{};
+    const auto [last, full] = std::to_chars(share.data(), share.data() + share.size(), value / 100);
+    return full == std::errc() ? write(std::string_view(share.data(), last)) : "";
+}
+
+}  // namespace
+
+std::string duration_hint(std::string_view text) {
+    const std::size_t number = text.find_first_not_of("0123456789.,");
+    if (!text.empty() && number == text.npos) return " (add a unit: us, ms, s, min)";
+    Duration sum = Duration::zero();
+    for (std::string_view rest = trim(text); !rest.empty();) {
+        const auto part = take_part(rest);
+        if (!part || *part > Duration::max() - sum) return "";
+        sum += *part;
+    }
+    const std::string meant = format_duration(sum);
+    return sum > Duration::zero() && parse_duration(meant) && meant != text ? write(meant) : "";
+}
+
+std::string number_hint(std::string_view text, bool whole) {
+    constexpr std::size_t kLongest = 40;
+    if (text.empty() || text.size() > kLongest) return "";
+    if (text.ends_with('%')) return whole ? "" : percent_hint(text);
+    auto meant = hexadecimal(text);
+    if (!meant) meant = plain_number(bare(text, whole), whole);
+    return meant && *meant != text ? write(*meant) : "";
+}
+
+std::string boolean_hint(const Node& node) {
+    constexpr std::array<std::string_view, 5> kTrue{"true", "yes", "on", "y", "1"};
+    constexpr std::array<std::string_view, 5> kFalse{"false", "no", "off", "n", "0"};
+    const std::string word = lower(node.scalar);
+    const bool is_true = std::ranges::find(kTrue, word) != kTrue.end();
+    const bool is_false = std::ranges::find(kFalse, word) != kFalse.end();
+    if (!is_true && !is_false) return "";
+    return write(is_true ? "true" : "false") + (node.quoted ? " without quotes" : "");
+}
+
+std::string variable_hint(std::string_view text) {
+    const bool percent = text.size() > 2 && text.front() == '%' && text.back() == '%';
+    if (!text.starts_with('$') && !percent) return "";
+    std::string name;
+    for (const char c : text) {
+        const bool word = c == '_' || (lower_of(c) >= 'a' && lower_of(c) <= 'z') ||
+                          (!name.empty() && kDigits.find(c) != kDigits.npos);
+        if (word) name += c;
+    }
+    return write("${" + (name.empty() ? "NAME" : name) + "} for a variable of the environment");
+}
+
+std::string blank_hint(std::string_view text) {
+    const std::size_t colon = text.find(':');
+    const auto is_letter = [](char c) {
+        return c == '_' || c == '-' || (lower_of(c) >= 'a' && lower_of(c) <= 'z');
+    };
+    if (colon == text.npos || colon == 0 || text.substr(colon).starts_with("://")) return "";
+    if (!std::ranges::all_of(text.substr(0, colon), is_letter)) return "";
+    const std::string key(text.substr(0, colon + 1));
+    return "; a blank is missing after " + quote(key);
+}
+
+}  // namespace panelgate::yaml

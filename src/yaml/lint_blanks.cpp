@@ -1,0 +1,84 @@
+#include <string>
+#include <string_view>
+
+#include "encoding.hpp"
+#include "lint.hpp"
+
+namespace panelgate::yaml {
+namespace {
+
+/// Looks like a blank, or like nothing at all, and is none for YAML.
+bool is_odd_blank(char32_t c) {
+    return c == 0xA0 || c == 0x3000 || c == 0xFEFF || c == 0x202F || (c >= 0x2000 && c <= 0x200B);
+}
+
+std::string odd_blank(char32_t c, std::string_view where) {
+    const bool is_no_break = c == 0xA0;
+    return name_of(c) + (is_no_break ? " (a no-break space)" : " (an odd blank)") + " stands " +
+           std::string(where) + "; type an ordinary blank in its place";
+}
+
+/// The first odd blank where a blank has a meaning: at the ends of a word, or behind its first
+/// colon or dash. Inside a text it is a character like any other.
+std::size_t find_odd(std::string_view word) {
+    bool meaning = true;
+    std::size_t ending = word.npos;
+    for (std::size_t at = 0; at < word.size();) {
+        const std::string_view character = character_at(word, at);
+        const bool odd = is_odd_blank(code_point(character));
+        if (odd && meaning) return at;
+        if (!odd) ending = word.npos;
+        if (odd && ending == word.npos) ending = at;
+        meaning = character == ":" || (character == "-" && at == 0);
+        at += character.size();
+    }
+    return ending;
+}
+
+/// Behind a real colon another one is part of the text.
+bool is_value(const Scanned& text, std::size_t token) {
+    return token > 0 && text.tokens[token - 1].kind == Token::Kind::colon && text.follows(token);
+}
+
+std::size_t tab_before(const Scanned& text, const Token& first) {
+    const std::size_t begin = line_begin(text.source.text(), first.begin);
+    const std::size_t tab = text.source.text().substr(begin, first.begin - begin).find('\t');
+    return tab == std::string_view::npos ? tab : begin + tab;
+}
+
+void find_tab(const Scanned& text, const Token& token, Findings& findings) {
+    const std::size_t tab = tab_before(text, token);
+    if (tab == std::string_view::npos) return;
+    findings.push_back({tab, "a tab in the indentation; type blanks in its place"});
+}
+
+/// `at` in `word`, the first token of its line or not.
+std::string_view place_of(std::string_view word, std::size_t at, bool first) {
+    if (at == 0) return first ? "in the indentation" : "before this text";
+    if (word[at - 1] == ':') return "behind ':'";
+    return word[at - 1] == '-' && at == 1 ? "behind '-'" : "behind this text";
+}
+
+}  // namespace
+
+bool is_oddly_indented(const Scanned& text, const Token& first) {
+    const std::string_view word = text.text(first);
+    return tab_before(text, first) != std::string_view::npos ||
+           is_odd_blank(code_point(character_at(word, 0)));
+}
+
+void find_odd_blanks(const Scanned& text, Findings& findings) {
+    for (std::size_t i = 0; i < text.tokens.size(); ++i) {
+        const Token& token = text.tokens[i];
+        if (token.first && token.depth == 0) find_tab(text, token, findings);
+        if (token.kind != Token::Kind::plain) continue;
+        const std::string_view word = text.text(token);
+        const std::size_t at = find_odd(word);
+        if (at == word.npos || (is_value(text, i) && at != 0)) continue;
+        const std::string_view where = place_of(word, at, token.first);
+        findings.push_back(
+            {token.begin + at, odd_blank(code_point(character_at(word, at)), where)});
+    }
+}
+
+}  // namespace panelgate::yaml

@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "encoding.hpp"
+#include "lint.hpp"
+#include "panelgate/yaml/quote.hpp"
+
+namespace panelgate::yaml {
+namespace {
+
+using Kind = Token::Kind;
+using State = Token::State;
+
+std::string in_quotes(std::string_view text) { return '"' + std::string(text) + '"'; }
+
+/// [::1]:502 without quotes is a list with something behind it.
+void find_address(const Scanned& text, std::size_t close, std::size_t open, Findings& findings) {
+    if (!text.follows(close + 1)) return;
+    const Token& next = text.tokens[close + 1];
+    const Token& first = text.tokens[open];
+    const std::string_view word = text.text(next);
+    if (next.kind == Kind::plain && word.starts_with(':') && next.begin == text.tokens[close].end) {
+        const auto all = text.source.text().substr(first.begin, next.end - first.begin);
+        findings.push_back(
+            {first.begin, "an address in [ ] must stand in quotes; write " + in_quotes(all)});
+    } else if (next.depth == 0 && next.kind != Kind::colon && next.state != State::stray) {
+        findings.push_back({next.begin, quote(word) + " stands behind the closing " +
+                                            std::string(text.text(text.tokens[close])) +
+                                            "; remove it, or put it on a line of its own"});
+    }
+}
+
+/// Where a `${` behind the bracket on its line lacks its own end.
+std::size_t open_variable(const Scanned& text, const Token& bracket) {
+    const std::string_view all = text.source.text();
+    const std::string_view line =
+        all.substr(0, std::min(all.find('\n', bracket.begin), all.size()));
+    const std::size_t dollar = line.find("${", bracket.begin);
+    if (dollar == line.npos) return dollar;
+    const std::size_t end = line.find_first_not_of(
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789", dollar + 2);
+    const bool closed =
+        end != line.npos && (line[end] == '}' || line.substr(end).starts_with(":-"));
+    return closed ? line.npos : dollar;
+}
+
+void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
+    const Token& token = text.tokens[i];
+    const std::size_t dollar =
+        token.state == State::unclosed ? open_variable(text, token) : std::string_view::npos;
+    if (dollar != std::string_view::npos) {
+        findings.push_back({dollar, "a variable is written ${NAME}; a '}' is missing"});
+        return;
+    }
+    const bool list = text.text(token) == "[";
+    if (token.state == State::unclosed) {
+        findings.push_back({token.begin, std::string(list ? "'['" : "'{'") +
+                                             " is never closed; a '" + (list ? ']' : '}') +
+                                             "' is missing behind it"});
+    }
+    if (token.state == State::stray) {
+        const bool closes_list = text.text(token) == "]";
+        findings.push_back({token.begin, std::string(closes_list ? "']'" : "'}'") +
+                                             " closes nothing; remove it, or open it with '" +
+                                             (closes_list ? '[' : '{') + '\''});
+    }
+}
+
+/// {a: 1 b: 2}: two colons and no comma between them.
+struct Pair {
+    std::size_t open = 0;  ///< token
+    bool colon = false;    ///< since the last comma
+};
+
+void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
+    const Token& before = text.tokens[colon - 1];
+    const std::string_view word = text.text(before);
+    const std::size_t blank = word.find_last_of(" \t");
+    if (before.kind == Kind::plain && blank == word.npos) {
+        const std::size_t last = text.follows(colon + 1) ? colon + 1 : colon;
+        const std::size_t end = text.tokens[last].end;
+        findings.push_back(
+            {before.begin,
+             "a text that holds ': ' must stand in quotes; write " +
+                 in_quotes(clip(text.source.text().substr(before.begin, end - before.begin), 60))});
+        return;
+    }
+    const std::size_t key = before.kind == Kind::plain ? blank + 1 : 0;
+    findings.push_back({before.begin + key, "a ',' is missing before " + quote(word.substr(key))});
+}
+
+/// {{ name }}: braces of other programs.
+bool find_placeholder(const Scanned& text, const Token& token, Findings& findings) {
+    if (!text.source.text().substr(token.begin).starts_with("{{")) return false;
+    findings.push_back({token.begin, "'{{' means nothing here; a variable is written ${NAME}"});
+    return true;
+}
+
+}  // namespace
+
+void find_brackets(const Scanned& text, Findings& findings) {
+    std::vector<Pair> pairs;
+    for (std::size_t i = 0; i < text.tokens.size(); ++i) {
+        const Token& token = text.tokens[i];
+        while (pairs.size() > token.depth) pairs.pop_back();
+        if (token.kind == Kind::open) {
+            if (!find_placeholder(text, token, findings)) find_unclosed(text, i, findings);
+            pairs.push_back({i, false});
+        } else if (token.kind == Kind::close) {
+            find_unclosed(text, i, findings);
+            if (token.state == State::fine && pairs.size() == 1)
+                find_address(text, i, pairs.back().open, findings);
+        } else if (!pairs.empty() && token.kind == Kind::comma) {
+            pairs.back().colon = false;
+        } else if (!pairs.empty() && token.kind == Kind::colon) {
+            if (pairs.back().colon) find_comma(text, i, findings);
+            pairs.back().colon = true;
+        }
+    }
+}
+
+}  // namespace panelgate::yaml
