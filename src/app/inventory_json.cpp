@@ -85,7 +85,8 @@ json::object relay_json(const points::Relay& relay) {
             {"to", relay.to.station + '/' + relay.to.at},
             {"count", relay.count},
             {"every_ms", milliseconds(relay.every)},
-            {"on_change", relay.on_change}};
+            {"on_change", relay.on_change},
+            {"refresh_ms", milliseconds(relay.refresh)}};
 }
 
 json::value text_json(const std::string& text) { return json::value(text); }

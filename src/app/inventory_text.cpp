@@ -1,5 +1,3 @@
-#include <array>
-#include <charconv>
 #include <cstddef>
 #include <cstdlib>
 #include <string>
@@ -7,18 +5,13 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/base/number_text.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
 namespace {
 
 using yaml::format_duration;
-
-/// The shortest that is this number.
-std::string number(double value) {
-    std::array<char, 32> text{};
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 std::string rights(bool read_only) { return read_only ? "read only" : "read and write"; }
 
@@ -29,8 +22,8 @@ std::string text_of(const points::Point& point) {
     if (!point.unit.empty()) text += ", in " + point.unit;
     if (point.writable) {
         text += ", writable";
-        if (point.min) text += " from " + number(*point.min);
-        if (point.max) text += " to " + number(*point.max);
+        if (point.min) text += " from " + number_text(*point.min);
+        if (point.max) text += " to " + number_text(*point.max);
     }
     return text + '\n';
 }
@@ -64,7 +57,7 @@ std::string text_of(const config::Line& line) {
 
 std::string text_of(const points::Relay& relay) {
     return "relay " + relay.name() + ": count " + std::to_string(relay.count) + ", every " +
-           format_duration(relay.every) + (relay.on_change ? ", on change" : "") + '\n';
+           format_duration(relay.every) + (relay.on_change ? ", on change and every " + format_duration(relay.refresh) : "") + '\n';
 }
 
 std::string text_of(const std::vector<Network>& allow) {

@@ -67,8 +67,11 @@ std::shared_ptr<tcp_server::Shared> House::make_shared_state() {
     info.bus = &seam_;
     for (const PanelPlan& panel : plan_.line.panels) info.stations.push_back(panel.id);
     tcp_server::UnitMap units(listener_settings(), {info});
-    return std::make_shared<tcp_server::Shared>(
-        tcp_server::Shared{listener_settings(), std::move(units), {}, clock_, {}, clock_.now()});
+    const tcp_server::Settings settings = listener_settings();
+    auto own = std::make_shared<tcp_server::OwnAnswers>(clock_, settings.own_answers,
+                                                        settings.own_answers_period);
+    return std::make_shared<tcp_server::Shared>(tcp_server::Shared{
+        settings, std::move(units), {}, clock_, {}, clock_.now(), std::move(own)});
 }
 
 std::unique_ptr<points::Poller> House::make_poller() {

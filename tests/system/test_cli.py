@@ -172,13 +172,14 @@ class Files(unittest.TestCase):
         self.assertEqual((plan["valid"], plan["errors"]), (True, []))
 
     def test_check_tells_errors_as_json_too(self):
-        self.file.write_text(good().replace("device: sim", "devise: sim"))
+        self.file.write_text(good().replace("device: sim", "devise: sim")
+                             .replace("data_bits: 8", "data_bits: 9"))
         ended = run("check", "-c", str(self.file), "--format", "json")
         self.assertEqual(ended.returncode, BAD_CONFIG)
         told = json.loads(ended.stdout)
         self.assertFalse(told["valid"])
         places = [(e["file"], e["line"], e["column"]) for e in told["errors"]]
-        self.assertEqual(places, [(str(self.file), 2, 5), (str(self.file), 3, 5)])
+        self.assertEqual(places, [(str(self.file), 3, 5), (str(self.file), 4, 38)])
         for error in told["errors"]:
             self.assertIn("{file}:{line}:{column}: {message}".format(**error), ended.stderr)
         gone = run("check", "-c", str(self.file) + "x", "--format", "json")

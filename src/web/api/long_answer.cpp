@@ -3,8 +3,9 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
-#include <boost/json/serialize.hpp>
 #include <utility>
+
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -14,7 +15,7 @@ constexpr std::size_t kEntriesOfATurn = 16;
 
 void LongAnswer::begin_member(std::string_view name) {
     if (!std::exchange(is_first_, false)) text_ += ',';
-    text_ += json::serialize(json::value(name)) + ':';
+    text_ += json_text(json::value(name)) + ':';
 }
 
 LongAnswer& LongAnswer::begin_list(std::string_view name) {
@@ -26,7 +27,7 @@ LongAnswer& LongAnswer::begin_list(std::string_view name) {
 
 void LongAnswer::add(const json::value& entry) {
     if (!std::exchange(is_first_, false)) text_ += ',';
-    text_ += json::serialize(entry);
+    text_ += json_text(entry);
     ++entries_;
 }
 
@@ -38,7 +39,7 @@ LongAnswer& LongAnswer::end_list() {
 
 LongAnswer& LongAnswer::member(std::string_view name, const json::value& value) {
     begin_member(name);
-    text_ += json::serialize(value);
+    text_ += json_text(value);
     return *this;
 }
 

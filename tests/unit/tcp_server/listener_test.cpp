@@ -204,8 +204,8 @@ TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
     EXPECT_TRUE(told);
     EXPECT_LE(turns, 2U) << "it spins";
     EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(
-        log.count("warn cannot accept listener=127.0.0.1:0 reason=\"Too many open files\""), 1U);
+    EXPECT_EQ(log.count("warn cannot accept listener=127.0.0.1:0 reason=\"Too many open files\""),
+              1U);
 }
 
 }  // namespace
