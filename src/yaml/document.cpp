@@ -252,6 +252,14 @@ void explain(const Source& source, Mark mark, std::string otherwise, Problems& p
     if (causes.empty()) problems.add(mark, std::move(otherwise), source.excerpt(mark));
 }
 
+/// Before yaml-cpp sees it: 8 MB of brackets would take it 2 GB.
+const Token* too_deep(const Scanned& scanned) {
+    const auto found = std::ranges::find_if(scanned.tokens, [](const Token& token) {
+        return token.kind == Token::Kind::open && token.depth >= kMaxDepth;
+    });
+    return found == scanned.tokens.end() ? nullptr : &*found;
+}
+
 /// False when yaml-cpp refused the text, which then has been told.
 bool build(const Source& source, Builder& builder, Problems& problems) {
     try {
@@ -281,10 +289,15 @@ Node parse(std::string_view text, Problems& problems) {
     const Source source(std::move(decoded.text));
     add(source, decoded.bad, problems);
     if (!decoded.bad.empty()) return {};  // all that follows may suffer from it
+    const Scanned scanned(source);
+    if (const Token* bracket = too_deep(scanned)) {
+        problems.add(source.mark(bracket->begin), kTooDeep);
+        return {};
+    }
     Problems found(problems.file());
     Builder builder(source, found);
     const bool built = build(source, builder, found);
-    const Findings traps = built ? find_traps(Scanned(source)) : Findings();
+    const Findings traps = built ? find_traps(scanned) : Findings();
     add(source, traps, problems);
     if (!traps.empty()) return {};  // what could be read is not what was meant
     problems.take(found);

@@ -34,16 +34,16 @@ void find_address(const Scanned& text, std::size_t close, std::size_t open, Find
 
 /// Where a `${` behind the bracket on its line lacks its own end.
 std::size_t open_variable(const Scanned& text, const Token& bracket) {
-    const std::string_view all = text.source.text();
-    const std::string_view line =
-        all.substr(0, std::min(all.find('\n', bracket.begin), all.size()));
-    const std::size_t dollar = line.find("${", bracket.begin);
+    constexpr std::size_t kNear = 1'000;  // many brackets may stand on one line
+    std::string_view line = text.source.text().substr(bracket.begin, kNear);
+    line = line.substr(0, line.find('\n'));
+    const std::size_t dollar = line.find("${");
     if (dollar == line.npos) return dollar;
     const std::size_t end = line.find_first_not_of(
         "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_0123456789", dollar + 2);
     const bool closed =
         end != line.npos && (line[end] == '}' || line.substr(end).starts_with(":-"));
-    return closed ? line.npos : dollar;
+    return closed ? line.npos : bracket.begin + dollar;
 }
 
 void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {

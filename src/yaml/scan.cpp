@@ -175,8 +175,8 @@ class Scanner {
             open_.clear();  // their ends are swallowed, too
             return;
         }
-        const std::size_t last = line_begin(text_, end);
-        if (last > line_) line_ = key_ = last;
+        const std::size_t last = text_.substr(begin_, end - begin_).rfind('\n');
+        if (last != std::string_view::npos) line_ = key_ = begin_ + last + 1;
     }
     std::size_t quote_end(char quote) const {
         for (std::size_t i = at_ + 1; i < text_.size(); ++i) {
@@ -192,13 +192,14 @@ class Scanner {
     /// A text of several lines goes on deeper than its key (YAML 1.2, 7.4); otherwise its quote was
     /// forgotten and this is the next one in the file.
     bool leaves_its_key(std::size_t end) const {
+        const std::string_view text = text_.substr(0, end);
         const std::size_t parent = key_ - line_;
-        std::size_t begin = text_.find('\n', at_);
+        std::size_t begin = text.find('\n', at_);
         while (begin < end) {
-            const std::size_t content = text_.find_first_not_of(" \t\r", ++begin);
+            const std::size_t content = text.find_first_not_of(" \t\r", ++begin);
             const bool closes = content + 1 >= end;  // the quote alone is in nobody's way
-            if (!closes && text_[content] != '\n' && content - begin <= parent) return true;
-            begin = text_.find('\n', begin);
+            if (!closes && text[content] != '\n' && content - begin <= parent) return true;
+            begin = text.find('\n', begin);
         }
         return false;
     }

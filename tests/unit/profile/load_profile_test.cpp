@@ -133,8 +133,9 @@ TEST(LoadProfile, HoldsRangesInsideTheAddressSpace) {
                   "p.yaml:5:62: readable must be [FIRST, LAST], two addresses from 0 to 65535\n")
             << range;
     }
-    EXPECT_EQ(problems_of(with_areas(start + "readable: 5}\n")),
-              "p.yaml:5:62: readable must be a list, not '5'\n");
+    EXPECT_EQ(
+        problems_of(with_areas(start + "readable: 5}\n")),
+        "p.yaml:5:62: readable must be a list, not '5'; write [5], or '- ' before each item\n");
 }
 
 TEST(LoadProfile, HoldsTheWritableRangeInsideTheReadable) {

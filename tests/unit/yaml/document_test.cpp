@@ -203,6 +203,10 @@ TEST(Document, StopsAtNestingBombs) {
                 StrEq("f.yaml:1:65: nested deeper than 64 levels\n"));
 }
 
+TEST(Document, CountsBracketsBeforeTheParserDoes) {
+    EXPECT_EQ(read(repeat("[", 4'000'000)).problems, "f.yaml:1:65: nested deeper than 64 levels\n");
+}
+
 TEST(Document, CountsTheDepthBehindAliases) {
     const std::string deep = repeat("[", 40) + repeat("]", 40);
     const std::string text = "a: &x " + deep + "\nb: " + repeat("[", 30) + "*x" + repeat("]", 30);

@@ -79,6 +79,17 @@ TEST(Lint, ShiftedLinesAreToldOnce) {
     EXPECT_EQ(causes("a:\n  b: 1\n    c: 2\n    d: 3\n  e: 4\n"), "3:5 ");
 }
 
+TEST(Lint, LongLinesTakeNoLongerThanManyLines) {
+    std::string quotes = "{";
+    std::string brackets;
+    for (int i = 0; i < 500'000; ++i) {
+        quotes += "\"a\": 1, ";
+        brackets += "{[}";
+    }
+    EXPECT_THAT(traps(quotes + "}\n"), IsEmpty());
+    EXPECT_EQ(causes(brackets + "\n"), "1:2 ");
+}
+
 TEST(Lint, EndsOnAnyText) {
     for (const char* text :
          {"\"", "'",  "[",  "{",  "|",     ">",        "- ", "-",       ":",      "*",      "&",
