@@ -6,6 +6,7 @@
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/judge.hpp"
+#include "panelgate/profile/shown_as.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -76,6 +77,11 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         entry.wants = points::wants_of(station.points, station.polls);
         entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
                                                 frame_gap(line, station.id));
+        const profile::PanelProfile& panel = *station.profile;
+        entry.memory.shown_as = [&panel](const modbus::Span& written) {
+            return profile::shown_as(panel, written);
+        };
+        entry.memory.known = panel.name != "generic";  // which says what anybody could
     }
     return polled;
 }

@@ -91,7 +91,8 @@ Poller::Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation>
     for (PolledStation& station : stations) {
         state_->stations.push_back(
             {station.id, bus::next_client_id(),
-             StationPolls(std::move(station.wants), std::move(station.limits), now)});
+             StationPolls(std::move(station.wants), std::move(station.limits), now,
+                          std::move(station.memory))});
     }
 }
 

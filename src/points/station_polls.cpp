@@ -52,11 +52,13 @@ Quality quality_of(const Reading& reading, Duration every, TimePoint now) {
                                                                          : Quality::good;
 }
 
-StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start)
+StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start,
+                           SharedMemory memory)
     : wants_(std::move(wants)),
       readings_(wants_.size()),
       plan_(plan_reads(wants_, limits)),
-      schedule_(schedule_of(plan_, start)) {
+      schedule_(schedule_of(plan_, start)),
+      memory_(std::move(memory)) {
     std::vector<int> reads(wants_.size());
     for (const PlannedRead& read : plan_) {
         for (const std::size_t want : read.wants) {
@@ -99,7 +101,7 @@ std::vector<std::size_t> StationPolls::on_write(TimePoint now,
     std::vector<std::size_t> outdated;
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         Reading& reading = readings_[i];
-        if (!modbus::may_change(items, wants_[i].span)) continue;
+        if (!changes(items, wants_[i].span)) continue;
         const bool was_old = reading.outdated();
         reading.written = now;
         if (!was_old && reading.outdated()) outdated.push_back(i);
@@ -112,10 +114,22 @@ void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& 
         for (std::size_t i = 0; i < plan_.size(); ++i) {
             const modbus::Span& span = plan_[i].span;
             const bool direct = items && items->overlaps(span);
-            if (direct == themselves && modbus::may_change(items, span) && is_outdated(plan_[i]))
-                schedule_.hasten(i, now);
+            if (direct != themselves || spares(items, span)) continue;
+            if (is_outdated(plan_[i]) || !changes(items, span)) schedule_.hasten(i, now);
         }
     }
+}
+
+bool StationPolls::changes(const std::optional<modbus::Span>& written,
+                           const modbus::Span& items) const {
+    if (!written || !memory_.shown_as) return modbus::may_change(written, items);
+    return std::ranges::any_of(memory_.shown_as(*written),
+                               [&](const modbus::Span& shown) { return shown.overlaps(items); });
+}
+
+bool StationPolls::spares(const std::optional<modbus::Span>& written,
+                          const modbus::Span& items) const {
+    return memory_.known ? !changes(written, items) : !modbus::may_change(written, items);
 }
 
 bool StationPolls::is_outdated(const PlannedRead& read) const {

@@ -18,6 +18,7 @@ struct PolledStation {
     std::uint8_t id = 1;
     std::vector<Want> wants;
     PlanLimits limits;
+    SharedMemory memory{};
 };
 
 /// Runs the polls of one line through its bus, as requests of the class `poll`: one under way a

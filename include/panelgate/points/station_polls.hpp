@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <vector>
@@ -38,6 +39,14 @@ std::string_view label(Quality quality);
 /// age.
 Quality quality_of(const Reading& reading, Duration every, TimePoint now);
 
+/// What is known of memory that a panel shows in several tables.
+struct SharedMemory {
+    /// Everything that a write of these items changes; empty: it may change all other tables.
+    std::function<std::vector<modbus::Span>(const modbus::Span&)> shown_as;
+    /// False: there may be more of it that nobody knows.
+    bool known = true;
+};
+
 /// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.
 class StationPolls {
   public:
@@ -47,7 +56,8 @@ class StationPolls {
     };
 
     /// Wants that the panel cannot serve are never read and stay bad.
-    StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start);
+    StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start,
+                 SharedMemory memory = {});
 
     std::vector<Due> take_due(TimePoint now);
     std::optional<TimePoint> next_due() const { return schedule_.next_due(); }
@@ -60,8 +70,8 @@ class StationPolls {
     /// Somebody writes these items (nothing: any) of the station; the request leaves now. Gives the
     /// wants that are old by that and were not before.
     std::vector<std::size_t> on_write(TimePoint now, const std::optional<modbus::Span>& items);
-    /// That is over: what it has made old is read again, the items themselves first, out of turn as
-    /// far as the schedule allows.
+    /// That is over: what it has made old is read again, the items themselves first, then what it
+    /// perhaps has; out of turn as far as the schedule allows.
     void on_written(TimePoint now, const std::optional<modbus::Span>& items);
 
     const std::vector<Want>& wants() const { return wants_; }
@@ -74,6 +84,9 @@ class StationPolls {
     void fail(const PlannedRead& read, std::optional<std::uint8_t> exception);
     bool split(TimePoint now, std::size_t read);
     bool is_outdated(const PlannedRead& read) const;
+    /// Surely nothing of these items is written.
+    bool spares(const std::optional<modbus::Span>& written, const modbus::Span& items) const;
+    bool changes(const std::optional<modbus::Span>& written, const modbus::Span& items) const;
 
     std::vector<Want> wants_;
     std::vector<Reading> readings_;
@@ -81,6 +94,7 @@ class StationPolls {
     std::map<std::size_t, std::map<std::uint32_t, TimePoint>> pieces_;
     std::vector<PlannedRead> plan_;
     PollSchedule schedule_;
+    SharedMemory memory_;
 };
 
 }  // namespace panelgate::points

@@ -143,6 +143,28 @@ TEST(StationPolls, P10AWriteToAnotherTableMakesEverythingStaleAndTheItemsThemsel
     EXPECT_EQ(polls.on_write(left + 1min, std::nullopt).size(), wants.size()) << "of no items: all";
 }
 
+TEST(StationPolls, P10WhereTheMemoryIsKnownAWriteMakesStaleWhatShowsItAndNothingElse) {
+    const auto good = [](const Bytes& pdu) {
+        return Result<Bytes>(pdu[0] == 1 ? Bytes{1, 1, 0} : reply_to(pdu));
+    };
+    const auto bit_and_word = [](const modbus::Span& written) {
+        return std::vector<modbus::Span>{written, {Table::holding_registers, 7, 1}};
+    };
+    const std::optional<modbus::Span> bit = modbus::Span{Table::coils, 112, 1};
+    for (const bool known : {true, false}) {
+        StationPolls polls(
+            {{{Table::coils, 112, 1}, 1h}, registers(7, 1, 1h), registers(900, 1, 1h)}, limits(),
+            kStart, {bit_and_word, known});
+        play(polls, kStart, 10s, good);
+        const TimePoint left = kStart + 10s;
+        EXPECT_EQ(polls.on_write(left, bit), (std::vector<std::size_t>{0, 1}));
+        EXPECT_EQ(quality_of(polls.reading(2), 1h, left), Quality::good);
+        polls.on_written(left + 1s, bit);
+        EXPECT_EQ(play(polls, left + 1s, 5s, good).size(), known ? 2u : 3u)
+            << "what may be touched for all we know is read again, too";
+    }
+}
+
 TEST(StationPolls, P10AReadThatAWriteOvertakesIsOldAndAskedAgain) {
     StationPolls polls({registers(7, 1, 60s)}, limits(), kStart);
     const auto first = polls.take_due(*polls.next_due());
