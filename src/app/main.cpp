@@ -191,7 +191,10 @@ class CommandLine {
 
 int main(int argc, char** argv) {
     try {
-        return CommandLine().parse({argv + 1, argv + argc});
+        const int code = CommandLine().parse({argv + 1, argv + argc});
+        if (code != kFine || std::cout.flush()) return code;
+        std::cerr << "panelgate: stdout takes nothing: what was asked for is lost\n";
+        return kInternal;
     } catch (const std::exception& error) {
         std::cerr << "panelgate: internal error: " << error.what() << '\n';
         return kInternal;

@@ -47,7 +47,7 @@ struct Synonym {
     std::string_view meant;
 };
 /// What other programs and other trades call it.
-constexpr std::array<Synonym, 77> kSynonyms{{{"baudrate", "baud"},
+constexpr std::array<Synonym, 80> kSynonyms{{{"baudrate", "baud"},
                                              {"speed", "baud"},
                                              {"bitrate", "baud"},
                                              {"bps", "baud"},
@@ -58,6 +58,9 @@ constexpr std::array<Synonym, 77> kSynonyms{{{"baudrate", "baud"},
                                              {"e", "even"},
                                              {"o", "odd"},
                                              {"int16", "i16"},
+                                             {"s16", "i16"},
+                                             {"s32", "i32"},
+                                             {"s64", "i64"},
                                              {"int", "i16"},
                                              {"sint16", "i16"},
                                              {"signed", "i16"},

@@ -84,9 +84,13 @@ void warn_of_ports(Loading& loading, const std::vector<Door>& doors) {
     }
 }
 
+bool lets_all_in(const std::vector<Network>& allow) {
+    return allow.empty() || std::ranges::count(allow, 0u, &Network::prefix) > 0;
+}
+
 void warn_of_open_listener(Loading& loading, const Node& node,
                            const tcp_server::Settings& listener) {
-    if (!is_any_address(listener.address) || !listener.allow.empty()) return;
+    if (!is_any_address(listener.address) || !lets_all_in(listener.allow)) return;
     if (!can_write(loading.config, listener)) return;
     loading.warn(mark_of(node, "listen"),
                  "whoever reaches port " + std::to_string(listener.port) +
@@ -137,7 +141,7 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
 }
 
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
-    const bool open = is_any_address(http.address) && http.allow.empty();
+    const bool open = is_any_address(http.address) && lets_all_in(http.allow);
     if (open && http.anonymous == web::Role::operator_) {
         loading.warn(mark_of(node, "anonymous"),
                      "whoever reaches port " + std::to_string(http.port) +

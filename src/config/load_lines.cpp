@@ -140,6 +140,7 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
         if (other.device.device != line.device.device) continue;
         in.problem("device", "line '" + other.name + "' has this device already");
+        break;
     }
     if (line.device.device == "sim") {
         line.kind = Line::Kind::simulated;
@@ -177,10 +178,8 @@ Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line");
     Line line;
     line.name = load_name(in, true).value_or("");
-    for (const Line& other : loading.config.lines) {
-        if (!line.name.empty() && other.name == line.name)
-            in.problem("name", "there are two lines '" + line.name + '\'');
-    }
+    if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
+        in.problem("name", "there are two lines '" + line.name + '\'');
     load_device(loading, in, line);
     const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;

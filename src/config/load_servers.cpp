@@ -214,12 +214,15 @@ std::string load_secret(Loading& loading, MapReader& in) {
     if (!file) return "";
     const auto text = loading.files.read(*file);
     if (!text) {
-        in.problem("file", "cannot read the token file " + *file);
+        // Not the text: whoever took the token for its file has written that.
+        in.problem("file",
+                   "cannot read the token file; give the path of a file that holds the token and "
+                   "that this program may read");
         return "";
     }
     const std::size_t first = text->find_first_not_of(kBlanks);
     if (first == std::string::npos) {
-        in.problem("file", "the token file " + *file + " is empty");
+        in.problem("file", "the token file is empty");
         return "";
     }
     std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
@@ -263,6 +266,7 @@ void load_modbus_tcp(Loading& loading, MapReader& root) {
         for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
             if (settings.port == 0 || other.name() != settings.name()) continue;
             loading.problems.add(node.mark, "there are two listeners on " + settings.name());
+            break;
         }
         loading.config.modbus_tcp.push_back(std::move(settings));
     }

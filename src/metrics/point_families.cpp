@@ -22,8 +22,8 @@ void add_points(Families& out, const Snapshot& snapshot) {
 
 void add_relays(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge("panelgate_relay_up", "1 when the last transfer of a relay succeeded.");
-    Family transfers = make_counter("panelgate_relay_transfers_total",
-                                    "Reads of a relay's source and writes of its target.");
+    Family reads = make_counter("panelgate_relay_reads_total", "Reads of a relay's source.");
+    Family writes = make_counter("panelgate_relay_writes_total", "Writes of a relay's target.");
     Family failures =
         make_counter("panelgate_relay_failures_total", "Reads and writes of a relay that failed.");
     for (const points::RelaySample& relay : snapshot.relays) {
@@ -31,13 +31,14 @@ void add_relays(Families& out, const Snapshot& snapshot) {
         const auto side = [&](Family& family, const char* name, std::uint64_t count) {
             family.counter({{"relay", relay.relay}, {"side", name}}, static_cast<double>(count));
         };
-        side(transfers, "source", relay.reads);
-        side(transfers, "target", relay.writes);
+        reads.counter({{"relay", relay.relay}}, static_cast<double>(relay.reads));
+        writes.counter({{"relay", relay.relay}}, static_cast<double>(relay.writes));
         side(failures, "source", relay.read_failures);
         side(failures, "target", relay.write_failures);
     }
     out.push_back(up.take());
-    out.push_back(transfers.take());
+    out.push_back(reads.take());
+    out.push_back(writes.take());
     out.push_back(failures.take());
 }
 

@@ -85,9 +85,8 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
     });
     if (overtaken) schedule_.hasten(read, now);
     const auto exception = pdu ? modbus::exception_of(*pdu) : std::nullopt;
-    if (pdu && !exception) {
-        take(planned, *pdu, sampled);
-    } else {
+    const bool good = pdu && !exception && take(planned, *pdu, sampled);
+    if (!good) {
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
@@ -137,8 +136,10 @@ bool StationPolls::is_outdated(const PlannedRead& read) const {
                                [&](std::size_t want) { return readings_[want].outdated(); });
 }
 
-void StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {
+/// False of a reply that holds less than was asked for, which no bus gives.
+bool StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {
     const std::vector<std::uint16_t> items = items_of(read, reply);
+    if (items.size() < read.span.count) return false;
     for (const std::size_t index : read.wants) {
         const modbus::Span& want = wants_[index].span;
         Reading& reading = readings_[index];
@@ -164,6 +165,7 @@ void StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampl
             std::ranges::min_element(pieces->second, {}, [](const auto& p) { return p.second; });
         reading.sampled = oldest->second;
     }
+    return true;
 }
 
 void StationPolls::fail(const PlannedRead& read, std::optional<std::uint8_t> exception) {

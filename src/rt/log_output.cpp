@@ -24,9 +24,10 @@ bool takes_some(int descriptor) {
 LogOutput::LogOutput(int descriptor, std::size_t most_pending)
     : descriptor_(descriptor), most_(most_pending) {
     struct stat file{};
-    if (::fstat(descriptor, &file) == 0 && S_ISSOCK(file.st_mode)) {
-        kind_ = Kind::socket;
-        return;
+    if (::fstat(descriptor, &file) == 0) {
+        if (S_ISSOCK(file.st_mode)) kind_ = Kind::socket;
+        if (S_ISREG(file.st_mode)) kind_ = Kind::file;
+        if (kind_ != Kind::shared) return;
     }
     // O_NONBLOCK on the descriptor itself would hold for everybody who has inherited it.
     const std::string path = "/proc/self/fd/" + std::to_string(descriptor);
@@ -48,6 +49,10 @@ std::size_t LogOutput::hand_over(std::string_view bytes) {
     switch (kind_) {
         case Kind::own:
             sent = ::write(own_, bytes.data(), bytes.size());
+            break;
+        case Kind::file:
+            // Takes all at once, and at the one place where others write to it, too (2>&1).
+            sent = ::write(descriptor_, bytes.data(), bytes.size());
             break;
         case Kind::socket:
             sent = ::send(descriptor_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);

@@ -70,6 +70,11 @@ class Expansion {
         const bool closed = typed.ends_with('}');
         const auto variable =
             closed ? parse_variable(typed.substr(2, typed.size() - 3)) : std::nullopt;
+        if (variable && variable->fallback && variable->fallback->find("${") != std::string::npos) {
+            problems_.add(node.mark, "the default of " + variable->name +
+                                         " holds a variable, which is not looked up; write a text");
+            return text;
+        }
         if (!variable) {
             problems_.add(node.mark, '\'' + text +
                                          "' must be ${NAME} or ${NAME:-default}, NAME of letters, "

@@ -85,6 +85,7 @@ class Simulator(unittest.TestCase):
             with harness.Program("simulate", "-c", str(file), "--http", "127.0.0.1:0",
                                  "--line", "floor1=tcp://127.0.0.1:0") as panels:
                 port = panels.log.wait_for(r"rtu_over_tcp=127\.0\.0\.1:(\d+)").group(1)
+                self.assertEqual(panels.get("/api/v1/simulator/floor1:31"), panels.get(PRESS))
                 self.assertIn(f":{panels.http_port()}/api/v1/simulator/",
                               panels.out.wait_for("faults: (.*)").group(1))
                 self.assertEqual(panels.get("/readyz")[0], 200)

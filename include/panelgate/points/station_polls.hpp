@@ -80,7 +80,7 @@ class StationPolls {
     const ScheduleCounters& counters() const { return schedule_.counters(); }
 
   private:
-    void take(const PlannedRead& read, ByteView reply, TimePoint sampled);
+    bool take(const PlannedRead& read, ByteView reply, TimePoint sampled);
     void fail(const PlannedRead& read, std::optional<std::uint8_t> exception);
     bool split(TimePoint now, std::size_t read);
     bool is_outdated(const PlannedRead& read) const;

@@ -37,7 +37,7 @@ class LogOutput {
     void on_pending(std::function<void()> called) { on_pending_ = std::move(called); }
 
   private:
-    enum class Kind : std::uint8_t { own, socket, shared, terminal };
+    enum class Kind : std::uint8_t { own, file, socket, shared, terminal };
 
     std::size_t hand_over(std::string_view bytes);
     void keep(std::string line);

@@ -27,13 +27,13 @@ std::optional<StationEntry> Directory::find_station(std::string_view name) const
 
     const auto colon = name.rfind(':');
     if (colon == std::string_view::npos) return std::nullopt;
-    const LineEntry* line = find_line(name.substr(0, colon));
     const auto id = parse_id(name.substr(colon + 1));
-    if (line == nullptr || !id) return std::nullopt;
+    if (!id) return std::nullopt;
     for (const StationEntry& station : stations) {
-        if (station.line == line->name && station.id == *id) return station;
+        if (station.line == name.substr(0, colon) && station.id == *id) return station;
     }
-    if (!line->pass_unlisted_stations) return std::nullopt;
+    const LineEntry* line = find_line(name.substr(0, colon));
+    if (line == nullptr || !line->pass_unlisted_stations) return std::nullopt;
     StationEntry unlisted;
     unlisted.name = line->name + ":" + std::to_string(*id);
     unlisted.line = line->name;

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <sstream>
 #include <string>
@@ -143,6 +144,20 @@ TEST_P(LogOutputTest, TheDescriptorOfOthersStaysAsItWas) {
     LogOutput output(way_.writer);
     output.write("x\n");
     EXPECT_EQ(::fcntl(way_.writer, F_GETFL), before);
+}
+
+TEST(LogOutput, InAPlainFileNobodyOverwritesTheOther) {
+    FILE* file = std::tmpfile();
+    ASSERT_NE(file, nullptr);
+    const int descriptor = ::fileno(file);
+    LogOutput out(descriptor);
+    ASSERT_EQ(::write(descriptor, "before\n", 7), 7);  // as `command >file 2>&1` does
+    out.write("log\n");
+    ASSERT_EQ(::write(descriptor, "after\n", 6), 6);
+    std::array<char, 64> text{};
+    const ssize_t size = ::pread(descriptor, text.data(), text.size(), 0);
+    EXPECT_EQ(std::string(text.data(), static_cast<std::size_t>(size)), "before\nlog\nafter\n");
+    std::fclose(file);
 }
 
 }  // namespace

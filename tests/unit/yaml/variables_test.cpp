@@ -43,6 +43,18 @@ TEST(YamlVariables, HaveADefaultWhereTheyAreUnsetOrEmpty) {
     EXPECT_EQ(read("a: ${NO:-[::1]:502, # and {so} on}"), "[::1]:502, # and {so on}");
 }
 
+TEST(YamlVariables, ADefaultHoldsNoVariable) {
+    for (const char* text : {"a: ${NO:-${BAUD}}", "a: \"/dev/${NO:-${BAUD:-x}}\""}) {
+        Problems problems("f");
+        Node tree = parse(text, problems);
+        expand_variables(tree, environment, problems);
+        EXPECT_EQ(
+            problems.text(),
+            "f:1:4: the default of NO holds a variable, which is not looked up; write a text\n")
+            << text;
+    }
+}
+
 TEST(YamlVariables, MayStandInFlowMapsAndLists) {
     Problems problems("f");
     Node tree = parse("{a: ${BAUD}, b: [${NO:-0.0.0.0:502}, \"${NO:-x, y}\"], c: 3}", problems);

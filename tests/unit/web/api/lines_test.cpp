@@ -142,7 +142,8 @@ TEST_F(ApiLines, AListOfManyStationsLetsOthersHaveTheirTurn) {
     boost::asio::post(io, turn);
     const Reply reply = client.receive();
     EXPECT_EQ(reply.at("stations").as_array().size(), 1001u);
-    EXPECT_GT(turns, 30u);
+    EXPECT_GT(std::exchange(turns, 10'000u), 30u);
+    io.poll();  // the turn that waits is the last
 }
 
 TEST_F(ApiLines, AListWhoseCallerLeavesIsNotMadeToItsEnd) {
