@@ -13,6 +13,8 @@ namespace {
 
 /// What was written and could not be read behind that is asked for again so soon.
 constexpr Duration kAgain = 5s;
+/// … where the panel has not been asked, as while a connection is opened anew.
+constexpr Duration kSoon = 500ms;
 
 std::vector<Duration> intervals_of(const std::vector<PlannedRead>& plan) {
     std::vector<Duration> intervals;
@@ -90,7 +92,8 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
-        if (is_outdated(planned)) schedule_.again_at(read, now + kAgain);
+        const bool unasked = !pdu && pdu.error() != Fault::timeout && pdu.error() != Fault::damaged;
+        if (is_outdated(planned)) schedule_.again_at(read, now + (unasked ? kSoon : kAgain));
     }
     return planned.wants;
 }

@@ -138,12 +138,24 @@ std::string subject_of(std::span<const LogField> fields) {
     return subject;
 }
 
-void put(LogLevel level, std::string_view event, std::span<const LogField> fields,
-         std::uint64_t left_out) {
-    std::string line = line_of(level, event, fields);
+void put(LogLevel level, std::string line, std::uint64_t left_out) {
     if (left_out > 0) line += field_of("left_out", std::to_string(left_out));
     if (g_tapped) return g_tapped->push_back(std::move(line));
     logger().log(level_of(level), line);
+}
+
+/// From error to info: unless its subject has said the same too often.
+void put_at_pace(LogLevel level, std::string_view event, std::string_view subject,
+                 std::span<const LogField> fields, const LogThrottle::Pace& pace) {
+    const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event, subject, pace);
+    std::string line = line_of(level, event, fields);
+    if (passed) return put(level, std::move(line), *passed);
+    g_throttle.hold(event, subject, level, std::move(line));
+}
+
+void put_held(TimePoint now) {
+    for (LogThrottle::Held& held : g_throttle.take_held(now))
+        put(held.level, std::move(held.line), held.left_out);
 }
 
 }  // namespace
@@ -172,26 +184,28 @@ void log(LogLevel level, std::string_view event, std::initializer_list<LogField>
 
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
-    std::uint64_t left_out = 0;
-    if (level <= LogLevel::info) {
-        const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event,
-                                            subject_of(fields), LogThrottle::kIncidents);
-        if (!passed) return;
-        left_out = *passed;
-    }
-    put(level, event, fields, left_out);
+    if (level > LogLevel::info) return put(level, line_of(level, event, fields), 0);
+    put_at_pace(level, event, subject_of(fields), fields, LogThrottle::kIncidents);
 }
 
 void log_deed(std::string_view event, std::string_view subject,
               std::initializer_list<LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
-    const auto passed =
-        g_throttle.pass(std::chrono::steady_clock::now(), event, subject, LogThrottle::kDeeds);
-    if (passed) put(LogLevel::info, event, std::span(fields.begin(), fields.size()), *passed);
+    put_at_pace(LogLevel::info, event, subject, std::span(fields.begin(), fields.size()),
+                LogThrottle::kDeeds);
 }
 
 struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
-    explicit State(Clock& its_clock) : clock(its_clock), alarm(clock.make_alarm()) {}
+    explicit State(Clock& its_clock)
+        : clock(its_clock), alarm(clock.make_alarm()), held(clock.make_alarm()) {}
+
+    void tell_held() {
+        constexpr Duration kPause = 10s;
+        held->arm(clock.now() + kPause, [self = shared_from_this()] {
+            put_held(self->clock.now());
+            self->tell_held();
+        });
+    }
 
     void watch() {
         constexpr Duration kPause = 20ms;
@@ -204,16 +218,20 @@ struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
 
     Clock& clock;
     std::unique_ptr<Alarm> alarm;
+    std::unique_ptr<Alarm> held;  ///< for what was left out and nothing follows
 };
 
 LogDrain::LogDrain(Clock& clock) : state_(std::make_shared<State>(clock)) {
     output().on_pending([state = state_.get()] { state->watch(); });
     state_->watch();
+    state_->tell_held();
 }
 
 LogDrain::~LogDrain() {
     output().on_pending({});
     state_->alarm->cancel();
+    state_->held->cancel();
+    put_held(TimePoint::max());
     output().flush();
 }
 

@@ -43,8 +43,8 @@ LogOutput::~LogOutput() {
     if (own_ >= 0) ::close(own_);
 }
 
-/// How many bytes are gone; all of them when nobody will ever read them.
-std::size_t LogOutput::hand_over(std::string_view bytes) {
+/// How many bytes are gone; nothing when it cannot take them at all.
+std::optional<std::size_t> LogOutput::hand_over(std::string_view bytes) {
     ssize_t sent = 0;
     switch (kind_) {
         case Kind::own:
@@ -70,30 +70,42 @@ std::size_t LogOutput::hand_over(std::string_view bytes) {
             break;
     }
     if (sent >= 0) return static_cast<std::size_t>(sent);
-    return errno == EAGAIN || errno == EINTR || errno == ENOBUFS ? 0 : bytes.size();
+    if (errno == EAGAIN || errno == EINTR || errno == ENOBUFS) return 0;
+    return std::nullopt;
 }
 
 void LogOutput::flush() {
+    bool took = false;
     while (!pending_.empty()) {
         std::string& first = pending_.front();
-        const std::size_t gone = hand_over(first);
-        if (gone == 0) return;
-        bytes_ -= gone;
-        first.erase(0, gone);
-        if (first.empty()) pending_.pop_front();
+        const auto gone = hand_over(first);
+        if (gone && *gone == 0) return;
+        bytes_ -= gone.value_or(first.size());
+        if (!gone) {
+            drop();
+            cut_ = cut_ || begun_;
+        } else if (*gone < first.size()) {
+            first.erase(0, *gone);
+            begun_ = true;
+            continue;
+        }
+        took = took || gone;
+        pending_.pop_front();
+        begun_ = false;
     }
-    if (untold_ == 0 || !lost_line_) return;
+    if (untold_ == 0 || !took || !lost_line_) return;
     keep(lost_line_(std::exchange(untold_, 0)));
     flush();
 }
 
+void LogOutput::drop() {
+    ++dropped_;
+    ++untold_;
+}
+
 void LogOutput::write(std::string_view line) {
     if (pending()) flush();
-    if (bytes_ + line.size() > most_) {
-        ++dropped_;
-        ++untold_;
-        return;
-    }
+    if (bytes_ + line.size() > most_) return drop();
     const bool first = !pending();
     keep(std::string(line));
     flush();
@@ -101,6 +113,7 @@ void LogOutput::write(std::string_view line) {
 }
 
 void LogOutput::keep(std::string line) {
+    if (std::exchange(cut_, false)) line.insert(0, 1, '\n');
     bytes_ += line.size();
     pending_.push_back(std::move(line));
 }

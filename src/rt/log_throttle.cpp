@@ -5,15 +5,24 @@
 
 namespace panelgate::rt {
 
-std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view event,
-                                               std::string_view subject, const Pace& pace) {
+namespace {
+
+std::string key_of(std::string_view event, std::string_view subject) {
     std::string key(event);
     key += '\0';
     key += subject;
+    return key;
+}
+
+}  // namespace
+
+std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view event,
+                                               std::string_view subject, const Pace& pace) {
+    std::string key = key_of(event, subject);
     auto found = seen_.find(key);
     if (found == seen_.end()) {
         make_room(now);
-        found = seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst, 0}).first;
+        found = seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst}).first;
     }
     Seen& seen = found->second;
     // Credit comes back one at a time: what was quiet for long may speak freely again.
@@ -26,7 +35,27 @@ std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view e
     }
     --seen.credit;
     seen.last = now;
+    seen.held.clear();
     return std::exchange(seen.left_out, 0);
+}
+
+void LogThrottle::hold(std::string_view event, std::string_view subject, LogLevel level,
+                       std::string line) {
+    const auto found = seen_.find(key_of(event, subject));
+    if (found == seen_.end()) return;
+    found->second.level = level;
+    found->second.held = std::move(line);
+}
+
+std::vector<LogThrottle::Held> LogThrottle::take_held(TimePoint now) {
+    std::vector<Held> all;
+    for (auto& [key, seen] : seen_) {
+        if (seen.held.empty() || now - seen.last < seen.interval) continue;
+        all.push_back({seen.level, std::exchange(seen.held, {}), seen.left_out - 1});
+        seen.left_out = 0;
+        seen.last = now;
+    }
+    return all;
 }
 
 /// Whoever has been quiet for an interval is as good as new; if nobody has, the one quiet longest.

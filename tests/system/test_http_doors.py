@@ -175,6 +175,29 @@ class Names(Doors):
                      socket.gethostname(), "[::1]:80"):
             self.assertEqual(self.status("GET", "/api/v1/lines", host=host), 200, host)
 
+    def test_P2_what_follows_a_body_of_unclear_length_is_no_request(self):
+        before = self.program.values(PRESS + "UW100")
+        hidden = (f"PUT {PRESS}UW100 HTTP/1.1\r\nHost: localhost\r\nContent-Length: 17\r\n\r\n"
+                  '{"values":[4242]}').encode()
+        for coding in ("xchunked", "identity", "gzip", "chunked, identity", "gzip, chunked", ""):
+            with self.subTest(coding=coding), Connection(self.port) as connection:
+                connection.socket.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n"
+                                          b"Transfer-Encoding: " + coding.encode() + b"\r\n\r\n"
+                                          + hidden)
+                self.assertEqual(connection.receive().status, 400)
+                self.assertIsNone(connection.receive(), "the connection ends")
+        self.assertEqual(self.program.values(PRESS + "UW100"), before)
+
+    def test_a_trailer_names_no_host_and_a_header_comes_once(self):
+        body = b'{"values":[4242]}'
+        with Connection(self.port) as connection:
+            connection.socket.sendall(
+                f"PUT {PRESS}UW100 HTTP/1.1\r\nTransfer-Encoding: chunked\r\n\r\n".encode()
+                + b"%x\r\n%b\r\n0\r\nHost: localhost\r\n\r\n" % (len(body), body))
+            self.assertEqual(connection.receive().status, 400)
+        self.assertEqual(self.status("GET", "/", "Authorization: Bearer a", "Authorization: Bearer b"),
+                         400)
+
     def test_probes_are_asked_by_any_name(self):
         for path in ("/healthz", "/readyz"):
             self.assertEqual(self.status("GET", path, host="pod-17.cluster"), 200)

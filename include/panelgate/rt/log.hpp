@@ -25,7 +25,7 @@ bool log_enabled(LogLevel level);
 /// Lines that nobody will see, because stderr's reader stood still.
 std::uint64_t log_lines_dropped();
 
-/// Hands over what waits, now and then, for as long as it lives.
+/// Hands over what waits, now and then, for as long as it lives; in the end what was left out last.
 class LogDrain {
   public:
     explicit LogDrain(Clock& clock);
@@ -44,7 +44,7 @@ class LogDrain {
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
 /// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
-/// times at once, then once a minute.
+/// times at once, then once a minute; the last one always.
 void log_deed(std::string_view event, std::string_view subject,
               std::initializer_list<LogField> fields);
 

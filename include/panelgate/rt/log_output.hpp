@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -39,8 +40,9 @@ class LogOutput {
   private:
     enum class Kind : std::uint8_t { own, file, socket, shared, terminal };
 
-    std::size_t hand_over(std::string_view bytes);
+    std::optional<std::size_t> hand_over(std::string_view bytes);
     void keep(std::string line);
+    void drop();
 
     int descriptor_;
     int own_ = -1;  ///< the same file, opened anew so that it never blocks; -1: not possible
@@ -48,6 +50,8 @@ class LogOutput {
     std::size_t most_;
     std::deque<std::string> pending_;  ///< the first one may be the rest of a line
     std::size_t bytes_ = 0;
+    bool begun_ = false;  ///< the first one is
+    bool cut_ = false;    ///< the last line that was written has no end
     std::uint64_t dropped_ = 0;
     std::uint64_t untold_ = 0;
     std::function<std::string(std::uint64_t)> lost_line_;

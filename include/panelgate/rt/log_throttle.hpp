@@ -6,8 +6,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/settings.hpp"
 
 namespace panelgate::rt {
 
@@ -28,12 +30,26 @@ class LogThrottle {
     std::optional<std::uint64_t> pass(TimePoint now, std::string_view event,
                                       std::string_view subject, const Pace& pace = kIncidents);
 
+    /// The last one that was left out, and how many before it.
+    struct Held {
+        LogLevel level = LogLevel::info;
+        std::string line;
+        std::uint64_t left_out = 0;
+    };
+    /// Keeps the one that pass() has just left out: what came last is to be told when nothing
+    /// follows.
+    void hold(std::string_view event, std::string_view subject, LogLevel level, std::string line);
+    /// Those whose interval is over; each stands for all before it.
+    std::vector<Held> take_held(TimePoint now);
+
   private:
     struct Seen {
         TimePoint last;  ///< passed
         Duration interval{};
         int credit = 0;
         std::uint64_t left_out = 0;
+        LogLevel level = LogLevel::info;
+        std::string held{};  ///< of those left out the last; empty: none
     };
     void make_room(TimePoint now);
 

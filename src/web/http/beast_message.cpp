@@ -1,6 +1,8 @@
 #include "beast_message.hpp"
 
+#include <boost/beast/core/string.hpp>
 #include <boost/beast/http/error.hpp>
+#include <string_view>
 #include <utility>
 
 #include "host_names.hpp"
@@ -11,6 +13,22 @@ namespace http = boost::beast::http;
 std::optional<Target> target_of(const BeastRequest& message) {
     const bool of_server = message.method() == http::verb::options && message.target() == "*";
     return parse_target(of_server ? std::string("/*") : std::string(message.target()));
+}
+
+bool has_sound_framing(const BeastRequest& message) {
+    const std::size_t codings = message.count(http::field::transfer_encoding);
+    if (codings == 0) return true;
+    return codings == 1 && message.version() >= 11 &&
+           boost::beast::iequals(message[http::field::transfer_encoding], "chunked");
+}
+
+std::optional<Problem> repeated_field(const BeastRequest& message) {
+    for (const char* name : kHeadersRead) {
+        if (std::string_view(name) == "accept-encoding" || message.count(name) < 2) continue;
+        return problem(400, "a request has one " + std::string(name) + ", not " +
+                                std::to_string(message.count(name)));
+    }
+    return std::nullopt;
 }
 
 Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {

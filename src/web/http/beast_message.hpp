@@ -22,6 +22,11 @@ constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 
 /// The target, "*" of OPTIONS as a path. Nothing when it cannot be understood.
 std::optional<Target> target_of(const BeastRequest& message);
+/// Is it clear where the body ends? Only `chunked` is understood (RFC 9112 6.1, 6.3): what follows
+/// anything else could be taken for a request.
+bool has_sound_framing(const BeastRequest& message);
+/// 400 when a header that is looked at comes twice: which of them counts?
+std::optional<Problem> repeated_field(const BeastRequest& message);
 /// The host that is asked (RFC 9112 3.2); "" of HTTP/1.0 without one.
 Parsed<std::string> host_of(const BeastRequest& message, const Target& target);
 HttpRequest to_request(BeastRequest&& message, Target target, std::string host);

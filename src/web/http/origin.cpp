@@ -25,6 +25,15 @@ bool follows_link(const HttpRequest& request) {
            header(request, "sec-fetch-dest") == "document" && is_page(request);
 }
 
+/// "http://gateway:8080"; "null" is nobody's.
+bool is_ours(std::string_view origin, const HostNames& names,
+             const boost::asio::ip::address& local) {
+    const std::size_t scheme = origin.find("://");
+    if (scheme == std::string_view::npos) return false;
+    const auto host = host_of_authority(origin.substr(scheme + 3));
+    return host && names.knows(*host, local);
+}
+
 }  // namespace
 
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
@@ -36,6 +45,14 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
     if (header(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
         return problem(403, "a page of another site may not ask this gateway");
     }
+    // Browsers name the site of whoever changes something, also where they tell nothing else.
+    const bool changes =
+        request.method != "GET" && request.method != "HEAD" && request.method != "OPTIONS";
+    if (changes && request.headers.contains("origin") &&
+        !is_ours(header(request, "origin"), names, local))
+        return problem(403,
+                       "a page of another site may not write to the panels; if it is one of "
+                       "yours, name its host in http: hosts");
     return std::nullopt;
 }
 

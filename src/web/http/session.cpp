@@ -90,6 +90,7 @@ asio::awaitable<bool> HttpSession::serve_one() {
 asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
     auto target = target_of(message);
     if (!target) co_return to_response(problem(400, "the request target cannot be understood"));
+    if (const auto repeated = repeated_field(message)) co_return to_response(*repeated);
     auto host = host_of(message, *target);
     if (!host) co_return to_response(host.error());
     departure_.ask_by(nullptr);
@@ -140,8 +141,12 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
     stream_.expires_after(shared_->site->settings.request_timeout);
     co_await http::async_read_header(stream_, buffer_, *parser_,
                                      asio::redirect_error(asio::use_awaitable, error));
+    if (!error && !has_sound_framing(parser_->get())) error = http::error::bad_transfer_encoding;
     if (error || parser_->is_done()) co_return error;
+    // Beast would add the trailer to it, and nothing there may count (RFC 9110 6.5.1).
+    http::request_header<> head = parser_->get().base();
     error = co_await receive_body();
+    parser_->get().base() = std::move(head);
     co_return error;
 }
 

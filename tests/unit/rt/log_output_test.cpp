@@ -146,6 +146,17 @@ TEST_P(LogOutputTest, TheDescriptorOfOthersStaysAsItWas) {
     EXPECT_EQ(::fcntl(way_.writer, F_GETFL), before);
 }
 
+TEST(LogOutput, WhatADeviceRefusesIsCounted) {
+    const int full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
+    ASSERT_GE(full, 0);
+    LogOutput out(full);
+    out.on_lost([](std::uint64_t) { return std::string("lost\n"); });
+    for (int i = 0; i < 3; ++i) out.write("log\n");
+    EXPECT_EQ(out.dropped(), 3u);
+    EXPECT_FALSE(out.pending());
+    ::close(full);
+}
+
 TEST(LogOutput, InAPlainFileNobodyOverwritesTheOther) {
     FILE* file = std::tmpfile();
     ASSERT_NE(file, nullptr);

@@ -90,12 +90,15 @@ TEST_F(Access, WhoAsksIsCalledByItsAddressAndItsToken) {
 TEST_F(Access, KeepsAForeignPageFromWritingThroughABrowser) {
     const char* body = R"({"station":5,"pdu":"0500010000"})";
     const std::string origin = "Origin: http://evil.example\r\nContent-Type: ";
-    const auto post = [&](const char* type) {
-        return ask("POST", "/api/v1/lines/floor1/raw", body, origin + type + "\r\n").status();
+    const auto post = [&](const std::string& headers) {
+        return ask("POST", "/api/v1/lines/floor1/raw", body, headers + "\r\n").status();
     };
-    EXPECT_EQ(post("text/plain"), 415u);
+    EXPECT_EQ(post(origin + "text/plain"), 403u);
+    EXPECT_EQ(post(origin + "application/json"), 403u);
+    const std::string ours = "Origin: http://x:8080\r\nContent-Type: ";
+    EXPECT_EQ(post(ours + "text/plain"), 415u);
     EXPECT_TRUE(bus.requests.empty());
-    EXPECT_EQ(post("application/json"), 200u);
+    EXPECT_EQ(post(ours + "application/json"), 200u);
     const Reply preflight =
         ask("OPTIONS", "/api/v1/lines/floor1/raw", "", origin + "text/plain\r\n");
     EXPECT_EQ(preflight.status(), 204u);

@@ -42,6 +42,25 @@ TEST_F(Origin, IsRefusedUnderAForeignName) {
     EXPECT_EQ(refusal(), 0u);
 }
 
+TEST_F(Origin, OfAnotherSiteChangesNothing) {
+    for (const char* origin :
+         {"http://evil.example", "https://evil.example:8080", "null", "gateway"}) {
+        request.headers["origin"] = origin;
+        for (const char* method : {"PUT", "POST"}) {
+            request.method = method;
+            EXPECT_EQ(refusal(), 403u) << method << ' ' << origin;
+        }
+        request.method = "GET";
+        EXPECT_EQ(refusal(), 0u);
+    }
+    request.method = "PUT";
+    for (const char* origin :
+         {"http://gateway:8080", "https://GATEWAY", "http://192.168.1.7:8080"}) {
+        request.headers["origin"] = origin;
+        EXPECT_EQ(refusal(), 0u) << origin;
+    }
+}
+
 TEST_F(Origin, MayBeAPageOfOursAndNoneOfAnotherSite) {
     for (const char* site : {"same-origin", "same-site", "none"}) {
         browse(site, "cors", "empty");
