@@ -1,5 +1,7 @@
 #include "dispatch.hpp"
 
+#include <optional>
+
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -37,11 +39,11 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
         return decide_broadcast(pdu[0], std::move(request), settings, std::move(lines));
     const Result<Target> target = units.route(unit);
     if (!target) return refuse(target.error());
-    if (writes) {
-        if (const auto refusal = target->bus->refusal_of_write(target->station))
-            return refuse(*refusal);
+    if (!request) {
+        // What is a request the bus refuses itself, which is counted and told.
+        const auto refusal = writes ? target->bus->refusal_of_write(target->station) : std::nullopt;
+        return refusal ? refuse(*refusal) : refuse(request.error());
     }
-    if (!request) return refuse(request.error());
     return Forward{*target, std::move(*request)};
 }
 

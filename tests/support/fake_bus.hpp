@@ -23,6 +23,12 @@ class FakeBus : public bus::BusClient {
     explicit FakeBus(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
 
     void transact(bus::Request request, bus::AnswerHandler handler) override {
+        if (auto refusal = rights.judge(request.station, request.request)) {
+            bus::Answer refused;
+            refused.pdu = bus::answer_to(*refusal, request.request.function());
+            refused.refusal = std::move(refusal);
+            return settle(std::move(handler), std::move(refused));
+        }
         requests.push_back(request);
         auto answer = script ? script(request) : fault(Fault::timeout, true);
         if (answer) {

@@ -97,6 +97,23 @@ class Log(unittest.TestCase):
                          {"table": "holding-registers", "address": 1003, "values": [1]})
             program.log.wait_for(r"info write .*station=broadcast .*at=holding-registers/1003 ")
 
+    def test_a_write_that_is_refused_here_leaves_a_line_and_a_count_too(self):
+        stations = "{id: 31, name: press, access: read_only}"
+        text = config.gateway(config.line(stations=stations), http=config.OPERATOR)
+        with harness.configured(text) as program:
+            with program.client() as client:
+                self.assertEqual(client.ask(31, write_register(1000, 7)), b"\x86\x01")
+            program.log.wait_for(r"info write .*client=\"modbus_tcp .*/1000 .*outcome=refused")
+            for path, body in (("/api/v1/stations/press/holding-registers/1001", {"values": [8]}),
+                               ("/api/v1/stations/press/holding-registers/1002", {"values": ["x"]})):
+                self.assertEqual(program.rest("PUT", path, body)[0], 403, path)
+            program.log.wait_for(r"info write .*client=\"http .*/1001 .*outcome=refused")
+            self.assertEqual(program.rest("POST", "/api/v1/lines/floor1/raw",
+                                          {"station": 31, "pdu": "0603EA0009"})[0], 403)
+            program.log.wait_for(r"info write .*/1002 .*outcome=refused")
+            self.assertRegex(program.get("/metrics")[1],
+                             r'requests_total\{.*function="6",outcome="refused"\} 3')
+
     def test_a_program_that_writes_without_end_does_not_fill_the_disk(self):
         with harness.configured(config.gateway(FAST)) as program:
             with program.client() as client:

@@ -61,12 +61,12 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
 }
 
 Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
-                               bool reads) {
+                               bool may) {
     if (id == 0) return check_may_write(*line.bus, 0);
     const std::string name = line.name + ":" + std::to_string(id);
     const auto station = directory.find_station(name);
     if (!station) return problem(404, "there is no station '" + name + "'");
-    if (reads) return {};
+    if (may) return {};
     return check_may_write(*line.bus, id);
 }
 
@@ -83,7 +83,7 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     const auto id = static_cast<std::uint8_t>(*station);
     const bool reads = modbus::is_pure_read(*pdu);  // also of one that is malformed
     auto made = request_to(id, std::move(*pdu));
-    const auto allowed = check_raw_station(directory, line, id, reads);
+    const auto allowed = check_raw_station(directory, line, id, reads || made);
     if (!allowed) return allowed.error();
     return made;
 }

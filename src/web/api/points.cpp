@@ -52,8 +52,6 @@ Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
 }
 
 Parsed<points::PointWrite> write_of(const Found& found, const HttpRequest& request) {
-    const auto allowed = check_may_write(*found.station.bus, found.station.id);
-    if (!allowed) return allowed.error();
     const auto rounding = rounding_of(request);
     if (!rounding) return rounding.error();
     const auto value = value_of(request.body);
@@ -117,7 +115,8 @@ Handling get_point(HttpRequest request, const Api* api) {
 Handling put_point(HttpRequest request, const Api* api) {
     const auto found = find_point(request, *api->directory);
     if (!found) co_return to_response(found.error());
-    const auto write = write_of(*found, request);
+    const auto write =
+        unless_refused(write_of(*found, request), *found->station.bus, found->station.id);
     if (!write) co_return to_response(write.error());
     auto planned = request_to(found->station.id, write->pdu);
     if (!planned) co_return to_response(planned.error());

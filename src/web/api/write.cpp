@@ -22,8 +22,6 @@ Problem not_writable(modbus::Table table) {
 
 /// The request that writes the body's values, or why there is none.
 Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
-    const auto allowed = check_may_write(*items.station.bus, items.station.id);
-    if (!allowed) return allowed.error();
     if (!is_writable(items.span.table)) return not_writable(items.span.table);
     const auto cells = cells_of(body, items.span.table);
     if (!cells) return cells.error();
@@ -34,7 +32,8 @@ Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
 
 Handling write_items(HttpRequest request, Parsed<Items> items) {
     if (!items) co_return to_response(items.error());
-    auto planned = write_request(*items, request.body);
+    auto planned =
+        unless_refused(write_request(*items, request.body), *items->station.bus, items->station.id);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));

@@ -24,13 +24,17 @@ class HeldBus : public bus::BusClient {
     explicit HeldBus(boost::asio::io_context& context) : context_(context) {}
 
     void transact(bus::Request request, bus::AnswerHandler handler) override {
-        seen.push_back(request);
-        if (instant) {
-            bus::Answer answer;
-            answer.pdu = *instant;
-            boost::asio::post(context_,
-                              [handler = std::move(handler), answer] { handler(answer); });
-            return;
+        bus::Answer answer;
+        answer.refusal = rights.judge(request.station, request.request);
+        if (answer.refusal) {
+            answer.pdu = bus::answer_to(*answer.refusal, request.request.function());
+        } else {
+            seen.push_back(request);
+            if (instant) answer.pdu = *instant;
+        }
+        if (answer.refusal || instant) {
+            return boost::asio::post(context_,
+                                     [handler = std::move(handler), answer] { handler(answer); });
         }
         held.push_back({std::move(request), std::move(handler)});
     }
