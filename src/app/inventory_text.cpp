@@ -57,7 +57,9 @@ std::string text_of(const config::Line& line) {
 
 std::string text_of(const points::Relay& relay) {
     return "relay " + relay.name() + ": count " + std::to_string(relay.count) + ", every " +
-           format_duration(relay.every) + (relay.on_change ? ", on change and every " + format_duration(relay.refresh) : "") + '\n';
+           format_duration(relay.every) +
+           (relay.on_change ? ", on change and every " + format_duration(relay.refresh) : "") +
+           '\n';
 }
 
 std::string text_of(const std::vector<Network>& allow) {
