@@ -42,6 +42,8 @@ TEST_F(LoginAttempts, OfAnAddressThatGuessesAreHeldUpAndThenJudged) {
 }
 
 TEST_F(LoginAttempts, MayBeGivenUpWhileTheyAreHeld) {
+    settings.logins.hold = 1h;
+    start();
     for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
     Client client = connect();
     client.send("GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
