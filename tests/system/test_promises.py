@@ -67,8 +67,9 @@ class Promises(PacedBus):
                 self.assertGreaterEqual(gaps.median, 0.1)
                 self.assertEqual((stats["gap_violations"], stats["collisions"]), (0, 0))
                 return (gaps.shortest,)
-            # When the bus wakes up late for the broadcast, the gap behind it looks shorter.
-            least = 0.1 - 150e-6
+            # When the bus wakes up late for the broadcast, the gap behind it looks shorter; one
+            # counted from the broadcast's first bit would be shorter by all of its 2.3 ms.
+            least = 0.1 - 500e-6
             self.assertGreaterEqual(best_of_three(shortest, least)[0], least)
 
     def test_P6_many_equal_readers_cost_as_one(self):
