@@ -12,6 +12,7 @@ import json
 import os
 import pathlib
 import platform
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ import time
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
 import config  # noqa: E402
+import harness  # noqa: E402
 from harness import Output, Program  # noqa: E402
 
 TOOLS = pathlib.Path(os.environ.get("PANELGATE_TOOLS", HERE.parents[3] / "shared/tools"))
@@ -187,6 +189,28 @@ def print_table(tools, folder):
               f"{'' if violations + more == 0 else f'  {violations + more} gap violations'}", flush=True)
 
 
+MEASURES = {  # what is compared: seconds of each are what a loss of 0.5 % needs to show
+    "utilisation": lambda *where: utilisation(*where, seconds=6)[0],
+    "one dead": lambda *where: with_dead(*where, 1)[0],
+    "three dead": lambda *where: with_dead(*where, 3)[0],
+    "64 equal readers": lambda *where: shared(*where, 64)[0],
+}
+
+
+def print_comparison(tools, folder, other, repeat):
+    """Each measure of this program and of `other`, turn and turn about; medians."""
+    programs = (other, harness.PANELGATE)
+    print(f"medians of {repeat}\nbaud    measure           the other  this one  ratio")
+    for baud in RATES:
+        for name, measure in MEASURES.items():
+            seen = ([], [])
+            for turn in range(2 * repeat):
+                harness.PANELGATE = programs[turn % 2]
+                seen[turn % 2].append(measure(tools, folder, baud))
+            before, now = map(statistics.median, seen)
+            print(f"{baud:<7} {name:<17} {before:<10.3f} {now:<9.3f} {now / before:.4f}", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -197,6 +221,9 @@ def main():
                         help="of these transactions (%(default)s; above it the second copy of a reply "
                              "comes when the next one is due, and cannot be told apart)")
     parser.add_argument("--lines", type=int, default=16, help="that share them (%(default)s)")
+    parser.add_argument("--against", metavar="PROGRAM",
+                        help="instead of the table: beside another panelgate, in turns")
+    parser.add_argument("--repeat", type=int, default=3, help="turns of each (%(default)s)")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         tools = build_tools(folder, options.tools)
@@ -204,7 +231,9 @@ def main():
             sys.exit(f"wire.py: there is no rtubus.cpp and mbload.cpp in {options.tools}")
         print(f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}, "
               f"{datetime.date.today()}")
-        if options.transactions is None:
+        if options.against:
+            print_comparison(tools, folder, options.against, options.repeat)
+        elif options.transactions is None:
             print_table(tools, folder)
         elif print_many(tools, folder, options.baud, options.transactions, options.lines):
             sys.exit(1)
