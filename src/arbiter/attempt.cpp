@@ -22,6 +22,7 @@ Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::siz
     timing.hole = line.reply_hole;
     timing.longest_reply = 2 * wire_time(line.serial, modbus::kMaxLongRtuAdu) + line.reply_hole;
     timing.serial = line.serial;
+    timing.steady = !line.may_stall;
     // Rates may differ by 2 %, and both ends in the same direction.
     if (line.paced) timing.tolerance = leaving * 3 / 100 + character_time(line.serial);
     return timing;
@@ -45,8 +46,26 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
+    const bool first = since_ == 0;
+    since_ += bytes.size();
+    const TimePoint latest = now - since_ * character();
+    began_ = first ? latest : std::min(began_, latest);
+    const Verdict verdict = hear(now, bytes, ends);
+    // More should have come by now: a hole, or a slower clock.
+    if (const auto busy = busy_until(); busy && *busy <= now) began_ = now - since_ * character();
+    return verdict;
+}
+
+std::optional<TimePoint> Attempt::busy_until() const {
+    const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
+    if (!timing_.steady || missing == 0) return std::nullopt;
+    return began_ + (since_ + missing) * character();
+}
+
+Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
+    if (echo_.complete() && !was_complete) began_ = now - (since_ = rest.size()) * character();
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
         lender_.emplace(group_.station, group_.request.pdu());

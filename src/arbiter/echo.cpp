@@ -44,6 +44,12 @@ ByteView EchoFilter::feed(ByteView bytes) {
     return complete_ ? bytes.subspan(taken) : ByteView(released_);
 }
 
+std::size_t EchoFilter::missing() const {
+    constexpr std::size_t kHeader = 3;  // a reply begins like the request, up to its byte count
+    if (!pending()) return 0;
+    return matched_ < kHeader ? kHeader - matched_ : frame_.size() - matched_;
+}
+
 Bytes EchoFilter::release() {
     if (!pending()) return {};
     expect_ = Expect::nothing;

@@ -10,13 +10,10 @@
 
 namespace panelgate::line {
 
-namespace asio = boost::asio;
-using boost::system::error_code;
-
-DescriptorLine::DescriptorLine(const asio::any_io_executor& executor, rt::Clock& clock,
+DescriptorLine::DescriptorLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
                                Settings settings)
     : settings_(std::move(settings)),
-      descriptor_(executor),
+      readiness_(executor, [this] { on_ready(); }),
       clock_(clock),
       next_opening_(clock.make_alarm()),
       reopen_(settings_.reopen_min, settings_.reopen_max) {}
@@ -36,28 +33,28 @@ void DescriptorLine::stop() {
 }
 
 void DescriptorLine::poll_input() {
-    if (descriptor_.is_open()) read_all();
+    if (is_open()) read_all();
 }
 
 ssize_t DescriptorLine::get(std::span<std::uint8_t> room) {
-    return ::read(descriptor_.native_handle(), room.data(), room.size());
+    return ::read(fd_, room.data(), room.size());
 }
 
-ssize_t DescriptorLine::put(ByteView bytes) {
-    return ::write(descriptor_.native_handle(), bytes.data(), bytes.size());
-}
+ssize_t DescriptorLine::put(ByteView bytes) { return ::write(fd_, bytes.data(), bytes.size()); }
 
 std::string DescriptorLine::adopt(int fd) {
-    error_code error;
-    descriptor_.assign(fd, error);
-    if (!error) return {};
-    ::close(fd);
-    return error.message();
+    std::string error = readiness_.watch(fd);
+    if (error.empty()) {
+        fd_ = fd;
+    } else {
+        ::close(fd);
+    }
+    return error;
 }
 
 void DescriptorLine::open_at(TimePoint when) {
     next_opening_->arm(when, [this] {
-        if (!descriptor_.is_open()) begin_open();
+        if (!is_open()) begin_open();
     });
 }
 
@@ -73,7 +70,6 @@ void DescriptorLine::opened() {
     if (openings_++ > 0) ++counters_.reopens;
     last_error_.clear();
     has_brought_ = false;
-    wait_readable();
     events_->on_up();
 }
 
@@ -83,7 +79,7 @@ void DescriptorLine::lost(const std::string& why) {
 }
 
 void DescriptorLine::reset(const std::string& why) {
-    if (!descriptor_.is_open()) return;
+    if (!is_open()) return;
     close(true);
     go_down(settings_.device + " is opened anew: " + why, has_brought_);
 }
@@ -105,7 +101,7 @@ void DescriptorLine::retry_later() {
 /// A device that comes changes its folder several times (node, owner, link): one attempt each
 /// 20 ms is enough, and the last change must not be missed.
 void DescriptorLine::open_soon() {
-    if (events_ == nullptr || descriptor_.is_open()) return;
+    if (events_ == nullptr || is_open()) return;
     constexpr Duration kPause = 20ms;
     const TimePoint now = clock_.now();
     const TimePoint when = std::max(now, next_try_);
@@ -115,25 +111,18 @@ void DescriptorLine::open_soon() {
 
 /// What should have left long ago is not to be sent when nobody waits for it any more.
 void DescriptorLine::close(bool discard) {
-    if (descriptor_.is_open()) close_device(discard || undelivered());
+    if (is_open()) close_device(discard || undelivered());
     unsent_.clear();
 }
 
 void DescriptorLine::close_device(bool) {
-    error_code ignored;  // close() itself may fail on an unplugged device
-    descriptor_.close(ignored);
+    readiness_.forget();
+    ::close(std::exchange(fd_, -1));
 }
 
-void DescriptorLine::wait_readable() {
-    descriptor_.async_wait(asio::posix::stream_descriptor::wait_read,
-                           [this, alive = alive_, opening = openings_](error_code error) {
-                               const auto current = [&] {
-                                   return *alive && opening == openings_ && descriptor_.is_open();
-                               };
-                               if (error == asio::error::operation_aborted || !current()) return;
-                               read_all();
-                               if (current()) wait_readable();
-                           });
+void DescriptorLine::on_ready() {
+    read_all();
+    if (is_open() && !unsent_.empty()) flush();
 }
 
 void DescriptorLine::read_all() {
@@ -145,7 +134,7 @@ void DescriptorLine::read_all() {
             counters_.bytes_received += static_cast<std::uint64_t>(n);
             if (!std::exchange(has_brought_, true)) reopen_.succeeded();
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
-            if (events_ == nullptr || !descriptor_.is_open()) return;
+            if (events_ == nullptr || !is_open()) return;
             if (static_cast<std::size_t>(n) < buffer.size()) return;
             continue;
         }
@@ -156,7 +145,7 @@ void DescriptorLine::read_all() {
 }
 
 void DescriptorLine::write(ByteView bytes) {
-    if (!descriptor_.is_open()) return;
+    if (!is_open()) return;
     if (undelivered()) return reset(takes_nothing());
     counters_.bytes_sent += bytes.size();
     unsent_.assign(bytes.begin(), bytes.end());
@@ -175,12 +164,7 @@ void DescriptorLine::flush() {
         lost(n == 0 ? "hang-up" : std::strerror(errno));
         return;
     }
-    if (unsent_.empty()) return;
-    descriptor_.async_wait(
-        asio::posix::stream_descriptor::wait_write,
-        [this, alive = alive_, opening = openings_](error_code error) {
-            if (!error && *alive && opening == openings_ && descriptor_.is_open()) flush();
-        });
+    readiness_.want_output(!unsent_.empty());
 }
 
 }  // namespace panelgate::line

@@ -2,7 +2,7 @@
 
 #include <sys/types.h>
 
-#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/any_io_executor.hpp>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +12,7 @@
 #include "panelgate/line/reopen.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/clock.hpp"
+#include "readiness.hpp"
 
 namespace panelgate::line {
 
@@ -27,6 +28,7 @@ class DescriptorLine : public Line {
     void start(Events& events) final;
     void stop() final;
     void poll_input() final;
+    void hold_input(bool hold) final { readiness_.want_input(!hold); }
     /// Resets the line when what was written before has not left (undelivered()).
     void write(ByteView bytes) override;
     bool undelivered() override { return !unsent_.empty(); }
@@ -68,8 +70,8 @@ class DescriptorLine : public Line {
     void remember(const SerialFormat& format) { settings_.serial = format; }
 
     const Settings& settings() const { return settings_; }
-    int fd() { return descriptor_.native_handle(); }
-    bool is_open() const { return descriptor_.is_open(); }
+    int fd() const { return fd_; }  ///< -1 while it is closed
+    bool is_open() const { return fd_ >= 0; }
     /// Completions outlive the line: they ask here first.
     std::shared_ptr<bool> alive() const { return alive_; }
     rt::Clock& clock() const { return clock_; }
@@ -79,21 +81,22 @@ class DescriptorLine : public Line {
     void retry_later();
     void open_at(TimePoint when);
     void close(bool discard = false);
-    void wait_readable();
+    void on_ready();
     void read_all();
     void flush();
 
     Settings settings_;
-    boost::asio::posix::stream_descriptor descriptor_;
+    int fd_ = -1;
+    Readiness readiness_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> next_opening_;
     Reopen reopen_;
     Events* events_ = nullptr;
     std::shared_ptr<bool> alive_;
-    Counters counters_;           ///< the driver's part is fetched when somebody asks
-    Bytes unsent_;                ///< what the driver did not take at once; at most one frame
-    std::uint64_t openings_ = 0;  ///< a completion of an earlier one is stale
-    bool has_brought_ = false;    ///< this opening, a byte
+    Counters counters_;  ///< the driver's part is fetched when somebody asks
+    Bytes unsent_;       ///< what the driver did not take at once; at most one frame
+    std::uint64_t openings_ = 0;
+    bool has_brought_ = false;  ///< this opening, a byte
     std::string last_error_;
     TimePoint next_try_{};  ///< open_soon() before this has to wait
 };

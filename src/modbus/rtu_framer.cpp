@@ -152,6 +152,18 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
     return result;
 }
 
+std::size_t ReplyFramer::missing() const {
+    constexpr std::size_t kHeader = 3;  // address, function, byte count or exception
+    if (starts_.empty()) return ends_with_address() ? kHeader - 1 : 0;
+    const ByteView rest = ByteView(heard_).subspan(starts_.front());
+    if (rest.size() < kHeader) return kHeader - rest.size();
+    const ReplyLength length = reply_length(rest);
+    const bool known = length.kind == ReplyLength::Kind::known;
+    const bool asked = length.kind == ReplyLength::Kind::by_silence && expected_;
+    const std::size_t whole = known ? length.length : asked ? *expected_ : 0;
+    return whole > rest.size() ? whole - rest.size() : 0;
+}
+
 bool ReplyFramer::ends_with_other_frame() const {
     if (!starts_.empty() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
     return known_reply_length(heard_) == heard_.size() && crc_ok(heard_);

@@ -1,39 +1,54 @@
 #include "panelgate/rt/asio_clock.hpp"
 
 #include <boost/asio/steady_timer.hpp>
-#include <cstdint>
+#include <memory>
 #include <utility>
 
 namespace panelgate::rt {
 namespace {
 
-/// A timer that was due when it was cancelled completes nevertheless: what was armed is known by
-/// its number.
+/// The system's timer is moved only when it must ring earlier: one that rings too early is set
+/// again, which most of them never are, because what they wait for comes first.
 class AsioAlarm final : public Alarm {
   public:
     explicit AsioAlarm(const boost::asio::any_io_executor& executor) : timer_(executor) {}
-    ~AsioAlarm() override { *armed_ = 0; }
+    ~AsioAlarm() override { *alive_ = false; }
 
     void arm(TimePoint when, Handler ring) override {
-        const std::uint64_t number = ++last_;
-        *armed_ = number;
-        timer_.expires_at(when);
-        timer_.async_wait(
-            [armed = armed_, number, ring = std::move(ring)](boost::system::error_code) {
-                if (*armed != number) return;
-                *armed = 0;
-                ring();
-            });
+        ring_ = std::move(ring);
+        when_ = when;
+        if (!waiting_ || when < timer_.expiry()) wait();
     }
     void cancel() override {
-        *armed_ = 0;
-        timer_.cancel();
+        ring_ = nullptr;
+        if (!std::exchange(waiting_, false)) return;
+        ++waits_;
+        timer_.cancel();  // a loop that has nothing else to do ends
     }
 
   private:
+    void wait() {
+        waiting_ = true;
+        const unsigned number = ++waits_;
+        timer_.expires_at(when_);
+        timer_.async_wait([this, number, alive = alive_](boost::system::error_code) {
+            if (*alive && number == waits_) on_time();
+        });
+    }
+    void on_time() {
+        waiting_ = false;
+        if (!ring_) return;
+        if (std::chrono::steady_clock::now() < when_) return wait();
+        const Handler ring = std::exchange(ring_, nullptr);
+        ring();
+    }
+
     boost::asio::steady_timer timer_;
-    std::uint64_t last_ = 0;
-    std::shared_ptr<std::uint64_t> armed_ = std::make_shared<std::uint64_t>(0);  ///< 0: nothing
+    TimePoint when_{};
+    Handler ring_;
+    unsigned waits_ = 0;    ///< a timer that was due when it was moved completes nevertheless
+    bool waiting_ = false;  ///< the system's timer is set
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
 
 }  // namespace

@@ -15,6 +15,10 @@ void HouseLine::write(ByteView bytes) {
 
 void HouseLine::come(ByteView bytes) {
     device_.insert(device_.end(), bytes.begin(), bytes.end());
+    if (!held_) wake();
+}
+
+void HouseLine::wake() {
     if (std::exchange(waking_, true)) return;
     agenda_.at(agenda_.now() + random_.between(0us, wake_), [this] {
         reach_([this] {

@@ -26,6 +26,10 @@ class HouseLine final : public line::Line {
     void poll_input() override {
         if (!deaf) read();
     }
+    void hold_input(bool hold) override {
+        held_ = hold;
+        if (!hold && !device_.empty()) wake();
+    }
     void write(ByteView bytes) override;
     const line::Counters& counters() override { return counters_; }
     void reset(const std::string& why) override { lose(50ms, why); }
@@ -38,6 +42,7 @@ class HouseLine final : public line::Line {
     bool deaf = false;  ///< broken on purpose: reads only when the loop wakes
 
   private:
+    void wake();
     void read();
 
     Agenda& agenda_;
@@ -48,6 +53,7 @@ class HouseLine final : public line::Line {
     Events* events_ = nullptr;
     Bytes device_;
     bool waking_ = false;
+    bool held_ = false;
     line::Counters counters_;
 };
 

@@ -25,6 +25,7 @@ class Subject {
         return arbiter_->poll_action();
     }
     virtual std::optional<TimePoint> next_deadline() const { return arbiter_->next_deadline(); }
+    std::optional<TimePoint> busy_until() const { return arbiter_->busy_until(); }
     virtual std::size_t queue_depth() const { return arbiter_->queue_depth(); }
     virtual void on_line_up(TimePoint now) { arbiter_->on_line_up(now); }
     virtual void on_line_down(TimePoint now) { arbiter_->on_line_down(now); }

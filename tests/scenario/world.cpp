@@ -42,11 +42,12 @@ bool World::step() {
     constexpr int kMostSpins = 1000;
     const auto next = agenda_.next();
     if (!customers_.are_waiting() && uncalled_.empty() && (!next || is_over())) return false;
-    const auto deadline = asleep_ ? std::nullopt : subject_.next_deadline();
+    const auto deadline = asleep_ ? std::nullopt : wake_at();
     if (deadline && (!next || *deadline < *next)) {
         spins_ = *deadline > now() ? 0 : spins_ + 1;
         if (spins_ > kMostSpins) checker_.on_spin();
         agenda_.advance_to(*deadline);
+        read_device();
         subject_.on_deadline(now());
         drain();
         return true;
@@ -55,6 +56,28 @@ bool World::step() {
     if (*next > now()) spins_ = 0;
     agenda_.happen_next();
     return true;
+}
+
+bool World::holds_input() const {
+    const auto busy = subject_.busy_until();
+    return busy && *busy > now();
+}
+
+/// The alarm: the arbiter's deadline, or when what lies in the device is to be read.
+std::optional<TimePoint> World::wake_at() const {
+    const auto deadline = subject_.next_deadline();
+    if (!holds_input()) return deadline;
+    const TimePoint busy = *subject_.busy_until();
+    return deadline ? std::min(*deadline, busy) : busy;
+}
+
+/// Before any verb.
+void World::read_device() {
+    const Bytes bytes = std::exchange(unread_, {});
+    if (bytes.empty()) return;
+    agenda_.tell("read", bytes);
+    subject_.on_rx(now(), bytes);
+    drain();
 }
 
 /// Behind every verb.
@@ -70,6 +93,7 @@ void World::reach(std::function<void()> call) {
         uncalled_.push_back(std::move(call));
         return;
     }
+    read_device();
     call();
     drain();
     checker_.on_settled();
@@ -116,8 +140,9 @@ void World::hear(ByteView bytes, bool answered) {
         checker_.on_heard(now(), bytes.size());
     }
     agenda_.tell(answered ? "heard, the answer's end" : "heard", bytes);
-    subject_.on_rx(now(), bytes);
-    drain();
+    const bool hold = holds_input();
+    unread_.insert(unread_.end(), bytes.begin(), bytes.end());
+    if (!hold) read_device();
 }
 
 void World::ask_panels(ByteView adu, std::uint64_t connection) {
@@ -197,12 +222,8 @@ void World::resume() {
     asleep_ = false;
     checker_.on_paused(asleep_from_, now());
     agenda_.tell("the process goes on, with", unread_);
-    const Bytes bytes = std::exchange(unread_, {});
-    if (!bytes.empty()) {
-        checker_.on_heard(now(), bytes.size());
-        subject_.on_rx(now(), bytes);
-        drain();
-    }
+    if (!unread_.empty()) checker_.on_heard(now(), unread_.size());
+    read_device();
     subject_.on_deadline(now());
     drain();
     for (const auto& call : std::exchange(uncalled_, {})) reach(call);

@@ -34,6 +34,9 @@ class World {
   private:
     bool step();
     bool call_deadline();
+    bool holds_input() const;
+    std::optional<TimePoint> wake_at() const;
+    void read_device();
     void drain();
     void act(const arbiter::Transmit& transmit);
     void act(const arbiter::Finish& finish);
@@ -74,7 +77,7 @@ class World {
     FrameKind what_next_ = FrameKind::request;  ///< the note of the frame that is transmitted next
     bool asleep_ = false;                       ///< nobody calls the arbiter
     TimePoint asleep_from_{};
-    Bytes unread_;  ///< what has come meanwhile
+    Bytes unread_;  ///< what has come, and lies in the device
     std::vector<std::function<void()>> uncalled_;
     int spins_ = 0;  ///< deadlines in a row that did not move time
 };

@@ -92,6 +92,12 @@ class Arbiter {
     /// When to call on_deadline next; nothing when only an event can change anything.
     std::optional<TimePoint> next_deadline() const;
 
+    /// Input that comes before then changes nothing: a reply has begun, and its rest takes as long.
+    /// Whoever drives the line need not look at each byte. Nothing: all input is wanted at once.
+    std::optional<TimePoint> busy_until() const {
+        return active_ && !active_->is_broadcast() ? active_->busy_until() : std::nullopt;
+    }
+
     std::size_t queue_depth() const { return schedule_.backlog().queue().size(); }
     /// Nothing waits and no client's request is on the wire.
     bool idle() const {

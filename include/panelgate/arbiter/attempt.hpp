@@ -41,6 +41,7 @@ class Attempt {
         /// A reply cannot begin more than this before `sent`; nothing: the line is no real UART.
         std::optional<Duration> tolerance;
         SerialFormat serial;
+        bool steady = false;       ///< bytes come one by one, at the line's rate
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
@@ -59,6 +60,11 @@ class Attempt {
     TimePoint deadline() const;
     /// A broadcast is over when its last bit has left.
     bool is_broadcast() const { return group_.station == 0; }
+
+    /// Bytes that come before then tell nothing: what may be the reply (or our echo) has begun, and
+    /// the rest of its header, or of all of it, takes as long at the line's rate. Who waits needs
+    /// not look at each. Nothing: every byte may tell something.
+    std::optional<TimePoint> busy_until() const;
 
     bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
     TimePoint end_wanted_at() const { return end_confirmed_ ? TimePoint::max() : timing_.sent; }
@@ -126,6 +132,8 @@ class Attempt {
 
   private:
     void drop_what_ended(TimePoint now, std::size_t size);
+    Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
+    Duration character() const { return character_time(timing_.serial); }
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
     bool may_be_echo(ByteView reply) const;
@@ -156,6 +164,8 @@ class Attempt {
     TimePoint first_byte_;
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
+    TimePoint began_;        ///< what is heard, if the line has kept its rate since
+    std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;
     bool disturbed_ = false;
     bool fragment_ = false;

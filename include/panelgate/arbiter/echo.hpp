@@ -29,6 +29,8 @@ class EchoFilter {
 
     /// Bytes are held back that may still turn out not to be the echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
+    /// ... and how many at least have to come until that shows. 0: none are held back.
+    std::size_t missing() const;
     /// It watches for the echo, as long as nothing else has come.
     bool expected() const { return expect_ != Expect::nothing; }
     /// The frame that it watches for: the one sent last.

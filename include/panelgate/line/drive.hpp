@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -16,6 +17,8 @@ namespace panelgate::line {
 /// due or asked are never taken for what came behind it.
 ///
 /// Machine: `poll_action()` gives an optional variant, `next_deadline()` an optional TimePoint.
+/// `busy_until()`, where it has one, too: input that comes before then changes nothing and wakes
+/// nobody.
 /// Host acts for it: `act(action)` for each alternative, `on_deadline(now)` when the machine's
 /// deadline has come, `settled(now)` when it wants nothing more for now.
 ///
@@ -41,11 +44,15 @@ class Drive {
     }
     /// The alarm rings no more, until the next verb.
     void rest() {
-        armed_.reset();
-        alarm_->cancel();
+        line_.hold_input(false);
+        silence();
     }
 
   private:
+    void silence() {
+        armed_.reset();
+        alarm_->cancel();
+    }
     void drain() {
         if (draining_) return;
         draining_ = true;
@@ -53,13 +60,20 @@ class Drive {
             std::visit([this](auto& one) { host_.act(one); }, *action);
         }
         draining_ = false;
-        host_.settled(clock_.now());
-        arm();
+        const TimePoint now = clock_.now();
+        host_.settled(now);
+        arm(now);
     }
-    void arm() {
-        const std::optional<TimePoint> next = machine_.next_deadline();
+    void arm(TimePoint now) {
+        std::optional<TimePoint> next = machine_.next_deadline();
+        if constexpr (requires { machine_.busy_until(); }) {
+            const std::optional<TimePoint> busy = machine_.busy_until();
+            const bool hold = busy && *busy > now;
+            if (hold) next = next ? std::min(*next, *busy) : *busy;
+            line_.hold_input(hold);
+        }
         if (next == armed_) return;
-        if (!next) return rest();
+        if (!next) return silence();
         armed_ = next;
         alarm_->arm(*next, [this] {
             armed_.reset();

@@ -30,6 +30,9 @@ class Line {
     virtual void stop() = 0;
     /// Hands all bytes that have arrived already to on_bytes, now.
     virtual void poll_input() = 0;
+    /// Input waits for poll_input(), which somebody will call, until this is taken back: it need
+    /// not wake anybody. A line that cannot keep it hands it over all the same.
+    virtual void hold_input(bool hold) { static_cast<void>(hold); }
     /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
     virtual const Counters& counters() = 0;

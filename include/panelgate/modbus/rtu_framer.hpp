@@ -62,6 +62,9 @@ class ReplyFramer {
     /// ... and its length is known, or will be by its own first bytes: a silence inside is only a
     /// hole.
     bool knows_length() const { return starts_.empty() ? ends_with_address() : open_length_; }
+    /// How many bytes have to come at least until what may be the reply tells more: its header, or
+    /// all of it. 0: every byte may tell.
+    std::size_t missing() const;
     /// The reply is there, but it may be a part of another frame that is not whole yet: a silence
     /// of its length tells.
     bool is_inside() const { return inside_; }
