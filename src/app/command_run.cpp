@@ -17,6 +17,7 @@
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/rt/punctual.hpp"
 #include "run_loop.hpp"
 
 namespace panelgate::app {
@@ -43,6 +44,8 @@ ExitCode serve(config::Config config, bool simulate,
     rt::set_up_log(config.log);
     for (const std::string& warning : config.warnings)
         rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
+    for (const std::string& refused : rt::be_punctual(config.realtime))
+        rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
     fit_to_descriptors(config);
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());

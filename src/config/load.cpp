@@ -39,6 +39,17 @@ void load_log(Loading& loading, MapReader& root) {
     in.finish();
 }
 
+void load_realtime(Loading& loading, MapReader& root) {
+    const yaml::Node* node = root.map("realtime", "{priority: 20, lock_memory: true}");
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "realtime");
+    rt::RealtimeSettings& realtime = loading.config.realtime;
+    if (const auto priority = in.integer("priority", 0, 99))
+        realtime.priority = static_cast<int>(*priority);
+    realtime.lock_memory = in.boolean("lock_memory").value_or(false);
+    in.finish();
+}
+
 /// The shipped profiles, with those of profiles_dir added or in their place.
 std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
@@ -68,6 +79,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_modbus_tcp(loading, root);
     load_http(loading, root);
     load_log(loading, root);
+    load_realtime(loading, root);
     load_relays(loading, root);
     const yaml::Node* listeners = root.child("modbus_tcp");
     const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&

@@ -49,6 +49,7 @@ struct Config {
     std::vector<tcp_server::Settings> modbus_tcp;
     std::optional<web::Settings> http;
     rt::LogSettings log;
+    rt::RealtimeSettings realtime;
     /// Things that are legal but worth a word ("8N1 is outside the standard"), FILE:LINE:COLUMN
     /// text.
     std::vector<std::string> warnings;

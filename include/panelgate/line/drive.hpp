@@ -75,7 +75,7 @@ class Drive {
         if (next == armed_) return;
         if (!next) return silence();
         armed_ = next;
-        alarm_->arm(*next, [this] {
+        alarm_->arm_sharp(*next, [this] {
             armed_.reset();
             tell([this](TimePoint now) { host_.on_deadline(now); });
         });

@@ -5,6 +5,7 @@
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/lead_time.hpp"
 
 namespace panelgate::rt {
 
@@ -19,6 +20,7 @@ class AsioClock final : public Clock {
 
   private:
     boost::asio::any_io_executor executor_;
+    LeadTime lead_;  ///< of all alarms: they ring from one loop
 };
 
 }  // namespace panelgate::rt

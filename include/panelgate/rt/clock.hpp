@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <utility>
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/wall_time.hpp"
@@ -19,6 +20,8 @@ class Alarm {
     virtual ~Alarm() = default;
     /// A time that has passed rings as soon as the loop runs.
     virtual void arm(TimePoint when, Handler ring) = 0;
+    /// As arm(), and not late by what waking up takes: for what is due on the wire.
+    virtual void arm_sharp(TimePoint when, Handler ring) { arm(when, std::move(ring)); }
     virtual void cancel() = 0;
 };
 

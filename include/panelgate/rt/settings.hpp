@@ -13,4 +13,10 @@ struct LogSettings {
     LogFormat format = LogFormat::text;
 };
 
+/// What the machine is asked to do for punctual frames.
+struct RealtimeSettings {
+    int priority = 0;          ///< 1..99: first in, first out (SCHED_FIFO); 0: as all programs
+    bool lock_memory = false;  ///< nothing is ever read back from a disk (mlockall)
+};
+
 }  // namespace panelgate::rt

@@ -30,6 +30,26 @@ TEST_F(AsioClockTest, RingsOnceNotBeforeItsTimeAndNotFromInside) {
     EXPECT_GE(clock.now(), when);
 }
 
+TEST_F(AsioClockTest, ASharpAlarmRingsNeverBeforeItsTimeEither) {
+    for (int i = 0; i < 50; ++i) {
+        const TimePoint when = clock.now() + 300us;
+        bool early = false;
+        alarm->arm_sharp(when, [&] { early = clock.now() < when; });
+        io.restart();
+        io.run();
+        EXPECT_FALSE(early);
+    }
+}
+
+TEST_F(AsioClockTest, WhatIsArmedForLaterRingsOnceAndThen) {
+    const TimePoint later = clock.now() + 3ms;
+    alarm->arm(clock.now() + 1ms, ring("a"));
+    alarm->arm(later, ring("b"));
+    io.run();
+    EXPECT_EQ(rung, "b");
+    EXPECT_GE(clock.now(), later);
+}
+
 TEST_F(AsioClockTest, ATimeThatHasPassedRingsFromTheLoop) {
     alarm->arm(clock.now() - 1h, ring("a"));
     EXPECT_EQ(rung, "");
