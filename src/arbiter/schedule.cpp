@@ -192,9 +192,9 @@ void Schedule::retry(Group group, Duration patience) {
     if (first) let_others_go_first();
 }
 
-std::vector<Job> Schedule::give_back(Group& group) {
+Jobs Schedule::give_back(Group& group) {
     for (Job& job : sharing_.split(group)) backlog_.queue().put_back(std::move(job));
-    std::vector<Job> gone;
+    Jobs gone;
     std::ranges::copy_if(group.jobs, std::back_inserter(gone), &Job::gone);
     std::erase_if(group.jobs, [](const Job& job) { return job.gone; });
     return gone;

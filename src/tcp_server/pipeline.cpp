@@ -115,7 +115,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units));
 }
 
-void Pipeline::answer(const modbus::Adu& adu, std::function<Bytes()> pdu) {
+void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
     if (shared_->own_answers->may_give()) return replies_.push(adu.transaction, adu.unit, pdu());
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {

@@ -6,11 +6,12 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
+
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate {
 
-using Bytes = std::vector<std::uint8_t>;
+using Bytes = PoolVector<std::uint8_t>;
 using ByteView = std::span<const std::uint8_t>;
 
 /// Reads big-endian fields from bytes it does not own. Reading past the end yields 0 and makes the
