@@ -8,15 +8,23 @@ namespace panelgate::bus {
 Answers::Answers(boost::asio::any_io_executor executor)
     : executor_(std::move(executor)), waiting_(std::make_shared<Waiting>()) {}
 
-void Answers::add(Handed handed) {
+void Answers::add(Handed handed, bool soon) {
     waiting_->next.push_back(std::move(handed));
-    if (std::exchange(waiting_->posted, true)) return;
-    boost::asio::post(executor_, [waiting = waiting_] { waiting->hand_over(); });
+    if ((soon && waiting_->leaving.empty()) || std::exchange(waiting_->posted, true)) return;
+    boost::asio::post(executor_, [waiting = waiting_] {
+        waiting->posted = false;
+        waiting->hand_over();
+    });
+}
+
+void Answers::hand_over() {
+    const std::shared_ptr<Waiting> waiting = waiting_;  // a handler may end this
+    waiting->hand_over();
 }
 
 /// A handler may hold the last of its owner: it ends before the next one is called.
 void Answers::Waiting::hand_over() {
-    posted = false;
+    if (!leaving.empty()) return;
     leaving.swap(next);
     for (Handed& one : leaving) {
         Handed now = std::move(one);

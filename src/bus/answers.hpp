@@ -14,14 +14,16 @@ struct Handed {
     Answer answer;
 };
 
-/// Hands answers over from the loop, in their order, all that there are in one turn of it. What an
-/// answer leads to is answered in a later turn.
+/// Hands answers over in their order, all that there are at a time, and never from inside the call
+/// of somebody who asks.
 class Answers {
   public:
     /// What has not been handed over when it ends is handed over all the same.
     explicit Answers(boost::asio::any_io_executor executor);
 
-    void add(Handed handed);
+    /// `soon`: whoever adds it is called by the loop, and hand_over() follows. Else it is posted.
+    void add(Handed handed, bool soon);
+    void hand_over();
 
   private:
     struct Waiting {

@@ -85,6 +85,14 @@ struct Bus::State final : public line::Line::Events {
     void settled(TimePoint now) {
         load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, arbiter, *line);
+        if (calls == 0) answers.hand_over();
+    }
+    /// Somebody calls: whatever it leads to, nobody is answered before it ends.
+    template <class Verb>
+    void call(Verb verb) {
+        ++calls;
+        verb();
+        --calls;
     }
     void answer(Pending pending, Answer answer);
     void observe(const BusEvent& event) const {
@@ -108,6 +116,7 @@ struct Bus::State final : public line::Line::Events {
     Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
+    int calls = 0;  ///< of those who ask, under way
     bool up = false;
     std::uint64_t ups = 0;  ///< how often the line came up
     std::string why_down = "not opened yet";
@@ -249,7 +258,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     if (refused) {
         refusals.add(std::move(handed));
     } else {
-        answers.add(std::move(handed));
+        answers.add(std::move(handed), calls == 0);
     }
 }
 
@@ -269,20 +278,25 @@ Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
 
 Bus::~Bus() { stop(); }
 
-void Bus::start() { state_->line->start(*state_); }
+void Bus::start() {
+    state_->call([this] { state_->line->start(*state_); });
+}
 
 void Bus::stop() {
-    state_->line->stop();
-    state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
-    state_->drive.rest();
+    state_->call([this] {
+        state_->line->stop();
+        state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
+        state_->drive.rest();
+    });
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {
-    state_->transact(std::move(request), std::move(handler));
+    state_->call([&] { state_->transact(std::move(request), std::move(handler)); });
 }
 
 void Bus::cancel(ClientId client) {
-    state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); });
+    state_->call(
+        [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
 }
 
 void Bus::name_client(ClientId client, std::string name) {
