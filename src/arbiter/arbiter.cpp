@@ -213,8 +213,8 @@ void Arbiter::start(TimePoint now, Group group) {
     if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
-    const EchoFilter echo(adu, echo_memory_.expect(group.request));
-    active_.emplace(std::move(group), timing, echo);
+    EchoFilter echo(adu, echo_memory_.expect(group.request));
+    active_.emplace(std::move(group), timing, std::move(echo));
     ledger_.transmit(now, *active_, std::move(adu), std::move(why));
 }
 

@@ -128,8 +128,9 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return may(job) && stations.may_spend(now, job.station);
     };
     // Who fails again and again waits for its share only while others want the line.
-    const JobQueue::Test& test = backlog_.queue().peek(in_budget) != nullptr ? in_budget : may;
-    const Job* next = backlog_.queue().peek(test);
+    const Job* next = backlog_.queue().peek(in_budget);
+    const JobQueue::Test& test = next != nullptr ? in_budget : may;
+    if (next == nullptr) next = backlog_.queue().peek(may);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))

@@ -39,6 +39,8 @@ class Reader {
 /// Appends big-endian fields.
 class Writer {
   public:
+    /// `expected`: bytes; more are taken, too.
+    explicit Writer(std::size_t expected = 16) { bytes_.reserve(expected); }
     Writer& u8(unsigned value);
     Writer& u16(unsigned value);
     Writer& raw(ByteView bytes);
