@@ -11,10 +11,11 @@
 
 namespace panelgate::test {
 
-/// A line whose panels answer everything well, a little later.
+/// A line whose panels answer everything well, after a while.
 class AnsweringLine final : public line::Line {
   public:
-    explicit AnsweringLine(rt::Clock& clock) : clock_(clock), replied_(clock.make_alarm()) {}
+    AnsweringLine(rt::Clock& clock, Duration think)
+        : clock_(clock), think_(think), replied_(clock.make_alarm()) {}
 
     void start(Events& events) override {
         events_ = &events;
@@ -28,7 +29,7 @@ class AnsweringLine final : public line::Line {
     void write(ByteView bytes) override {
         ++sent;
         reply_ = reply_to(bytes);
-        replied_->arm(clock_.now() + 1ms, [this] { events_->on_bytes(reply_); });
+        replied_->arm(clock_.now() + think_, [this] { events_->on_bytes(reply_); });
     }
     const line::Counters& counters() override { return counters_; }
 
@@ -36,6 +37,7 @@ class AnsweringLine final : public line::Line {
 
   private:
     rt::Clock& clock_;
+    Duration think_;
     std::unique_ptr<rt::Alarm> replied_;
     Events* events_ = nullptr;
     Bytes reply_;

@@ -41,7 +41,7 @@ class BusAllocations : public testing::Test {
     void SetUp() override {
         if (!test::counts_allocations()) GTEST_SKIP() << "the heap is not ours";
         bus = std::make_unique<Bus>(io.get_executor(), clock, settings(),
-                                    std::make_unique<test::AnsweringLine>(clock));
+                                    std::make_unique<test::AnsweringLine>(clock, 1ms));
         bus->start();
     }
     void ask(ClientId client) {
