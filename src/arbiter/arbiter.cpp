@@ -209,13 +209,13 @@ void Arbiter::start(TimePoint now, Group group) {
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
     ledger_.written(group, false);
-    std::string why;
+    Reason why;
     if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
-    const EchoFilter echo(adu, echo_memory_.expect(group.request));
-    active_.emplace(std::move(group), timing, echo);
-    ledger_.transmit(now, *active_, std::move(adu), why);
+    EchoFilter echo(adu, echo_memory_.expect(group.request));
+    active_.emplace(std::move(group), timing, std::move(echo));
+    ledger_.transmit(now, *active_, std::move(adu), std::move(why));
 }
 
 std::optional<TimePoint> Arbiter::next_deadline() const {

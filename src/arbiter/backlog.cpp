@@ -7,7 +7,7 @@ namespace panelgate::arbiter {
 
 namespace {
 
-void append(std::vector<Job>& jobs, std::vector<Job> more) {
+void append(Jobs& jobs, Jobs more) {
     jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
 }
 
@@ -22,7 +22,7 @@ bool Backlog::has(Client client, std::uint8_t station) const {
            });
 }
 
-std::optional<Group> Backlog::take_retry(const std::function<bool(const Group&)>& may_go) {
+std::optional<Group> Backlog::take_retry(const InlineFunction<bool(const Group&), 48>& may_go) {
     const auto next = std::ranges::find_if(retries_, may_go);
     if (next == retries_.end()) return std::nullopt;
     Group group = std::move(*next);
@@ -30,12 +30,12 @@ std::optional<Group> Backlog::take_retry(const std::function<bool(const Group&)>
     return group;
 }
 
-void Backlog::each_retry(const std::function<void(const Group&)>& show) const {
+void Backlog::each_retry(const InlineFunction<void(const Group&), 48>& show) const {
     for (const Group& group : retries_) show(group);
 }
 
-std::vector<Job> Backlog::remove_retries(const JobQueue::Test& match) {
-    std::vector<Job> removed;
+Jobs Backlog::remove_retries(const JobQueue::Test& match) {
+    Jobs removed;
     for (auto group = retries_.begin(); group != retries_.end();) {
         std::ranges::copy_if(group->jobs, std::back_inserter(removed), match);
         std::erase_if(group->jobs, match);
@@ -50,15 +50,15 @@ std::vector<Job> Backlog::remove_retries(const JobQueue::Test& match) {
     return removed;
 }
 
-std::vector<Job> Backlog::cancel(Client client) {
+Jobs Backlog::cancel(Client client) {
     const auto theirs = [&](const Job& job) { return job.client == client; };
-    std::vector<Job> removed = queue_.remove_if(theirs);
+    Jobs removed = queue_.remove_if(theirs);
     append(removed, remove_retries(theirs));
     return removed;
 }
 
-std::vector<Job> Backlog::expire(TimePoint now) {
-    std::vector<Job> removed = remove_retries([&](const Job& job) { return job.deadline <= now; });
+Jobs Backlog::expire(TimePoint now) {
+    Jobs removed = remove_retries([&](const Job& job) { return job.deadline <= now; });
     const auto first = queue_.first_expiry();
     if (!first || now < *first) return removed;
     append(removed, queue_.remove_if([&](const Job& job) { return job.start_by <= now; }));
@@ -75,9 +75,9 @@ std::optional<TimePoint> Backlog::first_expiry() const {
     return first;
 }
 
-std::vector<Job> Backlog::clear() {
+Jobs Backlog::clear() {
     const auto all = [](const Job&) { return true; };
-    std::vector<Job> removed = remove_retries(all);
+    Jobs removed = remove_retries(all);
     append(removed, queue_.remove_if(all));
     dropped_.clear();
     return removed;

@@ -1,6 +1,7 @@
 #include "explain.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace panelgate::arbiter::explain {
 namespace {
@@ -11,30 +12,48 @@ std::string ms(Duration duration) {
 }
 
 /// "read of modbus_tcp 10.0.0.5:50012 to station 17"; who polls is called after what it polls.
-std::string who(const Job& job, const ClientNames& names) {
-    const std::string name = names.of(job.client);
-    const std::string own = std::string(label(job.priority)) + " of ";
+std::string who(PriorityClass priority, const std::string& name, std::uint8_t station) {
+    const std::string own = std::string(label(priority)) + " of ";
     if (name.starts_with(own)) return name;
-    return own + name + " to station " + std::to_string(job.station);
+    return own + name + " to station " + std::to_string(station);
+}
+std::string who(const Job& job, const ClientNames& names) {
+    return who(job.priority, names.of(job.client), job.station);
+}
+
+/// Of a request that is sent.
+std::string turn(const Reason& reason) {
+    const std::string text =
+        who(reason.priority, ClientNames::words(reason.client), reason.station) + ": ";
+    if (reason.kind == Reason::Kind::again)
+        return text + "attempt " + std::to_string(reason.attempt);
+    return text + "next in turn after " + ms(reason.waited) + ", " +
+           std::to_string(reason.waiting) + " wait" +
+           (reason.passed_over ? ", ahead of a higher class that has had its turns" : "") +
+           (reason.answers > 1 ? ", answers " + std::to_string(reason.answers) + " requests in one"
+                               : "");
 }
 
 }  // namespace
 
-std::string start(TimePoint now, const Group& group, const JobQueue& queue,
-                  const ClientNames& names) {
-    if (group.learns_for != 0)
-        return "a write is next and nobody knows whether this line has an echo";
-    if (group.probe) return "the station is offline and its probe is due";
-    const Job& leader = group.jobs.front();
-    std::string text = who(leader, names) + ": ";
-    if (group.attempts > 1) return text + "attempt " + std::to_string(group.attempts);
-    text += "next in turn after " + ms(now - leader.arrived) + ", " +
-            std::to_string(queue.waiting()) + " wait";
-    if (queue.last_was_passed_over()) text += ", ahead of a higher class that has had its turns";
-    if (group.jobs.size() > 1) {
-        text += ", answers " + std::to_string(group.jobs.size()) + " requests in one";
+Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names) {
+    Reason reason;
+    if (group.learns_for != 0 || group.probe) {
+        const bool learns = group.learns_for != 0;
+        reason.kind = learns ? Reason::Kind::learns_echo : Reason::Kind::probe;
+        return reason;
     }
-    return text;
+    const Job& leader = group.jobs.front();
+    reason.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn;
+    reason.priority = leader.priority;
+    reason.station = leader.station;
+    reason.passed_over = queue.last_was_passed_over();
+    reason.attempt = group.attempts;
+    reason.waited = now - leader.arrived;
+    reason.waiting = queue.waiting();
+    reason.answers = group.jobs.size();
+    reason.client = names.name(leader.client);
+    return reason;
 }
 
 std::string offline(TimePoint now, const Job& job, const StationHealth& health,
@@ -67,3 +86,22 @@ std::string expired(TimePoint now, const Job& job, bool transmitted, const Clien
 }
 
 }  // namespace panelgate::arbiter::explain
+
+namespace panelgate::arbiter {
+
+std::string text_of(const Reason& reason) {
+    switch (reason.kind) {
+        case Reason::Kind::none:
+            return "";
+        case Reason::Kind::learns_echo:
+            return "a write is next and nobody knows whether this line has an echo";
+        case Reason::Kind::probe:
+            return "the station is offline and its probe is due";
+        case Reason::Kind::again:
+        case Reason::Kind::turn:
+            return explain::turn(reason);
+    }
+    std::abort();
+}
+
+}  // namespace panelgate::arbiter

@@ -5,6 +5,7 @@
 #include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/reason.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 
@@ -12,8 +13,7 @@
 /// read it.
 namespace panelgate::arbiter::explain {
 
-std::string start(TimePoint now, const Group& group, const JobQueue& queue,
-                  const ClientNames& names);
+Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names);
 std::string offline(TimePoint now, const Job& job, const StationHealth& health,
                     const ClientNames& names);
 std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,

@@ -12,7 +12,7 @@ constexpr auto kWrite = static_cast<std::size_t>(PriorityClass::write);
 constexpr auto kRead = static_cast<std::size_t>(PriorityClass::read);
 constexpr auto kPoll = static_cast<std::size_t>(PriorityClass::poll);
 
-void sort_by_ticket(std::vector<Job>& jobs) { std::ranges::sort(jobs, {}, &Job::ticket); }
+void sort_by_ticket(Jobs& jobs) { std::ranges::sort(jobs, {}, &Job::ticket); }
 
 }  // namespace
 
@@ -117,11 +117,11 @@ void JobQueue::to_the_end(const Place& place, std::size_t rank) {
     move(source.rounds, source.lanes.at(place.station).turns);
 }
 
-std::vector<Job> JobQueue::take_all(std::uint8_t station, const Test& wanted) {
-    std::vector<Job> taken;
+Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
+    Jobs taken;
     for (bool again = true; again;) {
         again = false;
-        std::map<Ticket, Place> places;
+        PoolMap<Ticket, Place> places;
         for (const auto& [host, origin] : hosts_) {
             for (const auto& [client, source] : origin.sources) {
                 const auto lane = source.lanes.find(station);
@@ -150,8 +150,8 @@ bool JobQueue::has_first(const Place& place) const {
            in_order(source->second, place.station);
 }
 
-std::vector<Job> JobQueue::remove_if(const Test& match) {
-    std::vector<std::pair<Place, std::size_t>> found;
+Jobs JobQueue::remove_if(const Test& match) {
+    PoolVector<std::pair<Place, std::size_t>> found;
     for (const auto& [host, origin] : hosts_) {
         for (const auto& [client, source] : origin.sources) {
             for (const auto& [station, lane] : source.lanes) {
@@ -162,14 +162,14 @@ std::vector<Job> JobQueue::remove_if(const Test& match) {
             }
         }
     }
-    std::vector<Job> removed;
+    Jobs removed;
     for (auto it = found.rbegin(); it != found.rend(); ++it)
         removed.push_back(take(it->first, it->second));
     sort_by_ticket(removed);
     return removed;
 }
 
-void JobQueue::each_first(const std::function<void(const Job&)>& show) const {
+void JobQueue::each_first(const Show& show) const {
     for (const auto& [host, origin] : hosts_) {
         for (const auto& [client, source] : origin.sources) {
             for (const auto& [station, lane] : source.lanes) {

@@ -49,7 +49,11 @@ void JobQueue::insert(Entry entry) {
     }
     auto at = lane.jobs.end();
     while (at != lane.jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
-    lane.jobs.insert(at, std::move(entry));
+    if (at == lane.jobs.end()) {
+        lane.jobs.push_back(std::move(entry));
+    } else {
+        lane.jobs.insert(at, std::move(entry));
+    }
     enlist(place);
 }
 

@@ -22,7 +22,7 @@ JobQueue::Admission JobQueue::push(Job job) {
 
 /// When the victim carried others, these count in its place and may have to go as well. Tried on a
 /// copy: either there is room in the end, or nothing changes.
-bool JobQueue::make_room(const Job& newcomer, std::vector<Job>& shed) {
+bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
     const auto first = find_victim(newcomer);
     if (!first) return false;
     if (first->merit.makes_room) {

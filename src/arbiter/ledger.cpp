@@ -57,7 +57,7 @@ StationCounters& Ledger::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[kUnlisted] : found->second;
 }
 
-void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, std::string why) {
+void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Reason why) {
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
@@ -96,7 +96,7 @@ void Ledger::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
     const TimePoint end = std::max({timing.sent, attempt.last_byte(), std::min(now, longest)});
     const Duration busy = end - timing.started + gap;
     line_.busy += busy;
-    const std::vector<Job>& jobs = attempt.group().jobs;
+    const Jobs& jobs = attempt.group().jobs;
     for (const Job& job : jobs) {
         if (!job.gone) shares_.add(job.client, busy / static_cast<int>(jobs.size()));
     }

@@ -128,8 +128,9 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
         return may(job) && stations.may_spend(now, job.station);
     };
     // Who fails again and again waits for its share only while others want the line.
-    const JobQueue::Test& test = backlog_.queue().peek(in_budget) != nullptr ? in_budget : may;
-    const Job* next = backlog_.queue().peek(test);
+    const Job* next = backlog_.queue().peek(in_budget);
+    const JobQueue::Test& test = next != nullptr ? in_budget : may;
+    if (next == nullptr) next = backlog_.queue().peek(may);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
     if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
@@ -192,9 +193,9 @@ void Schedule::retry(Group group, Duration patience) {
     if (first) let_others_go_first();
 }
 
-std::vector<Job> Schedule::give_back(Group& group) {
+Jobs Schedule::give_back(Group& group) {
     for (Job& job : sharing_.split(group)) backlog_.queue().put_back(std::move(job));
-    std::vector<Job> gone;
+    Jobs gone;
     std::ranges::copy_if(group.jobs, std::back_inserter(gone), &Job::gone);
     std::erase_if(group.jobs, [](const Job& job) { return job.gone; });
     return gone;

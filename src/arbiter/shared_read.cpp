@@ -12,7 +12,7 @@ Bytes slice_reply(const modbus::Span& whole, ByteView reply, const modbus::Span&
     const std::size_t first = part.first - whole.first;
     const modbus::Function function = modbus::read_function(part.table);
     if (!modbus::is_bit_table(part.table)) {
-        Writer out;
+        Writer out(2 + std::size_t{2} * part.count);
         out.u8(function).u8(2 * part.count);
         return out.raw(reply.subspan(2 + 2 * first, std::size_t{2} * part.count)).take();
     }

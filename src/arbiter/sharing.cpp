@@ -52,13 +52,13 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
     });
 }
 
-std::vector<Job> Sharing::split(Group& group) {
+Jobs Sharing::split(Group& group) {
     const auto stays = [&](const Job& job) { return job.request == group.request || job.gone; };
     if (group.joined()) {
         if (refused_.size() >= kRemembered) refused_.pop_front();
         refused_.push_back({group.station, *group.span});
     }
-    std::vector<Job> parts;
+    Jobs parts;
     for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
         if (stays(*job)) continue;
         job->alone = true;

@@ -1,11 +1,13 @@
 #include "panelgate/bus/bus.hpp"
 
-#include <boost/asio/post.hpp>
 #include <utility>
 
+#include "answers.hpp"
 #include "client_shares.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/reason.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"
@@ -14,6 +16,7 @@
 #include "refusals.hpp"
 #include "request_counters.hpp"
 #include "station_events.hpp"
+#include "wall.hpp"
 #include "write_log.hpp"
 
 namespace panelgate::bus {
@@ -52,6 +55,8 @@ struct Bus::State final : public line::Line::Events {
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
+          wall(clock),
+          answers(executor),
           drive(clock, *line, arbiter, *this) {}
 
     void on_up() override;
@@ -80,11 +85,16 @@ struct Bus::State final : public line::Line::Events {
     void settled(TimePoint now) {
         load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, arbiter, *line);
+        if (calls == 0) answers.hand_over();
+    }
+    /// Somebody calls: whatever it leads to, nobody is answered before it ends.
+    template <class Verb>
+    void call(Verb verb) {
+        ++calls;
+        verb();
+        --calls;
     }
     void answer(Pending pending, Answer answer);
-    WallTime on_the_wall(TimePoint at) const {
-        return wall_time_of(at, clock.now(), rt::wall_now());
-    }
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
@@ -102,8 +112,11 @@ struct Bus::State final : public line::Line::Events {
     LineDoctor doctor;
     LoadMeter load;
     Refusals refusals;
+    Wall wall;
+    Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
-    std::map<arbiter::Ticket, Pending> pending;
+    PoolMap<arbiter::Ticket, Pending> pending;
+    int calls = 0;  ///< of those who ask, under way
     bool up = false;
     std::uint64_t ups = 0;  ///< how often the line came up
     std::string why_down = "not opened yet";
@@ -140,7 +153,7 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
-    entry.deed = deed_of(request, arbiter.client_names().of(request.client));
+    entry.deed = deed_of(request, arbiter.client_names());
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -191,15 +204,15 @@ void Bus::State::act(arbiter::Note& note) {
                 {{"line", settings.name},
                  {"what", std::string(label(note.kind))},
                  {"bytes", to_hex(note.bytes)},
-                 {"why", note.why}});
+                 {"why", text_of(note.why)}});
     }
-    TraceFrame frame;
+    RecordedFrame frame;
     frame.sequence = ++happened;
     frame.at = note.at;
     frame.kind = note.kind;
     frame.bytes = std::move(note.bytes);
     frame.why = std::move(note.why);
-    frame.time = on_the_wall(note.at);
+    frame.time = wall.at(note.at);
     recorder.add(std::move(frame));
 }
 
@@ -207,7 +220,7 @@ void Bus::State::act(arbiter::Decision& decision) {
     if (rt::log_enabled(rt::LogLevel::trace)) {
         rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
     }
-    decisions.add({++happened, decision.at, std::move(decision.text), on_the_wall(decision.at)});
+    decisions.add({++happened, decision.at, std::move(decision.text), wall.at(decision.at)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
@@ -230,23 +243,22 @@ void Bus::State::check_delivery(TimePoint now) {
 
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
-    const Duration took = clock.now() - entry.arrived;
+    const TimePoint now = clock.now();
+    const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
     counters.count(entry.station, entry.function, outcome, took);
     if (entry.deed) log_deed(settings, entry.station, *entry.deed, outcome);
     observe(TransactionEvent{entry.station, entry.function, outcome, took});
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
-    if (success) counters.succeeded(entry.station, rt::wall_seconds());
+    if (success) counters.succeeded(entry.station, wall_seconds_of(wall.at(now)));
     if (!result.pdu && result.pdu.error() == Fault::line_down)
         result.why = up ? "its device is being closed" : why_down;
     const bool refused = !result.transmitted && result.source == Source::bus;
-    auto hand_over = [handler = std::move(entry.handler), result = std::move(result)]() mutable {
-        handler(std::move(result));
-    };
+    Handed handed{std::move(entry.handler), std::move(result)};
     if (refused) {
-        refusals.add(std::move(hand_over));
+        refusals.add(std::move(handed));
     } else {
-        asio::post(executor, std::move(hand_over));
+        answers.add(std::move(handed), calls == 0);
     }
 }
 
@@ -266,20 +278,25 @@ Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
 
 Bus::~Bus() { stop(); }
 
-void Bus::start() { state_->line->start(*state_); }
+void Bus::start() {
+    state_->call([this] { state_->line->start(*state_); });
+}
 
 void Bus::stop() {
-    state_->line->stop();
-    state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
-    state_->drive.rest();
+    state_->call([this] {
+        state_->line->stop();
+        state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
+        state_->drive.rest();
+    });
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {
-    state_->transact(std::move(request), std::move(handler));
+    state_->call([&] { state_->transact(std::move(request), std::move(handler)); });
 }
 
 void Bus::cancel(ClientId client) {
-    state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); });
+    state_->call(
+        [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
 }
 
 void Bus::name_client(ClientId client, std::string name) {
@@ -317,14 +334,16 @@ std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 
-std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->recorder.last(last); }
+std::vector<TraceFrame> Bus::trace(std::size_t last) const {
+    return in_words(state_->recorder.last(last));
+}
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
     return state_->decisions.last(last);
 }
 
 std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->recorder.since(sequence, most);
+    return in_words(state_->recorder.since(sequence, most));
 }
 
 std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {

@@ -8,8 +8,8 @@ namespace {
 
 constexpr auto kPause = 1ms;
 
-void hand_all(const std::vector<std::function<void()>>& waiting) {
-    for (const auto& hand_over : waiting) hand_over();
+void hand_all(std::vector<Handed> waiting) {
+    for (Handed& one : waiting) one.handler(std::move(one.answer));
 }
 
 }  // namespace
@@ -19,11 +19,12 @@ Refusals::Refusals(boost::asio::any_io_executor executor, rt::Clock& clock)
 
 Refusals::~Refusals() {
     if (waiting_.empty()) return;
-    boost::asio::post(executor_, [waiting = std::move(waiting_)] { hand_all(waiting); });
+    boost::asio::post(executor_,
+                      [waiting = std::move(waiting_)]() mutable { hand_all(std::move(waiting)); });
 }
 
-void Refusals::add(std::function<void()> hand_over) {
-    waiting_.push_back(std::move(hand_over));
+void Refusals::add(Handed refused) {
+    waiting_.push_back(std::move(refused));
     if (waiting_.size() > 1) return;
     alarm_->arm(clock_.now() + kPause, [this] { hand_all(std::exchange(waiting_, {})); });
 }

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
-#include <functional>
 #include <memory>
 #include <vector>
 
+#include "answers.hpp"
 #include "panelgate/rt/clock.hpp"
 
 namespace panelgate::bus {
@@ -19,13 +19,13 @@ class Refusals {
     Refusals(const Refusals&) = delete;
     Refusals& operator=(const Refusals&) = delete;
 
-    void add(std::function<void()> hand_over);
+    void add(Handed refused);
 
   private:
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> alarm_;
-    std::vector<std::function<void()>> waiting_;
+    std::vector<Handed> waiting_;
 };
 
 }  // namespace panelgate::bus

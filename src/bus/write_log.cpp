@@ -10,10 +10,10 @@
 
 namespace panelgate::bus {
 
-std::optional<Deed> deed_of(const Request& request, const std::string& client) {
+std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
     constexpr std::size_t kShown = 32;  // bytes
     if (request.poll || request.request.is_read()) return std::nullopt;
-    Deed deed{client, {}, {}};
+    Deed deed{names.of(request.client), {}, {}};
     if (const auto written = request.request.access().write)
         deed.place =
             std::string(modbus::label(written->table)) + '/' + std::to_string(written->first);

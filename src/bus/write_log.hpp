@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus.hpp"
 
@@ -16,7 +17,7 @@ struct Deed {
 };
 
 /// Nothing for what changes nothing and for what no client wants (polls, relays).
-std::optional<Deed> deed_of(const Request& request, const std::string& client);
+std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names);
 /// One line at info.
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);
 

@@ -68,7 +68,7 @@ void MbapFramer::take(std::size_t count) {
 }
 
 Bytes encode_mbap(std::uint16_t transaction, std::uint8_t unit, ByteView pdu) {
-    Writer out;
+    Writer out(kMbapPrefix + 1 + pdu.size());
     out.u16(transaction).u16(0).u16(static_cast<unsigned>(pdu.size() + 1)).u8(unit).raw(pdu);
     return out.take();
 }

@@ -111,9 +111,9 @@ std::optional<Bytes> ReplyFramer::scan(bool silence) {
     collect_starts();
     open_length_ = false;
     inside_ = false;
-    while (!starts_.empty()) {
+    while (has_start()) {
         bool open = false;
-        const std::size_t start = starts_.front();
+        const std::size_t start = starts_[judged_];
         auto pdu = judge(start, silence, open);
         if (pdu) {
             const Inside inside = inside_other(start, start + pdu->size() + kAduOverhead);
@@ -126,7 +126,7 @@ std::optional<Bytes> ReplyFramer::scan(bool silence) {
             open_length_ = expected_ || length.kind != ReplyLength::Kind::by_silence;
             return std::nullopt;
         }
-        starts_.pop_front();
+        ++judged_;
     }
     return std::nullopt;
 }
@@ -154,8 +154,8 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
 
 std::size_t ReplyFramer::missing() const {
     constexpr std::size_t kHeader = 3;  // address, function, byte count or exception
-    if (starts_.empty()) return ends_with_address() ? kHeader - 1 : 0;
-    const ByteView rest = ByteView(heard_).subspan(starts_.front());
+    if (!has_start()) return ends_with_address() ? kHeader - 1 : 0;
+    const ByteView rest = ByteView(heard_).subspan(starts_[judged_]);
     if (rest.size() < kHeader) return kHeader - rest.size();
     const ReplyLength length = reply_length(rest);
     const bool known = length.kind == ReplyLength::Kind::known;
@@ -165,7 +165,7 @@ std::size_t ReplyFramer::missing() const {
 }
 
 bool ReplyFramer::ends_with_other_frame() const {
-    if (!starts_.empty() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
+    if (has_start() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
     return known_reply_length(heard_) == heard_.size() && crc_ok(heard_);
 }
 
@@ -178,6 +178,12 @@ bool ReplyFramer::holds_start(ByteView bytes) const {
         if (is_start(bytes[i], bytes[i + 1])) return true;
     }
     return false;
+}
+
+void ReplyFramer::forget_starts() {
+    starts_.clear();
+    judged_ = 0;
+    looked_ = 0;
 }
 
 void ReplyFramer::collect_starts() {
@@ -238,8 +244,7 @@ std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     open_length_ = false;
     inside_ = false;
     heard_.clear();
-    starts_.clear();
-    looked_ = 0;
+    forget_starts();
     return pdu;
 }
 
@@ -247,8 +252,7 @@ std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
 void ReplyFramer::discard(std::size_t count) {
     classify(ByteView(heard_).first(count));
     heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(count));
-    starts_.clear();
-    looked_ = 0;
+    forget_starts();
     open_length_ = false;
     collect_starts();
 }

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
-#include <functional>
 #include <memory>
 
+#include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
 
@@ -17,7 +17,7 @@ namespace panelgate::tcp_server {
 class OwnAnswers : public std::enable_shared_from_this<OwnAnswers> {
   public:
     /// Gives one; false: nobody wants it any more.
-    using Give = std::function<bool()>;
+    using Give = InlineFunction<bool(), 96>;
 
     OwnAnswers(rt::Clock& clock, std::size_t most, Duration period);
 
@@ -36,7 +36,7 @@ class OwnAnswers : public std::enable_shared_from_this<OwnAnswers> {
     Duration period_;
     TimePoint end_{};        ///< of the period
     std::size_t given_ = 0;  ///< in it
-    std::deque<Give> waiting_;
+    PoolDeque<Give> waiting_;
     std::unique_ptr<rt::Alarm> next_;
 };
 

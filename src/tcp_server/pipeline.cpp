@@ -23,12 +23,12 @@ Bytes exception_reply(std::uint8_t function, Fault fault) {
 
 /// What a client is sent for a bus's answer. A reply that no MBAP frame can carry is refused as one
 /// that is too large to answer.
-Bytes reply_pdu(std::uint8_t function, const Result<Bytes>& pdu) {
+Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
     if (!pdu) return exception_reply(function, pdu.error());
     if (pdu->empty() || pdu->size() > modbus::kMaxPdu) {
         return exception_reply(function, Fault::malformed);
     }
-    return *pdu;
+    return std::move(*pdu);
 }
 
 Bytes diagnose(ByteView request, const Shared& shared) {
@@ -115,7 +115,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
                decide(adu.unit, adu.pdu, shared_->settings, shared_->units));
 }
 
-void Pipeline::answer(const modbus::Adu& adu, std::function<Bytes()> pdu) {
+void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
     if (shared_->own_answers->may_give()) return replies_.push(adu.transaction, adu.unit, pdu());
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
@@ -133,12 +133,12 @@ void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
 void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
     if (turning_away_) return refuse(adu, Fault::cancelled);
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
-    caller_.transact(
-        forwarding.target.bus, forwarding.target.station, std::move(forwarding.request),
-        [weak = weak_from_this(), ticket, function = adu.pdu[0]](const bus::Answer& answer) {
-            const auto self = weak.lock();
-            if (self) self->settle(ticket, reply_pdu(function, answer.pdu));
-        });
+    caller_.transact(forwarding.target.bus, forwarding.target.station,
+                     std::move(forwarding.request),
+                     [weak = weak_from_this(), ticket, function = adu.pdu[0]](bus::Answer answer) {
+                         const auto self = weak.lock();
+                         if (self) self->settle(ticket, reply_pdu(function, std::move(answer.pdu)));
+                     });
 }
 
 void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -12,6 +11,8 @@
 #include "dispatch.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/mbap.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -53,14 +54,15 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     void broadcast(const modbus::Adu& adu, const Broadcast& broadcasting);
     void refuse(const modbus::Adu& adu, Fault fault);
     /// The gateway's own answer, now or when it is its turn (OwnAnswers).
-    void answer(const modbus::Adu& adu, std::function<Bytes()> pdu);
+    using OwnPdu = InlineFunction<Bytes(), 48>;
+    void answer(const modbus::Adu& adu, OwnPdu pdu);
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
 
     std::shared_ptr<const Shared> shared_;
     Caller caller_;
     std::function<void()> on_answer_;
-    std::deque<modbus::Adu> waiting_;  ///< not judged yet
+    PoolDeque<modbus::Adu> waiting_;  ///< not judged yet
     ReplyQueue replies_;
     bool turning_away_ = false;
     bool closed_ = false;

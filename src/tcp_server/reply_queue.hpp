@@ -2,9 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -48,7 +48,7 @@ class ReplyQueue {
     void close(Slot& slot);
     void step_over_silent();
 
-    std::deque<Slot> slots_;
+    PoolDeque<Slot> slots_;
     Ticket first_ = 0;       ///< of slots_.front()
     std::size_t ready_ = 0;  ///< slots at the front that are settled; the first has an ADU
     std::size_t unanswered_ = 0;

@@ -3,13 +3,16 @@
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
 
+#include <boost/asio/bind_allocator.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/write.hpp>
+#include <cstddef>
 #include <utility>
 #include <variant>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -31,7 +34,8 @@ void Session::start(Caller caller) {
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->go_on();
     });
-    watch_for_reset();
+    error_code ignored;
+    socket_.non_blocking(true, ignored);
     read();
 }
 
@@ -75,12 +79,13 @@ void Session::go_on() {
 
 void Session::read() {
     if (closed_ || reading_ || input_state_ == Input::ended) return;
-    if (input_state_ == Input::served && !pipeline_->has_room()) return;
+    if (input_state_ == Input::served && !pipeline_->has_room()) return watch_for_reset();
     reading_ = true;
+    auto handler = [self = shared_from_this()](const error_code& error, std::size_t size) {
+        self->on_read(error, size);
+    };
     socket_.async_read_some(asio::buffer(input_),
-                            [self = shared_from_this()](const error_code& error, std::size_t size) {
-                                self->on_read(error, size);
-                            });
+                            asio::bind_allocator(PoolAllocator<std::byte>(), std::move(handler)));
 }
 
 void Session::on_read(const error_code& error, std::size_t size) {
@@ -143,27 +148,40 @@ void Session::on_end_of_input() {
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;
     forget_partial_adu();
+    watch_for_reset();
     write();
 }
 
-/// Also while nobody reads, and after the client's FIN. Then nobody waits for the others.
+/// Who does not read, for want of room or because the client has said all, would not notice it.
+/// Nobody waits for the others then.
 void Session::watch_for_reset() {
+    if (std::exchange(watching_for_reset_, true)) return;
     socket_.async_wait(asio::ip::tcp::socket::wait_error,
                        [self = shared_from_this()](const error_code&) { self->close(); });
 }
 
 // Output.
 
+/// As a rule the kernel takes a reply at once; what it does not take waits.
 void Session::write() {
     if (closed_ || writing_) return;
-    const Bytes* adu = pipeline_->front();
-    if (adu == nullptr) {
-        if (input_state_ != Input::served && pipeline_->empty()) close();
-        return;
+    while (const Bytes* adu = pipeline_->front()) {
+        error_code error;
+        const std::size_t taken = socket_.write_some(asio::buffer(*adu), error);
+        if (error && error != asio::error::would_block) return close();
+        if (taken < adu->size()) return write_later(ByteView(*adu).subspan(taken));
+        ++written_;
+        pipeline_->pop();
+        if (input_state_ == Input::served) take_adus();
+        if (closed_) return;
     }
+    if (input_state_ != Input::served && pipeline_->empty()) close();
+}
+
+void Session::write_later(ByteView rest) {
     writing_ = true;
     watch_output();
-    asio::async_write(socket_, asio::buffer(*adu),
+    asio::async_write(socket_, asio::buffer(rest.data(), rest.size()),
                       [self = shared_from_this()](const error_code& error, std::size_t) {
                           self->on_written(error);
                       });

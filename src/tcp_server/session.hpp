@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "caller.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/mbap.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "pipeline.hpp"
@@ -49,6 +50,7 @@ class Session : public std::enable_shared_from_this<Session> {
     void guard_partial_adu(bool progress);
     void forget_partial_adu();
     void write();
+    void write_later(ByteView rest);
     void on_written(const boost::system::error_code& error);
     void watch_output();
     int not_taken();
@@ -62,12 +64,13 @@ class Session : public std::enable_shared_from_this<Session> {
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};
     bool reading_ = false;
+    bool watching_for_reset_ = false;
     modbus::MbapFramer framer_;  ///< empty but for an unfinished ADU whenever a read starts
     int bad_protocol_ids_ = 0;   ///< in a row
     std::unique_ptr<rt::Alarm> partial_alarm_;
     bool watching_partial_ = false;  ///< the alarm is armed
 
-    bool writing_ = false;       ///< the pipeline's front()
+    bool writing_ = false;       ///< the rest of the pipeline's front()
     std::uint64_t written_ = 0;  ///< replies
     std::unique_ptr<rt::Alarm> output_alarm_;
     bool watching_output_ = false;

@@ -1,6 +1,7 @@
 #include "house_seam.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
@@ -96,8 +97,9 @@ void HouseSeam::transact(bus::Request request, bus::AnswerHandler handler) {
         return;
     }
     inside_ = true;
-    bus_.transact(std::move(request), [this, id, open, handler](bus::Answer answer) {
-        hand_over(open, std::move(answer), handler, id);
+    const auto asked = std::make_shared<std::pair<Open, bus::AnswerHandler>>(open, handler);
+    bus_.transact(std::move(request), [this, id, asked](bus::Answer answer) {
+        hand_over(asked->first, std::move(answer), asked->second, id);
     });
     inside_ = false;
 }

@@ -70,7 +70,7 @@ class QueueFixture : public testing::Test {
         while (const Ticket ticket = next()) tickets.push_back(ticket);
         return tickets;
     }
-    static std::vector<Ticket> tickets(const std::vector<Job>& jobs) {
+    static std::vector<Ticket> tickets(const arbiter::Jobs& jobs) {
         std::vector<Ticket> all;
         for (const Job& job : jobs) all.push_back(job.ticket);
         return all;

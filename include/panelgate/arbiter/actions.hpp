@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/reason.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/frame_kind.hpp"
@@ -33,7 +34,7 @@ struct Note {
     TimePoint at;  ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
-    std::string why;  ///< of a sent frame, with Settings::explain: why this one now
+    Reason why{};  ///< of a sent frame, with Settings::explain: why this one now
 };
 /// With Settings::explain: why something is not done now, or not at all. One line.
 struct Decision {

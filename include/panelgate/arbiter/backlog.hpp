@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <deque>
-#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
 
@@ -32,27 +32,27 @@ class Backlog {
         return std::ranges::any_of(retries_,
                                    [&](const Group& group) { return group.station == station; });
     }
-    std::optional<Group> take_retry(const std::function<bool(const Group&)>& may_go);
-    void each_retry(const std::function<void(const Group&)>& show) const;
+    std::optional<Group> take_retry(const InlineFunction<bool(const Group&), 48>& may_go);
+    void each_retry(const InlineFunction<void(const Group&), 48>& show) const;
 
     /// Retries that nobody waits for any more, without their jobs: what failed has failed.
     std::vector<Group> take_dropped() { return std::exchange(dropped_, {}); }
 
     /// What this client has waiting; it is gone then.
-    std::vector<Job> cancel(Client client);
+    Jobs cancel(Client client);
     /// Those that can no longer be started, or, transmitted before, answered in time.
-    std::vector<Job> expire(TimePoint now);
+    Jobs expire(TimePoint now);
     std::optional<TimePoint> first_expiry() const;
     /// Those that match, waiting for their first turn.
-    std::vector<Job> remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
+    Jobs remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
     /// Everything.
-    std::vector<Job> clear();
+    Jobs clear();
 
   private:
-    std::vector<Job> remove_retries(const JobQueue::Test& match);
+    Jobs remove_retries(const JobQueue::Test& match);
 
     JobQueue queue_;
-    std::deque<Group> retries_;
+    PoolDeque<Group> retries_;
     std::vector<Group> dropped_;
 };
 

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <iterator>
 #include <optional>
-#include <vector>
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/time.hpp"
@@ -15,7 +14,7 @@ namespace panelgate::arbiter {
 
 /// Jobs that one transaction answers, and its request. jobs[0] leads; a probe has none.
 struct Group {
-    std::vector<Job> jobs{};
+    Jobs jobs{};
     std::uint8_t station = 0;
     modbus::Request request;
     std::optional<modbus::Span> span{};  ///< of a read that can be shared
@@ -40,9 +39,9 @@ struct Group {
         for (Job& job : jobs) job.gone = job.gone || job.client == client;
     }
     /// Those whose own deadline has come; the others go on waiting.
-    std::vector<Job> expire(TimePoint now) {
+    Jobs expire(TimePoint now) {
         const auto late = [&](const Job& job) { return job.deadline <= now; };
-        std::vector<Job> expired;
+        Jobs expired;
         std::ranges::copy_if(jobs, std::back_inserter(expired), late);
         std::erase_if(jobs, late);
         return expired;

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "panelgate/base/fault.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -30,5 +31,6 @@ struct Job {
     bool alone = false;    ///< a shared transaction for it was refused: ask for just this
     bool gone = false;     ///< its client has left while it was on the wire: no further attempt
 };
+using Jobs = PoolVector<Job>;
 
 }  // namespace panelgate::arbiter

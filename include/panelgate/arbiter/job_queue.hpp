@@ -3,19 +3,16 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
-#include <functional>
-#include <map>
 #include <optional>
-#include <set>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/arbiter/waiting_reads.hpp"
+#include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
 
@@ -40,7 +37,8 @@ namespace panelgate::arbiter {
 /// not call the queue.
 class JobQueue {
   public:
-    using Test = std::function<bool(const Job&)>;
+    using Test = InlineFunction<bool(const Job&), 48>;
+    using Show = InlineFunction<void(const Job&), 48>;
     static constexpr std::size_t kMost = 4096;
     static constexpr int kReadTurn = 5;   ///< a read gets at least every fifth turn
     static constexpr int kPollTurn = 10;  ///< a poll gets at least every tenth
@@ -51,7 +49,7 @@ class JobQueue {
     /// busy: one, or more where reads that others rode on count in their place.
     struct Admission {
         bool taken = false;
-        std::vector<Job> shed;
+        Jobs shed;
     };
     Admission push(Job job);
     /// A job that was taken before: ahead of its client's younger ones for that station; never
@@ -65,11 +63,11 @@ class JobQueue {
     /// Takes, of all lanes for this station, the first jobs that match, again and again until none
     /// does. `wanted` may change its mind with each that it accepts. No turns move. Order of
     /// tickets.
-    std::vector<Job> take_all(std::uint8_t station, const Test& wanted);
+    Jobs take_all(std::uint8_t station, const Test& wanted);
     /// In order of tickets.
-    std::vector<Job> remove_if(const Test& match);
+    Jobs remove_if(const Test& match);
     /// Each lane's first job that order allows to run.
-    void each_first(const std::function<void(const Job&)>& show) const;
+    void each_first(const Show& show) const;
 
     /// Something of this client waits for this station; a broadcast of it is for every station.
     bool has(Client client, std::uint8_t station) const;
@@ -89,7 +87,7 @@ class JobQueue {
     static constexpr std::size_t kRanks = 3;  ///< probes are not queued
     /// Who is next, by turn.
     template <class Key>
-    using Rounds = std::array<std::map<std::uint64_t, Key>, kRanks>;
+    using Rounds = std::array<PoolMap<std::uint64_t, Key>, kRanks>;
     using Turns = std::array<std::uint64_t, kRanks>;
     using HostKey = std::pair<bool, std::uint64_t>;  ///< whether a client is its own, and its id
 
@@ -98,17 +96,17 @@ class JobQueue {
         std::optional<ReadSpan> span;  ///< of a read that can share
     };
     struct Lane {
-        std::deque<Entry> jobs;
+        PoolDeque<Entry> jobs;
         Turns turns{};
     };
     struct Source {
-        std::map<std::uint8_t, Lane> lanes;
+        PoolMap<std::uint8_t, Lane> lanes;
         Rounds<std::uint8_t> rounds;
         Turns turns{};
         std::size_t counting = 0;
     };
     struct Origin {
-        std::map<Client, Source> sources;
+        PoolMap<Client, Source> sources;
         Rounds<Client> rounds;
         Turns turns{};
         std::size_t counting = 0;
@@ -145,7 +143,7 @@ class JobQueue {
         Client client;
         const Source& source;
     };
-    using Ask = std::function<bool(const Holder&)>;
+    using Ask = InlineFunction<bool(const Holder&), 32>;
 
     static std::size_t rank_of(const Job& job);
     static bool in_order(const Source& source, std::uint8_t station);
@@ -169,7 +167,7 @@ class JobQueue {
     void forget(const Entry& entry);
 
     std::size_t counting_of(Client client) const;
-    bool make_room(const Job& newcomer, std::vector<Job>& shed);
+    bool make_room(const Job& newcomer, Jobs& shed);
     std::optional<Victim> find_victim(const Job& newcomer) const;
     std::optional<Victim> greediest(const Ask& may_lose, const Ask& writes_too) const;
     std::optional<Victim> victim_of(const Holder& holder, bool writes_too) const;
@@ -177,11 +175,11 @@ class JobQueue {
     bool source_consistent(Client client, const HostKey& host, const Source& source) const;
 
     QueueSettings settings_;
-    std::map<HostKey, Origin> hosts_;  ///< nothing empty in it
+    PoolMap<HostKey, Origin> hosts_;  ///< nothing empty in it
     Rounds<HostKey> rounds_;
-    std::map<Client, HostKey> home_;  ///< of those that wait
+    PoolMap<Client, HostKey> home_;  ///< of those that wait
     WaitingReads reads_;
-    std::multiset<TimePoint> expiries_;  ///< of all that wait
+    PoolMultiset<TimePoint> expiries_;  ///< of all that wait
     std::size_t size_ = 0;
     std::uint64_t turns_ = 0;
     /// Turns that others had while one of this class could have run.

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <deque>
 #include <map>
 #include <optional>
-#include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/arbiter/actions.hpp"
@@ -12,6 +11,7 @@
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
@@ -23,7 +23,7 @@ class Ledger {
     explicit Ledger(const Settings& settings);
 
     std::optional<Action> poll();
-    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, std::string why);
+    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Reason why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
@@ -68,7 +68,7 @@ class Ledger {
     bool explain_;
     bool inside_attempt_ = false;
     std::optional<TimePoint> told_collision_;
-    std::deque<Action> actions_;
+    PoolDeque<Action> actions_;
     LineCounters line_;
     BusShares shares_;
     std::map<std::uint8_t, StationCounters> stations_;

@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <map>
 #include <optional>
 
 #include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -41,7 +41,7 @@ class ReadCache {
         Bytes reply;
         TimePoint sampled;
     };
-    std::list<Entry> entries_;                   ///< the youngest first
+    PoolList<Entry> entries_;                    ///< the youngest first
     std::map<std::uint8_t, TimePoint> written_;  ///< when each station was last written to; 0: all
 };
 

@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <set>
-#include <vector>
 
 #include "panelgate/arbiter/backlog.hpp"
 #include "panelgate/arbiter/echo.hpp"
@@ -12,6 +10,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/sharing.hpp"
 #include "panelgate/arbiter/stations.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
 
@@ -44,7 +43,7 @@ class Schedule {
     void retry(Group group, Duration patience);
     /// The parts of a joined read go again, each by itself. Returns those whose client has left:
     /// they do not.
-    std::vector<Job> give_back(Group& group);
+    Jobs give_back(Group& group);
 
   private:
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
@@ -59,10 +58,10 @@ class Schedule {
     bool may_stall_;
     Backlog backlog_;
     Sharing sharing_;
-    Ticket learned_for_ = 0;         ///< a read was sent for it, to find out about the echo (P8)
-    std::set<std::uint8_t> others_;  ///< stations that waited when a retry was due
-    std::size_t turns_ = 0;          ///< that it leaves to them, at most
-    bool dear_ = false;              ///< a retry may cost them much
+    Ticket learned_for_ = 0;        ///< a read was sent for it, to find out about the echo (P8)
+    PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
+    std::size_t turns_ = 0;         ///< that it leaves to them, at most
+    bool dear_ = false;             ///< a retry may cost them much
 };
 
 }  // namespace panelgate::arbiter

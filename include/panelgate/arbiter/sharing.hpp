@@ -1,12 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/arbiter/station.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
 
@@ -24,7 +24,7 @@ class Sharing {
     /// The joined read did not come about: its parts go alone from now on. Gives them in the order
     /// in which they are to be put back in front of the queue; what asked for the whole, and what
     /// nobody waits for any more, stays in the group.
-    std::vector<Job> split(Group& group);
+    Jobs split(Group& group);
     /// What of `reply` answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
 
@@ -32,7 +32,7 @@ class Sharing {
     bool joins(const Group& group, const Job& job, const Station& station) const;
 
     bool share_;
-    std::deque<ReadSpan> refused_;
+    PoolDeque<ReadSpan> refused_;
 };
 
 }  // namespace panelgate::arbiter

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 
 #include "panelgate/arbiter/attempt.hpp"
@@ -17,6 +16,7 @@
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
+#include "panelgate/base/pool.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -208,11 +208,11 @@ class Station {
     Trail trail_;
     ProbeBudget budget_{ProbeBudget::kFailing};   ///< of its failures; no reply pays for them
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of those while it is failing()
-    std::uint8_t lately_ = 0;     ///< the last 8 attempts, the latest lowest: 1 was silent
-    std::deque<TimePoint> owed_;  ///< when the requests left whose replies may still come
-    Bytes owed_pdu_;              ///< they are one and the same
-    TimePoint again_until_{};     ///< it may say the reply that came damaged once more
-    Bytes damaged_pdu_;           ///< the request whose reply has just come damaged
+    std::uint8_t lately_ = 0;    ///< the last 8 attempts, the latest lowest: 1 was silent
+    PoolDeque<TimePoint> owed_;  ///< when the requests left whose replies may still come
+    Bytes owed_pdu_;             ///< they are one and the same
+    TimePoint again_until_{};    ///< it may say the reply that came damaged once more
+    Bytes damaged_pdu_;          ///< the request whose reply has just come damaged
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};

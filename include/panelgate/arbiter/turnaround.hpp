@@ -30,6 +30,15 @@ class Turnaround {
         return *nth;
     }
 
+    /// quantile(share) >= bound; something is known.
+    bool reaches(double share, Duration bound) const {
+        const auto rank = static_cast<std::size_t>(share * static_cast<double>(count_));
+        const auto below = static_cast<std::size_t>(
+            std::count_if(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(count_),
+                          [&](Duration sample) { return sample < bound; }));
+        return below <= std::min(rank, count_ - 1);
+    }
+
   private:
     std::array<Duration, kSamples> samples_{};
     std::size_t next_ = 0;
@@ -64,9 +73,9 @@ class DriftAlarm {
     /// True when it is to be told: 95 of 100 replies no longer keep below 80 % of the timeout.
     bool check(const Turnaround& seen, Duration timeout) {
         if (!seen.known()) return false;
-        const Duration slow = seen.quantile(0.95);
-        if (slow * 10 < timeout * 6) told_ = false;
-        if (told_ || slow * 10 < timeout * 8) return false;
+        constexpr double kMost = 0.95;
+        if (told_) told_ = seen.reaches(kMost, timeout * 6 / 10);
+        if (told_ || !seen.reaches(kMost, timeout * 8 / 10)) return false;
         told_ = true;
         return true;
     }

@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
-#include <map>
 #include <tuple>
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
 
@@ -17,7 +17,7 @@ namespace panelgate::arbiter {
 class WaitingReads {
   public:
     /// This client has so many more, or fewer, that count.
-    using Count = std::function<void(Client, int)>;
+    using Count = InlineFunction<void(Client, int), 16>;
 
     /// A read of this span would ride.
     bool carries(const ReadSpan& span) const;
@@ -37,8 +37,8 @@ class WaitingReads {
     struct WiderFirst {
         bool operator()(const ReadSpan& a, const ReadSpan& b) const;
     };
-    using Equals = std::map<Ticket, Client>;  ///< never empty, the oldest may count
-    using Spans = std::map<ReadSpan, Equals, WiderFirst>;
+    using Equals = PoolMap<Ticket, Client>;  ///< never empty, the oldest may count
+    using Spans = PoolMap<ReadSpan, Equals, WiderFirst>;
     using Place = std::tuple<std::uint8_t, modbus::Table, std::uint32_t>;
 
     static Place place(const ReadSpan& span) {
@@ -50,7 +50,7 @@ class WaitingReads {
 
     Spans spans_;
     /// Those that no other contains. None contains another, so their ends rise as they begin.
-    std::map<Place, ReadSpan> widest_;
+    PoolMap<Place, ReadSpan> widest_;
 };
 
 }  // namespace panelgate::arbiter

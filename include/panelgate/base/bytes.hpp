@@ -6,11 +6,12 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
+
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate {
 
-using Bytes = std::vector<std::uint8_t>;
+using Bytes = PoolVector<std::uint8_t>;
 using ByteView = std::span<const std::uint8_t>;
 
 /// Reads big-endian fields from bytes it does not own. Reading past the end yields 0 and makes the
@@ -38,6 +39,8 @@ class Reader {
 /// Appends big-endian fields.
 class Writer {
   public:
+    /// `expected`: bytes; more are taken, too.
+    explicit Writer(std::size_t expected = 16) { bytes_.reserve(expected); }
     Writer& u8(unsigned value);
     Writer& u16(unsigned value);
     Writer& raw(ByteView bytes);

@@ -18,4 +18,9 @@ inline WallTime wall_time_of(TimePoint then, TimePoint now, WallTime wall) {
     return wall - std::chrono::floor<std::chrono::microseconds>(now - then);
 }
 
+/// Since 1970.
+inline double wall_seconds_of(WallTime time) {
+    return std::chrono::duration<double>(time.time_since_epoch()).count();
+}
+
 }  // namespace panelgate

@@ -48,7 +48,7 @@ struct Settings {
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.
 class Bus final : public BusClient {
   public:
-    /// Answers are posted to the executor; it and the clock outlive the bus.
+    /// Answers come from the executor's loop; it and the clock outlive the bus.
     Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
         std::unique_ptr<line::Line> line);
     /// Answers what is still open with Fault::cancelled.

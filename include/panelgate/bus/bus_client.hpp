@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +12,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/health.hpp"
+#include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/wall_time.hpp"
@@ -52,7 +52,7 @@ struct Answer {
     std::optional<Refusal> refusal{};
     std::string why{};  ///< of Fault::line_down: what is wrong with the line, as its state says
 };
-using AnswerHandler = std::function<void(Answer)>;
+using AnswerHandler = InlineFunction<void(Answer), 48>;
 
 /// A frame on the wire, for traces.
 struct TraceFrame {

@@ -2,11 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/pool.hpp"
 
 namespace panelgate::modbus {
 
@@ -58,10 +58,10 @@ class ReplyFramer {
     /// Bytes wait for more, or for the silence that judges them.
     bool has_pending() const { return !heard_.empty(); }
     /// Some of them may be the beginning of the reply.
-    bool has_candidate() const { return !starts_.empty() || ends_with_address(); }
+    bool has_candidate() const { return has_start() || ends_with_address(); }
     /// ... and its length is known, or will be by its own first bytes: a silence inside is only a
     /// hole.
-    bool knows_length() const { return starts_.empty() ? ends_with_address() : open_length_; }
+    bool knows_length() const { return has_start() ? open_length_ : ends_with_address(); }
     /// How many bytes have to come at least until what may be the reply tells more: its header, or
     /// all of it. 0: every byte may tell.
     std::size_t missing() const;
@@ -90,6 +90,8 @@ class ReplyFramer {
     std::size_t frame_size(ByteView rest, bool silence) const;
     std::optional<Bytes> judge(std::size_t start, bool silence, bool& open) const;
     std::optional<Bytes> answering(ByteView frame) const;
+    bool has_start() const { return judged_ < starts_.size(); }
+    void forget_starts();
     bool ends_with_address() const { return !heard_.empty() && heard_.back() == station_; }
     enum class Inside : std::uint8_t { no, perhaps, yes };
     Inside inside_other(std::size_t start, std::size_t end) const;
@@ -106,7 +108,8 @@ class ReplyFramer {
     std::optional<std::size_t> expected_;  ///< from the request (FRM-04)
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
-    std::deque<std::size_t> starts_;  ///< offsets with the right address and function, unjudged
+    PoolVector<std::size_t> starts_;  ///< offsets with the right address and function
+    std::size_t judged_ = 0;          ///< of the starts
     bool open_length_ = false;
     bool inside_ = false;
     bool damaged_ = false;

@@ -22,7 +22,7 @@ class BacklogTest : public test::QueueFixture {
         return ticket;
     }
     /// Was sent, and goes again.
-    void retry(std::vector<Job> jobs) {
+    void retry(Jobs jobs) {
         Group group{
             .station = jobs.front().station, .request = jobs.front().request, .attempts = 1};
         group.jobs = std::move(jobs);

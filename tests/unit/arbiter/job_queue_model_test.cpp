@@ -23,7 +23,7 @@ class Model {
   public:
     explicit Model(QueueSettings settings) : settings_(settings) {}
 
-    std::vector<Job> jobs;  ///< by ticket
+    Jobs jobs;  ///< by ticket
 
     void add(const Job& job) {
         enter({own(job), 0, 0});
@@ -258,7 +258,7 @@ class JobQueueBesideAModel : public JobQueueModel {
     const QueueSettings settings_{.limit = 24, .per_client = 6, .deadline = 2s};
     JobQueue queue_{settings_};
     Model model_{settings_};
-    std::vector<Job> taken_;
+    Jobs taken_;
     int overtaken_ = 0;
     int shed_ = 0;
 };

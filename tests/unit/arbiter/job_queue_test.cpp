@@ -154,7 +154,7 @@ TEST_F(JobQueueTest, AJobPutBackGoesAheadOfItsLaneAndIsNeverRefused) {
     limits(2, 2);
     const Ticket first = add(read(1, 1));
     const Ticket second = add(read(1, 1));
-    std::vector<Job> taken = queue_.take_all(1, any);
+    Jobs taken = queue_.take_all(1, any);
     const Ticket third = add(read(1, 1));
     const Ticket fourth = add(read(1, 1));
     for (Job& job : taken) queue_.put_back(std::move(job));

@@ -114,7 +114,7 @@ TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
     bus.submit(17, kRead, 1);
     bus.submit(18, kRead, 2);
     EXPECT_FALSE(bus.try_submit(18, "03 00 00 00 03"_hex, 2));
-    EXPECT_EQ(bus.notes[0].why,
+    EXPECT_EQ(text_of(bus.notes[0].why),
               "read of modbus_tcp 10.0.0.5:50012 to station 17: next in turn after 0.0 ms, 0 wait");
     ASSERT_EQ(bus.decisions.size(), 1u);
     EXPECT_EQ(

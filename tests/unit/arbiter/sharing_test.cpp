@@ -88,7 +88,7 @@ TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
     wait(registers(12, 2));
     wait(registers(14, 2));
     Group group = gather(registers(10, 2));
-    std::vector<Job> parts = sharing_.split(group);
+    Jobs parts = sharing_.split(group);
     EXPECT_TRUE(group.jobs.empty());
     ASSERT_EQ(parts.size(), 3u);
     for (Job& part : parts) {
@@ -106,7 +106,7 @@ TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
     wait(registers(10, 2));
     wait(registers(12, 1));
     Group group = gather(registers(10, 4));
-    const std::vector<Job> parts = sharing_.split(group);
+    const Jobs parts = sharing_.split(group);
     EXPECT_EQ(parts.size(), 2u);
     ASSERT_EQ(group.jobs.size(), 1u);
     EXPECT_EQ(group.jobs[0].request.pdu(), registers(10, 4));

@@ -14,6 +14,17 @@ TEST(Turnaround, KnowsTheQuantilesOfTheLastReplies) {
     EXPECT_EQ(seen.quantile(0.5), Duration(169ms));
 }
 
+TEST(Turnaround, ReachesWhatItsQuantilesAreAtLeast) {
+    Turnaround seen;
+    for (int i = 1; i <= 90; ++i) {
+        seen.add((i * 37 % 50) * 1ms);
+        for (const double share : {0.1, 0.5, 0.95, 1.0}) {
+            for (int bound = 0; bound <= 51; ++bound)
+                EXPECT_EQ(seen.reaches(share, bound * 1ms), seen.quantile(share) >= bound * 1ms);
+        }
+    }
+}
+
 TEST(AdaptiveTimeout, FollowsTheTurnaroundBetweenFloorAndCeiling) {
     AdaptiveTimeout timeout(20ms, 500ms);
     Turnaround seen;
