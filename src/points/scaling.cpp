@@ -116,4 +116,13 @@ std::optional<std::int64_t> Scaling::exact_raw_of(std::int64_t value) const {
     return exact_raw_of(Decimal{value, 0});
 }
 
+std::optional<std::int64_t> Scaling::exact_raw_of(std::uint64_t value) const {
+    constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+    int exponent = 0;
+    for (; value > kMost && value % 10 == 0; value /= 10) ++exponent;
+    if (value > kMost) return std::nullopt;
+    const auto digits = static_cast<std::int64_t>(value);
+    return exponent == 0 ? exact_raw_of(digits) : exact_raw_of(Decimal{digits, exponent});
+}
+
 }  // namespace panelgate::points

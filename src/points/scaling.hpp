@@ -20,6 +20,7 @@ class Scaling {
     std::optional<std::int64_t> exact_raw_of(double value) const;
     /// … of a whole value, beyond what a double holds.
     std::optional<std::int64_t> exact_raw_of(std::int64_t value) const;
+    std::optional<std::int64_t> exact_raw_of(std::uint64_t value) const;
 
   private:
     /// digits * 10^exponent

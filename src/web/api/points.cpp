@@ -58,6 +58,7 @@ Parsed<points::PointWrite> write_of(const Found& found, const HttpRequest& reque
     if (!value) return value.error();
     auto write = points::write_request(*found.station.profile, *found.point, *value, *rounding);
     if (write) return std::move(*write);
+    if (write.error().malformed) return problem(400, write.error().message);
     const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
     return problem(422, write.error().message + hint);
 }
