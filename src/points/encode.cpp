@@ -153,6 +153,11 @@ WriteRefusal inexact(const Point& point, const Value& value, double below, doubl
 
 WriteRefusal inexact_whole(const Point& point, const Value& value, double raw) {
     const Limits limits = limits_of(point.type);
+    if (std::abs(raw) > kExactDouble)
+        return {.message = point.name +
+                           " takes no fraction here: with so many digits it is not exact (" +
+                           type_text(point) + ')',
+                .inexact = true};
     return inexact(point, value, from_raw(point, std::max(std::floor(raw), limits.low)),
                    from_raw(point, std::min(std::ceil(raw), limits.high)));
 }

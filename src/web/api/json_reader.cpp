@@ -148,6 +148,12 @@ class Builder {
     std::string number_;
 };
 
+std::string why_no_json(std::string_view rest, const error_code& error) {
+    for (const char* const word : {"NaN", "Infinity"})
+        if (rest.starts_with(word)) return std::string(word) + " is no number of JSON";
+    return error.message();
+}
+
 }  // namespace
 
 JsonRead read_json(std::string_view text) {
@@ -159,7 +165,7 @@ JsonRead read_json(std::string_view text) {
         return {nullptr,
                 JsonFault{begin, excerpt(*number) + " is beyond what a 64-bit number holds", true}};
     }
-    if (error) return {nullptr, JsonFault{used, error.message()}};
+    if (error) return {nullptr, JsonFault{used, why_no_json(text.substr(used), error)}};
     if (used < text.size()) return {nullptr, JsonFault{used, "something follows the value"}};
     return {parser.handler().release(), std::nullopt};
 }

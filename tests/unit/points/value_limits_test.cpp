@@ -139,6 +139,13 @@ TEST(Value, AScaledWholeNumberIsNotRoundedThroughADouble) {
     Point point = point_of(Type::u64);
     point.scale = 10;
     EXPECT_NE(refused(point, kMostU64), "accepted") << "ends with a 5";
+    point = point_of(Type::i64);
+    point.scale = 0.01;
+    EXPECT_EQ(refused(point, 90071992547409.93),
+              "x takes no fraction here: with so many digits it is not exact (i64, scale 0.01)")
+        << "the same double as .94";
+    EXPECT_EQ(refused(point, std::int64_t{90071992547410}), "accepted");
+    EXPECT_EQ(refused(point, 9007199254740.93), "accepted");
 }
 
 TEST(Value, WhatIsNotZeroIsNotWrittenAsZero) {

@@ -112,6 +112,8 @@ TEST(Body, RefusesANumberThatNoneCouldBe) {
                   std::string("a number that cannot be: line 1, column 11: ") + number +
                       " is beyond what a 64-bit number holds");
     }
+    EXPECT_EQ(value_of("{\"value\": NaN}").error().detail,
+              "the body is not JSON: line 1, column 11: NaN is no number of JSON");
     for (const char* number : {"NaN", "Infinity", "-Infinity", "1e99999999999999999999"})
         EXPECT_EQ(value_of(std::string("{\"value\": ") + number + "}").error().status, 400u);
 }
