@@ -173,6 +173,12 @@ void Gateway::stop() {
     lag_.stop();
     for (const auto& listener : listeners_) listener->close_now();
     http_.reset();
+std::size_t Gateway::owing() const {
+    std::size_t count = http_ ? http_->connections() : 0;
+    for (const auto& listener : listeners_) count += listener->counters().connections;
+    return count;
+}
+
     relays_->stop();
     for (const auto& poller : pollers_) poller->stop();
     for (const auto& bus : buses_) bus->stop();

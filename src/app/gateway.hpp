@@ -43,6 +43,8 @@ class Gateway {
     void stop_accepting();
     /// Nothing is owed to any client any more.
     bool drained() const;
+    /// Connections to whom something is owed, once nothing more is accepted.
+    std::size_t owing() const;
     /// The longest that a request which was accepted may take to its answer.
     Duration longest_answer() const;
     /// Closes everything.
