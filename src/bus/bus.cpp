@@ -69,7 +69,7 @@ struct Bus::State final : public line::Line::Events {
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
     void act(const arbiter::Written& written) {
-        observe(WriteEvent{written.station, written.items, written.ended});
+        observe(WriteEvent{written.station, written.items, written.ended, written.client});
     }
     void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {

@@ -156,6 +156,7 @@ Handling get_relays(HttpRequest, const Api* api) {
         object["state"] = text_of(relay);
         object["reads"] = relay.reads;
         object["writes"] = relay.writes;
+        object["repairs"] = relay.repairs;
         object["read_failures"] = relay.read_failures;
         object["write_failures"] = relay.write_failures;
         object["last_write_ms"] = nullptr;

@@ -68,6 +68,7 @@ TEST_F(BusTellsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
     EXPECT_EQ(told[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
     EXPECT_FALSE(told[0].ended);
     EXPECT_TRUE(told[1].ended);
+    EXPECT_EQ(told[0].client, 1u);
     line->fail_writes = true;
     ask(0, kWrite);
     ASSERT_EQ(told.size(), 4u) << "lost on its way: nobody knows what has come of it";
