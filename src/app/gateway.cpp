@@ -49,6 +49,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         simulated = simulated_.back().get();
         device.device = simulated->device();
         device.rs485 = {};
+        device.simulated = true;
         settings.device = kSimulatedDevice;
     }
     const bool remote = line.kind == config::Line::Kind::tcp && simulated == nullptr;
