@@ -35,7 +35,11 @@ struct Settings {
     bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
 };
 
-/// "tcp://HOST:PORT", "tcp://[::1]:4001": nothing on anything else.
+/// Digits and dots that are no IPv4 address, such as 10.0.0.300: no name looks like this.
+bool is_broken_address(std::string_view host);
+
+/// "tcp://HOST:PORT", "tcp://[::1]:4001": nothing on anything else. The host is a name of letters,
+/// digits, '-', '_' and '.', or an address.
 struct TcpEndpoint {
     std::string host;
     std::string port;
