@@ -59,11 +59,11 @@ ExitCode serve(config::Config config, bool simulate,
         return kUnavailable;
     }
     started(gateway);
-    loop.run({.begin = [&] { gateway.stop_accepting(); },
-              .done = [&] { return gateway.drained(); },
-              .finish = [&] { gateway.stop(); },
-              .longest_answer = gateway.longest_answer()});
-    return kFine;
+    return loop.run({.begin = [&] { gateway.stop_accepting(); },
+                     .done = [&] { return gateway.drained(); },
+                     .finish = [&] { gateway.stop(); },
+                     .open = [&] { return gateway.owing(); },
+                     .longest_answer = gateway.longest_answer()});
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {

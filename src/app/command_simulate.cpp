@@ -88,8 +88,11 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
         return kUnavailable;
     }
     std::cout << panels.text() << "Ctrl-C ends it.\n" << std::flush;
-    loop.run({[] {}, [] { return true; }, [&] { panels.stop(); }, {}});
-    return kFine;
+    return loop.run({.begin = [] {},
+                     .done = [] { return true; },
+                     .finish = [&] { panels.stop(); },
+                     .open = {},
+                     .longest_answer = {}});
 }
 
 }  // namespace panelgate::app

@@ -49,6 +49,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
         simulated = simulated_.back().get();
         device.device = simulated->device();
         device.rs485 = {};
+        device.simulated = true;
         settings.device = kSimulatedDevice;
     }
     const bool remote = line.kind == config::Line::Kind::tcp && simulated == nullptr;
@@ -64,8 +65,10 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
 void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, plant_, line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
+    if (write == nullptr) return;
     const auto listener = write_listeners_.find(line);
-    if (write != nullptr && listener != write_listeners_.end()) listener->second(*write);
+    if (listener != write_listeners_.end()) listener->second(*write);
+    if (relay_listener_) relay_listener_(line, *write);
 }
 
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
@@ -89,10 +92,11 @@ void Gateway::add_relays() {
     std::vector<points::RelayRoute> routes;
     for (const points::Relay& relay : config_.relays) routes.push_back(route_of(plant_, relay));
     relays_ = std::make_unique<points::Relays>(clock_, std::move(routes));
+    relay_listener_ = relays_->write_listener();
     relays_->on_state([](const points::RelayStatus& relay) {
         const bool ok = relay.state == points::RelayState::ok;
-        rt::log(ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
-                {{"relay", relay.name}, {"state", text_of(relay)}});
+        rt::log_about(relay.name, ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
+                      {{"relay", relay.name}, {"state", text_of(relay)}});
     });
 }
 
@@ -167,6 +171,12 @@ void Gateway::stop_accepting() {
 
 bool Gateway::drained() const {
     return open_listeners_ == 0 && (!http_ || http_->connections() == 0);
+}
+
+std::size_t Gateway::owing() const {
+    std::size_t count = http_ ? http_->connections() : 0;
+    for (const auto& listener : listeners_) count += listener->counters().connections;
+    return count;
 }
 
 void Gateway::stop() {

@@ -43,6 +43,8 @@ class Gateway {
     void stop_accepting();
     /// Nothing is owed to any client any more.
     bool drained() const;
+    /// Connections to whom something is owed, once nothing more is accepted.
+    std::size_t owing() const;
     /// The longest that a request which was accepted may take to its answer.
     Duration longest_answer() const;
     /// Closes everything.
@@ -71,6 +73,7 @@ class Gateway {
     Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
     /// Who hears of the writes on a line, by its name; buses tell to their end.
     std::map<std::string, std::function<void(const bus::WriteEvent&)>> write_listeners_;
+    std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;

@@ -2,6 +2,7 @@
 
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
+#include <string>
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/log.hpp"
@@ -25,13 +26,14 @@ class Loop {
         wait_for_end();
         wait_for_reload();
     }
+    ExitCode code() const { return code_; }
 
   private:
     void wait_for_end() {
         ends_.async_wait([this](error_code error, int) {
             if (error) return;
             if (ending_now_) {
-                finish();
+                cut();
                 return;
             }
             ending_now_ = true;
@@ -44,6 +46,17 @@ class Loop {
             look();
             wait_for_end();
         });
+    }
+
+    /// Somebody does not want to wait for what is owed.
+    void cut() {
+        if (!finished_ && !ending_.done()) {
+            code_ = kCut;
+            rt::log(rt::LogLevel::warn, "stopped at once",
+                    {{"why", "a second signal came: what is in flight is not answered"},
+                     {"connections", std::to_string(ending_.open ? ending_.open() : 0)}});
+        }
+        finish();
     }
 
     void look() {
@@ -81,6 +94,7 @@ class Loop {
     asio::steady_timer limit_;
     bool ending_now_ = false;
     bool finished_ = false;
+    ExitCode code_ = kFine;
 };
 
 }  // namespace
@@ -90,10 +104,11 @@ SignalLoop::SignalLoop(asio::io_context& io)
     std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
 }
 
-void SignalLoop::run(const Ending& ending) {
+ExitCode SignalLoop::run(const Ending& ending) {
     Loop loop(io_, ending, ends_, reloads_);
     loop.start();
     io_.run();
+    return loop.code();
 }
 
 }  // namespace panelgate::app

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <cstddef>
 #include <functional>
 
+#include "exit_code.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::app {
@@ -14,7 +16,8 @@ struct Ending {
     std::function<void()> begin;   ///< first SIGTERM or SIGINT: stop accepting
     std::function<bool()> done;    ///< asked again and again until true
     std::function<void()> finish;  ///< then, or when patience() is over, or at the second signal
-    Duration longest_answer{};     ///< of what is in flight
+    std::function<std::size_t()> open{};  ///< connections that are still owed an answer
+    Duration longest_answer{};            ///< of what is in flight
 
     /// What has been accepted is answered within its time, and the answer needs a moment to leave.
     Duration patience() const { return std::max<Duration>(10s, longest_answer + 2s); }
@@ -24,9 +27,9 @@ struct Ending {
 class SignalLoop {
   public:
     explicit SignalLoop(boost::asio::io_context& io);
-    /// Runs the loop until a signal, also an earlier one, has ended it. SIGHUP is told to be no
-    /// reload in this version.
-    void run(const Ending& ending);
+    /// Runs the loop until a signal, also an earlier one, has ended it: kFine, or kCut when a
+    /// second one came before it was done. SIGHUP is told to be no reload in this version.
+    ExitCode run(const Ending& ending);
 
   private:
     boost::asio::io_context& io_;

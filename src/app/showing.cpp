@@ -84,7 +84,7 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
     std::vector<points::RelaySample> samples;
     for (const points::RelayStatus& relay : relays) {
         samples.push_back({relay.name, relay.state == points::RelayState::ok, relay.reads,
-                           relay.writes, relay.read_failures, relay.write_failures});
+                           relay.writes, relay.repairs, relay.read_failures, relay.write_failures});
     }
     return samples;
 }

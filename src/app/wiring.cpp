@@ -43,6 +43,16 @@ std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
     return functions;
 }
 
+/// The profile outlives it.
+points::SharedMemory memory_of(const profile::PanelProfile& panel) {
+    points::SharedMemory memory;
+    memory.shown_as = [&panel](const modbus::Span& written) {
+        return profile::shown_as(panel, written);
+    };
+    memory.known = panel.name != "generic";  // which says what anybody could
+    return memory;
+}
+
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
     std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
     for (const arbiter::StationSettings& settings : line.arbiter.stations) {
@@ -77,11 +87,7 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         entry.wants = points::wants_of(station.points, station.polls);
         entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
                                                 frame_gap(line, station.id));
-        const profile::PanelProfile& panel = *station.profile;
-        entry.memory.shown_as = [&panel](const modbus::Span& written) {
-            return profile::shown_as(panel, written);
-        };
-        entry.memory.known = panel.name != "generic";  // which says what anybody could
+        entry.memory = memory_of(*station.profile);
     }
     return polled;
 }
@@ -97,6 +103,8 @@ points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
     route.from_station = from.id;
     route.to = to.bus;
     route.to_station = to.id;
+    route.to_line = to.line;
+    route.to_memory = memory_of(*to.configured->profile);
     route.to_has_multiple = to.configured->profile->has_function(multiple);
     return route;
 }

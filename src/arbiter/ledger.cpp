@@ -83,7 +83,8 @@ void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
 
 void Ledger::written(const Group& group, bool ended) {
     if (group.request.is_read()) return;
-    actions_.push_back(Written{group.station, group.request.access().write, ended});
+    const Client client = group.jobs.empty() ? 0 : group.jobs.front().client;
+    actions_.push_back(Written{group.station, group.request.access().write, ended, client});
 }
 
 void Ledger::on_started(TimePoint now, const Job& job) {

@@ -65,6 +65,7 @@ struct Bus::State final : public line::Line::Events {
 
     void transact(Request request, AnswerHandler handler);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
+    void tell_refused(std::uint8_t station, ByteView pdu, ClientId client);
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -74,7 +75,7 @@ struct Bus::State final : public line::Line::Events {
     void act(arbiter::Decision& decision);
     void act(arbiter::StationEvent& event);
     void act(const arbiter::Written& written) {
-        observe(WriteEvent{written.station, written.items, written.ended});
+        observe(WriteEvent{written.station, written.items, written.ended, written.client});
     }
     void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {
@@ -180,6 +181,14 @@ void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal>
     refused.pdu = std::move(pdu);
     refused.refusal = std::move(refusal);
     answer(std::move(entry), std::move(refused));
+}
+
+void Bus::State::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+    if (pdu.empty()) return;
+    counters.count(station, pdu[0], Outcome::refused, Duration::zero());
+    if (const auto deed = deed_of(pdu, arbiter.client_names().of(client)))
+        log_deed(settings, station, *deed, Outcome::refused);
+    observe(TransactionEvent{station, pdu[0], Outcome::refused, Duration::zero()});
 }
 
 void Bus::State::act(arbiter::Finish& finish) {
@@ -292,6 +301,10 @@ void Bus::stop() {
 
 void Bus::transact(Request request, AnswerHandler handler) {
     state_->call([&] { state_->transact(std::move(request), std::move(handler)); });
+}
+
+void Bus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+    state_->tell_refused(station, pdu, client);
 }
 
 void Bus::cancel(ClientId client) {

@@ -10,18 +10,31 @@
 
 namespace panelgate::bus {
 
-std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
+namespace {
+
+/// As `raw` takes it; the first bytes of a long one.
+std::string hex_of(ByteView pdu) {
     constexpr std::size_t kShown = 32;  // bytes
+    std::string hex = to_hex(pdu.first(std::min(kShown, pdu.size())));
+    std::erase(hex, ' ');
+    return pdu.size() > kShown ? hex + "..." : hex;
+}
+
+}  // namespace
+
+std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
     if (request.poll || request.request.is_read()) return std::nullopt;
     Deed deed{names.of(request.client), {}, {}};
     if (const auto written = request.request.access().write)
         deed.place =
             std::string(modbus::label(written->table)) + '/' + std::to_string(written->first);
-    const ByteView pdu(request.request.pdu());
-    deed.pdu = to_hex(pdu.first(std::min(kShown, pdu.size())));
-    std::erase(deed.pdu, ' ');  // as `raw` takes it
-    if (pdu.size() > kShown) deed.pdu += "...";
+    deed.pdu = hex_of(request.request.pdu());
     return deed;
+}
+
+std::optional<Deed> deed_of(ByteView pdu, const std::string& client) {
+    if (modbus::is_pure_read(pdu)) return std::nullopt;
+    return Deed{client, {}, hex_of(pdu)};
 }
 
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "panelgate/arbiter/client_names.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus.hpp"
 
@@ -18,6 +19,8 @@ struct Deed {
 
 /// Nothing for what changes nothing and for what no client wants (polls, relays).
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names);
+/// The same of a PDU that is no request: its place is not told.
+std::optional<Deed> deed_of(ByteView pdu, const std::string& client);
 /// One line at info.
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);
 

@@ -96,7 +96,7 @@ std::string TtyLine::try_open() {
 std::string TtyLine::set_up() {
     const SetUp result = set_up_tty(fd(), settings().serial, ops_);
     if (!result.error.empty()) return result.error;
-    warn_once(last_warning_, "device settings differ", result.warning);
+    if (!settings().simulated) warn_once(last_warning_, "device settings differ", result.warning);
     driver_ = look_at_driver(fd(), ops_);
     gone_by_ = clock().now() + kTransferTime;
     errors_.opened(fd(), ops_);

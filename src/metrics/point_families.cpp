@@ -24,6 +24,8 @@ void add_relays(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge("panelgate_relay_up", "1 when the last transfer of a relay succeeded.");
     Family reads = make_counter("panelgate_relay_reads_total", "Reads of a relay's source.");
     Family writes = make_counter("panelgate_relay_writes_total", "Writes of a relay's target.");
+    Family repairs = make_counter("panelgate_relay_repairs_total",
+                                  "Writes of a relay's target that somebody else had written.");
     Family failures =
         make_counter("panelgate_relay_failures_total", "Reads and writes of a relay that failed.");
     for (const points::RelaySample& relay : snapshot.relays) {
@@ -33,12 +35,14 @@ void add_relays(Families& out, const Snapshot& snapshot) {
         };
         reads.counter({{"relay", relay.relay}}, static_cast<double>(relay.reads));
         writes.counter({{"relay", relay.relay}}, static_cast<double>(relay.writes));
+        repairs.counter({{"relay", relay.relay}}, static_cast<double>(relay.repairs));
         side(failures, "source", relay.read_failures);
         side(failures, "target", relay.write_failures);
     }
     out.push_back(up.take());
     out.push_back(reads.take());
     out.push_back(writes.take());
+    out.push_back(repairs.take());
     out.push_back(failures.take());
 }
 

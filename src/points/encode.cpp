@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "compare.hpp"
 #include "panelgate/base/number_text.hpp"
 #include "panelgate/points/value.hpp"
 #include "registers.hpp"
@@ -15,7 +16,9 @@
 namespace panelgate::points {
 namespace {
 
-WriteRefusal refusal(std::string message) { return {std::move(message)}; }
+WriteRefusal refusal(std::string message) { return {.message = std::move(message)}; }
+
+constexpr double kExactDouble = 9007199254740992.0;  ///< 2^53
 
 struct Limits {
     double low = 0;
@@ -74,8 +77,9 @@ std::string range_text(const Point& point) {
     return low + " to " + high + " (" + type_text(point) + ')';
 }
 
-bool within_limits(const Point& point, double number) {
-    return !(point.min && number < *point.min) && !(point.max && number > *point.max);
+bool within_limits(const Point& point, const Value& value) {
+    return !(point.min && is_below(value, *point.min)) &&
+           !(point.max && is_above(value, *point.max));
 }
 
 /// "x must be at most 25"
@@ -110,12 +114,20 @@ std::uint64_t nearest_bits(Type type, double raw) {
 /// The raw number whose value is exactly this; nothing when there is none.
 std::optional<std::uint64_t> exact_raw(const Point& point, const Value& value, double raw) {
     if (auto bits = exact_bits(point, value)) return bits;
-    if (is_plain(point))
-        return raw == std::floor(raw) ? std::optional(nearest_bits(point.type, raw)) : std::nullopt;
+    if (is_plain(point)) {
+        // Beyond 2^53 a double is whole whatever was meant.
+        const bool is_whole = raw == std::floor(raw) && std::abs(raw) <= kExactDouble;
+        return is_whole ? std::optional(nearest_bits(point.type, raw)) : std::nullopt;
+    }
     const Scaling scaling(point.scale, point.offset);
-    const auto* whole = std::get_if<std::int64_t>(&value);
-    const auto exact =
-        whole != nullptr ? scaling.exact_raw_of(*whole) : scaling.exact_raw_of(*number_of(value));
+    std::optional<std::int64_t> exact;
+    if (const auto* i = std::get_if<std::int64_t>(&value)) {
+        exact = scaling.exact_raw_of(*i);
+    } else if (const auto* u = std::get_if<std::uint64_t>(&value)) {
+        exact = scaling.exact_raw_of(*u);
+    } else {
+        exact = scaling.exact_raw_of(*number_of(value));
+    }
     if (exact) return static_cast<std::uint64_t>(*exact);
     return std::nullopt;
 }
@@ -134,13 +146,18 @@ std::string neighbours_text(const Point& point, double below, double above) {
 }
 
 WriteRefusal inexact(const Point& point, const Value& value, double below, double above) {
-    return {point.name + " cannot be exactly " + to_string(value) + " (" + type_text(point) + ')' +
-                neighbours_text(point, below, above),
-            true};
+    return {.message = point.name + " cannot be exactly " + to_string(value) + " (" +
+                       type_text(point) + ')' + neighbours_text(point, below, above),
+            .inexact = true};
 }
 
 WriteRefusal inexact_whole(const Point& point, const Value& value, double raw) {
     const Limits limits = limits_of(point.type);
+    if (std::abs(raw) > kExactDouble)
+        return {.message = point.name +
+                           " takes no fraction here: with so many digits it is not exact (" +
+                           type_text(point) + ')',
+                .inexact = true};
     return inexact(point, value, from_raw(point, std::max(std::floor(raw), limits.low)),
                    from_raw(point, std::min(std::ceil(raw), limits.high)));
 }
@@ -148,9 +165,9 @@ WriteRefusal inexact_whole(const Point& point, const Value& value, double raw) {
 /// What everybody is refused: not a number, outside what the configuration allows, outside the
 /// type.
 std::optional<WriteRefusal> judge_given(const Point& point, const Value& value, double raw) {
-    const double number = *number_of(value);
-    if (!std::isfinite(number)) return refusal(point.name + " takes finite numbers only");
-    if (!within_limits(point, number))
+    if (!std::isfinite(*number_of(value)))
+        return refusal(point.name + " takes finite numbers only");
+    if (!within_limits(point, value))
         return refusal(limits_text(point) + ", not " + to_string(value));
     const Limits limits = limits_of(point.type);
     if (exact_bits(point, value) || (raw >= limits.low && raw <= limits.high)) return std::nullopt;
@@ -162,7 +179,7 @@ Encoded<Words> judge_written(const Point& point, const Value& value, Words words
     const auto written = decode(point, words);
     if (!written)
         return refusal(point.name + " cannot be " + to_string(value) + ": that means no value");
-    if (!within_limits(point, *number_of(*written)))
+    if (!within_limits(point, *written))
         return refusal(limits_text(point) + "; " + to_string(value) + " would be written as " +
                        to_string(*written));
     return words;
@@ -179,19 +196,32 @@ Encoded<Words> encode_whole(const Point& point, const Value& value, Rounding rou
                          reordered(parted(bits, point.count()), point.word_order, false));
 }
 
-/// The nearest float, for nobody means the 24th bit of a fraction; but a whole number is meant
-/// exactly.
+/// Of a number that a float is to hold, too: the float nearest to it, for nobody means the last bit
+/// of a fraction; but a whole number is meant exactly, and what is not 0 must not become 0 or lose
+/// most of its digits.
+template <class Float>
+bool is_held(const Point& point, const Value& value, double raw, Float number) {
+    if (!is_plain(point)) return true;
+    const auto held = static_cast<double>(number);
+    if (is_same(value, held) || is_printed_as(value, number)) return true;
+    if (raw == std::floor(raw)) return false;
+    return std::abs(held) >= static_cast<double>(std::numeric_limits<Float>::min());
+}
+
+/// The float that is nearest on the other side of the value.
+template <class Float>
+Float beyond(const Value& value, Float number) {
+    constexpr Float kMost = std::numeric_limits<Float>::max();
+    return std::nextafter(number, is_below(value, static_cast<double>(number)) ? -kMost : kMost);
+}
+
 Encoded<Words> encode_f32(const Point& point, const Value& value, double raw, Rounding rounding) {
     constexpr float kMost = std::numeric_limits<float>::max();
     const float number = std::abs(raw) > static_cast<double>(kMost)
                              ? std::copysign(kMost, static_cast<float>(raw < 0 ? -1 : 1))
                              : static_cast<float>(raw);
-    const bool is_exact = static_cast<double>(number) == raw || as_printed(number) == raw;
-    if (rounding == Rounding::exact && is_plain(point) && raw == std::floor(raw) && !is_exact) {
-        const bool above = static_cast<double>(number) > raw;
-        const float other = std::nextafter(number, above ? -kMost : kMost);
-        return inexact(point, value, static_cast<double>(number), static_cast<double>(other));
-    }
+    if (rounding == Rounding::exact && !is_held(point, value, raw, number))
+        return inexact(point, value, as_printed(number), as_printed(beyond(value, number)));
     const auto bits = std::bit_cast<std::uint32_t>(number);
     return judge_written(point, value, reordered(parted(bits, 2), point.word_order, false));
 }
@@ -201,6 +231,8 @@ Encoded<Words> encode_number(const Point& point, const Value& value, Rounding ro
     const double raw = Scaling(point.scale, point.offset).raw_of(*number_of(value));
     if (auto refused = judge_given(point, value, raw)) return std::move(*refused);
     if (point.type == Type::f32) return encode_f32(point, value, raw, rounding);
+    if (rounding == Rounding::exact && !is_held(point, value, raw, raw))
+        return inexact(point, value, raw, beyond(value, raw));
     const auto bits = std::bit_cast<std::uint64_t>(raw);
     return judge_written(point, value, reordered(parted(bits, 4), point.word_order, false));
 }
@@ -231,6 +263,18 @@ std::string labels_of(const Point& point) {
     return list;
 }
 
+/// A text that is none of the point's labels.
+WriteRefusal no_label(const Point& point, const std::string& text) {
+    if (is_no_number(text))
+        return {.message = point.name + " takes finite numbers only, not '" + text + '\'',
+                .malformed = true};
+    if (!point.labels.empty())
+        return refusal(point.name + " has no label '" + text + '\'' + labels_of(point));
+    const char* const wanted = point.type == Type::boolean ? " takes true or false, not the text '"
+                                                           : " takes a number, not the text '";
+    return refusal(point.name + wanted + text + '\'');
+}
+
 Encoded<Words> encode_bit(const Point& point, const Value& value) {
     const double number = *number_of(value);
     if (number == 0 || number == 1) return Words{static_cast<std::uint16_t>(number)};
@@ -249,7 +293,7 @@ Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& valu
     Value given = value;
     if (text != nullptr) {
         const auto raw = raw_of_label(point, *text);
-        if (!raw) return refusal(point.name + " has no label '" + *text + '\'' + labels_of(point));
+        if (!raw) return no_label(point, *text);
         given = *raw;  // raw, so it has to become a value first where there is a scale
         if (!is_plain(point)) given = from_raw(point, static_cast<double>(*raw));
     }

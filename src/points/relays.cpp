@@ -1,5 +1,7 @@
 #include "panelgate/points/relays.hpp"
 
+#include <algorithm>
+#include <set>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
@@ -9,6 +11,19 @@
 namespace panelgate::points {
 
 namespace {
+
+constexpr auto kRepairPause = 1s;  ///< between two repairs of one relay
+
+/// Does such a write change what this relay's target holds, as far as is known?
+bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
+    if (write.station != 0 && write.station != route.to_station) return false;
+    if (!write.items) return true;
+    const modbus::Span target{route.relay.to.table, route.relay.to.address, route.relay.count};
+    if (write.items->overlaps(target)) return true;
+    if (!route.to_memory.shown_as) return false;
+    return std::ranges::any_of(route.to_memory.shown_as(*write.items),
+                               [&](const modbus::Span& shown) { return shown.overlaps(target); });
+}
 
 /// Why an answer is none; empty when it is one.
 std::string failure_of(const bus::Answer& answer) {
@@ -43,9 +58,14 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
+        Bytes writing;              ///< the write that is under way
         Bytes written;              ///< the last write that was confirmed
         TimePoint written_for;      ///< the turn that it was of
         std::uint64_t returns = 0;  ///< of the target, then
+        bool open = false;          ///< a request is under way, which will lead to arm()
+        bool overwritten = false;   ///< by somebody else, and not repaired yet
+        bool repairing = false;     ///< the next write that is confirmed undoes that
+        TimePoint next_repair{};    ///< not earlier
     };
     explicit State(rt::Clock& c) : clock(c) {}
     using Then = void (State::*)(Entry&, const bus::Answer&);
@@ -56,21 +76,27 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     void on_written(Entry& entry, const bus::Answer& answer);
     bool holds(const Entry& entry, const Bytes& write) const;
     void check_target(Entry& entry);
+    void on_write(const std::string& line, const bus::WriteEvent& write);
     void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
     void set(Entry& entry, RelayState state, std::string why = {});
 
     rt::Clock& clock;
     std::vector<std::unique_ptr<Entry>> entries;
+    std::set<bus::ClientId> clients;  ///< of the relays
     Changed changed;
     bool running = false;
 };
 
-/// The next turn that is still to come: what a slow panel has missed is missed.
+/// The next turn that is still to come: what a slow panel has missed is missed. One for a repair
+/// comes in between.
 void Relays::State::arm(Entry& entry) {
     const TimePoint now = clock.now();
     const Duration every = entry.route.relay.every;
     while (entry.due <= now) entry.due += every * ((now - entry.due) / every + 1);
-    entry.alarm->arm(entry.due, [this, &entry] { read(entry); });
+    TimePoint at = entry.due;
+    if (entry.overwritten) at = std::min(at, std::max(now, entry.next_repair));
+    entry.open = false;
+    entry.alarm->arm(at, [this, &entry] { read(entry); });
 }
 
 void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu,
@@ -86,6 +112,13 @@ void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station,
 }
 
 void Relays::State::read(Entry& entry) {
+    entry.open = true;
+    const TimePoint now = clock.now();
+    if (entry.overwritten && now >= entry.next_repair) {
+        entry.overwritten = false;
+        entry.repairing = true;
+        entry.next_repair = now + kRepairPause;
+    }
     const Relay& relay = entry.route.relay;
     ask(entry, *entry.route.from, entry.route.from_station,
         modbus::encode_read({relay.from.table, relay.from.address, relay.count}), &State::on_read);
@@ -105,14 +138,15 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
         arm(entry);
         return;
     }
-    entry.written = write;
+    entry.writing = write;
     ask(entry, *entry.route.to, entry.route.to_station, std::move(write), &State::on_written);
 }
 
 /// The target has this, as far as anybody can know without asking it.
 bool Relays::State::holds(const Entry& entry, const Bytes& write) const {
     const RelayRoute& route = entry.route;
-    return write == entry.written && entry.due - entry.written_for < route.relay.refresh &&
+    return !entry.repairing && write == entry.written &&
+           entry.due - entry.written_for < route.relay.refresh &&
            route.to->station_status(route.to_station).returns == entry.returns;
 }
 
@@ -134,11 +168,29 @@ void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
     } else {
         ++entry.status.writes;
         entry.status.last_write = clock.now();
+        if (std::exchange(entry.repairing, false)) ++entry.status.repairs;
+        entry.written = std::move(entry.writing);
         entry.written_for = entry.due;
         entry.returns = entry.route.to->station_status(entry.route.to_station).returns;
         set(entry, RelayState::ok);
     }
     arm(entry);
+}
+
+/// Told from inside the bus: asks nobody.
+void Relays::State::on_write(const std::string& line, const bus::WriteEvent& write) {
+    if (write.ended) return;
+    for (const auto& entry : entries) {
+        if (entry->route.to_line != line) continue;
+        if (write.client == entry->client) {  // what was written before is written over now
+            if (std::exchange(entry->overwritten, false)) entry->repairing = true;
+            continue;
+        }
+        // What relays write is what their user wants, and their targets lie apart.
+        if (clients.contains(write.client) || !changes_target(entry->route, write)) continue;
+        entry->overwritten = true;
+        if (!entry->open) arm(*entry);
+    }
 }
 
 void Relays::State::set(Entry& entry, RelayState state, std::string why) {
@@ -152,6 +204,7 @@ Relays::Relays(rt::Clock& clock, std::vector<RelayRoute> routes)
     : state_(std::make_shared<State>(clock)) {
     for (RelayRoute& route : routes)
         state_->entries.push_back(std::make_unique<State::Entry>(clock, std::move(route)));
+    for (const auto& entry : state_->entries) state_->clients.insert(entry->client);
 }
 
 Relays::~Relays() { stop(); }
@@ -184,6 +237,13 @@ std::vector<RelayStatus> Relays::status() const {
     std::vector<RelayStatus> all;
     for (const auto& entry : state_->entries) all.push_back(entry->status);
     return all;
+}
+
+std::function<void(const std::string&, const bus::WriteEvent&)> Relays::write_listener() const {
+    return [weak = std::weak_ptr(state_)](const std::string& line, const bus::WriteEvent& write) {
+        const auto state = weak.lock();
+        if (state && state->running) state->on_write(line, write);
+    };
 }
 
 }  // namespace panelgate::points

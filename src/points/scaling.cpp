@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <system_error>
 
@@ -103,7 +104,10 @@ std::optional<std::int64_t> Scaling::exact_raw_of(const Decimal& value) const {
 std::optional<std::int64_t> Scaling::exact_raw_of(double value) const {
     const auto decimal = decimal_of(value);
     if (!decimal) return std::nullopt;
-    if (const auto raw = exact_raw_of(*decimal)) return raw;
+    if (const auto raw = exact_raw_of(*decimal)) {
+        // Beyond, the next raw number may be the same double.
+        return std::abs(*raw) <= kExact ? raw : std::nullopt;
+    }
     // What a client was shown it may write back, digits or not.
     const double nearest = std::round(raw_of(value));
     if (std::abs(nearest) > static_cast<double>(kExact) || value_of(nearest) != value)
@@ -112,8 +116,18 @@ std::optional<std::int64_t> Scaling::exact_raw_of(double value) const {
 }
 
 std::optional<std::int64_t> Scaling::exact_raw_of(std::int64_t value) const {
-    if (value <= kExact && value >= -kExact) return exact_raw_of(static_cast<double>(value));
-    return exact_raw_of(Decimal{value, 0});
+    if (const auto raw = exact_raw_of(Decimal{value, 0})) return raw;
+    if (value > kExact || value < -kExact) return std::nullopt;
+    return exact_raw_of(static_cast<double>(value));
+}
+
+std::optional<std::int64_t> Scaling::exact_raw_of(std::uint64_t value) const {
+    constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();
+    int exponent = 0;
+    for (; value > kMost && value % 10 == 0; value /= 10) ++exponent;
+    if (value > kMost) return std::nullopt;
+    const auto digits = static_cast<std::int64_t>(value);
+    return exponent == 0 ? exact_raw_of(digits) : exact_raw_of(Decimal{digits, exponent});
 }
 
 }  // namespace panelgate::points

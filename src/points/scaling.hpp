@@ -16,10 +16,12 @@ class Scaling {
     double value_of(double raw) const;
     /// Not rounded.
     double raw_of(double value) const;
-    /// The whole raw number whose value this is, or is shown as this; nothing when there is none.
+    /// The whole raw number whose value this is, or is shown as this; nothing when there is none,
+    /// and beyond 2^53, where a double may be several.
     std::optional<std::int64_t> exact_raw_of(double value) const;
     /// … of a whole value, beyond what a double holds.
     std::optional<std::int64_t> exact_raw_of(std::int64_t value) const;
+    std::optional<std::int64_t> exact_raw_of(std::uint64_t value) const;
 
   private:
     /// digits * 10^exponent

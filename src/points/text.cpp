@@ -40,4 +40,12 @@ std::vector<std::uint16_t> text_to_words(std::string_view text, unsigned count) 
     return words;
 }
 
+bool is_no_number(std::string text) {
+    std::ranges::transform(text, text.begin(), [](char c) {
+        return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+    if (text.starts_with('-') || text.starts_with('+')) text.erase(0, 1);
+    return text == "nan" || text == "inf" || text == "infinity";
+}
+
 }  // namespace panelgate::points

@@ -14,4 +14,7 @@ std::string text_of_words(const std::vector<std::uint16_t>& words, unsigned leng
 /// Filled up with NUL. The text fits.
 std::vector<std::uint16_t> text_to_words(std::string_view text, unsigned count);
 
+/// "NaN", "-inf", "Infinity", however it is written.
+bool is_no_number(std::string text);
+
 }  // namespace panelgate::points

@@ -6,7 +6,7 @@
 namespace panelgate::points {
 namespace {
 
-WriteRefusal refusal(std::string message) { return {std::move(message)}; }
+WriteRefusal refusal(std::string message) { return {.message = std::move(message)}; }
 
 bool writes_coils(const profile::PanelProfile& profile) {
     return profile.has_function(modbus::kWriteSingleCoil) ||

@@ -188,6 +188,13 @@ void log(LogLevel level, std::string_view event, std::span<const LogField> field
     put_at_pace(level, event, subject_of(fields), fields, LogThrottle::kIncidents);
 }
 
+void log_about(std::string_view subject, LogLevel level, std::string_view event,
+               std::initializer_list<LogField> fields) {
+    if (!log_enabled(level)) return;
+    put_at_pace(level, event, subject, std::span(fields.begin(), fields.size()),
+                LogThrottle::kIncidents);
+}
+
 void log_deed(std::string_view event, std::string_view subject,
               std::initializer_list<LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;

@@ -8,10 +8,20 @@ Caller::Caller(std::string name, bus::Host host) : name_(std::move(name)), host_
 
 void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
-    if (used_.insert(bus).second) bus->name_client(client_, "modbus_tcp " + name_);
+    use(bus);
     bus->transact(
         {.station = station, .request = std::move(request), .client = client_, .host = host_},
         std::move(handler));
+}
+
+void Caller::tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu) {
+    use(bus);
+    bus->tell_refused(station, pdu, client_);
+}
+
+/// It has a name there before it does anything.
+void Caller::use(bus::BusClient* bus) {
+    if (used_.insert(bus).second) bus->name_client(client_, "modbus_tcp " + name_);
 }
 
 void Caller::withdraw() {

@@ -4,6 +4,7 @@
 #include <set>
 #include <string>
 
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -19,10 +20,14 @@ class Caller {
     /// Hands the request to a bus, for one of its stations; 0: all of them.
     void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
+    /// Has the bus count what was refused before it was asked.
+    void tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu);
     /// Takes back what still waits on the buses; it is answered Fault::cancelled.
     void withdraw();
 
   private:
+    void use(bus::BusClient* bus);
+
     std::string name_;
     bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();

@@ -15,6 +15,7 @@ namespace panelgate::tcp_server {
 /// What is to be done with a request.
 struct Refuse {
     modbus::ExceptionCode code;
+    std::vector<Target> asked{};  ///< whose buses count it as refused
 };
 struct Forward {
     Target target;

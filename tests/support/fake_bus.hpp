@@ -38,6 +38,8 @@ class FakeBus : public bus::BusClient {
         }
     }
 
+    void tell_refused(std::uint8_t, ByteView, bus::ClientId) override { ++told_refused; }
+
     void cancel(bus::ClientId client) override {
         cancelled.push_back(client);
         std::vector<Open> kept;
@@ -99,6 +101,7 @@ class FakeBus : public bus::BusClient {
     Script script;
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
+    int told_refused = 0;
     bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, EchoState::absent};
     bus::Rights rights;  ///< to everything, at first
     std::vector<bus::ClientShare> shares;

@@ -109,6 +109,10 @@ class Demo(unittest.TestCase):
                                  text=True, timeout=harness.PATIENCE, check=False)
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
 
+    def test_each_panel_is_asked_for_something_so_that_it_is_seen_to_live(self):
+        self.becomes("/api/v1/stations", lambda body: all(
+            station["state"] == "online" for station in body["stations"]))
+
     def test_points_a_poll_and_a_relay_live_in_it(self):
         listing = self.program.get("/api/v1/stations")[1]["stations"]
         with_points = 0

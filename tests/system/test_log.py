@@ -111,8 +111,52 @@ class Log(unittest.TestCase):
             self.assertEqual(program.rest("POST", "/api/v1/lines/floor1/raw",
                                           {"station": 31, "pdu": "0603EA0009"})[0], 403)
             program.log.wait_for(r"info write .*/1002 .*outcome=refused")
+            self.assertEqual(program.rest("POST", "/api/v1/lines/floor1/raw",
+                                          {"station": 31, "pdu": "0F03EA"})[0], 403)
+            program.log.wait_for(r"info write .*pdu=0f03ea outcome=refused")
+            self.assertEqual(program.rest(
+                "POST", "/api/v1/lines/floor1/broadcast",
+                {"table": "holding-registers", "address": 1003, "values": [1]})[0], 403)
+            program.log.wait_for(r"info write .*station=broadcast .*/1003 .*outcome=refused")
             self.assertRegex(program.get("/metrics")[1],
                              r'requests_total\{.*function="6",outcome="refused"\} 3')
+
+    def test_a_broadcast_that_is_refused_on_one_of_several_lines_leaves_a_line_there(self):
+        lines = (config.line("a", stations="{id: 1, name: one}"),
+                 config.line("b", stations="{id: 2, name: two, access: read_only}"))
+        with harness.configured(config.gateway(*lines, http=config.OPERATOR)) as program:
+            with program.client() as client:
+                self.assertEqual(client.ask(0, write_register(1000, 7)), b"\x86\x01")
+                self.assertEqual(client.ask(2, b"\x06\x00"), b"\x86\x01")
+                self.assertEqual(client.ask(1, b"\x06\x01"), b"\x86\x03")
+            program.log.wait_for(r"info write line=b station=broadcast .*outcome=refused")
+            program.log.wait_for(r"info write line=b station=two .*pdu=0600 outcome=refused")
+            program.log.wait_for(r"info write line=a station=one .*pdu=0601 outcome=refused")
+            metrics = program.get("/metrics")[1]
+            self.assertRegex(metrics, r'line="b",station="other",.*outcome="refused"\} 1')
+            self.assertRegex(metrics, r'line="b",station="two",.*outcome="refused"\} 1')
+
+    def test_a_simulated_line_has_any_parity_and_no_warning(self):
+        with harness.configured(config.gateway(config.line(
+                parity="even", stations="{id: 1, name: one}"))) as program:
+            program.log.wait_for("line up")
+            self.assertNotIn(" warn ", program.log.text())
+
+    def test_a_relay_whose_source_comes_and_goes_is_quoted_now_and_then(self):
+        stations = ("{id: 31, name: press, simulate: {drop: 0.5}}, {id: 20, name: oven}")
+        text = config.gateway(
+            config.line(baud=1000000, stations=stations, retries=0,
+                        timing="{response_timeout: 5ms}", offline="{after: 100}"),
+            relays="[{from: press/400001, to: oven/400001, every: 20ms}]", http=config.OPERATOR)
+        with harness.configured(text) as program:
+            def changes():
+                [relay] = program.get("/api/v1/relays")[1]["relays"]
+                return min(relay["read_failures"], relay["writes"])
+            while changes() < 30:
+                pass
+            self.assertLess(program.log.text().count(" relay relay="), 10)
+            program.stop()
+            self.assertRegex(program.log.finished_text(), r" relay relay=.* left_out=\d+")
 
     def test_a_program_that_writes_without_end_does_not_fill_the_disk(self):
         with harness.configured(config.gateway(FAST)) as program:

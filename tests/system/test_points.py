@@ -240,6 +240,28 @@ class Relay(unittest.TestCase):
                 until(lambda: len(writes()) == 2)
                 self.assertEqual(writes()[0].bytes, writes()[1].bytes)
 
+    def test_what_anybody_else_writes_to_the_target_is_written_over_at_once(self):
+        stations = """{id: 31, name: press, profile: autonics-gplp-s},
+                      {id: 20, name: oven, profile: panasonic-gt}"""
+        seldom = RELAY.replace("20ms", "10s")
+        text = config.gateway(config.line(stations=stations), relays=f"[{seldom}]",
+                              http=config.OPERATOR)
+        with harness.configured(text) as program, program.client() as client:
+            def relay():
+                return program.get("/api/v1/relays")[1]["relays"][0]
+            until(lambda: relay()["writes"] == 1)
+            target = "/api/v1/stations/oven/devices/GDT200"
+            wanted = program.values(target)
+            for n, write in enumerate((
+                    lambda: program.rest("PUT", target, {"values": [wanted[0] + 1]})[0],
+                    lambda: client.ask(20, harness.write_register(207, 4711))[0],
+                    lambda: client.ask(0, harness.write_register(200, 4712))[0])):
+                self.assertIn(write(), (200, 6))
+                until(lambda: relay()["repairs"] == n + 1)
+                self.assertEqual(program.values(target), wanted)
+            self.assertLess(relay()["reads"], 10, "its own turns are ten seconds apart")
+            self.assertRegex(program.get("/metrics")[1], r"relay_repairs_total\{relay=.*\} 3")
+
 
 if __name__ == "__main__":
     unittest.main()

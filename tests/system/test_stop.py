@@ -28,6 +28,26 @@ class Stop(unittest.TestCase):
                     self.assertEqual(client.receive()[2], b"\x03\x02\x00\x2a")
                     self.assertEqual(program.wait(), 0)
 
+    def test_a_second_sigterm_ends_at_once_with_a_code_and_a_line_when_requests_are_cut(self):
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            slow = config.line("slow", link, "{id: 1, name: one}", timing="{response_timeout: 15s}",
+                               queue="{deadline: 20s}")
+            with RtuBus(link, {1: lambda frame: None}) as bus:
+                with harness.configured(config.gateway(slow)) as program, \
+                        program.client() as client:
+                    program.log.wait_for("line up")
+                    client.send(1, read_registers(0))
+                    bus.wait_for(1)
+                    program.process.terminate()
+                    program.log.wait_for("info stopping")
+                    program.process.terminate()
+                    program.ends_with = 1
+                    self.assertEqual(program.wait(), 1)
+                    self.assertIn('warn stopped at once why="a second signal came: what is in '
+                                  'flight is not answered" connections=1',
+                                  program.log.finished_text())
+
 
 if __name__ == "__main__":
     unittest.main()

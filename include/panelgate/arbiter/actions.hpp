@@ -63,6 +63,7 @@ struct Written {
     std::uint8_t station = 0;           ///< 0: all of them
     std::optional<modbus::Span> items;  ///< nothing: the request names none
     bool ended = false;
+    Client client = 0;  ///< whose it is; 0: nobody waits for it any more
 };
 /// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
 /// more: then on_line_down and on_line_up.

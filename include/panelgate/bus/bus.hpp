@@ -59,6 +59,7 @@ class Bus final : public BusClient {
     void stop();
 
     void transact(Request request, AnswerHandler handler) override;
+    void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
     void cancel(ClientId client) override;
     LineStatus status() const override;
     std::vector<ClientShare> clients() const override;

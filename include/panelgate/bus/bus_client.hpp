@@ -124,6 +124,13 @@ class BusClient {
         static_cast<void>(station);
         return std::nullopt;
     }
+    /// Counts (and, of a write, logs) as refused what never became a request, because whoever was
+    /// asked has refused it: a PDU that contradicts its function, a listener only for reads.
+    virtual void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+        static_cast<void>(station);
+        static_cast<void>(pdu);
+        static_cast<void>(client);
+    }
     /// Forgets a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// one on the wire is completed and then answered normally.
     virtual void cancel(ClientId client) = 0;

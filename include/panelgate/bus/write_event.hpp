@@ -13,6 +13,7 @@ struct WriteEvent {
     std::uint8_t station = 0;           ///< 0: all of the line
     std::optional<modbus::Span> items;  ///< nothing: it may change anything
     bool ended = false;
+    std::uint64_t client = 0;  ///< whose it is (ClientId); 0: nobody waits for it any more
 };
 
 }  // namespace panelgate::bus

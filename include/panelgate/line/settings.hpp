@@ -32,6 +32,7 @@ struct Settings {
     Rs485 rs485;                  ///< of a serial device
     Duration reopen_min = 100ms;  ///< back-off between attempts to open, doubled each time
     Duration reopen_max = 1s;
+    bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
 };
 
 /// Digits and dots that are no IPv4 address, such as 10.0.0.300: no name looks like this.

@@ -22,6 +22,7 @@ struct RelaySample {
     bool ok = false;  ///< the last transfer succeeded
     std::uint64_t reads = 0;
     std::uint64_t writes = 0;
+    std::uint64_t repairs = 0;  ///< of these: after somebody else had written there
     std::uint64_t read_failures = 0;
     std::uint64_t write_failures = 0;
 };

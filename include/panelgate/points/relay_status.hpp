@@ -18,6 +18,7 @@ struct RelayStatus {
     std::string why;                         ///< it fails: an outcome, or "exception 2"
     std::uint64_t reads = 0;
     std::uint64_t writes = 0;
+    std::uint64_t repairs = 0;  ///< of these: after somebody else had written there
     std::uint64_t read_failures = 0;
     std::uint64_t write_failures = 0;
     std::optional<TimePoint> last_write;

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/bus/write_event.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/points/settings.hpp"
+#include "panelgate/points/station_polls.hpp"
 #include "panelgate/rt/clock.hpp"
 
 namespace panelgate::points {
@@ -18,6 +20,8 @@ struct RelayRoute {
     Relay relay;
     bus::BusClient* from = nullptr;  ///< outlive the relays
     bus::BusClient* to = nullptr;
+    std::string to_line{};  ///< the name of the target's line
+    SharedMemory to_memory{};
     std::uint8_t from_station = 0;
     std::uint8_t to_station = 0;
     bool to_has_multiple = true;  ///< the target takes functions 15 and 16
@@ -26,7 +30,8 @@ struct RelayRoute {
 /// Copies blocks between stations, over lines too. One request of each relay is open at a time, of
 /// the class `poll`: a relay whose panel is silent keeps nobody waiting. It writes only what it has
 /// read just before; with on_change what is new, and all again after a while and whenever the
-/// target may have been restarted. One thread; the clock outlives it.
+/// target may have been restarted. What somebody else has written to the target is written over at
+/// once, but once a second at most: nobody wins a fight. One thread; the clock outlives it.
 class Relays {
   public:
     using Changed = std::function<void(const RelayStatus&)>;
@@ -41,6 +46,9 @@ class Relays {
     void start();
     void stop();
     std::vector<RelayStatus> status() const;
+    /// To be told what is written on a line (its name), from inside its bus; may outlive the
+    /// relays.
+    std::function<void(const std::string&, const bus::WriteEvent&)> write_listener() const;
 
   private:
     struct State;

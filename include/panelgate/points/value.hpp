@@ -20,7 +20,8 @@ using Value = std::variant<bool, std::int64_t, std::uint64_t, double, std::strin
 /// Why something cannot be written: one sentence for the user.
 struct WriteRefusal {
     std::string message;
-    bool inexact = false;  ///< Rounding::nearest would do
+    bool inexact = false;    ///< Rounding::nearest would do
+    bool malformed = false;  ///< no value of any point: NaN, an infinity
 };
 [[noreturn]] void throw_exception_from_error(const WriteRefusal& refusal,
                                              const boost::source_location& where);
@@ -39,9 +40,9 @@ enum class Rounding : std::uint8_t { exact, nearest };
 
 /// The items that hold this value: the inverse of decode. One that no raw number has is refused,
 /// with the nearest below and above, unless it may be rounded; but a fraction takes the nearest
-/// float, for its digits are never meant to the last bit. Refused outside the type's range, and
-/// where what was asked for or what would be written is outside the point's min and max. A label
-/// stands for its raw value.
+/// float, for its digits are never meant to the last bit, where that is a normal one. Refused
+/// outside the type's range, and where what was asked for or what would be written is outside the
+/// point's min and max. A label stands for its raw value.
 Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& value,
                                            Rounding rounding = Rounding::exact);
 

@@ -43,6 +43,9 @@ class LogDrain {
 /// port does not count.
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
+/// The same of a subject by name: however its fields differ, its lines are of one kind.
+void log_about(std::string_view subject, LogLevel level, std::string_view event,
+               std::initializer_list<LogField> fields);
 /// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
 /// times at once, then once a minute; the last one always.
 void log_deed(std::string_view event, std::string_view subject,

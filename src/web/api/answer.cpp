@@ -36,7 +36,8 @@ unsigned status_of(Fault fault) {
     std::abort();
 }
 
-const char* detail_of(Fault fault) {
+/// Of what was not transmitted the words must not sound as if it had been.
+const char* detail_of(Fault fault, bool transmitted) {
     switch (fault) {
         case Fault::denied:
             return "no request may carry this function here";
@@ -53,11 +54,16 @@ const char* detail_of(Fault fault) {
         case Fault::line_lost:
             return "the line was lost while the request was on its way";
         case Fault::timeout:
-            return "the station did not answer in time";
+            return transmitted ? "the station did not answer in time"
+                               : "nothing was sent: its time was over while the station owed an "
+                                 "answer";
         case Fault::damaged:
-            return "only damaged replies came back";
+            return transmitted ? "only damaged replies came back"
+                               : "nothing was sent: the station's replies come damaged";
         case Fault::offline:
-            return "the station is silent; it is probed from time to time";
+            return transmitted ? "the station is silent; it is probed from time to time"
+                               : "nothing was sent: the station is silent; it is probed from time "
+                                 "to time";
         case Fault::cancelled:
             return "the gateway is stopping";
     }
@@ -82,7 +88,7 @@ HttpResponse json_response(unsigned status, const json::value& body) {
 }
 
 Problem problem_of(Fault fault, bool transmitted) {
-    Problem made = problem(status_of(fault), detail_of(fault));
+    Problem made = problem(status_of(fault), detail_of(fault, transmitted));
     made.kind = label(fault);
     made.extensions["modbus_exception"] = static_cast<std::uint8_t>(modbus::to_exception(fault));
     made.extensions["transmitted"] = transmitted;

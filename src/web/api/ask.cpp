@@ -44,14 +44,17 @@ Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu) {
     return bus::Request{.station = station, .request = std::move(*request)};
 }
 
+void introduce(Caller& caller, bus::BusClient* bus) {
+    const bus::ClientId client = caller.id();
+    caller.at_leaving(bus, [bus, client] { bus->cancel(client); });
+    bus->name_client(client, caller.name());
+}
+
 asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
                                  bus::Request request) {
     if (!caller->has_left()) {
-        const bus::ClientId client = caller->id();
-        const auto cancel = [bus, client] { bus->cancel(client); };
-        caller->at_leaving(bus, cancel);
-        bus->name_client(client, caller->name());
-        request.client = client;
+        introduce(*caller, bus);
+        request.client = caller->id();
         if (!caller->address().empty()) request.host = bus::host_of(caller->address());
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);

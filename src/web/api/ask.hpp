@@ -20,4 +20,7 @@ Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu);
 boost::asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
                                         bus::Request request);
 
+/// Tells the bus who asks, for as long as the client is there.
+void introduce(Caller& caller, bus::BusClient* bus);
+
 }  // namespace panelgate::web

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <boost/json/array.hpp>
-#include <boost/json/stream_parser.hpp>
 #include <cmath>
 #include <optional>
 
+#include "json_reader.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "repeated_member.hpp"
 
@@ -22,8 +22,9 @@ std::string place_of(std::string_view body, std::size_t at) {
     return "line " + std::to_string(line) + ", column " + std::to_string(column);
 }
 
-Problem bad_json(std::string_view body, std::size_t at, const std::string& what) {
-    return problem(400, "the body is not JSON: " + place_of(body, at) + ": " + what);
+Problem bad_json(std::string_view body, const JsonFault& fault) {
+    const char* const kind = fault.is_json ? "a number that cannot be: " : "the body is not JSON: ";
+    return problem(400, kind + place_of(body, fault.at) + ": " + fault.what);
 }
 
 /// The number when it is whole and fits; JSON has no integers of its own.
@@ -53,19 +54,13 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
 }  // namespace
 
 Parsed<json::object> parse_object(std::string_view body) {
-    json::stream_parser parser;
-    boost::system::error_code error;
-    const std::size_t used = parser.write_some(body.data(), body.size(), error);
-    if (error) return bad_json(body, used, error.message());
-    if (!parser.done()) parser.finish(error);
-    if (error) return bad_json(body, body.size(), error.message());
-    if (used < body.size()) return bad_json(body, used, "something follows the value");
+    const JsonRead read = read_json(body);
+    if (read.fault) return bad_json(body, *read.fault);
     if (const auto twice = find_repeated_member(body))
         return problem(400, "the member '" + excerpt(twice->name) +
                                 "' comes a second time: " + place_of(body, twice->at));
-    const json::value value = parser.release();
-    if (!value.is_object()) return problem(400, "the body must be a JSON object");
-    return value.get_object();
+    if (!read.value.is_object()) return problem(400, "the body must be a JSON object");
+    return read.value.get_object();
 }
 
 Parsed<json::object> parse_object(std::string_view body, Members known) {

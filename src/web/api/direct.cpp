@@ -5,6 +5,7 @@
 #include "body.hpp"
 #include "handlers.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "refusal.hpp"
 #include "station_path.hpp"
@@ -47,8 +48,6 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
     if (!address) return address.error();
     const auto cells = values_member(body, *table);
     if (!cells) return cells.error();
-    const auto allowed = check_may_write(*line.bus, 0);
-    if (!allowed) return allowed.error();
 
     const auto functions = write_functions(*table, cells->size());
     const std::uint8_t function = broadcast_function(directory, line, functions);
@@ -70,6 +69,15 @@ Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line
     return check_may_write(*line.bus, id);
 }
 
+/// Nobody answers a broadcast, so it can do nothing but write.
+Problem no_broadcast() {
+    Problem made = problem_of(Fault::denied, false);
+    made.detail =
+        "refused here, nothing was sent: station 0 is all stations of the line, of which none "
+        "answers: a broadcast can write (05, 06, 15, 16), but not read";
+    return made;
+}
+
 Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& line,
                                  const json::object& body) {
     const auto station = number_member(body, "station", 0, modbus::kMaxStation);
@@ -82,10 +90,22 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     }
     const auto id = static_cast<std::uint8_t>(*station);
     const bool reads = modbus::is_pure_read(*pdu);  // also of one that is malformed
+    const bool spreads = modbus::is_broadcastable(pdu->front());
     auto made = request_to(id, std::move(*pdu));
+    if (id == 0 && !spreads && (made || reads)) return no_broadcast();
     const auto allowed = check_raw_station(directory, line, id, reads || made);
     if (!allowed) return allowed.error();
     return made;
+}
+
+/// What was no request, or is refused before its bus is asked: the bus counts and logs it.
+void tell_refused(Caller& caller, bus::BusClient& bus, const json::object& body) {
+    const auto station = number_member(body, "station", 0, modbus::kMaxStation);
+    const auto hex = string_member(body, "pdu");
+    const auto pdu = hex ? from_hex(*hex) : std::nullopt;
+    if (!station || !pdu || pdu->empty() || pdu->size() > modbus::kMaxPdu) return;
+    introduce(caller, &bus);
+    bus.tell_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
 }
 
 HttpResponse broadcast_answer(const bus::Answer& answer) {
@@ -112,7 +132,8 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
     if (!body) co_return to_response(body.error());
-    auto planned = broadcast_request(*api->directory, **line, *body);
+    auto planned = unless_refused(broadcast_request(*api->directory, **line, *body), *(*line)->bus,
+                                  std::uint8_t{0});
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
@@ -125,7 +146,10 @@ Handling post_raw(HttpRequest request, const Api* api) {
     const auto body = parse_object(request.body, {"station", "pdu"});
     if (!body) co_return to_response(body.error());
     auto planned = raw_request(*api->directory, **line, *body);
-    if (!planned) co_return to_response(planned.error());
+    if (!planned) {
+        tell_refused(*request.caller, *(*line)->bus, *body);
+        co_return to_response(planned.error());
+    }
     bus::Request made = std::move(*planned);
     const bool broadcast = made.station == 0;
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));

@@ -58,6 +58,7 @@ Parsed<points::PointWrite> write_of(const Found& found, const HttpRequest& reque
     if (!value) return value.error();
     auto write = points::write_request(*found.station.profile, *found.point, *value, *rounding);
     if (write) return std::move(*write);
+    if (write.error().malformed) return problem(400, write.error().message);
     const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
     return problem(422, write.error().message + hint);
 }
@@ -155,6 +156,7 @@ Handling get_relays(HttpRequest, const Api* api) {
         object["state"] = text_of(relay);
         object["reads"] = relay.reads;
         object["writes"] = relay.writes;
+        object["repairs"] = relay.repairs;
         object["read_failures"] = relay.read_failures;
         object["write_failures"] = relay.write_failures;
         object["last_write_ms"] = nullptr;

@@ -6,8 +6,21 @@ namespace panelgate::web {
 
 Duration Logins::hold(TimePoint now, const std::string& address) const {
     const auto known = known_.find(address);
-    if (known == known_.end()) return Duration::zero();
-    return count_at(now, known->second) > settings_.free ? settings_.hold : Duration::zero();
+    return known != known_.end() && guesses(now, known->second) ? settings_.hold : Duration::zero();
+}
+
+Duration Logins::turn(TimePoint now, const std::string& address) {
+    const auto known = known_.find(address);
+    if (known == known_.end() || !guesses(now, known->second)) return Duration::zero();
+    Failures& failures = known->second;
+    // So many may be connected that this is their pace when each is held; nobody waits longer.
+    const TimePoint mine = std::clamp(failures.free, now, now + settings_.hold);
+    failures.free = mine + settings_.hold / settings_.at_once;
+    return mine - now;
+}
+
+bool Logins::guesses(TimePoint now, const Failures& failures) const {
+    return count_at(now, failures) > settings_.free;
 }
 
 void Logins::failed(TimePoint now, const std::string& address) {
@@ -18,12 +31,14 @@ void Logins::failed(TimePoint now, const std::string& address) {
     }
     Failures& failures = known_[address];
     const unsigned before = fresh ? 0 : count_at(now, failures);
-    failures = {std::min(before + 1, settings_.remembered), now};
+    failures.count = std::min(before + 1, settings_.remembered);
+    failures.last = now;
 }
 
 void Logins::succeeded(const std::string& address) {
     const auto known = known_.find(address);
     if (known == known_.end()) return;
+    known->second.free -= settings_.hold / settings_.at_once;  // it was no guess
     if (known->second.count <= 1) {
         known_.erase(known);
     } else {

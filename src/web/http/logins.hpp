@@ -8,14 +8,17 @@
 
 namespace panelgate::web {
 
-/// Who guesses tokens is slowed down, by address. What is right is held up as what is wrong, or the
-/// time would tell them apart; never for long, and each right one makes up for a wrong one: behind
-/// one address there may be many. Pure.
+/// Who guesses tokens is slowed down, by address. A wrong one is answered late. What is right is
+/// not, and that tells it apart before the answer of a wrong one comes; so an address that guesses
+/// is looked at one request at a time, no faster than if each were held: hanging up early wins
+/// nothing. Each right one makes up for a wrong one: behind one address there may be many. Pure.
 class Logins {
   public:
     explicit Logins(const LoginSettings& settings) : settings_(settings) {}
 
-    /// How long a request with a token waits before anybody looks at it.
+    /// How long a request with a token waits before anybody looks at it: its turn is taken.
+    Duration turn(TimePoint now, const std::string& address);
+    /// How long a wrong one waits for its answer then.
     Duration hold(TimePoint now, const std::string& address) const;
     void failed(TimePoint now, const std::string& address);
     void succeeded(const std::string& address);
@@ -25,7 +28,9 @@ class Logins {
     struct Failures {
         unsigned count = 0;
         TimePoint last;
+        TimePoint free{};  ///< when the next request with a token may be looked at
     };
+    bool guesses(TimePoint now, const Failures& failures) const;
     unsigned count_at(TimePoint now, const Failures& failures) const;
 
     LoginSettings settings_;

@@ -89,9 +89,7 @@ HttpResponse options(const Found& found, const HttpRequest& request, const Site&
     return response;
 }
 
-/// A request with a token, when its address may be guessing.
-asio::awaitable<void> hold_up(const HttpRequest* request, Shared* shared) {
-    const Duration hold = shared->logins.hold(shared->site->now(), request->caller->address());
+asio::awaitable<void> hold_up(Duration hold) {
     if (hold == Duration::zero()) co_return;
     asio::steady_timer timer(co_await asio::this_coro::executor, hold);
     boost::system::error_code ignored;
@@ -110,11 +108,23 @@ void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
 /// check_access(), and what comes of a token.
 asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
                                               Shared* shared) {
-    const bool login = needed != Role::none && request->headers.contains("authorization");
-    if (login) co_await hold_up(request, shared);
-    const auto refused = check_access(*request, needed, shared->site->settings);
+    const Settings& settings = shared->site->settings;
+    if (needed == Role::none || !request->headers.contains("authorization"))
+        co_return check_access(*request, needed, settings);
+    const std::string& address = request->caller->address();
+    asio::awaitable<void> turn = hold_up(shared->logins.turn(shared->site->now(), address));
+    co_await std::move(turn);
+    // Whoever hangs up is told nothing by that.
+    if (request->caller->has_left()) co_return std::nullopt;
+    const auto refused = check_access(*request, needed, settings);
     // With a token, nothing but one that nobody has is a 401.
-    if (login) judge_login(*request, refused && refused->status == 401, *shared);
+    const bool failed = refused && refused->status == 401;
+    const Duration hold = shared->logins.hold(shared->site->now(), address);
+    judge_login(*request, failed, *shared);
+    if (failed) {
+        asio::awaitable<void> waiting = hold_up(hold);
+        co_await std::move(waiting);
+    }
     co_return refused;
 }
 

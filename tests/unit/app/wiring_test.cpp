@@ -93,6 +93,8 @@ TEST_F(WiringTest, ARelayGoesFromStationToStation) {
     EXPECT_EQ(there.from_station, 31);
     EXPECT_EQ(there.to, &bus);
     EXPECT_EQ(there.to_station, 5);
+    EXPECT_EQ(there.to_line, floor.name);
+    EXPECT_TRUE(there.to_memory.shown_as) << "writes elsewhere may change it, too";
     EXPECT_FALSE(there.to_has_multiple);
     std::swap(relay.from, relay.to);
     EXPECT_TRUE(route_of(plant, relay).to_has_multiple);

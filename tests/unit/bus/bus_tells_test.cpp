@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/rt/log.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 #include "support/memory_line.hpp"
@@ -67,11 +68,32 @@ TEST_F(BusTellsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
     ASSERT_EQ(told.size(), 2u);
     EXPECT_EQ(told[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
     EXPECT_FALSE(told[0].ended);
+    EXPECT_EQ(told[0].client, 1u);
     EXPECT_TRUE(told[1].ended);
     line->fail_writes = true;
     ask(0, kWrite);
     ASSERT_EQ(told.size(), 4u) << "lost on its way: nobody knows what has come of it";
     EXPECT_EQ(told[3].station, 0);
+}
+
+TEST_F(BusTellsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
+    settings.stations[17].name = "press";
+    make_bus();
+    const rt::LogTap log;
+    bus->name_client(1, "modbus_tcp 10.0.0.5:1");
+    bus->tell_refused(17, "06 00"_hex, 1);
+    bus->tell_refused(0, "05 00 01 FF 00"_hex, 1);
+    bus->tell_refused(17, "03 00"_hex, 1);
+    ASSERT_EQ(log.lines().size(), 2u) << "nobody asks who has read what";
+    EXPECT_EQ(log.lines()[0],
+              "info write line=floor1 station=press client=\"modbus_tcp 10.0.0.5:1\" at=\"\" "
+              "pdu=0600 outcome=refused");
+    EXPECT_EQ(log.count("station=broadcast"), 1u);
+    const LineReport report = bus->report();
+    const auto& press = report.stations.back();
+    EXPECT_EQ(press.requests.at(6)[Outcome::refused], 1u);
+    EXPECT_EQ(press.requests.at(3)[Outcome::refused], 1u);
+    EXPECT_EQ(report.stations.front().requests.at(5)[Outcome::refused], 1u);
 }
 
 TEST_F(BusTellsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {

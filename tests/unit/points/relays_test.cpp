@@ -24,6 +24,11 @@ class RelaysTest : public testing::Test {
         route.to = &to;
         route.from_station = 31;
         route.to_station = 20;
+        route.to_line = "floor1";
+        route.to_memory.shown_as = [](const modbus::Span& written) {
+            return std::vector{
+                written, modbus::Span{modbus::Table::holding_registers, written.first / 16u, 1}};
+        };
         from.script = [this](const bus::Request&) { return source; };
         to.script = [this](const bus::Request&) { return target; };
         relays = std::make_unique<Relays>(clock, std::vector{route});
@@ -39,6 +44,11 @@ class RelaysTest : public testing::Test {
         run_until([&] { return status().reads >= enough; });
         io.restart();
         io.poll();
+    }
+    /// Somebody writes this register on the target's line.
+    void written(std::uint8_t station, std::uint16_t address) {
+        const modbus::Span items{modbus::Table::holding_registers, address, 1};
+        relays->write_listener()("floor1", {station, items, false, 99});
     }
     RelayStatus status() { return relays->status().at(0); }
 
@@ -142,6 +152,81 @@ TEST_F(RelaysTest, AWriteThatFailedIsTriedAgainThoughNothingChanged) {
     target = test::FakeBus::reply("10 00 C8 00 02"_hex);
     run_until([&] { return status().writes == 1; });
     EXPECT_EQ(status().state, RelayState::ok);
+}
+
+TEST_F(RelaysTest, WhatSomebodyElseWroteToTheTargetIsWrittenOverAtOnce) {
+    every = 30s;
+    make(true);
+    turns(1);
+    const TimePoint before = clock.now();
+    written(20, 201);
+    run_until([&] { return status().writes == 2; });
+    EXPECT_EQ(clock.now(), before) << "and not at the next turn";
+    EXPECT_EQ(status().repairs, 1u);
+    turns(2);
+    EXPECT_EQ(status().writes, 2u) << "it holds that now";
+}
+
+TEST_F(RelaysTest, FightsOverATargetOnceASecondAtMost) {
+    every = 30s;
+    make(true);
+    turns(1);
+    const TimePoint before = clock.now();
+    while (status().writes < 5) {
+        written(0, 200);
+        const auto now = status().writes;
+        run_until([&] { return status().writes > now; });
+    }
+    EXPECT_GE(clock.now() - before, 3s);
+    EXPECT_LT(clock.now() - before, 4s);
+    EXPECT_EQ(status().repairs, 4u);
+}
+
+TEST_F(RelaysTest, FightsNoMoreWhenItsTurnsAreShort) {
+    every = 20ms;
+    make(true);
+    turns(1);
+    const TimePoint before = clock.now();
+    while (clock.now() - before < 2500ms) {
+        written(20, 200);
+        turns(1);
+    }
+    EXPECT_EQ(status().repairs, 3u);
+    EXPECT_EQ(status().writes, 4u);
+}
+
+TEST_F(RelaysTest, AWriteThatLeavesTheTargetAloneIsNoneOfItsBusiness) {
+    every = 30s;
+    make(true);
+    turns(1);
+    const std::uint64_t reads = status().reads;
+    const auto tell = relays->write_listener();
+    written(20, 202);
+    written(21, 200);
+    tell("floor2", {20, modbus::Span{modbus::Table::holding_registers, 200, 1}, false, 99});
+    tell("floor1", {20, modbus::Span{modbus::Table::coils, 16, 1}, false, 99});
+    tell("floor1", {20, modbus::Span{modbus::Table::holding_registers, 200, 1}, false,
+                    to.requests[0].client});
+    turns(1);
+    EXPECT_EQ(status().reads, reads + 1);
+    EXPECT_EQ(to.requests.size(), 1u);
+    tell("floor1", {20, modbus::Span{modbus::Table::coils, 200 * 16, 1}, false, 99});
+    run_until([&] { return status().repairs == 1; });
+}
+
+TEST_F(RelaysTest, AWriteOfItsOwnThatWaitsBehindAnotherRepairsThat) {
+    every = 30s;
+    target.reset();
+    make(true);
+    run_until([&] { return to.open() == 1; });
+    const auto tell = relays->write_listener();
+    written(20, 200);
+    tell("floor1", {20, modbus::Span{modbus::Table::holding_registers, 200, 2}, false,
+                    to.requests[0].client});
+    to.release(test::FakeBus::reply("10 00 C8 00 02"_hex));
+    turns(1);
+    EXPECT_EQ(to.requests.size(), 1u);
+    EXPECT_EQ(status().repairs, 1u);
 }
 
 TEST_F(RelaysTest, StopsWithWhatItHasOpen) {

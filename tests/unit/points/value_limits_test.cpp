@@ -106,6 +106,74 @@ TEST(Value, SixtyFourBitsAreExactUpToTheirEnds) {
     EXPECT_NE(refused(narrow, 9223372036854775808.0), "accepted");
 }
 
+TEST(Value, AWholeNumberBeyondTheDigitsOfAFloatIsNotChanged) {
+    const std::int64_t odd = 9007199254740993;  // 2^53 + 1
+    EXPECT_EQ(refused(point_of(Type::f64), odd),
+              "x cannot be exactly 9007199254740993 (f64); the nearest that it can be are "
+              "9007199254740992 and 9007199254740994");
+    EXPECT_EQ(refused(point_of(Type::f64), odd - 1), "accepted");
+    EXPECT_EQ(refused(point_of(Type::f64), std::uint64_t{9223372036854776000u}), "accepted")
+        << "as 2^63 is shown";
+    EXPECT_EQ(refused(point_of(Type::f32), odd).substr(0, 36),
+              "x cannot be exactly 9007199254740993");
+    EXPECT_TRUE(encode(point_of(Type::f64), odd, Rounding::nearest));
+    EXPECT_EQ(refused(point_of(Type::i64), odd), "accepted");
+    EXPECT_NE(refused(point_of(Type::i64), 9007199254740994.0), "accepted")
+        << "a fraction beyond the digits of a double";
+}
+
+TEST(Value, LimitsHoldForNumbersThatNoDoubleIs) {
+    Point point = point_of(Type::i64);
+    point.max = 9007199254740992.0;
+    EXPECT_NE(refused(point, std::int64_t{9007199254740993}), "accepted");
+    EXPECT_EQ(refused(point, std::int64_t{9007199254740992}), "accepted");
+    point.max = 0.5;
+    point.min = -0.5;
+    EXPECT_EQ(refused(point, std::int64_t{0}), "accepted");
+    EXPECT_NE(refused(point, std::int64_t{1}), "accepted");
+    EXPECT_NE(refused(point, std::int64_t{-1}), "accepted");
+    EXPECT_NE(refused(point, kMostU64), "accepted");
+}
+
+TEST(Value, AScaledWholeNumberIsNotRoundedThroughADouble) {
+    Point point = point_of(Type::u64);
+    point.scale = 10;
+    EXPECT_NE(refused(point, kMostU64), "accepted") << "ends with a 5";
+    point = point_of(Type::i64);
+    point.scale = 0.01;
+    EXPECT_EQ(refused(point, 90071992547409.93),
+              "x takes no fraction here: with so many digits it is not exact (i64, scale 0.01)")
+        << "the same double as .94";
+    EXPECT_EQ(refused(point, std::int64_t{90071992547410}), "accepted");
+    EXPECT_EQ(refused(point, 9007199254740.93), "accepted");
+}
+
+TEST(Value, WhatIsNotZeroIsNotWrittenAsZero) {
+    EXPECT_EQ(refused(point_of(Type::f32), 1e-308),
+              "x cannot be exactly 1e-308 (f32); the nearest that it can be are 0 and 1e-45");
+    EXPECT_NE(refused(point_of(Type::f32), -2e-45), "accepted") << "half of it would be lost";
+    EXPECT_EQ(refused(point_of(Type::f32), 1e-45), "accepted") << "as it is shown";
+    EXPECT_EQ(refused(point_of(Type::f32), 1.1e-37), "accepted");
+    EXPECT_EQ(refused(point_of(Type::f64), 5e-324), "accepted");
+    EXPECT_EQ(*encode(point_of(Type::f32), 1e-308, Rounding::nearest), (Words{0, 0}));
+}
+
+TEST(Value, ATextIsNoNumber) {
+    EXPECT_EQ(refused(point_of(Type::i16), std::string("21.5")),
+              "x takes a number, not the text '21.5'");
+    Point bit = point_of(Type::boolean);
+    bit.bit = 3;
+    EXPECT_EQ(refused(bit, std::string("on")), "x takes true or false, not the text 'on'");
+    for (const char* text : {"NaN", "-Infinity", "inf"}) {
+        const auto encoded = encode(point_of(Type::f32), std::string(text));
+        ASSERT_FALSE(encoded);
+        EXPECT_TRUE(encoded.error().malformed);
+        EXPECT_EQ(encoded.error().message,
+                  "x takes finite numbers only, not '" + std::string(text) + "'");
+    }
+    EXPECT_EQ(refused(text_of_five(), std::string("NaN")), "accepted");
+}
+
 TEST(Value, TheRangeIsToldInTheUnitOfTheValue) {
     Point point = point_of(Type::i16);
     point.scale = 0.1;

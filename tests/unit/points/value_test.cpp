@@ -132,7 +132,7 @@ TEST(Value, WhatDoesNotFitIsRefusedWithTheRange) {
     EXPECT_EQ(refused(point, std::int64_t{-1}), "x must be from 0 to 65535 (u16), not -1");
     EXPECT_EQ(refused(point, std::numeric_limits<double>::quiet_NaN()),
               "x takes finite numbers only");
-    EXPECT_EQ(refused(point, std::string("on")), "x has no label 'on'");
+    EXPECT_EQ(refused(point, std::string("on")), "x takes a number, not the text 'on'");
     point.min = 0;
     point.max = 400;
     EXPECT_EQ(refused(point, 400.5), "x must be from 0 to 400, not 400.5");

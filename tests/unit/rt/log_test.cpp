@@ -42,5 +42,15 @@ TEST_F(LogTest, LeavesOutWhoRepeatsHimselfWhateverHisPort) {
     EXPECT_EQ(tap.count("client=10.0.0.8"), 1u);
 }
 
+TEST_F(LogTest, QuotesASubjectThatChangesItsMindLikeOneThatRepeatsItself) {
+    for (int i = 0; i < 30; ++i) {
+        for (const char* state : {"ok", "timeout", "damaged"})
+            log_about("a to b", LogLevel::warn, "relay", {{"relay", "a to b"}, {"state", state}});
+    }
+    log_about("a to c", LogLevel::warn, "relay", {{"relay", "a to c"}, {"state", "ok"}});
+    EXPECT_EQ(tap.count("\"a to b\""), 3u);
+    EXPECT_EQ(tap.count("\"a to c\""), 1u);
+}
+
 }  // namespace
 }  // namespace panelgate::rt

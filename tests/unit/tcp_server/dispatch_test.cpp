@@ -97,6 +97,28 @@ TEST_F(DispatchTest, WhatIsNotAllowedIsToldBeforeTheRequestIsLookedAt) {
     EXPECT_EQ(decided(0, "06 00"_hex), "refused 03");
 }
 
+TEST_F(DispatchTest, WhatIsRefusedIsCountedByWhoeverWasAsked) {
+    const auto asked = [&](std::uint8_t unit, const Bytes& pdu) {
+        const UnitMap units(settings, {{"a", &bus_a, {1, 2}, false}, {"b", &bus_b, {3}, false}});
+        std::string text;
+        const Decision decision = decide(unit, pdu, settings, units);
+        for (const Target& target : std::get<Refuse>(decision).asked)
+            text += name_of(target.bus) + '/' + std::to_string(target.station) + ' ';
+        return text;
+    };
+    EXPECT_EQ(asked(1, "06 00"_hex), "a/1 ");
+    EXPECT_EQ(asked(2, "06 00"_hex), "a/2 ");
+    EXPECT_EQ(asked(0, kWrite), "a/0 ") << "the line that would have refused it";
+    EXPECT_EQ(asked(77, kWrite), "");
+    bus_a.rights = {};
+    EXPECT_EQ(asked(0, kRead), "a/0 b/0 ");
+    settings.broadcast = BroadcastMode::deny;
+    EXPECT_EQ(asked(0, kWrite), "a/0 b/0 ");
+    settings.read_only = true;
+    EXPECT_EQ(asked(3, kWrite), "b/3 ");
+    EXPECT_EQ(asked(255, kWrite), "") << "the gateway's own registers";
+}
+
 TEST_F(DispatchTest, AUnitThatNobodyHasIsToldBeforeTheRequestIsLookedAt) {
     EXPECT_EQ(decided(77, kRead), "refused 0a");
     EXPECT_EQ(decided(77, kTooMuch), "refused 0a");

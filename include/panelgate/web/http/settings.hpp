@@ -22,7 +22,8 @@ struct Token {
 /// How guesses at tokens are slowed down, by address.
 struct LoginSettings {
     unsigned free = 5;              ///< wrong tokens that cost nothing
-    Duration hold = 1s;             ///< for each request with a token, beyond these
+    Duration hold = 1s;             ///< for each wrong one beyond these
+    unsigned at_once = 32;          ///< requests of an address that are looked at in this time
     Duration forgiven_after = 10s;  ///< each
     unsigned remembered = 20;       ///< at most, of an address
     std::size_t addresses = 256;    ///< at most

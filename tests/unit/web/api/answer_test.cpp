@@ -21,6 +21,13 @@ TEST(Answer, TellsAFaultWithTheExceptionThatModbusClientsGetAndWhetherItLeft) {
     EXPECT_EQ(object.at("transmitted"), true);
 }
 
+TEST(Answer, NeverSoundsAsIfSomethingWasSentThatWasNot) {
+    for (const Fault fault : {Fault::timeout, Fault::damaged, Fault::offline}) {
+        EXPECT_TRUE(problem_of(fault, false).detail.starts_with("nothing was sent: "));
+        EXPECT_FALSE(problem_of(fault, true).detail.starts_with("nothing was sent"));
+    }
+}
+
 TEST(Answer, AsksToTryAgainOnlyWhereThatMayHelp) {
     ASSERT_EQ(problem_of(Fault::busy, false).headers.size(), 1u);
     EXPECT_EQ(problem_of(Fault::busy, false).headers[0].first, "Retry-After");

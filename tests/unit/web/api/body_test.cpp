@@ -4,6 +4,8 @@
 
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
+#include <cmath>
+#include <limits>
 #include <string>
 
 namespace panelgate::web {
@@ -85,6 +87,35 @@ TEST(Body, TakesAPointsValueAsItIs) {
     for (const char* body : {R"({"value":null})", R"({"value":[1]})", R"({"value":{}})"}) {
         EXPECT_EQ(value_of(body).error().detail, "value must be a number, true, false or a text");
     }
+}
+
+TEST(Body, TakesANumberAsItIsWritten) {
+    using points::Value;
+    const std::int64_t beyond_doubles = 9007199254740993;
+    EXPECT_EQ(*value_of(R"({"value":9007199254740993})"), Value(beyond_doubles));
+    EXPECT_EQ(*value_of(R"({"value":-9007199254740993.0})"), Value(-beyond_doubles));
+    EXPECT_EQ(*value_of(R"({"value":9007199254740.9930e+03})"), Value(beyond_doubles));
+    EXPECT_EQ(*value_of(R"({"value":1e19})"), Value(10'000'000'000'000'000'000u));
+    EXPECT_EQ(*value_of(R"({"value":-9223372036854775808})"),
+              Value(std::numeric_limits<std::int64_t>::min()));
+    EXPECT_EQ(*value_of(R"({"value":18446744073709551616})"), Value(0x1p64));
+    EXPECT_EQ(*value_of(R"({"value":7.0385307e-26})"), Value(7.0385307e-26)) << "nearest";
+    EXPECT_TRUE(std::signbit(std::get<double>(*value_of(R"({"value":-0.0})"))));
+}
+
+TEST(Body, RefusesANumberThatNoneCouldBe) {
+    for (const char* number : {"1e400", "-1e400", "1e-400"}) {
+        const auto value = value_of(std::string("{\"value\": ") + number + "}");
+        ASSERT_FALSE(value) << number;
+        EXPECT_EQ(value.error().status, 400u);
+        EXPECT_EQ(value.error().detail,
+                  std::string("a number that cannot be: line 1, column 11: ") + number +
+                      " is beyond what a 64-bit number holds");
+    }
+    EXPECT_EQ(value_of("{\"value\": NaN}").error().detail,
+              "the body is not JSON: line 1, column 11: NaN is no number of JSON");
+    for (const char* number : {"NaN", "Infinity", "-Infinity", "1e99999999999999999999"})
+        EXPECT_EQ(value_of(std::string("{\"value\": ") + number + "}").error().status, 400u);
 }
 
 TEST(Body, GivesMembersOfTheirKind) {

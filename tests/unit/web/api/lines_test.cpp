@@ -249,6 +249,21 @@ TEST_F(ApiLines, P2ARawRequestToStation0IsABroadcastAndNobodyHasReplied) {
     EXPECT_EQ(bus.requests[0].station, 0);
 }
 
+TEST_F(ApiLines, SaysThatABroadcastCannotRead) {
+    add_meter();
+    const Reply reply =
+        ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"0300640002"})");
+    EXPECT_EQ(reply.status(), 403u);
+    EXPECT_THAT(reply.body(),
+                ::testing::HasSubstr("a broadcast can write (05, 06, 15, 16), but not read"));
+    EXPECT_EQ(reply.at("transmitted"), false);
+    EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"03"})").at("detail"),
+              reply.at("detail"))
+        << "malformed as well";
+    EXPECT_TRUE(bus.requests.empty());
+    EXPECT_EQ(bus.told_refused, 2);
+}
+
 TEST_F(ApiLines, ARawRequestThatAGuardRefusesWasNotAnsweredByThePanel) {
     bus.script = [](const bus::Request&) {
         bus::Answer answer = test::FakeBus::reply({0x83, 2});

@@ -41,6 +41,19 @@ TEST_F(LoginAttempts, OfAnAddressThatGuessesAreHeldUpAndThenJudged) {
     EXPECT_EQ(server->counters().login_failures, 6u);
 }
 
+TEST_F(LoginAttempts, ThatAreRightAreAnsweredAtOnceWhereWrongOnesAreHeld) {
+    settings.logins.hold = 1h;
+    start();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
+    Client guessing = connect();
+    guessing.send("GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
+    while (server->counters().login_failures < 4) io.run_one();
+    now += 1h;  // another turn
+    EXPECT_EQ(status("right"), 200u);
+    EXPECT_EQ(server->counters().requests.at(401), 3u) << "the fourth wrong one waits";
+    server.reset();
+}
+
 TEST_F(LoginAttempts, MayBeGivenUpWhileTheyAreHeld) {
     settings.logins.hold = 1h;
     start();

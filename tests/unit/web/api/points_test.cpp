@@ -78,6 +78,7 @@ TEST_F(ApiPoints, WritesAValueByOneRequest) {
 TEST_F(ApiPoints, RefusesAValueThatThePointCannotTake) {
     EXPECT_EQ(put(R"({"value":101})").status(), 422u);
     EXPECT_EQ(put(R"({"value":"much"})").status(), 422u);
+    EXPECT_EQ(put(R"({"value":"NaN"})").status(), 400u);
     EXPECT_EQ(put(R"({"value":null})").status(), 400u);
     EXPECT_EQ(put(R"({"values":[1]})").status(), 400u);
     EXPECT_EQ(ask("PUT", "/api/v1/stations/press/points/serial", R"({"value":1})").status(), 422u);

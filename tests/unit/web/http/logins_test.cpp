@@ -31,6 +31,27 @@ TEST_F(LoginsTest, HoldUpAnAddressThatGuesses) {
     EXPECT_FALSE(held("b"));
 }
 
+TEST_F(LoginsTest, LookAtAnAddressThatGuessesNoFasterThanItsGuessesAreAnswered) {
+    EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
+    fail(settings.free + 1);
+    EXPECT_EQ(logins.turn(now, "a"), Duration::zero()) << "the first is looked at at once";
+    const Duration pause = settings.hold / settings.at_once;
+    EXPECT_EQ(logins.turn(now, "a"), pause);
+    EXPECT_EQ(logins.turn(now, "a"), 2 * pause) << "whether the one before has hung up or not";
+    for (int i = 0; i < 1000; ++i) EXPECT_LE(logins.turn(now, "a"), settings.hold);
+    EXPECT_EQ(logins.turn(now, "b"), Duration::zero());
+    now += settings.hold + pause;
+    EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
+}
+
+TEST_F(LoginsTest, ARightTokenTakesNobodysTurn) {
+    fail(settings.free + 10);
+    for (int i = 0; i < 5; ++i) {
+        EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
+        logins.succeeded("a");
+    }
+}
+
 TEST_F(LoginsTest, ForgiveWithTime) {
     fail(1000);
     now += settings.forgiven_after;
