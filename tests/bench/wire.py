@@ -50,36 +50,21 @@ def wire_limit(baud, registers=10):
     return 1 / (8 * character + gap + THINK + (5 + 2 * registers) * character + gap)
 
 
-class Bus:
-    """rtubus with stations 1 to 8, and a gateway on it; `settings`: more keys of its line."""
+class PacedLine:
+    """rtubus with stations 1 to 8; `link` is the tty. `options`: more of rtubus' own."""
 
-    def __init__(self, tools, folder, baud, faults=(), settings=None, log=False, echo=0):
+    def __init__(self, tools, folder, baud, options=(), pass_fds=()):
         self.tools = tools
-        link = f"{folder}/tty{baud}-{id(self)}"
-        command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8",
-                   "--echo", str(echo)]
-        for fault in faults:
-            command += ["--fault", fault]
-        read, write = os.pipe()
-        if log:
-            command += ["--log", f"/dev/fd/{write}"]
-        self.bus = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                                    pass_fds=[write])
-        os.close(write)
-        self.log = Output(os.fdopen(read))  # a line for every frame: START END BUS KIND hex...
+        self.link = f"{folder}/tty{baud}-{id(self)}"
+        self.bus = subprocess.Popen([tools["rtubus"], "--baud", str(baud), "--bus",
+                                     f"{self.link}=1-8", *options], pass_fds=pass_fds,
+                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.bus.stdout.readline()
-        line = config.line("wire", link, config.station_ids(range(1, 9)), baud=baud, parity="even",
-                           **(settings or {}))
-        file = pathlib.Path(f"{link}.yaml")
-        file.write_text(config.gateway(line, http=None))
-        self.gateway = Program("run", "-c", str(file))
 
     def __enter__(self):
-        self.gateway.log.wait_for("line up")
         return self
 
     def __exit__(self, *_):
-        self.gateway.stop()
         self.bus.communicate("quit\n")
 
     def tell(self, command):
@@ -89,6 +74,34 @@ class Bus:
 
     def stats(self):
         return json.loads(self.tell("stats"))[0]
+
+
+class Bus(PacedLine):
+    """A paced line and a gateway on it; `settings`: more keys of its line."""
+
+    def __init__(self, tools, folder, baud, faults=(), settings=None, log=False, echo=0):
+        options = ["--echo", str(echo)]
+        for fault in faults:
+            options += ["--fault", fault]
+        read, write = os.pipe()
+        if log:
+            options += ["--log", f"/dev/fd/{write}"]
+        super().__init__(tools, folder, baud, options, [write])
+        os.close(write)
+        self.log = Output(os.fdopen(read))  # a line for every frame: START END BUS KIND hex...
+        line = config.line("wire", self.link, config.station_ids(range(1, 9)), baud=baud,
+                           parity="even", **(settings or {}))
+        file = pathlib.Path(f"{self.link}.yaml")
+        file.write_text(config.gateway(line, http=None))
+        self.gateway = Program("run", "-c", str(file))
+
+    def __enter__(self):
+        self.gateway.log.wait_for("line up")
+        return self
+
+    def __exit__(self, *_):
+        self.gateway.stop()
+        super().__exit__()
 
     def start_load(self, *options):
         port = str(self.gateway.modbus_port())
