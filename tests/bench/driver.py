@@ -3,7 +3,7 @@
 
 Bus, load and ideal master are independent programs (rtubus.cpp, mbload.cpp and bare.cpp in
 $PANELGATE_TOOLS, else ../shared/tools beside this tree). What is compared takes turns on one bus in
-one run. --out gets results.json and table.md. Bars are for the first --program.
+one run. --out gets results.json, table.md and plot.svg. Bars are for the first --program.
 """
 import argparse
 import collections
@@ -11,15 +11,19 @@ import datetime
 import os
 import pathlib
 import platform
+import subprocess
 import sys
 import tempfile
+import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from measures import figures, latency, report, rig, saturated  # noqa: E402
+from measures import (counts, crowd, dead, figures, growth, latency, lines, memory, micro,  # noqa: E402
+                      plot, report, rig, rivals, saturated, scrape)
 
-Run = collections.namedtuple("Run", "tools gateways rivals quick")
-Run.__doc__ = "`gateways`: builds of ours, the judged one first; `rivals`: programs of others."
+Run = collections.namedtuple("Run", "tools gateways rivals quick left_out")
+Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
+what could not be measured, and why."""
 
 TOPICS = {
     "wire": saturated.measure,
@@ -27,8 +31,20 @@ TOPICS = {
     "busy": saturated.measure_busy,
     "beside": saturated.measure_beside,
     "latency": latency.measure,
+    "crowd": crowd.measure,
+    "dead": dead.measure,
+    "writes": dead.measure_writes,
+    "lines": lines.measure,
+    "memory": memory.measure,
+    "start": memory.measure_start,
+    "instructions": counts.measure_instructions,
+    "allocations": counts.measure_allocations,
+    "scrape": scrape.measure,
+    "growth": growth.measure,
+    "micro": micro.measure,
 }
-BARS = saturated.BARS + latency.BARS
+BROKEN = "broken off:"
+BARS = [bar for topic in (saturated, latency, crowd, lines, memory, counts, scrape) for bar in topic.BARS]
 
 
 def program(text):
@@ -75,8 +91,22 @@ def write(options, rows, left_out):
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "table.md").write_text(report.table(rows, BARS, judged, head, left_out))
     (options.out / "results.json").write_text(report.as_json(rows, BARS, head, left_out))
+    (options.out / "plot.svg").write_text(plot.svg(rows, BARS, head))
     print(report.bars_table(rows, BARS, judged), end="")
-    print(f"{options.out}: table.md, results.json")
+    print(f"{options.out}: table.md, results.json, plot.svg")
+
+
+def rows_of(name, run):
+    """Of one topic; one that breaks leaves the others their figures."""
+    rows = []
+    try:
+        for row in TOPICS[name](run):
+            show(row)
+            rows.append(row)
+    except (AssertionError, OSError, subprocess.SubprocessError, ValueError):
+        traceback.print_exc()
+        run.left_out.append(f"{BROKEN} {name}")
+    return rows
 
 
 def main():
@@ -86,18 +116,17 @@ def main():
         if reason := subject.unavailable():
             sys.exit(f"driver.py: {reason}")
     print(machine())
-    rows, left_out = [], []
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         tools = rig.build_tools(folder)
         if tools is None:
             sys.exit(f"driver.py: rtubus.cpp, mbload.cpp and bare.cpp are not in {rig.wire.TOOLS}")
-        run = Run(tools, options.program, [], options.quick)
-        for name, measure in TOPICS.items():
-            if not options.only or name in options.only:
-                for row in measure(run):
-                    show(row)
-                    rows.append(row)
+        others, left_out = ([], []) if options.no_rivals else rivals.all_there_are(folder)
+        run = Run(tools, options.program, others, options.quick, left_out)
+        for name in options.only or TOPICS:
+            rows += rows_of(name, run)
     write(options, rows, left_out)
+    sys.exit(any(what.startswith(BROKEN) for what in left_out))
 
 
 if __name__ == "__main__":

@@ -51,13 +51,13 @@ def wire_limit(baud, registers=10):
 
 
 class PacedLine:
-    """rtubus with stations 1 to 8; `link` is the tty. `options`: more of rtubus' own."""
+    """rtubus with these stations; `link` is the tty. `options`: more of rtubus' own."""
 
-    def __init__(self, tools, folder, baud, options=(), pass_fds=()):
+    def __init__(self, tools, folder, baud, options=(), pass_fds=(), stations="1-8"):
         self.tools = tools
         self.link = f"{folder}/tty{baud}-{id(self)}"
         self.bus = subprocess.Popen([tools["rtubus"], "--baud", str(baud), "--bus",
-                                     f"{self.link}=1-8", *options], pass_fds=pass_fds,
+                                     f"{self.link}={stations}", *options], pass_fds=pass_fds,
                                     stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.bus.stdout.readline()
 
@@ -72,8 +72,12 @@ class PacedLine:
         self.bus.stdin.flush()
         return self.bus.stdout.readline()
 
+    def all_stats(self):
+        """Of each bus, in the order of the options."""
+        return json.loads(self.tell("stats"))
+
     def stats(self):
-        return json.loads(self.tell("stats"))[0]
+        return self.all_stats()[0]
 
 
 class Bus(PacedLine):

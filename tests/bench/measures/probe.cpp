@@ -1,7 +1,7 @@
 // probe tcp PORT UNIT FUNCTION REGISTERS PAUSE_US SECONDS | probe rtu TTY UNIT FUNCTION ...
 // One client with one request open: how long each took, in microseconds, one a line. `rtu` is the
 // same client alone on the line, without a gateway: the difference is what the gateway adds.
-// FUNCTION 3 reads REGISTERS from 100 on, 6 writes one at 200. Between two it pauses for PAUSE_US
+// FUNCTION 3 reads REGISTERS from 0 on, 6 writes one at 200. Between two it pauses for PAUSE_US
 // and up to a millisecond more, so that it does not run in step with anybody's clock; the pause is
 // longer than the gap, which is therefore no part of what is measured. `fail` stands for a request
 // that was not answered well.
@@ -69,7 +69,7 @@ int open_tty(const char* path) {
 }
 
 Bytes pdu_of(int function, int registers, std::uint16_t turn) {
-    const int address = function == 3 ? 100 : 200;
+    const int address = function == 3 ? 0 : 200;
     const int value = function == 3 ? registers : turn;
     return {static_cast<std::uint8_t>(function), static_cast<std::uint8_t>(address >> 8),
             static_cast<std::uint8_t>(address), static_cast<std::uint8_t>(value >> 8),

@@ -6,13 +6,13 @@ from measures import figures
 
 
 def number(value):
-    """Four digits at least, and no exponent."""
+    """Four digits, and no exponent."""
     if math.isnan(value):
         return "-"
-    if value == 0 or abs(value) >= 1000:
+    size = abs(value)
+    if size >= 1000 or value == 0:
         return f"{value:.0f}"
-    return f"{value:.{max(0, 3 - math.floor(math.log10(abs(value))))}f}"[:6].rstrip(".") \
-        if abs(value) >= 1e-3 else f"{value:.6f}"
+    return f"{value:.{4 if size < 1 else 3 - math.floor(math.log10(size))}f}"
 
 
 def asked(bar):

@@ -42,37 +42,42 @@ def cpu_seconds(pid):
 
 
 class Panelgate:
-    """A build of the gateway. `core`: the only one that it may use."""
+    """A build of the gateway. `core`: the only one that it may use; `http`: its listener, as YAML;
+    `wrapper`: (program, arguments) that runs it; `environment`: more of it."""
 
-    def __init__(self, name, program, core=None, settings=None, http=None):
-        self.name, self.program, self.core = name, str(program), core
-        self.settings, self.http = settings or {}, http
+    def __init__(self, name, program, **how):
+        self.name, self.program, self._how = name, str(program), how
 
-    def with_http(self):
-        return Panelgate(self.name, self.program, self.core, self.settings, config.FREE_PORT)
+    def but(self, **how):
+        """The same build, run in another way."""
+        return Panelgate(self.name, self.program, **{**self._how, **how})
 
     def unavailable(self):
         return None if os.access(self.program, os.X_OK) else f"there is no {self.program}"
 
     @contextlib.contextmanager
-    def serving(self, link, baud):
+    def serving(self, link, baud, stations=STATIONS):
         """A running gateway: its Modbus/TCP port is `port`, its process `pid`."""
-        settings = dict(self.settings)
-        if baud == 0:
-            settings.setdefault("timing", f"{{frame_gap: {UNPACED_GAP}}}")
-        line = config.line("wire", link, config.station_ids(STATIONS), baud=baud or UNPACED,
-                           parity="even", **settings)
-        with self.running(config.gateway(line, http=self.http)) as program:
+        keys = {} if baud else {"timing": f"{{frame_gap: {UNPACED_GAP}}}"}
+        line = config.line("wire", link, config.station_ids(stations), baud=baud or UNPACED,
+                           parity="even", **keys)
+        with self.running(config.gateway(line, http=self._how.get("http"))) as program:
             program.log.wait_for("line up")
             yield program
 
     @contextlib.contextmanager
     def running(self, text):
-        pin = None if self.core is None else lambda: os.sched_setaffinity(0, {self.core})
+        core = self._how.get("core")
+        pin = None if core is None else lambda: os.sched_setaffinity(0, {core})
+        arguments, executable = [], self.program
+        if "wrapper" in self._how:
+            executable, options = self._how["wrapper"]
+            arguments = [*options, self.program]
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "panelgate.yaml"
             file.write_text(text)
-            with harness.Program("run", "-c", str(file), executable=self.program,
+            with harness.Program(*arguments, "run", "-c", str(file), executable=executable,
+                                 env={**os.environ, **self._how.get("environment", {})},
                                  preexec_fn=pin) as program:
                 program.port = program.modbus_port() if "modbus_tcp:" in text else None
                 program.pid = program.process.pid
@@ -83,13 +88,13 @@ class LoggedLine(wire.PacedLine):
     """A line whose frames can be read back, with their times on the wire. `baud` 0: without pacing,
     and its stations answer at once."""
 
-    def __init__(self, tools, folder, baud, faults=()):
+    def __init__(self, tools, folder, baud, faults=(), stations="1-8"):
         self._log = pathlib.Path(folder) / f"log{id(self)}"
         self.baud = baud
         options = ["--log", str(self._log)] if baud else ["--turnaround", "0"]
         for fault in faults:
             options += ["--fault", fault]
-        super().__init__(tools, folder, baud, options)
+        super().__init__(tools, folder, baud, options, stations=stations)
 
     def frames(self, begin, end):
         with open(self._log, encoding="ascii") as lines:
@@ -99,6 +104,28 @@ class LoggedLine(wire.PacedLine):
     def __exit__(self, *_):
         super().__exit__()
         self._log.unlink(missing_ok=True)
+
+
+class Plant(wire.PacedLine):
+    """Many lines in one bus program: line n has the one station n. Each reply comes in one piece, at
+    its end: the machine is not what is measured."""
+
+    def __init__(self, tools, folder, baud, lines):
+        self.baud = baud
+        more = [f"{folder}/line{n}-{id(self)}" for n in range(2, lines + 1)]
+        options = ["--chunk", "256"]
+        for n, link in enumerate(more, 2):
+            options += ["--bus", f"{link}={n}"]
+        super().__init__(tools, folder, baud, options)
+        self.links = [self.link, *more]
+
+    def configuration(self):
+        return config.gateway(*(config.line(f"line{n}", link, config.station_ids([n]), baud=self.baud,
+                                            parity="even")
+                                for n, link in enumerate(self.links, 1)))
+
+    def replies(self):
+        return [bus["replies"] for bus in self.all_stats()]
 
 
 class Window:
@@ -139,12 +166,21 @@ def bare(line, baud, registers, seconds):
     return seen
 
 
-def saturate(line, port, pid, registers, seconds, clients=8, options=()):
+def until_replies(line, count):
+    """Until the stations have answered so many requests."""
+    wanted = line.stats()["replies"] + count
+    end = time.monotonic() + harness.PATIENCE
+    while line.stats()["replies"] < wanted:
+        assert time.monotonic() < end, "the line is silent"
+        time.sleep(0.01)
+
+
+def saturate(line, port, pid, registers, seconds, *, clients=8, warm=None, units="1-8"):
     """Clients that always want something: (Window, what the load generator saw)."""
-    warm = warm_time(line.baud, registers)
+    warm = warm or warm_time(line.baud, registers)
     command = [line.tools["mbload"], "--port", str(port), "--conns", str(clients),
-               "--units", f"1-{len(STATIONS)}", "--regs", str(registers),
-               "--time", f"{seconds + 0.2:.1f}", "--warm", f"{warm:.1f}", *map(str, options)]
+               "--units", units, "--regs", str(registers),
+               "--time", f"{seconds + 0.2:.1f}", "--warm", f"{warm:.1f}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as load:
         time.sleep(warm)
         window = Window(line, seconds, pid)

@@ -14,6 +14,9 @@ LIMIT = "share of what the wire allows"
 RATE = "transactions a second, unpaced"
 CPU = "CPU us a transaction"
 LATE_P50, LATE_P99 = "gap late us, p50", "gap late us, p99"
+OF_BRIDGE = "share of the libmodbus bridge's rate"
+OVER_P50, OVER_P99 = (
+    f"gap late us more than the ideal master, {word}" for word in ("p50", "p99"))
 BESIDE = "115200, 10 registers, beside scrapes"
 
 RATES = (9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600)
@@ -38,6 +41,7 @@ BARS = [
     Bar(CPU, {case_of(115200, 10)}, most=100),
     Bar(CPU, cases((9600, 38400, 115200), (100,)), most=160),
     Bar(CPU, {case_of(0, 10)}, most=25),
+    Bar(OF_BRIDGE, {case_of(0, 10)}, least=1.0),
     Bar(LATE_P50, {case_of(115200, 10)}, most=40),
     Bar(LATE_P99, {case_of(115200, 10)}, most=150),
 ]
@@ -56,9 +60,11 @@ def rows_of(subject, baud, registers, window, seen, ideal, share):
     yield Row(share, case, name, window.rate / ideal.rate, "", {"errors": errors} if errors else None)
     yield Row(CPU, case, name, window.cpu_us(), "us", {"transactions": window.replies})
     if baud:
-        late = window.lateness(baud)
-        yield Row(LATE_P50, case, name, 1e6 * figures.quantile(late, 0.5), "us")
-        yield Row(LATE_P99, case, name, 1e6 * figures.quantile(late, 0.99), "us", {"gaps": len(late)})
+        late, best = window.lateness(baud), ideal.lateness(baud)
+        for absolute, over, q in ((LATE_P50, OVER_P50, 0.5), (LATE_P99, OVER_P99, 0.99)):
+            own = 1e6 * figures.quantile(late, q)
+            yield Row(absolute, case, name, own, "us", {"gaps": len(late)})
+            yield Row(over, case, name, own - 1e6 * figures.quantile(best, q), "us")
         yield Row(LIMIT, case, name, window.rate / rig.wire.wire_limit(baud, registers), "")
     else:
         yield Row(RATE, case, name, window.rate, "/s")
@@ -100,12 +106,26 @@ def measure(run):
                                     turns=turns, seconds=seconds)
 
 
+def of_bridge(rows, case):
+    """Turn by turn, the rates of all others as a share of the bridge's."""
+    rates = {}
+    for row in rows:
+        if row.measure == RATE:
+            rates.setdefault(row.subject, []).append(row.value)
+    for name, own in rates.items():
+        for rate, bridge in zip(own, rates.get("libmodbus bridge", [])):
+            yield Row(OF_BRIDGE, case, name, rate / bridge, "")
+
+
 def measure_unpaced(run):
     turns, seconds = (1, 2) if run.quick else (3, 3)
     for registers in REGISTERS:
-        rivals = run.rivals if registers == 10 else []
-        yield from measure_case(run.tools, run.gateways + rivals, 0, registers,
-                                turns=turns, seconds=seconds)
+        rows = []
+        for row in measure_case(run.tools, run.gateways + run.rivals, 0, registers,
+                                turns=turns, seconds=seconds):
+            rows.append(row)
+            yield row
+        yield from of_bridge(rows, case_of(0, registers))
 
 
 def measure_busy(run):
@@ -149,7 +169,7 @@ def measure_beside(run):
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, baud) as line:
         for _ in range(turns):
             for subject in run.gateways:
-                with subject.with_http().serving(line.link, baud) as gateway, \
+                with subject.but(http=rig.config.FREE_PORT).serving(line.link, baud) as gateway, \
                         scraped(gateway.http_port()):
                     window, _ = rig.saturate(line, gateway.port, gateway.pid, registers, seconds)
                 late = window.lateness(baud)
