@@ -28,6 +28,7 @@ what could not be measured, and why."""
 TOPICS = {
     "wire": saturated.measure,
     "unpaced": saturated.measure_unpaced,
+    "tcp": saturated.measure_tcp,
     "busy": saturated.measure_busy,
     "beside": saturated.measure_beside,
     "latency": latency.measure,
@@ -79,7 +80,7 @@ def machine():
 
 
 def show(row):
-    print(f"{row.measure:<44}{row.case:<28}{row.subject:<16}{report.number(row.value):>9} "
+    print(f"{row.measure:<44}{row.case:<40}{row.subject:<17}{report.number(row.value):>9} "
           f"{row.unit}{'  ' + str(row.detail['errors']) if row.detail and 'errors' in row.detail else ''}",
           flush=True)
 

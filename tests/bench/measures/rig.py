@@ -17,7 +17,7 @@ from measures import figures  # noqa: E402
 
 STATIONS = range(1, 9)
 UNPACED = 4_000_000  # what a line without pacing is told it has: 3.5 characters are 10 us
-UNPACED_GAP = "10us"  # the shortest that the gateway takes on a tty
+UNPACED_GAP = "10us"  # the shortest that the gateway takes on a tty with that rate
 
 
 def build_tools(folder):
@@ -26,7 +26,8 @@ def build_tools(folder):
     bare = wire.TOOLS / "bare.cpp"
     if tools is None or not bare.exists():
         return None
-    for name, source in (("bare", bare), ("probe", HERE / "probe.cpp")):
+    for name, source in (("bare", bare), ("probe", HERE / "probe.cpp"),
+                         ("tcp_bus", HERE / "tcp_bus.cpp")):
         tools[name] = str(pathlib.Path(folder) / name)
         subprocess.run(["g++", "-O2", "-std=c++17", "-w", "-o", tools[name], str(source)], check=True)
     return tools
@@ -58,7 +59,8 @@ class Panelgate:
     @contextlib.contextmanager
     def serving(self, link, baud, stations=STATIONS):
         """A running gateway: its Modbus/TCP port is `port`, its process `pid`."""
-        keys = {} if baud else {"timing": f"{{frame_gap: {UNPACED_GAP}}}"}
+        gap = "0us" if link.startswith("tcp://") else UNPACED_GAP
+        keys = {} if baud else {"timing": f"{{frame_gap: {gap}}}"}
         line = config.line("wire", link, config.station_ids(stations), baud=baud or UNPACED,
                            parity="even", **keys)
         with self.running(config.gateway(line, http=self._how.get("http"))) as program:
@@ -104,6 +106,29 @@ class LoggedLine(wire.PacedLine):
     def __exit__(self, *_):
         super().__exit__()
         self._log.unlink(missing_ok=True)
+
+
+class TcpLine:
+    """Stations behind a TCP server, without pacing: what a line is to a gateway that may leave no gap."""
+
+    baud = 0
+
+    def __init__(self, tools):
+        self.tools = tools
+        self._bus = subprocess.Popen([tools["tcp_bus"]], stdin=subprocess.PIPE,
+                                     stdout=subprocess.PIPE, text=True)
+        self.link = f"tcp://127.0.0.1:{self._bus.stdout.readline().split()[1]}"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._bus.communicate()
+
+    def stats(self):
+        self._bus.stdin.write("stats\n")
+        self._bus.stdin.flush()
+        return {"gap_violations": 0, **wire.json.loads(self._bus.stdout.readline())}
 
 
 class Plant(wire.PacedLine):

@@ -40,7 +40,7 @@ BARS = [
     Bar(CPU, {case_of(38400, 10)}, most=110),
     Bar(CPU, {case_of(115200, 10)}, most=100),
     Bar(CPU, cases((9600, 38400, 115200), (100,)), most=160),
-    Bar(CPU, {case_of(0, 10)}, most=25),
+    Bar(CPU, {case_of(0, 10), "unpaced tcp://, 10 registers"}, most=25),
     Bar(OF_BRIDGE, {case_of(0, 10)}, least=1.0),
     Bar(LATE_P50, {case_of(115200, 10)}, most=40),
     Bar(LATE_P99, {case_of(115200, 10)}, most=150),
@@ -98,7 +98,7 @@ def measure_case(tools, subjects, baud, registers, *, turns, seconds, share=SHAR
 
 def measure(run):
     """Paced lines and the unpaced one; rivals at some rates, one turn each."""
-    turns, seconds = (1, 2) if run.quick else (3, 4)
+    turns, seconds = (1, 2) if run.quick else (2, 4)
     for baud in QUICK_RATES if run.quick else RATES:
         for registers in REGISTERS:
             rivals = run.rivals if baud in RIVAL_RATES and registers == 10 else []
@@ -128,8 +128,26 @@ def measure_unpaced(run):
         yield from of_bridge(rows, case_of(0, registers))
 
 
+def over_tcp(registers):
+    return f"unpaced tcp://, {registers} registers"
+
+
+def measure_tcp(run):
+    """The line on which `frame_gap: 0us` is allowed."""
+    turns, seconds = (1, 2) if run.quick else (3, 3)
+    for registers in REGISTERS:
+        with rig.TcpLine(run.tools) as line:
+            for subject in run.gateways * turns:
+                with subject.serving(line.link, 0) as gateway:
+                    window, seen = rig.saturate(line, gateway.port, gateway.pid, registers, seconds)
+                errors = {what: n for what, n in errors_of(seen, window).items() if n}
+                detail = {"errors": errors} if errors else None
+                yield Row(RATE, over_tcp(registers), subject.name, window.rate, "/s", detail)
+                yield Row(CPU, over_tcp(registers), subject.name, window.cpu_us(), "us", detail)
+
+
 def measure_busy(run):
-    turns, seconds = (1, 2) if run.quick else (3, 4)
+    turns, seconds = (1, 2) if run.quick else (2, 4)
     with rig.busy_cores():
         for baud in QUICK_RATES if run.quick else RATES:
             for registers in REGISTERS:
