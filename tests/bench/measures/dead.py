@@ -34,14 +34,14 @@ def write_times(run, line, gateway, seconds):
             "--regs", "100", "--time", str(seconds + 2), "--warm", "0"]
     with subprocess.Popen(load, stdout=subprocess.DEVNULL) as crowd:
         rig.until_replies(line, 4)
-        taken = latency.probe(run.tools, "tcp", gateway.port, registers=1, pause=50_000,
+        taken = latency.probe(run.tools, "tcp", gateway.port, registers=1, pause=75_000,
                               seconds=seconds, function=6)
         crowd.terminate()
     return taken
 
 
 def measure_writes(run):
-    seconds = 4 if run.quick else 12
+    seconds = 5 if run.quick else 15
     per_second = rig.wire.wire_limit(BAUD, 100)
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, BAUD) as line:
         for subject in run.gateways + run.rivals:

@@ -1,10 +1,10 @@
 // probe tcp PORT UNIT FUNCTION REGISTERS PAUSE_US SECONDS | probe rtu TTY UNIT FUNCTION ...
 // One client with one request open: how long each took, in microseconds, one a line. `rtu` is the
 // same client alone on the line, without a gateway: the difference is what the gateway adds.
-// FUNCTION 3 reads REGISTERS from 0 on, 6 writes one at 200. Between two it pauses for PAUSE_US
-// and up to a millisecond more, so that it does not run in step with anybody's clock; the pause is
-// longer than the gap, which is therefore no part of what is measured. `fail` stands for a request
-// that was not answered well.
+// FUNCTION 3 reads REGISTERS from 0 on, 6 writes one at 200. Between two it pauses for PAUSE_US and
+// up to as long again, at least a millisecond, so that it does not run in step with anybody; the
+// pause is longer than the gap, which is therefore no part of what is measured. `fail` stands for a
+// request that was not answered well.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/tcp.h>
@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -134,7 +135,7 @@ int main(int argc, char** argv) {
         const bool good = receive(fd, length, reply);
         took.push_back(good ? static_cast<double>(now_ns() - sent) / 1e3 : -1);
         dice = dice * 1664525U + 1013904223U;
-        const long pause = pause_us + static_cast<long>(dice >> 16) % 1000;
+        const long pause = pause_us + static_cast<long>(dice >> 8) % std::max(1000L, pause_us);
         const timespec rest{pause / 1'000'000, pause % 1'000'000 * 1000};
         nanosleep(&rest, nullptr);
     }
