@@ -18,13 +18,13 @@ def fitted(costs, what):
 def with_clients(run, seconds):
     costs = {}
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, BAUD) as line:
-        for clients in (1, 8, 64, 512):
+        for clients in (1, 8, 64, 200):
             for subject in run.gateways:
                 with subject.serving(line.link, BAUD) as gateway:
                     window, _ = rig.saturate(line, gateway.port, gateway.pid, 10, seconds,
                                              clients=clients, warm=4)
                 costs.setdefault(subject.name, {})[clients] = window.cpu_us()
-    yield from fitted(costs, "CPU a transaction with clients, 1 to 512")
+    yield from fitted(costs, "CPU a transaction with clients, 1 to 200")
 
 
 def with_stations(run, seconds):
@@ -60,9 +60,9 @@ def with_lines(run, seconds):
 
 def with_points(run):
     scrapes, starts = {}, {}
-    for stations in (1, 6, 31):
-        points = 4 * stations * 40
-        text = rig.config.wide(4, stations, 40)
+    for stations in (4, 8, 16, 31):
+        points = 4 * stations * 80
+        text = rig.config.wide(4, stations, 80)
         for subject in run.gateways:
             with memory.started(subject, text) as milliseconds:
                 starts.setdefault(subject.name, {})[points] = milliseconds
@@ -72,8 +72,8 @@ def with_points(run):
                 _, _, _, cpu, _ = metrics.measure(program, fetcher, "/metrics", 10, (0, 0))
                 fetcher.end()
             scrapes.setdefault(subject.name, {})[points] = cpu
-    yield from fitted(scrapes, "CPU of a scrape with points, 160 to 4960")
-    yield from fitted(starts, "start time with points, 160 to 4960")
+    yield from fitted(scrapes, "CPU of a scrape with points, 1280 to 9920")
+    yield from fitted(starts, "start time with points, 1280 to 9920")
 
 
 def measure(run):

@@ -45,6 +45,22 @@ def loaded(tools, port, lines, seconds):
             load.terminate()
 
 
+@contextlib.contextmanager
+def ideal_masters(plant, lines, seconds, core):
+    """One alone on each of these lines, all on that core; they ask station 1."""
+    with contextlib.ExitStack() as stack:
+        with on_core(core):
+            masters = [stack.enter_context(subprocess.Popen(
+                [plant.tools["bare"], plant.links[n - 1], str(plant.baud), "1", "10", str(seconds + 2)],
+                stdout=subprocess.DEVNULL)) for n in lines]
+        time.sleep(1)  # warm
+        try:
+            yield
+        finally:
+            for master in masters:
+                master.terminate()
+
+
 def rates(plant, lines, seconds):
     """Transactions a second of each of these lines (numbers)."""
     before, begin = plant.replies(), time.monotonic()
@@ -76,6 +92,21 @@ def measure_plant(run, count, seconds):
         yield Row(CPU, case_of(count), subject.name, 1e6 * cpu / (sum(together) * seconds), "us")
 
 
+def measure_ideal(run, count, seconds):
+    """What the bus itself loses when all of its lines are busy."""
+    cores = sorted(os.sched_getaffinity(0))
+    everybody = list(range(1, count + 1))
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        with on_core(cores[-1]):
+            plant = stack.enter_context(rig.Plant(run.tools, folder, BAUD, count))
+        with ideal_masters(plant, [1], seconds, cores[0]):
+            alone = rates(plant, [1], seconds)[0]
+        with ideal_masters(plant, everybody, seconds, cores[0]):
+            together = rates(plant, everybody, seconds)
+    yield Row(SLOWEST, case_of(count), "ideal masters", min(together) / alone, "")
+
+
 def measure(run):
     for _ in range(1 if run.quick else 3):
+        yield from measure_ideal(run, 32, 3 if run.quick else 4)
         yield from measure_plant(run, 32, 3 if run.quick else 4)

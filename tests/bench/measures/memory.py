@@ -34,6 +34,7 @@ def under_load(tools, gateway, units, connections, seconds):
                "--units", units, "--time", str(seconds), "--warm", "0"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL) as load:
         time.sleep(seconds - 0.5)
+        assert len(os.listdir(f"/proc/{gateway.pid}/fd")) > connections, "not all are connected"
         seen = (mebibytes(gateway.pid, "smaps_rollup", "Pss"), mebibytes(gateway.pid, "status", "VmHWM"))
         load.terminate()
     return seen

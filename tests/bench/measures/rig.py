@@ -132,16 +132,17 @@ class TcpLine:
 
 
 class Plant(wire.PacedLine):
-    """Many lines in one bus program: line n has the one station n. Each reply comes in one piece, at
-    its end: the machine is not what is measured."""
+    """Many lines in one bus program: the gateway is told that line n has the station n. Each reply
+    comes in one piece, at its end: the machine is not what is measured."""
 
     def __init__(self, tools, folder, baud, lines):
         self.baud = baud
         more = [f"{folder}/line{n}-{id(self)}" for n in range(2, lines + 1)]
+        everybody = f"1-{lines}"
         options = ["--chunk", "256"]
-        for n, link in enumerate(more, 2):
-            options += ["--bus", f"{link}={n}"]
-        super().__init__(tools, folder, baud, options)
+        for link in more:
+            options += ["--bus", f"{link}={everybody}"]
+        super().__init__(tools, folder, baud, options, stations=everybody)
         self.links = [self.link, *more]
 
     def configuration(self):
