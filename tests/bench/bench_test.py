@@ -91,10 +91,18 @@ class Report(unittest.TestCase):
 
     def test_json_has_every_figure_and_null_for_what_is_none(self):
         lost = Row("time", "slow", "theirs", math.nan, "ms")
-        read = json.loads(report.as_json([*ROWS, lost], BARS, "a machine"))["figures"]
+        text = report.as_json([*ROWS, lost], BARS, "a machine")
+        read = json.loads(text)["figures"]
         self.assertEqual(len(read), 6)
         self.assertIsNone(read[-1]["value"])
+        self.assertEqual(report.from_json(text)[:5], ROWS)
         self.assertEqual((read[1]["asked"], read[1]["holds"]), (">= 0.9", False))
+
+    def test_a_new_figure_takes_the_place_of_the_old_one(self):
+        again = ROWS[1]._replace(value=0.99)
+        other = Row("size", "all", "ours", 5.0, "MiB")
+        self.assertEqual(report.updated(ROWS, [other, again]),
+                         [ROWS[0], again, *ROWS[2:], other])
 
     def test_a_plot_is_well_formed_and_shows_what_can_be_compared(self):
         root = xml.etree.ElementTree.fromstring(plot.svg(ROWS, BARS, "a < b"))

@@ -21,9 +21,9 @@ sys.path.insert(0, str(HERE))
 from measures import (counts, crowd, dead, figures, growth, latency, lines, memory, micro,  # noqa: E402
                       plot, report, rig, rivals, saturated, scrape)
 
-Run = collections.namedtuple("Run", "tools gateways rivals quick left_out")
+Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
 Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
-what could not be measured, and why."""
+what could not be measured, and why; `rates`: of the topics that have many."""
 
 TOPICS = {
     "wire": saturated.measure,
@@ -65,6 +65,9 @@ def parse_arguments():
                         help="a gateway; several take turns, the first is judged "
                              "(default: $PANELGATE, else build/release/panelgate)")
     parser.add_argument("--no-rivals", action="store_true")
+    parser.add_argument("--rates", type=int, nargs="+", metavar="BAUD", default=saturated.RATES,
+                        help="of the topics wire and busy (all that are measured)")
+    parser.add_argument("--add", action="store_true", help="keep the other figures that --out has")
     parser.add_argument("--out", type=pathlib.Path, default=rig.harness.ROOT / "build/bench")
     return parser.parse_args()
 
@@ -87,6 +90,8 @@ def show(row):
 
 def write(options, rows, left_out):
     rows = figures.medians(rows)
+    if options.add and (options.out / "results.json").exists():
+        rows = report.updated(report.from_json((options.out / "results.json").read_text()), rows)
     judged = options.program[0].name
     head = f"{machine()}{'; quick' if options.quick else ''}"
     options.out.mkdir(parents=True, exist_ok=True)
@@ -123,7 +128,7 @@ def main():
         if tools is None:
             sys.exit(f"driver.py: rtubus.cpp, mbload.cpp and bare.cpp are not in {rig.wire.TOOLS}")
         others, left_out = ([], []) if options.no_rivals else rivals.all_there_are(folder)
-        run = Run(tools, options.program, others, options.quick, left_out)
+        run = Run(tools, options.program, others, options.quick, options.rates, left_out)
         for name in options.only or TOPICS:
             rows += rows_of(name, run)
     write(options, rows, left_out)

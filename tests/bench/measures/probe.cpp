@@ -93,13 +93,13 @@ Bytes framed(bool tcp, int unit, const Bytes& pdu, std::uint16_t turn) {
     return frame;
 }
 
-// Whether a whole reply of this length came within five seconds.
+// Whether a whole reply of this length came within 15 seconds.
 bool receive(int fd, std::size_t length, Bytes& reply) {
     reply.resize(length);
     std::size_t have = 0;
     while (have < length) {
         pollfd waiting{fd, POLLIN, 0};
-        if (poll(&waiting, 1, 5000) <= 0) return false;
+        if (poll(&waiting, 1, 15000) <= 0) return false;
         const ssize_t more = read(fd, reply.data() + have, length - have);
         if (more <= 0) return false;
         have += static_cast<std::size_t>(more);

@@ -80,9 +80,24 @@ def table(rows, bars, judged, head, left_out=()):
 def as_json(rows, bars, head, left_out=()):
     def entry(row):
         bar = figures.bar_of(bars, row)
-        value = None if math.isnan(row.value) else row.value
-        return {"measure": row.measure, "case": row.case, "program": row.subject, "value": value,
-                "unit": row.unit, **({"asked": asked(bar), "holds": figures.holds(bar, row.value)}
-                                     if bar else {}), **(row.detail or {})}
+        judged = {"asked": asked(bar), "holds": figures.holds(bar, row.value)} if bar else {}
+        return {"measure": row.measure, "case": row.case, "program": row.subject,
+                "value": None if math.isnan(row.value) else row.value, "unit": row.unit, **judged,
+                "detail": row.detail}
     return json.dumps({"head": head, "left_out": list(left_out),
                        "figures": [entry(row) for row in rows]}, indent=1) + "\n"
+
+
+def from_json(text):
+    """The rows of as_json()."""
+    return [figures.Row(one["measure"], one["case"], one["program"],
+                        math.nan if one["value"] is None else one["value"], one["unit"], one["detail"])
+            for one in json.loads(text)["figures"]]
+
+
+def updated(old, new):
+    """`old` rows with those of `new` in their place, and the others of `new` behind them."""
+    def key(row):
+        return row.measure, row.case, row.subject
+    fresh = {key(row): row for row in new}
+    return [fresh.pop(key(row), row) for row in old] + list(fresh.values())

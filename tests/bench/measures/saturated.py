@@ -96,10 +96,14 @@ def measure_case(tools, subjects, baud, registers, *, turns, seconds, share=SHAR
                 yield from (row for row in rows if share == SHARE or row.measure == share)
 
 
+def rates(run):
+    return [baud for baud in run.rates if baud in QUICK_RATES or not run.quick]
+
+
 def measure(run):
     """Paced lines and the unpaced one; rivals at some rates, one turn each."""
     turns, seconds = (1, 2) if run.quick else (2, 4)
-    for baud in QUICK_RATES if run.quick else RATES:
+    for baud in rates(run):
         for registers in REGISTERS:
             rivals = run.rivals if baud in RIVAL_RATES and registers == 10 else []
             yield from measure_case(run.tools, run.gateways + rivals, baud, registers,
@@ -149,7 +153,7 @@ def measure_tcp(run):
 def measure_busy(run):
     turns, seconds = (1, 2) if run.quick else (2, 4)
     with rig.busy_cores():
-        for baud in QUICK_RATES if run.quick else RATES:
+        for baud in rates(run):
             for registers in REGISTERS:
                 yield from measure_case(run.tools, run.gateways, baud, registers,
                                         turns=turns, seconds=seconds, share=BUSY)
