@@ -53,7 +53,7 @@ def measure_case(run, subjects, baud, *, turns, seconds, registers=10):
 
 
 def measure(run):
-    turns, seconds = (2, 2) if run.quick else (5, 6)
+    turns, seconds = (2, 2) if run.quick else (3, 5)
     for baud in (115200,) if run.quick else (9600, 38400, 115200, 921600):
         rivals = run.rivals if baud == 115200 else []
         yield from measure_case(run, run.gateways + rivals, baud, turns=turns, seconds=seconds)

@@ -42,7 +42,7 @@ class Mbusd:
     def serving(self, link, baud):
         port = free_port()
         command = [self._program, "-d", "-v", "0", "-L", "-", "-p", link, "-s",
-                   baud or UNPACED_BAUD, "-m", "8e1", "-A", "127.0.0.1", "-P", port, "-C", 128,
+                   baud or UNPACED_BAUD, "-m", "8n1", "-A", "127.0.0.1", "-P", port, "-C", 128,
                    "-N", 0, "-R", 2]
         with Helper(command, stderr=subprocess.DEVNULL) as program:
             wait_for_listener(port)
