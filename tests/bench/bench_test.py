@@ -85,9 +85,10 @@ class Report(unittest.TestCase):
         self.assertIn("| fast | 0.8900 | 0.5000 (!) | >= 0.9 | **no** |", text)
 
     def test_a_bar_shows_its_worst_case(self):
-        text = report.bars_table(ROWS, BARS, "ours")
+        text = report.bars_table(ROWS, [*BARS, Bar("size", {"all"}, most=1)], "ours")
         self.assertIn("| share | 1 of 2 hold; worst fast | >= 0.9 | 0.8900 | **no** |", text)
         self.assertIn("| time | slow | <= 5 | 4.000 | yes |", text)
+        self.assertIn("| size | all | <= 1 | not measured | |", text)
 
     def test_json_has_every_figure_and_null_for_what_is_none(self):
         lost = Row("time", "slow", "theirs", math.nan, "ms")

@@ -51,11 +51,12 @@ def measure_table(measure, rows, bars, judged):
 
 
 def bars_table(rows, bars, judged):
-    """Each bar with the worst figure that it is for."""
+    """Each bar with the worst figure that it is for, and how many of its cases hold."""
     text = "| measure | cases | asked | worst | holds |\n|---|---|---|---|---|\n"
     for bar in bars:
         own = [row for row in rows if row.subject == judged and figures.bar_of([bar], row)]
         if not own:
+            text += f"| {bar.measure} | {', '.join(sorted(bar.asked))} | {asked(bar)} | not measured | |\n"
             continue
         worst = max(own, key=lambda row: math.inf if math.isnan(row.value) else
                     row.value if bar.least is None else -row.value)
