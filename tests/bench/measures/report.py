@@ -56,7 +56,8 @@ def bars_table(rows, bars, judged):
     for bar in bars:
         own = [row for row in rows if row.subject == judged and figures.bar_of([bar], row)]
         if not own:
-            text += f"| {bar.measure} | {', '.join(sorted(bar.asked))} | {asked(bar)} | not measured | |\n"
+            where = next(iter(bar.asked)) if len(bar.asked) == 1 else f"{len(bar.asked)} cases"
+            text += f"| {bar.measure} | {where} | {asked(bar)} | not measured | |\n"
             continue
         worst = max(own, key=lambda row: math.inf if math.isnan(row.value) else
                     row.value if bar.least is None else -row.value)
