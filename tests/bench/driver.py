@@ -131,7 +131,7 @@ def main():
         run = Run(tools, options.program, others, options.quick, options.rates, left_out)
         for name in options.only or TOPICS:
             rows += rows_of(name, run)
-    write(options, rows, left_out)
+    write(options, rows, report.in_order(left_out))
     sys.exit(any(what.startswith(BROKEN) for what in left_out))
 
 

@@ -46,9 +46,10 @@ def per_transaction(count_all, few, many):
 
 
 def rows(run, measure, count_all, baud, few, many):
+    gateways = run.gateways if baud else rig.without_gap(run)
     with tempfile.TemporaryDirectory() as folder, rig.LoggedLine(run.tools, folder, baud) as line:
         for registers in (10, 100):
-            for subject in run.gateways:
+            for subject in gateways:
                 value = per_transaction(
                     lambda count, who=subject, regs=registers:
                     count_all(run.tools, who, line, regs, count), few, many)

@@ -57,4 +57,5 @@ def measure(run):
     for baud in (115200,) if run.quick else (9600, 38400, 115200, 921600):
         rivals = run.rivals if baud == 115200 else []
         yield from measure_case(run, run.gateways + rivals, baud, turns=turns, seconds=seconds)
-    yield from measure_case(run, run.gateways + run.rivals, 0, turns=turns, seconds=min(seconds, 3))
+    yield from measure_case(run, rig.without_gap(run) + run.rivals, 0, turns=turns,
+                            seconds=min(seconds, 3))

@@ -56,14 +56,25 @@ class Panelgate:
     def unavailable(self):
         return None if os.access(self.program, os.X_OK) else f"there is no {self.program}"
 
-    @contextlib.contextmanager
-    def serving(self, link, baud, stations=STATIONS):
-        """A running gateway: its Modbus/TCP port is `port`, its process `pid`."""
+    def configuration(self, link, baud, stations=STATIONS):
         gap = "0us" if link.startswith("tcp://") else UNPACED_GAP
         keys = {} if baud else {"timing": f"{{frame_gap: {gap}}}"}
         line = config.line("wire", link, config.station_ids(stations), baud=baud or UNPACED,
                            parity="even", **keys)
-        with self.running(config.gateway(line, http=self._how.get("http"))) as program:
+        return config.gateway(line, http=self._how.get("http"))
+
+    def takes(self, link, baud):
+        """Whether this build accepts the configuration of such a line."""
+        with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+            file.write(self.configuration(link, baud))
+            file.flush()
+            return subprocess.run([self.program, "check", "-c", file.name], capture_output=True,
+                                  check=False).returncode == 0
+
+    @contextlib.contextmanager
+    def serving(self, link, baud, stations=STATIONS):
+        """A running gateway: its Modbus/TCP port is `port`, its process `pid`."""
+        with self.running(self.configuration(link, baud, stations)) as program:
             program.log.wait_for("line up")
             yield program
 
@@ -84,6 +95,15 @@ class Panelgate:
                 program.port = program.modbus_port() if "modbus_tcp:" in text else None
                 program.pid = program.process.pid
                 yield program
+
+
+def without_gap(run, link="/dev/ttyS0"):
+    """The gateways that may leave (nearly) no gap on such a line; builds that refuse it are told."""
+    able = [subject for subject in run.gateways if subject.takes(link, 0)]
+    for subject in run.gateways:
+        if subject not in able:
+            run.left_out.append(f"{subject.name} on an unpaced line ({link}): it asks for a gap")
+    return able
 
 
 class LoggedLine(wire.PacedLine):

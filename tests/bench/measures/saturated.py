@@ -123,9 +123,10 @@ def of_bridge(rows, case):
 
 def measure_unpaced(run):
     turns, seconds = (1, 2) if run.quick else (3, 3)
+    gateways = rig.without_gap(run)
     for registers in REGISTERS:
         rows = []
-        for row in measure_case(run.tools, run.gateways + run.rivals, 0, registers,
+        for row in measure_case(run.tools, gateways + run.rivals, 0, registers,
                                 turns=turns, seconds=seconds):
             rows.append(row)
             yield row
@@ -139,9 +140,10 @@ def over_tcp(registers):
 def measure_tcp(run):
     """The line on which `frame_gap: 0us` is allowed."""
     turns, seconds = (1, 2) if run.quick else (3, 3)
+    gateways = rig.without_gap(run, "tcp://127.0.0.1:4001")
     for registers in REGISTERS:
         with rig.TcpLine(run.tools) as line:
-            for subject in run.gateways * turns:
+            for subject in gateways * turns:
                 with subject.serving(line.link, 0) as gateway:
                     window, seen = rig.saturate(line, gateway.port, gateway.pid, registers, seconds)
                 errors = {what: n for what, n in errors_of(seen, window).items() if n}
