@@ -50,27 +50,52 @@ def wire_limit(baud, registers=10):
     return 1 / (8 * character + gap + THINK + (5 + 2 * registers) * character + gap)
 
 
-class Bus:
-    """rtubus with stations 1 to 8, and a gateway on it; `settings`: more keys of its line."""
+class PacedLine:
+    """rtubus with these stations; `link` is the tty. `options`: more of rtubus' own."""
+
+    def __init__(self, tools, folder, baud, options=(), pass_fds=(), stations="1-8"):
+        self.tools = tools
+        self.link = f"{folder}/tty{baud}-{id(self)}"
+        self.bus = subprocess.Popen([tools["rtubus"], "--baud", str(baud), "--bus",
+                                     f"{self.link}={stations}", *options], pass_fds=pass_fds,
+                                    stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.bus.stdout.readline()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.bus.communicate("quit\n")
+
+    def tell(self, command):
+        self.bus.stdin.write(command + "\n")
+        self.bus.stdin.flush()
+        return self.bus.stdout.readline()
+
+    def all_stats(self):
+        """Of each bus, in the order of the options."""
+        return json.loads(self.tell("stats"))
+
+    def stats(self):
+        return self.all_stats()[0]
+
+
+class Bus(PacedLine):
+    """A paced line and a gateway on it; `settings`: more keys of its line."""
 
     def __init__(self, tools, folder, baud, faults=(), settings=None, log=False, echo=0):
-        self.tools = tools
-        link = f"{folder}/tty{baud}-{id(self)}"
-        command = [tools["rtubus"], "--baud", str(baud), "--bus", f"{link}=1-8",
-                   "--echo", str(echo)]
+        options = ["--echo", str(echo)]
         for fault in faults:
-            command += ["--fault", fault]
+            options += ["--fault", fault]
         read, write = os.pipe()
         if log:
-            command += ["--log", f"/dev/fd/{write}"]
-        self.bus = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-                                    pass_fds=[write])
+            options += ["--log", f"/dev/fd/{write}"]
+        super().__init__(tools, folder, baud, options, [write])
         os.close(write)
         self.log = Output(os.fdopen(read))  # a line for every frame: START END BUS KIND hex...
-        self.bus.stdout.readline()
-        line = config.line("wire", link, config.station_ids(range(1, 9)), baud=baud, parity="even",
-                           **(settings or {}))
-        file = pathlib.Path(f"{link}.yaml")
+        line = config.line("wire", self.link, config.station_ids(range(1, 9)), baud=baud,
+                           parity="even", **(settings or {}))
+        file = pathlib.Path(f"{self.link}.yaml")
         file.write_text(config.gateway(line, http=None))
         self.gateway = Program("run", "-c", str(file))
 
@@ -80,15 +105,7 @@ class Bus:
 
     def __exit__(self, *_):
         self.gateway.stop()
-        self.bus.communicate("quit\n")
-
-    def tell(self, command):
-        self.bus.stdin.write(command + "\n")
-        self.bus.stdin.flush()
-        return self.bus.stdout.readline()
-
-    def stats(self):
-        return json.loads(self.tell("stats"))[0]
+        super().__exit__()
 
     def start_load(self, *options):
         port = str(self.gateway.modbus_port())
