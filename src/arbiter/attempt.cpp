@@ -46,20 +46,19 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
-    const bool first = since_ == 0;
     since_ += bytes.size();
     const TimePoint latest = now - since_ * character();
-    began_ = first ? latest : std::min(began_, latest);
+    began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
-    // More should have come by now: a hole, or a slower clock.
-    if (const auto busy = busy_until(); busy && *busy <= now) began_ = now - since_ * character();
+    // More should have come by now: a hole, or a slower clock, as the next byte will tell.
+    if (const auto busy = busy_until(); busy && *busy <= now) began_.reset();
     return verdict;
 }
 
 std::optional<TimePoint> Attempt::busy_until() const {
     const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
-    if (!timing_.steady || missing == 0) return std::nullopt;
-    return began_ + (since_ + missing) * character();
+    if (!timing_.steady || missing == 0 || !began_) return std::nullopt;
+    return *began_ + (since_ + missing) * character();
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {

@@ -164,7 +164,8 @@ class Attempt {
     TimePoint first_byte_;
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
-    TimePoint began_;        ///< what is heard, if the line has kept its rate since
+    /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
+    std::optional<TimePoint> began_;
     std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;
     bool disturbed_ = false;

@@ -27,9 +27,11 @@ struct Machine {
         return first;
     }
     std::optional<TimePoint> next_deadline() const { return deadline; }
+    std::optional<TimePoint> busy_until() const { return busy; }
 
     std::vector<std::variant<Send, Other>> wishes;
     std::optional<TimePoint> deadline;
+    std::optional<TimePoint> busy;
 };
 
 /// A device with something in it, and everything that happens, a letter each.
@@ -43,6 +45,7 @@ class DriveTest : public testing::Test, public Line {
             drive.hear([&](TimePoint) { story += bytes; });
     }
     void write(ByteView) override {}
+    void hold_input(bool hold) override { held = hold; }
     const Counters& counters() override { return counters_; }
 
     struct Host {
@@ -65,6 +68,7 @@ class DriveTest : public testing::Test, public Line {
     Host host{this};
     std::string device;  ///< has come, and nobody has read it
     std::string story;
+    bool held = false;  ///< input wakes nobody
     TimePoint rang;
     Drive<Machine, Host> drive{clock, *this, machine, host};
 
@@ -129,6 +133,36 @@ TEST_F(DriveTest, RestsUntilTheNextVerb) {
     EXPECT_EQ(clock.next(), std::nullopt);
     drive.hear([](TimePoint) {});
     EXPECT_EQ(clock.next(), machine.deadline);
+}
+
+TEST_F(DriveTest, InputThatChangesNothingWaitsForItsTimeAndIsReadThen) {
+    machine.deadline = clock.now() + 50ms;
+    machine.busy = clock.now() + 5ms;
+    drive.hear([](TimePoint) {});
+    EXPECT_TRUE(held);
+    EXPECT_EQ(clock.next(), machine.busy);
+    device = "xy";
+    story.clear();
+    clock.advance(5ms);
+    EXPECT_EQ(story, "pxy.!.");
+    EXPECT_FALSE(held) << "its time is over: every byte matters again";
+}
+
+TEST_F(DriveTest, HeldInputIsReadBeforeAnyVerb) {
+    machine.busy = clock.now() + 5ms;
+    drive.hear([](TimePoint) {});
+    device = "xy";
+    story.clear();
+    drive.tell([&](TimePoint) { story += 'v'; });
+    EXPECT_EQ(story, "pxy.v.");
+}
+
+TEST_F(DriveTest, WhoRestsHoldsNothingBack) {
+    machine.busy = clock.now() + 5ms;
+    drive.hear([](TimePoint) {});
+    drive.rest();
+    EXPECT_FALSE(held);
+    EXPECT_EQ(clock.next(), std::nullopt);
 }
 
 }  // namespace

@@ -33,6 +33,29 @@ TEST(RtuFramer, GivesTheReplyAtItsLastByteHoweverItIsCut) {
     }
 }
 
+TEST(RtuFramer, TellsHowManyBytesMustComeAtLeast) {
+    ReplyFramer framer(0x11, kRequest);
+    EXPECT_EQ(framer.missing(), 0);
+    framer.feed("11"_hex);
+    EXPECT_EQ(framer.missing(), 2);
+    framer.feed("03"_hex);
+    EXPECT_EQ(framer.missing(), 1);
+    framer.feed("06"_hex);
+    EXPECT_EQ(framer.missing(), 8);
+    framer.feed("02 2B 00 00 00 64 C8"_hex);
+    EXPECT_EQ(framer.missing(), 1);
+    framer.feed("BA"_hex);
+    EXPECT_EQ(framer.missing(), 0);
+}
+
+TEST(RtuFramer, OfWhatIsNoReplyEveryByteMayTell) {
+    ReplyFramer framer(0x11, kRequest);
+    framer.feed("22 03 06"_hex);
+    EXPECT_EQ(framer.missing(), 0);
+    framer.feed("11 03 04"_hex);
+    EXPECT_EQ(framer.missing(), 0) << "a byte count that does not answer";
+}
+
 TEST(RtuFramer, TakesAnExceptionBeforeItLooksAtAnyByteCount) {
     ReplyFramer framer(0x11, kRequest);
     EXPECT_EQ(framer.feed("11 83 02 C1 34"_hex).value(), "83 02"_hex);

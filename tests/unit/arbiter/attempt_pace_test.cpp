@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "panelgate/arbiter/attempt.hpp"
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+using test::group_of;
+
+constexpr std::uint8_t kStation = 17;
+const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
+
+/// What has to be looked at and what need not, while a reply of 11 bytes comes.
+class AttemptPaceTest : public testing::Test {
+  protected:
+    static Attempt attempt_of(bool may_stall, EchoFilter echo = {}) {
+        Settings line;
+        line.may_stall = may_stall;
+        Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+        timing.patience = timing.usual = 500ms;
+        return {group_of(kStation, "03 00 6B 00 03"_hex), timing, std::move(echo)};
+    }
+    /// Bytes `from` to `to` of the reply, whose byte n is there n + 1 characters after `start_`;
+    /// `late`: when they are read.
+    Verdict hear(std::size_t from, std::size_t to, Duration late = {}) {
+        now_ = start_ + to * kCharacter + late;
+        return attempt_.on_rx(now_, ByteView(kReply).subspan(from, to - from),
+                              [](ByteView) { return true; });
+    }
+    /// After the reply's start.
+    std::optional<Duration> busy() const {
+        const auto until = attempt_.busy_until();
+        return until && *until > now_ ? std::optional(*until - start_) : std::nullopt;
+    }
+
+    const Duration kCharacter = character_time(SerialFormat{});
+    Attempt attempt_ = attempt_of(false);
+    TimePoint start_ = attempt_.timing().sent + 5ms;
+    TimePoint now_{};
+};
+
+TEST_F(AttemptPaceTest, WantsEachByteUntilSomethingHasBegun) {
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, ThreeLooksAtAReplyAreEnough) {
+    hear(0, 1);
+    EXPECT_EQ(busy(), 3 * kCharacter) << "its header";
+    hear(1, 3);
+    EXPECT_EQ(busy(), 11 * kCharacter) << "all of it";
+    EXPECT_EQ(hear(3, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
+    attempt_.on_rx(now_ = start_ + 3 * kCharacter, "11 83 02"_hex, [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 5 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, ALateLookAtTheFirstByteIsMadeUpForByAnyBetterOne) {
+    hear(0, 1, kCharacter / 2);
+    EXPECT_EQ(busy(), 3 * kCharacter + kCharacter / 2);
+    hear(1, 3);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, BytesThatAreLateAreWantedOneByOneUntilTheNextTells) {
+    hear(0, 3);
+    start_ += 4ms;  // a hole
+    now_ = start_ + 7 * kCharacter;
+    attempt_.on_rx(now_, ByteView(kReply).subspan(3, 1), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), std::nullopt);
+    attempt_.on_rx(now_, ByteView(kReply).subspan(4, 3), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 11 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, WhatIsNoReplyIsWantedByteByByte) {
+    attempt_.on_rx(now_ = start_, "FF 00"_hex, [](ByteView) { return true; });
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, OverTcpNothingComesAtTheRateOfTheLine) {
+    attempt_ = attempt_of(true);
+    hear(0, 1);
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
+    const Bytes frame = "11 03 00 6B 00 03 76 87"_hex;
+    attempt_ = attempt_of(false, {frame, EchoFilter::Expect::perhaps});
+    start_ = attempt_.timing().started;
+    now_ = start_ + 3 * kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).first(3), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 8 * kCharacter);
+    now_ = start_ + 8 * kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).subspan(3), [](ByteView) { return true; });
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
