@@ -38,10 +38,12 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
 }
 
 /// A read that comes while one which contains it is still leaving goes along with it, unless
-/// something older of its client waits for that station.
+/// something older of its client waits for that station: on a line that keeps pace. On another one
+/// nobody knows that the request has not left.
 bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
     const auto own = test::read_span(job.station, job.request.pdu());
-    const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
+    const bool held_back = settings_.paced && settings_.share_reads;
+    const bool leaving = held_back && now < attempt_.sent && !attempt_.again;
     if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
     return std::ranges::none_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
