@@ -50,6 +50,7 @@ class Checker : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint now) override { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station) override;
     void on_line_down(TimePoint now);
@@ -120,8 +121,9 @@ class Checker : public Witness {
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
-    bool is_luck();
-    void check_write(TimePoint now, const Open& open);
+    Bytes heard_for(const Open& open, const Bytes& reply) const;
+    bool is_luck(ByteView heard);
+    void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;

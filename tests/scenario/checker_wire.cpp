@@ -84,6 +84,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     if (what != FrameKind::retry) was_silent = watch_.is_silent(station);
     if (what == FrameKind::retry) {
         retried_.insert(station);
+        watch_.on_again(now, station);
     } else {
         retried_.erase(station);
     }
