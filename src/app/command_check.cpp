@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "inventory.hpp"
 #include "load.hpp"
+#include "panelgate/base/utf8.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
@@ -52,7 +53,7 @@ void print_json(const std::string& file, const Loaded& loaded) {
     }
     all["errors"] = errors_json(file, loaded.problems);
     all["warnings"] = std::move(warnings);
-    std::cout << web::json_text(all) << '\n';
+    std::cout << as_utf8(web::json_text(all)) << '\n';  // the names of files may be any bytes
 }
 
 }  // namespace

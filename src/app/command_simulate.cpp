@@ -35,8 +35,10 @@ bool parse_links(const std::vector<std::string>& texts, const config::Config& co
                    !config::parse_endpoint(text.substr(equals + 1 + kTcpLink.size()))) {
             std::cerr << "panelgate: --line '" << text
                       << "' is not NAME=tcp://ADDR:PORT with an IP address and a port\n";
+        } else if (!links.emplace(name, text.substr(equals + 1)).second) {
+            std::cerr << "panelgate: --line '" << text << "': line '" << name
+                      << "' has been given already; a line goes to one place\n";
         } else {
-            links[name] = text.substr(equals + 1);
             continue;
         }
         return false;

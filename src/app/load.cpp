@@ -21,7 +21,7 @@ std::optional<std::string> environment(const std::string& name) {
 }  // namespace
 
 Loaded load_file(const std::string& path) {
-    const auto text = config::RealFiles().read(path);
+    const auto text = config::RealFiles::read_any(path);
     if (!text) {
         const std::string why = std::strerror(errno);
         std::cerr << "panelgate: cannot read " << path << ": " << why

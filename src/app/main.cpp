@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <exception>
 #include <iostream>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,13 +44,20 @@ class CommandLine {
         }
         if (!words[0].starts_with('-') && !has_command(words[0]))
             return which_command("there is no command '" + words[0] + '\'' +
-                                 did_you_mean(words[0]));
+                                 did_you_mean(words[0], commands()));
+        static const std::set<std::string> kAlone{"-h", "--help", "-V", "--version"};
+        if (words[0].starts_with('-') && !kAlone.contains(words[0]))
+            return which_command("a command is missing before '" + words[0] + '\'');
+        const std::string command = words[0];
         try {
             std::ranges::reverse(words);  // as CLI11 takes them
             cli_.parse(std::move(words));
         } catch (const CLI::ParseError& error) {
             const bool asked_for =
                 error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
+            if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
+                has_command(command))
+                return unexpected(*cli_.get_subcommand(command));
             cli_.exit(error);  // prints the help, the version, or what is wrong
             return asked_for ? kFine : kUsage;
         }
@@ -69,11 +77,34 @@ class CommandLine {
         return std::ranges::find(names, name) != names.end();
     }
 
-    std::string did_you_mean(std::string_view typed) const {
-        const auto names = commands();
+    static std::string did_you_mean(std::string_view typed, const std::vector<std::string>& known) {
         const std::string near =
-            nearest(typed, std::vector<std::string_view>(names.begin(), names.end()));
+            nearest(typed, std::vector<std::string_view>(known.begin(), known.end()));
         return near.empty() ? "" : "; did you mean '" + near + "'?";
+    }
+
+    /// What `command` did not understand, the first of it.
+    static ExitCode unexpected(const CLI::App& command) {
+        std::vector<std::string> left = command.remaining();
+        const auto first = std::ranges::find_if(
+            left, [](const std::string& word) { return word.starts_with('-'); });
+        const bool is_option = first != left.end();
+        const std::string typed = is_option ? first->substr(0, first->find('=')) : left.front();
+        std::vector<std::string> names;
+        for (const CLI::Option* option : command.get_options()) {
+            for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+            for (const std::string& name : option->get_snames()) names.push_back('-' + name);
+        }
+        const bool takes_file = command.get_option_no_throw("--config") != nullptr;
+        std::cerr << "panelgate: " << command.get_name()
+                  << (is_option ? " has no option '" : " does not take '") << typed << '\'';
+        if (is_option) {
+            std::cerr << did_you_mean(typed, names);
+        } else if (takes_file) {
+            std::cerr << "; a file is given with -c: " << command.get_name() << " -c " << typed;
+        }
+        std::cerr << "; `panelgate help " << command.get_name() << "` says what it takes\n";
+        return kUsage;
     }
 
     ExitCode which_command(const std::string& what) const {

@@ -128,6 +128,11 @@ void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings
     }
 }
 
+/// Docker and Podman mount secrets there for one container, readable by all that is in it.
+bool is_container_secret(std::string_view path) {
+    return path.starts_with("/run/secrets/") || path.starts_with("/var/run/secrets/");
+}
+
 void warn_of_token(Loading& loading, const Node& node, const web::Token& token) {
     const Node* file = find(node, "file");
     if (token.secret.size() < kShortToken)
@@ -135,9 +140,11 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
                                      std::to_string(token.secret.size()) + " characters; take " +
                                      std::to_string(kShortToken) +
                                      " or more, such as of `openssl rand -hex 16`");
+    if (is_container_secret(file->scalar)) return;
     if (loading.files.is_readable_by_all(file->scalar))
         loading.warn(file->mark, "everybody on this machine can read the token file " +
-                                     file->scalar + "; `chmod o-r " + file->scalar + '`');
+                                     file->scalar + "; `chmod o-r " + file->scalar +
+                                     "`, or a secret of the container platform in /run/secrets");
 }
 
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {

@@ -18,6 +18,14 @@ unsigned bits_of_address(const std::string& text) {
     return 0;
 }
 
+/// ::ffff:10.0.0.1 (RFC 4291, 2.5.5.2)
+bool is_mapped(const std::string& address) {
+    constexpr std::array<unsigned char, 12> kMapped{0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF};
+    std::array<unsigned char, 16> buffer{};
+    return inet_pton(AF_INET6, address.c_str(), buffer.data()) == 1 &&
+           std::equal(kMapped.begin(), kMapped.end(), buffer.begin());
+}
+
 }  // namespace
 
 std::optional<Endpoint> parse_endpoint(std::string_view text) {
@@ -51,6 +59,7 @@ std::optional<Cidr> parse_cidr(std::string_view text) {
     if (slash == std::string_view::npos) return cidr;
     const auto prefix = yaml::parse_integer(text.substr(slash + 1));
     if (!prefix || *prefix < 0 || *prefix > bits) return std::nullopt;
+    if (is_mapped(cidr.address) && *prefix < 96) return std::nullopt;
     cidr.prefix = static_cast<unsigned>(*prefix);
     return cidr;
 }

@@ -5,8 +5,11 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "check_doors.hpp"
+#include "check_texts.hpp"
+#include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
@@ -57,14 +60,29 @@ void drop_extensions(yaml::Node& tree) {
                   [](const yaml::Entry& entry) { return entry.key.starts_with("x-"); });
 }
 
+/// Keys that people write at the left margin.
+constexpr std::array<yaml::Elsewhere, 12> kElsewhere{{{"level", "log", {}},
+                                                      {"format", "log", {}},
+                                                      {"listen", {}, "modbus_tcp or http"},
+                                                      {"allow", {}, "modbus_tcp or http"},
+                                                      {"units", {}, "modbus_tcp"},
+                                                      {"tokens", {}, "http"},
+                                                      {"anonymous", {}, "http"},
+                                                      {"stations", {}, "a line, one of 'lines'"},
+                                                      {"device", {}, "a line, one of 'lines'"},
+                                                      {"serial", {}, "a line, one of 'lines'"},
+                                                      {"baud", {}, "a line's serial"},
+                                                      {"points", {}, "a station"}}};
+
 void load_tree(Loading& loading, yaml::Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
     drop_extensions(tree);
-    apply_templates(loading, tree);
+    const std::vector<yaml::Node> unused = apply_templates(loading, tree);
     MapReader root(tree, loading.problems, "the configuration");
     if (tree.kind != yaml::Node::Kind::map) return;
     loading.config.profiles = load_profiles(loading, root);
     load_lines(loading, root);
+    for (const yaml::Node& body : unused) judge_template(loading, body);
     load_modbus_tcp(loading, root);
     load_http(loading, root);
     load_log(loading, root);
@@ -72,8 +90,12 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     const yaml::Node* listeners = root.child("modbus_tcp");
     const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
                                                    listeners->items.empty());
-    if (is_empty && root.child("http") == nullptr)
-        loading.problems.add({1, 1}, "nothing to serve: add 'modbus_tcp' or 'http'");
+    const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http");
+    if (is_empty && root.child("http") == nullptr && !mistyped)
+        loading.problems.add({1, 1},
+                             "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
+                             "[{listen: 127.0.0.1:502}]");
+    root.elsewhere(kElsewhere);
     root.has("templates");  // known, though nothing of it is left
     root.finish();
     if (loading.problems.empty()) warn_of_doors(loading, tree);
@@ -158,6 +180,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     }
     yaml::Problems unset(problems.file());
     yaml::expand_variables(tree, environment, unset);
+    refuse_control_characters(tree, unset);
     yaml::Problems found(problems.file());
     Config config;
     Loading loading{files, found, config, {}};

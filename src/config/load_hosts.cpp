@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/line/settings.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 /// A name as a browser would send it, or an address without brackets.
 bool is_host(std::string_view text) {
     if (text.find('/') == text.npos && parse_cidr(text)) return true;
+    if (line::is_broken_address(text)) return false;
     return !text.empty() && !text.ends_with('.') && std::ranges::all_of(text, [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
                c == '-' || c == '.' || c == '_';
@@ -26,10 +28,13 @@ void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) 
         if (is_host(item.scalar)) {
             settings.hosts.push_back(item.scalar);
         } else {
-            loading.problems.add(item.mark,
-                                 "hosts lists names such as gateway.plant.example, without http:// "
-                                 "and without a port, not '" +
-                                     item.scalar + '\'');
+            loading.problems.add(
+                item.mark,
+                "hosts lists names such as gateway.plant.example, without http:// "
+                "and without a port, not '" +
+                    item.scalar + '\'' +
+                    (line::is_broken_address(item.scalar) ? "; its numbers are no IP address"
+                                                          : ""));
         }
     }
     if (list->items.empty())

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <utility>
 
+#include "line_hints.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -17,30 +18,10 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-/// What `38400 8N1` would be.
-std::string serial_example(MapReader& line) {
-    const Node* node = line.child("serial");
-    const std::string_view typed = node == nullptr ? std::string_view() : node->scalar;
-    const std::size_t digits = std::min(typed.find_first_not_of("0123456789"), typed.size());
-    const auto baud = yaml::parse_integer(typed.substr(0, digits));
-    const std::size_t format = typed.find("8", digits);
-    std::string parity = "none";
-    std::string stop_bits = "1";
-    if (format != std::string_view::npos && format + 2 < typed.size()) {
-        const char letter = typed[format + 1];
-        parity = letter == 'E' || letter == 'e'   ? "even"
-                 : letter == 'O' || letter == 'o' ? "odd"
-                                                  : parity;
-        if (typed[format + 2] == '2') stop_bits = "2";
-    }
-    return "{baud: " + std::to_string(baud.value_or(38400)) + ", parity: " + parity +
-           ", stop_bits: " + stop_bits + '}';
-}
-
 /// False when there was a fault: then nothing may be concluded from the format.
 bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
     const std::size_t before = loading.problems.list().size();
-    const Node* node = line.map("serial", serial_example(line));
+    const Node* node = line.map("serial", serial_example(line.child("serial")));
     if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
     format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
@@ -134,6 +115,22 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
     in.finish();
 }
 
+/// /dev/ttyUSB0:9600 and the like; paths by name have colons, too.
+void check_path(MapReader& in, const std::string& path) {
+    const std::size_t end = path.find_first_of(":,; ");
+    if (!path.starts_with("/dev/tty") || end == path.npos) return;
+    if (end + 1 == path.size()) {
+        in.problem("device", "device must be a path alone, not " + yaml::quote(path) + "; write " +
+                                 path.substr(0, end));
+        return;
+    }
+    Node behind;
+    behind.scalar = path.substr(end);
+    in.problem("device", "device must be a path alone, not " + yaml::quote(path) + "; write " +
+                             path.substr(0, end) +
+                             ", and what is behind it as serial: " + serial_example(&behind));
+}
+
 void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
     for (const Line& other : loading.config.lines) {
@@ -150,12 +147,14 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
         if (!line::parse_tcp_device(line.device.device))
             in.problem("device",
                        "device must be tcp://HOST:PORT with a port from 1 to 65535, not " +
-                           yaml::quote(line.device.device));
+                           yaml::quote(line.device.device) + device_hint(line.device.device));
     } else if (!line.device.device.empty() && line.device.device[0] != '/') {
         in.problem(
             "device",
             "device must be an absolute path such as /dev/ttyUSB0, tcp://HOST:PORT or sim, not " +
-                yaml::quote(line.device.device));
+                yaml::quote(line.device.device) + device_hint(line.device.device));
+    } else {
+        check_path(in, line.device.device);
     }
 }
 
@@ -174,8 +173,35 @@ arbiter::Quarantine load_quarantine(MapReader& in) {
     return in.choice<Quarantine>("quarantine", kWords).value_or(Quarantine::automatic);
 }
 
+constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
+constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
+
+/// Keys that people write beside `device`.
+constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"baud", "serial", {}},
+                                                      {"data_bits", "serial", {}},
+                                                      {"parity", "serial", {}},
+                                                      {"stop_bits", "serial", {}},
+                                                      {"response_timeout", "timing", {}},
+                                                      {"frame_gap", "timing", {}},
+                                                      {"reply_hole", "timing", {}},
+                                                      {"broadcast_turnaround", "timing", {}},
+                                                      {"late_window", "timing", {}},
+                                                      {"think_time", "timing", {}},
+                                                      {"limit", "queue", {}},
+                                                      {"per_client", "queue", {}},
+                                                      {"deadline", "queue", {}},
+                                                      {"after", "offline", {}},
+                                                      {"probe_min", "offline", {}},
+                                                      {"probe_max", "offline", {}},
+                                                      {"mode", "rs485", {}},
+                                                      {"points", {}, "a station"},
+                                                      {"poll", {}, "a station"},
+                                                      {"profile", {}, "a station"},
+                                                      {"listen", {}, "modbus_tcp or http"}}};
+
 Line load_line(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a line");
+    MapReader in(node, loading.problems, "a line", kLineExample);
+    in.elsewhere(kElsewhere);
     Line line;
     line.name = load_name(in, true).value_or("");
     if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
@@ -204,10 +230,12 @@ Line load_line(Loading& loading, const Node& node) {
 }  // namespace
 
 void load_lines(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("lines");
+    const Node* list = root.sequence("lines", kListExample);
+    if (list == nullptr && root.is_mistyped("lines")) return;
     if (list == nullptr || list->items.empty()) {
         loading.problems.add(root.mark("lines"),
-                             "a configuration needs at least one line in 'lines'");
+                             "a configuration needs at least one line in 'lines', such as lines: " +
+                                 std::string(kListExample));
         return;
     }
     for (const Node& node : list->items) loading.config.lines.push_back(load_line(loading, node));

@@ -1,13 +1,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdlib>
-#include <limits>
 
 #include "load_stations.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/yaml/quote.hpp"
+#include "point_limits.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -68,68 +67,18 @@ void load_scale(MapReader& in, Point& point) {
         in.problem("scale", "scale must not be 0");
         point.scale = 1;
     }
-    point.min = in.number("min");
-    point.max = in.number("max");
-    if (point.min && point.max && *point.min > *point.max)
-        in.problem("min", "min is above max: nothing could be written");
+    load_limits(in, point);
 }
 
-/// What the raw number of a whole type may be written as: signed or unsigned.
-struct RawRange {
-    std::int64_t low = 0;
-    std::int64_t high = 0;
-    bool contains(std::int64_t raw) const { return raw >= low && raw <= high; }
-    std::string text() const { return std::to_string(low) + " to " + std::to_string(high); }
-};
-
-RawRange signed_range(unsigned bits) {
-    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-    const std::int64_t high = bits >= 64 ? kMost : (std::int64_t{1} << (bits - 1)) - 1;
-    return {-high - 1, high};
-}
-
-RawRange unsigned_range(unsigned bits) {
-    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
-    return {0, bits >= 63 ? kMost : (std::int64_t{1} << bits) - 1};
-}
-
-RawRange label_range(Type type) {
-    switch (type) {
-        case Type::bcd16:
-            return {0, 9'999};
-        case Type::bcd32:
-            return {0, 99'999'999};
-        case Type::i16:
-        case Type::i32:
-        case Type::i64:
-            return signed_range(16 * points::registers_of(type));
-        case Type::u16:
-        case Type::u32:
-        case Type::u64:
-            return unsigned_range(16 * points::registers_of(type));
-        case Type::boolean:
-        case Type::f32:
-        case Type::f64:
-        case Type::string:
-            return signed_range(64);
-    }
-    std::abort();
-}
-
-/// Of no_value: 65535 and -1 are the same register.
-RawRange no_value_range(Type type) {
-    RawRange range = label_range(type);
-    const bool is_bcd = type == Type::bcd16 || type == Type::bcd32;
-    if (!is_integer(type) || is_bcd) return range;
-    range.low = signed_range(16 * points::registers_of(type)).low;
-    range.high = unsigned_range(16 * points::registers_of(type)).high;
-    return range;
-}
+constexpr std::string_view kPollExample = "{read: UW100, count: 8, every: 1s}";
 
 void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     const auto raw = yaml::parse_integer(entry.key);
     if (!raw || entry.value.kind != Node::Kind::scalar || entry.value.scalar.empty()) {
-        in.problems().add(entry.mark, "labels are RAW-NUMBER: text, such as 1: running");
+        const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
+        in.problems().add(entry.mark,
+                          "labels are RAW-NUMBER: text, such as 1: running" +
+                              (turned ? "; write " + entry.value.scalar + ": " + entry.key : ""));
         return;
     }
     if (const RawRange range = label_range(point.type); !range.contains(*raw)) {
@@ -146,8 +95,19 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     point.labels[*raw] = entry.value.scalar;
 }
 
+/// [stopped, running] as a map.
+std::string labels_example(const Node* typed) {
+    constexpr std::size_t kMost = 8;
+    if (typed == nullptr || typed->items.empty() || typed->items.size() > kMost)
+        return "{0: stopped, 1: running}";
+    std::string map;
+    for (std::size_t i = 0; i < typed->items.size(); ++i)
+        map += (i > 0 ? ", " : "") + std::to_string(i) + ": " + typed->items[i].scalar;
+    return '{' + map + '}';
+}
+
 void load_labels(MapReader& in, Point& point) {
-    const Node* labels = in.map("labels", "{0: stopped, 1: running}");
+    const Node* labels = in.map("labels", labels_example(in.child("labels")));
     if (labels == nullptr) return;
     if (!is_integer(point.type)) {
         in.problem("labels",
@@ -224,7 +184,7 @@ bool is_point_name(std::string_view text) {
 }
 
 void load_point(Loading& loading, const Node& node, Station& station) {
-    MapReader in(node, loading.problems, "a point");
+    MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
     point.name = in.required_text("name").value_or("");
     if (!point.name.empty() && !is_point_name(point.name))
@@ -255,7 +215,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
 }
 
 void load_poll(Loading& loading, const Node& node, Station& station) {
-    MapReader in(node, loading.problems, "a poll");
+    MapReader in(node, loading.problems, "a poll", kPollExample);
     points::Poll poll;
     const auto item = load_notation(in, "read", *station.profile);
     poll.read = in.text("read").value_or("");
@@ -279,9 +239,9 @@ void load_poll(Loading& loading, const Node& node, Station& station) {
 }
 
 template <class Load>
-void load_list(Loading& loading, MapReader& in, std::string_view key, std::size_t most,
-               const Load& load) {
-    const Node* list = in.sequence(key);
+void load_list(Loading& loading, MapReader& in, std::string_view key, std::string_view example,
+               std::size_t most, const Load& load) {
+    const Node* list = in.sequence(key, example);
     if (list == nullptr) return;
     if (list->items.size() > most) {
         in.problem(key, "at most " + std::to_string(most) + ' ' + std::string(key) +
@@ -313,9 +273,9 @@ void check_read_count(MapReader& in, std::string_view key, const profile::PanelP
 }
 
 void load_points(Loading& loading, MapReader& in, Station& station) {
-    load_list(loading, in, "poll", points::kMaxPolls,
+    load_list(loading, in, "poll", "[{read: UW100, count: 8, every: 1s}]", points::kMaxPolls,
               [&](Loading& l, const Node& node) { load_poll(l, node, station); });
-    load_list(loading, in, "points", points::kMaxPoints,
+    load_list(loading, in, "points", "[{name: temperature, at: UW100}]", points::kMaxPoints,
               [&](Loading& l, const Node& node) { load_point(l, node, station); });
 }
 

@@ -149,7 +149,7 @@ void check_loop(MapReader& in, const Route& route, const std::vector<Route>& oth
 }
 
 void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) {
-    MapReader in(node, loading.problems, "a relay");
+    MapReader in(node, loading.problems, "a relay", "{from: press/UW100, to: oven/GDT200}");
     const auto from = load_end(loading, in, "from");
     const auto to = load_end(loading, in, "to");
     Relay relay;
@@ -182,7 +182,7 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
 }  // namespace
 
 void load_relays(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("relays");
+    const Node* list = root.sequence("relays", "[{from: press/UW100, to: oven/GDT200}]");
     if (list == nullptr) return;
     if (list->items.size() > points::kMaxRelays) {
         root.problem("relays", "at most " + std::to_string(points::kMaxRelays) + " relays, not " +

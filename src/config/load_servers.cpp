@@ -4,7 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "address_hints.hpp"
 #include "load_hosts.hpp"
+#include "load_tokens.hpp"
 #include "loader.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/quote.hpp"
@@ -22,7 +24,7 @@ void load_listen(MapReader& in, Settings& settings) {
     const auto endpoint = parse_endpoint(*text);
     if (!endpoint) {
         in.problem("listen", "listen must be ADDR:PORT such as 127.0.0.1:502 or [::1]:502, not " +
-                                 yaml::quote(*text));
+                                 yaml::quote(*text) + listen_hint(*text));
         return;
     }
     settings.address = endpoint->address;
@@ -53,6 +55,10 @@ void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& 
         return;
     }
     for (const Node& item : list->items) {
+        if (item.kind != Node::Kind::scalar) {
+            loading.problems.add(item.mark, "lines lists the names of lines, such as [floor1]");
+            continue;
+        }
         if (find_line(loading, item.mark, item.scalar) == nullptr) continue;
         if (std::ranges::find(settings.lines, item.scalar) != settings.lines.end()) {
             loading.problems.add(item.mark, "line '" + item.scalar + "' is listed twice");
@@ -75,12 +81,24 @@ std::optional<std::uint8_t> find_station(const Line& line, const std::string& te
     return static_cast<std::uint8_t>(*id);
 }
 
+/// The line of a station that was named alone.
+std::string line_hint(const Config& config, const std::string& station) {
+    for (const Line& line : config.lines) {
+        for (const Station& known : line.stations) {
+            if (known.name == station || std::to_string(known.id) == station)
+                return "; write " + line.name + '/' + station;
+        }
+    }
+    return "";
+}
+
 /// "floor1/31" or "floor1/press" -> line and station; problems at `mark`.
 std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& node) {
     const std::size_t slash = node.scalar.find('/');
     if (slash == std::string::npos) {
         loading.problems.add(node.mark, "a unit points to LINE/STATION such as floor1/31, not " +
-                                            yaml::quote(node.scalar));
+                                            yaml::quote(node.scalar) +
+                                            line_hint(loading.config, node.scalar));
         return std::nullopt;
     }
     const std::string name = node.scalar.substr(0, slash);
@@ -103,8 +121,10 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
         if (!unit || *unit < 0 || *unit > 255) {
+            const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
             loading.problems.add(
-                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key));
+                entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key) +
+                                (turned ? "; write " + entry.value.scalar + ": " + entry.key : ""));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -173,7 +193,8 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
             allow.push_back({cidr->address, cidr->prefix});
         } else {
             loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not " +
-                                                yaml::quote(item.scalar));
+                                                yaml::quote(item.scalar) +
+                                                network_hint(item.scalar));
         }
     }
     if (list->items.empty())
@@ -187,7 +208,7 @@ void refuse_tls(MapReader& in) {
 }
 
 tcp_server::Settings load_listener(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a modbus_tcp listener");
+    MapReader in(node, loading.problems, "a modbus_tcp listener", "{listen: 127.0.0.1:502}");
     tcp_server::Settings settings;
     load_listen(in, settings);
     load_listener_lines(loading, in, settings);
@@ -207,59 +228,10 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     return settings;
 }
 
-/// A token's secret: the file's text without blanks around it.
-std::string load_secret(Loading& loading, MapReader& in) {
-    constexpr std::string_view kBlanks = " \t\r\n";
-    const auto file = in.required_text("file");
-    if (!file) return "";
-    const auto text = loading.files.read(*file);
-    if (!text) {
-        // Not the text: whoever took the token for its file has written that.
-        in.problem("file",
-                   "cannot read the token file; give the path of a file that holds the token and "
-                   "that this program may read");
-        return "";
-    }
-    const std::size_t first = text->find_first_not_of(kBlanks);
-    if (first == std::string::npos) {
-        in.problem("file", "the token file is empty");
-        return "";
-    }
-    std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
-    if (secret.find_first_of(kBlanks) != std::string::npos)
-        in.problem("file", "the token file " + *file + " must hold one token, without blanks");
-    return secret;
-}
-
-web::Token load_token(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a token");
-    web::Token token;
-    token.name = in.required_text("name").value_or("");
-    constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
-        {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
-    if (in.required_text("role"))
-        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
-    token.secret = load_secret(loading, in);
-    in.finish();
-    return token;
-}
-
-void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
-    const Node* list = in.sequence("tokens");
-    if (list == nullptr) return;
-    for (const Node& node : list->items) {
-        web::Token token = load_token(loading, node);
-        if (!token.name.empty() &&
-            std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
-            loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
-        tokens.push_back(std::move(token));
-    }
-}
-
 }  // namespace
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("modbus_tcp");
+    const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");
     if (list == nullptr) return;
     for (const Node& node : list->items) {
         tcp_server::Settings settings = load_listener(loading, node);

@@ -1,6 +1,7 @@
 #include "load_stations.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <initializer_list>
 #include <utility>
@@ -53,8 +54,10 @@ const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
     if (const PanelProfile* found = catalogue.find(name)) return found;
     std::vector<std::string_view> names;
     for (const auto& [known, profile] : catalogue.all()) names.push_back(known);
-    in.problem("profile",
-               "there is no profile " + yaml::quote(name) + did_you_mean(name, names, "profiles"));
+    const std::string hint = did_you_mean(name, names, "profiles");
+    const bool is_far = hint.starts_with("; known");
+    in.problem("profile", "there is no profile " + yaml::quote(name) + hint +
+                              (is_far ? "; `panelgate profiles` says for which panels" : ""));
     return catalogue.find("generic");
 }
 
@@ -139,15 +142,9 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
                          std::to_string(id) + " (" + profile.manual + ')');
 }
 
-Station load_station(Loading& loading, const Node& node, const LineInWork& work) {
-    MapReader in(node, loading.problems, "a station");
-    in.has("template");  // known, though apply_templates() has left nothing of it
-    Station station;
-    station.id = load_id(in, work.line);
-    station.name = load_station_name(loading, in, work.line, station.id);
-    station.profile = load_profile_name(loading, in);
-    check_range(in, *station.profile, station.id);
-    check_serial(in, work, *station.profile);
+/// What a template may give: all but id, name and profile, which `station` has.
+StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& work,
+                          Station& station) {
     station.read_only = load_read_only(in).value_or(false);
 
     StationSettings settings = load_station_timing(loading, in, work, station);
@@ -164,8 +161,51 @@ Station load_station(Loading& loading, const Node& node, const LineInWork& work)
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
-    work.line.arbiter.stations.push_back(settings);
+    return settings;
+}
+
+/// Keys that people write beside `id`.
+constexpr std::array<yaml::Elsewhere, 9> kElsewhere{
+    {{"response_timeout", "timing", {}},
+     {"frame_gap", "timing", {}},
+     {"late_window", "timing", {}},
+     {"think_time", "timing", {}},
+     {"serial", {}, "a line: all stations of a line share it"},
+     {"baud", {}, "a line's serial"},
+     {"parity", {}, "a line's serial"},
+     {"device", {}, "a line"},
+     {"at", {}, "a point"}}};
+
+Station load_station(Loading& loading, const Node& node, const LineInWork& work) {
+    MapReader in(node, loading.problems, "a station", "{id: 31, name: press}");
+    in.elsewhere(kElsewhere);
+    in.has("template");  // known, though apply_templates() has left nothing of it
+    Station station;
+    station.id = load_id(in, work.line);
+    station.name = load_station_name(loading, in, work.line, station.id);
+    station.profile = load_profile_name(loading, in);
+    check_range(in, *station.profile, station.id);
+    check_serial(in, work, *station.profile);
+    work.line.arbiter.stations.push_back(load_body(loading, in, work, station));
     return station;
+}
+
+/// What is wrong with a template's body on a panel of this profile; on nullptr, of the one it
+/// names.
+yaml::Problems faults_of(Loading& loading, const Node& body, const PanelProfile* profile) {
+    yaml::Problems faults(loading.problems.file());
+    Config config;
+    config.profiles = loading.config.profiles;
+    Loading alone{loading.files, faults, config, {}};
+    Line line;
+    MapReader in(body, faults, "a station");
+    Station station;
+    station.id = 1;
+    station.name = "template";
+    in.has("profile");
+    station.profile = profile == nullptr ? load_profile_name(alone, in) : profile;
+    load_body(alone, in, {line, false, {}}, station);
+    return faults;
 }
 
 bool needs_8n1(const Station& station) {
@@ -188,12 +228,23 @@ void warn_of_character(Loading& loading, MapReader& in, const LineInWork& work) 
 
 }  // namespace
 
+void judge_template(Loading& loading, const Node& body) {
+    const bool named = std::ranges::count(body.entries, "profile", &yaml::Entry::key) > 0;
+    yaml::Problems least = faults_of(loading, body, nullptr);
+    for (const auto& [name, profile] : loading.config.profiles->all()) {
+        if (named || least.empty()) break;
+        yaml::Problems faults = faults_of(loading, body, &profile);
+        if (faults.list().size() < least.list().size()) least = std::move(faults);
+    }
+    loading.problems.take(least);
+}
+
 void load_stations(Loading& loading, MapReader& in, LineInWork work) {
     load_line_timing(loading, in, work);
     StationSettings& settings = work.timing.settings;
     settings.retries = static_cast<int>(in.integer("retries", 0, 10).value_or(settings.retries));
     work.line.arbiter.unlisted = settings;
-    if (const Node* list = in.sequence("stations")) {
+    if (const Node* list = in.sequence("stations", "[{id: 31, name: press}]")) {
         for (const Node& node : list->items)
             work.line.stations.push_back(load_station(loading, node, work));
     }

@@ -31,6 +31,11 @@ arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& 
 /// line's serial format has been read already.
 void load_stations(Loading& loading, yaml::MapReader& in, LineInWork work);
 
+/// A template that no station names, as the body of a station of any line: what is wrong with it
+/// would be found by whoever uses it. One without a profile is held against the profile that it
+/// fits best.
+void judge_template(Loading& loading, const yaml::Node& body);
+
 /// Warns of what the queue's deadline makes impossible, once of each cause: a response timeout, or
 /// a read on this wire, that ends behind it. `node` is the whole line's.
 void warn_of_deadline(Loading& loading, const yaml::Node& node, const Line& line);

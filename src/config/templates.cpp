@@ -109,10 +109,14 @@ class Templates {
         }
     }
 
-    void warn_of_unused() {
-        for (const auto& [name, one] : templates_) {
-            if (!one.used) loading_.warn(one.mark, "no station has template: " + name);
+    std::vector<Node> take_unused() {
+        std::vector<Node> unused;
+        for (auto& [name, one] : templates_) {
+            if (one.used) continue;
+            loading_.warn(one.mark, "no station has template: " + name);
+            if (one.body.kind == Node::Kind::map) unused.push_back(std::move(one.body));
         }
+        return unused;
     }
 
   private:
@@ -156,7 +160,7 @@ class Templates {
 
 }  // namespace
 
-void apply_templates(Loading& loading, Node& tree) {
+std::vector<Node> apply_templates(Loading& loading, Node& tree) {
     Templates templates(loading);
     if (auto list = take(tree, "templates")) templates.read(*list);
     Node* lines = find(tree, "lines");
@@ -167,7 +171,7 @@ void apply_templates(Loading& loading, Node& tree) {
             for (Node& station : stations->items) templates.apply(station);
         }
     }
-    templates.warn_of_unused();
+    return templates.take_unused();
 }
 
 }  // namespace panelgate::config

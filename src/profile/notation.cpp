@@ -5,6 +5,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "notation_hint.hpp"
+
 namespace panelgate::profile {
 namespace {
 
@@ -94,12 +96,13 @@ NotationError not_known(std::string_view text, const PanelProfile& profile) {
     }
     return {NotationError::Kind::unknown, '\'' + std::string(text) + "' is no notation of " +
                                               profile.name + "; its notations look like " +
-                                              examples};
+                                              examples + notation_hint(profile, text)};
 }
 
-NotationError malformed(std::string_view text, const Area& area) {
+NotationError malformed(std::string_view text, const PanelProfile& profile, const Area& area) {
     return {NotationError::Kind::malformed, '\'' + std::string(text) + "' is not written as " +
-                                                area.name + " is: " + range_text(area)};
+                                                area.name + " is: " + range_text(area) +
+                                                notation_hint(profile, text)};
 }
 
 }  // namespace
@@ -131,7 +134,7 @@ boost::system::result<Item, NotationError> parse_notation(const PanelProfile& pr
         }
     }
     if (same_prefix == nullptr) return not_known(text, profile);
-    if (!read) return malformed(text, *same_prefix);
+    if (!read) return malformed(text, profile, *same_prefix);
     return out_of_range(text, profile, same_prefix->notation);
 }
 

@@ -114,9 +114,11 @@ class Builder final : public YAML::EventHandler {
     /// "?" is a plain value, "!" a quoted one; anything else was written by hand.
     void check_tag(const YAML::Mark& mark, const std::string& tag) {
         if (tag.empty() || tag == "?" || tag == "!") return;
+        const bool lookup = tag == "!secret" || tag == "!env_var" || tag == "!env" || tag == "!ENV";
         problems_.add(mark_of(mark),
-                      "a tag (" + quote(tag) +
-                          ") has no meaning here; leave it out, or put the text in quotes");
+                      "a tag (" + quote(tag) + ") has no meaning here; " +
+                          (lookup ? "a variable of the environment is written ${NAME}"
+                                  : "leave it out, or put the text in quotes"));
     }
     void open(Node::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
         if (stack_.size() >= kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};
@@ -203,9 +205,14 @@ class Builder final : public YAML::EventHandler {
         if (is_decimal_comma(level, node)) {
             Node& number = level.node.entries.back().value;
             const std::string comma = number.scalar + ',' + level.pending.key;
-            number.scalar += '.' + level.pending.key;
-            problems_.add(number.mark, quote(comma) + " is two values here; write " +
-                                           number.scalar + ", with a decimal point");
+            const bool thousands = level.pending.key.size() == 3;
+            const std::string fraction = number.scalar + '.' + level.pending.key;
+            const std::string whole = number.scalar + level.pending.key;
+            problems_.add(number.mark,
+                          quote(comma) + " is two values here; write " +
+                              (thousands ? whole + ", or " + fraction : fraction) +
+                              (thousands ? " for a fraction" : ", with a decimal point"));
+            number.scalar = thousands ? whole : fraction;
             return;
         }
         Entry entry = std::move(level.pending);
@@ -260,13 +267,12 @@ const Token* too_deep(const Scanned& scanned) {
     return found == scanned.tokens.end() ? nullptr : &*found;
 }
 
-/// False when yaml-cpp refused the text, which then has been told.
-bool build(const Source& source, Builder& builder, Problems& problems) {
+/// False when yaml-cpp refused the text: why is added to `problems`, what else is wrong to `found`.
+bool build(const Source& source, Builder& builder, Problems& problems, Problems& found) {
     try {
         std::istringstream in{mask_variables(source.text())};
         YAML::Parser parser(in);
-        return !parser.HandleNextDocument(builder) ||
-               refuse_second_document(parser, source, problems);
+        return !parser.HandleNextDocument(builder) || refuse_second_document(parser, source, found);
     } catch (const TooLarge& reason) {
         problems.add(reason.mark, reason.message);
     } catch (const YAML::DeepRecursion& error) {
@@ -296,13 +302,21 @@ Node parse(std::string_view text, Problems& problems) {
     }
     Problems found(problems.file());
     Builder builder(source, found);
-    const bool built = build(source, builder, found);
+    Problems refusal(problems.file());
+    const bool built = build(source, builder, refusal, found);
     const Findings traps = built ? find_traps(scanned) : Findings();
     add(source, traps, problems);
     if (!traps.empty()) return {};  // what could be read is not what was meant
+    problems.take(refusal);
     problems.take(found);
     if (!built) return {};
-    return builder.take();
+    Node root = builder.take();
+    // Lines of another form, all of them: `device = /dev/ttyUSB0`.
+    const bool is_text = root.kind == Node::Kind::scalar && !root.quoted;
+    if (!is_text || root.scalar.find_first_of("=:") == root.scalar.npos) return root;
+    const Findings causes = find_causes(scanned);
+    add(source, causes, problems);
+    return causes.empty() ? root : Node();
 }
 
 }  // namespace panelgate::yaml

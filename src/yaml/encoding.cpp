@@ -104,6 +104,13 @@ std::string why_bad(const Step& step, std::string_view bytes, const Encoding& en
     return "byte " + std::string(hex.data()) + " is not " + what + "; save the file as UTF-8";
 }
 
+/// A CR alone ends a line, too (YAML 1.2, 5.4).
+void end_lines(std::string& text) {
+    for (std::size_t at = text.find('\r'); at != text.npos; at = text.find('\r', at + 1)) {
+        if (at + 1 == text.size() || text[at + 1] != '\n') text[at] = '\n';
+    }
+}
+
 }  // namespace
 
 Decoded decode(std::string_view bytes) {
@@ -124,6 +131,7 @@ Decoded decode(std::string_view bytes) {
         if (!first || c != kMark) append(decoded.text, bad ? kReplacement : c);
         bytes.remove_prefix(step.bytes);
     }
+    end_lines(decoded.text);
     return decoded;
 }
 

@@ -9,7 +9,7 @@
 namespace panelgate::yaml {
 
 struct Decoded {
-    std::string text;  ///< UTF-8 without a byte order mark
+    std::string text;  ///< UTF-8 without a byte order mark, each line ended by LF or CR LF
     Findings bad;      ///< the first of each line, at most kMaxTold lines
 };
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "panelgate/base/number_text.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 #include "panelgate/yaml/quote.hpp"
@@ -84,14 +85,38 @@ std::optional<std::string> hexadecimal(std::string_view text) {
     return std::to_string(value);
 }
 
+/// 600 of 9,600
+bool is_group(std::string_view text) {
+    return text.size() == 3 && text.find_first_not_of(kDigits) == text.npos;
+}
+
+/// 9.6k, 38k4 and 9600 kBd; nothing of anything else.
+std::optional<std::string> kilo(std::string_view text) {
+    const std::size_t k = std::min(text.find_first_of("kK"), text.size());
+    const std::string_view thousands = text.substr(0, text.find_last_not_of(' ', k - 1) + 1);
+    const std::string_view behind = text.substr(std::min(k + 1, text.size()));
+    const bool has_digit = !behind.empty() && kDigits.find(behind[0]) != kDigits.npos;
+    double value = 0;
+    const std::string digits =
+        std::string(thousands) + (has_digit ? '.' + std::string(behind) : "");
+    const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    const bool good = error == std::errc() && stop == digits.data() + digits.size();
+    constexpr double kMost = 1e9;
+    if (k == text.size() || !good || !(value > 0 && value < kMost)) return std::nullopt;
+    const double all = value * 1000;
+    if (std::fabs(all - std::round(all)) > 1e-6) return std::nullopt;
+    return std::to_string(std::llround(all));
+}
+
 /// Without a plus, leading zeros, groups of three and a unit; with a decimal point.
 std::string bare(std::string_view text, bool whole) {
     std::string all;
     const std::size_t unit = text.find_last_of(kDigits);
     text = text.substr(0, unit == text.npos ? text.size() : unit + 1);
     for (std::size_t i = 0; i < text.size(); ++i) {
+        const bool is_point = text[i] == ',' || text[i] == '.';
         const bool group = text[i] == '_' || text[i] == ' ' || text[i] == '\'' ||
-                           (whole && (text[i] == ',' || text[i] == '.') && text.size() - i == 4);
+                           (whole && is_point && is_group(text.substr(i + 1)));
         if (!group) all += text[i] == ',' ? '.' : text[i];
     }
     if (all.starts_with('+')) all.erase(0, 1);
@@ -99,6 +124,30 @@ std::string bare(std::string_view text, bool whole) {
     while (all.size() > sign + 1 && all[sign] == '0' && kDigits.find(all[sign + 1]) != kDigits.npos)
         all.erase(sign, 1);
     return all;
+}
+
+/// 1/10, /10, x0.1 and 10^-1
+std::optional<std::string> calculated(std::string_view text) {
+    const auto number = [](std::string_view digits) -> std::optional<double> {
+        double value = 0;
+        const char* end = digits.data() + digits.size();
+        const auto [stop, error] = std::from_chars(digits.data(), end, value);
+        if (error != std::errc() || stop != end) return std::nullopt;
+        return value;
+    };
+    const std::size_t sign = text.find_first_of("/^");
+    std::optional<double> value;
+    if (text.starts_with('x') || text.starts_with('*')) {
+        value = number(trim(text.substr(1)));
+    } else if (sign != text.npos) {
+        if (sign == 0 && text[0] == '^') return std::nullopt;
+        const auto left = sign == 0 ? std::optional(1.0) : number(text.substr(0, sign));
+        const auto right = number(text.substr(sign + 1));
+        if (!left || !right) return std::nullopt;
+        value = text[sign] == '/' ? *left / *right : std::pow(*left, *right);
+    }
+    if (!value || !std::isfinite(*value)) return std::nullopt;
+    return number_text(*value);
 }
 
 std::string write(std::string_view text) { return "; write " + std::string(text); }
@@ -133,7 +182,11 @@ std::string number_hint(std::string_view text, bool whole) {
     constexpr std::size_t kLongest = 40;
     if (text.empty() || text.size() > kLongest) return "";
     if (text.ends_with('%')) return whole ? "" : percent_hint(text);
+    for (const std::string_view minus : {"\u2212", "\u2013"})
+        if (text.starts_with(minus)) return write('-' + std::string(text.substr(minus.size())));
     auto meant = hexadecimal(text);
+    if (!meant && !whole) meant = calculated(text);
+    if (!meant && whole) meant = kilo(text);
     if (!meant) meant = plain_number(bare(text, whole), whole);
     return meant && *meant != text ? write(*meant) : "";
 }
@@ -160,14 +213,34 @@ std::string variable_hint(std::string_view text) {
     return write("${" + (name.empty() ? "NAME" : name) + "} for a variable of the environment");
 }
 
+std::string text_hint(const Node& node, char opening) {
+    if (node.kind != Node::Kind::scalar || !node.scalar.starts_with(opening)) return "";
+    // Without quotes it would be no text, had it been typed.
+    const std::string each = std::string("write ") +
+                             (opening == '[' ? "[${ONE}, ${TWO}]" : "{key: ${NAME}}") +
+                             ", a variable for each";
+    if (!node.quoted) return "; what a variable brings is one text: " + each;
+    return "; in quotes it is one text: leave them out; so it is out of a variable: " + each;
+}
+
+std::string none_hint(std::string_view key, std::string_view example, const Node& node) {
+    constexpr std::array<std::string_view, 5> kNone{"off", "false", "no", "none", "disabled"};
+    const bool says_none = std::ranges::find(kNone, node.scalar) != kNone.end();
+    if (!says_none || example.find("off") != example.npos) return "";
+    return "; leave " + std::string(key) + " out for none";
+}
+
 std::string blank_hint(std::string_view text) {
-    const std::size_t colon = text.find(':');
+    const std::size_t colon = text.find_first_of(":=");
     const auto is_letter = [](char c) {
         return c == '_' || c == '-' || (lower_of(c) >= 'a' && lower_of(c) <= 'z');
     };
     if (colon == text.npos || colon == 0 || text.substr(colon).starts_with("://")) return "";
     if (!std::ranges::all_of(text.substr(0, colon), is_letter)) return "";
     const std::string key(text.substr(0, colon + 1));
+    if (text[colon] == '=')
+        return "; write " + std::string(text.substr(0, colon)) + ": " +
+               std::string(trim(text.substr(colon + 1)));
     return "; a blank is missing after " + quote(key);
 }
 

@@ -16,7 +16,11 @@ std::string number_hint(std::string_view text, bool whole);
 std::string boolean_hint(const Node& node);
 /// A variable of the environment in the form of another program.
 std::string variable_hint(std::string_view text);
-/// `baud:9600` where `baud` and a value were meant.
+/// A list (`[`) or a map (`{`) that is a text, by quotes or out of a variable.
+std::string text_hint(const Node& node, char opening);
+/// `http: off`, where the example of a map has no "off".
+std::string none_hint(std::string_view key, std::string_view example, const Node& node);
+/// `baud:9600` or `baud=9600` where `baud` and a value were meant.
 std::string blank_hint(std::string_view text);
 
 }  // namespace panelgate::yaml

@@ -40,13 +40,15 @@ std::string_view Scanned::rest(std::size_t token) const {
 }
 
 Findings find_traps(const Scanned& text) {
-    static constexpr std::array<Find, 2> kFinds{find_odd_blanks, find_open_quotes};
+    static constexpr std::array<Find, 4> kFinds{find_odd_blanks, find_odd_dashes, find_open_quotes,
+                                                find_typeset_quotes};
     return run(text, kFinds);
 }
 
 Findings find_causes(const Scanned& text) {
-    static constexpr std::array<Find, 6> kFinds{find_odd_blanks, find_open_quotes, find_quote_ends,
-                                                find_brackets,   find_odd_starts,  find_columns};
+    static constexpr std::array<Find, 8> kFinds{
+        find_odd_blanks, find_odd_dashes, find_open_quotes, find_typeset_quotes,
+        find_quote_ends, find_brackets,   find_odd_starts,  find_columns};
     return run(text, kFinds);
 }
 

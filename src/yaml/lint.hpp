@@ -23,9 +23,9 @@ struct Scanned {
     /// The rest of the token's line from its begin: without a comment, and with the blanks between
     /// tokens as they are.
     std::string_view rest(std::size_t token) const;
-    /// From 0, in bytes: for what stands at the begin of its line.
+    /// From 0, in characters.
     std::size_t column(const Token& token) const {
-        return token.begin - line_begin(source.text(), token.begin);
+        return static_cast<std::size_t>(source.mark(token.begin).column) - 1;
     }
     int line(const Token& token) const { return source.mark(token.begin).line; }
     /// Token `i` exists and stands on the line of the one before.
@@ -45,9 +45,15 @@ Findings find_causes(const Scanned& text);
 /// The indentation of its line cannot be counted in columns.
 bool is_oddly_indented(const Scanned& text, const Token& first);
 
+/// `127.0.0.1: 502`, whose first part is `word`: what is wrong with it, and what would be right.
+/// Empty when it is no address.
+std::string address_hint(std::string_view word, std::string_view all);
+
 // One kind of mistake each, in the order of the text.
 void find_open_quotes(const Scanned& text, Findings& findings);
 void find_odd_blanks(const Scanned& text, Findings& findings);
+void find_odd_dashes(const Scanned& text, Findings& findings);
+void find_typeset_quotes(const Scanned& text, Findings& findings);
 void find_quote_ends(const Scanned& text, Findings& findings);
 void find_brackets(const Scanned& text, Findings& findings);
 void find_odd_starts(const Scanned& text, Findings& findings);

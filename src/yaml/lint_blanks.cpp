@@ -52,6 +52,15 @@ void find_tab(const Scanned& text, const Token& token, Findings& findings) {
     findings.push_back({tab, "a tab in the indentation; type blanks in its place"});
 }
 
+/// Between a dash and a key a tab is no indentation.
+void find_tab_behind(const Scanned& text, std::size_t dash, Findings& findings) {
+    const std::size_t end = text.tokens[dash].end;
+    const bool has_key = text.follows(dash + 1) && text.follows(dash + 2) &&
+                         text.tokens[dash + 2].kind == Token::Kind::colon;
+    if (has_key && text.source.text().substr(end).starts_with('\t'))
+        findings.push_back({end, "a tab behind '-'; type a blank in its place"});
+}
+
 /// `at` in `word`, the first token of its line or not.
 std::string_view place_of(std::string_view word, std::size_t at, bool first) {
     if (at == 0) return first ? "in the indentation" : "before this text";
@@ -71,6 +80,7 @@ void find_odd_blanks(const Scanned& text, Findings& findings) {
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
         if (token.first && token.depth == 0) find_tab(text, token, findings);
+        if (token.kind == Token::Kind::dash) find_tab_behind(text, i, findings);
         if (token.kind != Token::Kind::plain) continue;
         const std::string_view word = text.text(token);
         const std::size_t at = find_odd(word);

@@ -81,10 +81,13 @@ void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
     if (before.kind == Kind::plain && blank == word.npos) {
         const std::size_t last = text.follows(colon + 1) ? colon + 1 : colon;
         const std::size_t end = text.tokens[last].end;
-        findings.push_back(
-            {before.begin,
-             "a text that holds ': ' must stand in quotes; write " +
-                 in_quotes(clip(text.source.text().substr(before.begin, end - before.begin), 60))});
+        const auto all = clip(text.source.text().substr(before.begin, end - before.begin), 60);
+        const std::string address = address_hint(word, all);
+        findings.push_back({before.begin, !address.empty()
+                                              ? address
+                                              : "a text that holds ': ' must stand in quotes; "
+                                                "write " +
+                                                    in_quotes(all)});
         return;
     }
     const std::size_t key = before.kind == Kind::plain ? blank + 1 : 0;
@@ -99,6 +102,16 @@ bool find_placeholder(const Scanned& text, const Token& token, Findings& finding
 }
 
 }  // namespace
+
+std::string address_hint(std::string_view word, std::string_view all) {
+    const std::size_t port = all.find_first_not_of(" \t", std::min(word.size() + 1, all.size()));
+    const bool is_host = word.find_first_of(".:]") != word.npos || word == "localhost";
+    if (!is_host || port == all.npos || word.find_first_of(" \t") != word.npos ||
+        all.find_first_not_of("0123456789/", port) != all.npos)
+        return "";
+    return "a blank behind the ':' of an address; write " + std::string(word) + ':' +
+           std::string(all.substr(port));
+}
 
 void find_brackets(const Scanned& text, Findings& findings) {
     std::vector<Pair> pairs;

@@ -1,11 +1,14 @@
-#include <cctype>
+#include <algorithm>
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "block_line.hpp"
 #include "encoding.hpp"
+#include "key_hints.hpp"
 #include "lint.hpp"
 #include "panelgate/yaml/quote.hpp"
 
@@ -13,46 +16,6 @@ namespace panelgate::yaml {
 namespace {
 
 using Kind = Token::Kind;
-
-bool is_word(std::string_view text) {
-    if (text.empty()) return false;
-    for (const char c : text) {
-        const bool letter = std::isalnum(static_cast<unsigned char>(c)) != 0;
-        if (!letter && c != '_' && c != '-') return false;
-    }
-    return std::isalpha(static_cast<unsigned char>(text[0])) != 0;
-}
-
-/// What a line without a ': ' should have been, if it began with a key.
-std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
-    const Token& line = text.tokens[token];
-    const std::string_view word = text.text(line);
-    if (line.kind != Kind::plain) return std::nullopt;
-    if (word.starts_with("//") || word.starts_with("/*") || word.starts_with(';'))
-        return Finding{line.begin, "a comment begins with '#'"};
-    const std::size_t end = std::min(word.find_first_of(":= \t\xEF"), word.size());
-    const std::string_view key = word.substr(0, end);
-    const std::string_view rest = word.substr(end);
-    if (!is_word(key)) return std::nullopt;
-    constexpr std::string_view kWide = "\xEF\xBC\x9A";  // U+FF1A, as Asian keyboards type it
-    const auto shown = [&](std::string_view value) {
-        value.remove_prefix(std::min(value.find_first_not_of(" \t:="), value.size()));
-        return "write '" + std::string(key) + (value.empty() ? ":" : ": ") +
-               std::string(clip(value, 60)) + '\'';
-    };
-    if (rest.starts_with(kWide))
-        return Finding{line.begin + end, "U+FF1A is no colon; " + shown(rest.substr(3))};
-    if (rest.starts_with("://")) return std::nullopt;
-    if (rest.starts_with(':'))
-        return Finding{line.begin + end + 1, "a blank is missing after '" + std::string(key) +
-                                                 ":'; " + shown(rest.substr(1))};
-    const std::size_t sign = std::min(rest.find_first_not_of(" \t"), rest.size());
-    if (rest.substr(sign).starts_with('='))
-        return Finding{line.begin + end + sign,
-                       "a key is followed by ':', not '='; " + shown(rest)};
-    return Finding{line.begin + end,
-                   "a ':' is missing after '" + std::string(key) + "'; " + shown(rest)};
-}
 
 /// A list or map that is open at this place.
 struct Level {
@@ -69,7 +32,9 @@ class Columns {
   public:
     Columns(const Scanned& text, Findings& findings) : text_(text), findings_(findings) {}
 
-    void read(const BlockLine& line) {
+    /// `behind`: the lines that follow.
+    void read(const BlockLine& line, std::span<const BlockLine> behind) {
+        behind_ = behind;
         two_keys(line);
         shift_ = 0;
         Level item;
@@ -141,12 +106,13 @@ class Columns {
     /// `name: press profile: x`, `unit: deg: C`
     void two_keys(const BlockLine& line) {
         if (line.key && glued(*line.key)) return;
+        if (line.key && line.text && text_.tokens[*line.text].kind == Kind::dash)
+            return tell(*line.text,
+                        "a list begins below its key; begin a new line before this '-'");
         if (!line.key || !line.text || text_.tokens[*line.text].kind != Kind::plain) return;
         const std::size_t behind = *line.text + 1;
         if (!text_.follows(behind) || text_.tokens[behind].kind != Kind::colon) return;
-        const std::string all(clip(text_.rest(*line.text), 60));
-        tell(*line.text, "a text that holds ': ' must stand in quotes; write \"" + all +
-                             "\", or begin a new line for a second key");
+        tell(*line.text, second_colon(text_, *line.key, *line.text));
     }
 
     /// Of a level that has just been left, or that is there, as "as 'name' on line 2".
@@ -236,7 +202,9 @@ class Columns {
     /// Between two levels, or below a value.
     void deeper(Level item, const std::optional<Level>& left) {
         const Level level = levels_.back();
-        if (left) {
+        if (left && is_dash_moved(item, level, *left)) {
+            tell_dash(level, *left, item);
+        } else if (left) {
             const bool nearer = item.column - level.column < left->column - item.column;
             const bool both = level.list == left->list;
             tell_shift(item, (both ? nearer : level.list == item.list) ? level : *left);
@@ -256,12 +224,56 @@ class Columns {
             }
         }
         if (level.list) return tell_shift(item, level);
+        const Level* list = levels_.size() > 1 ? &levels_[levels_.size() - 2] : nullptr;
+        if (list != nullptr && is_dash_moved(item, *list, level)) {
+            tell_dash(*list, level, item);
+            levels_.pop_back();
+            return;
+        }
         const std::size_t by = item.column - level.column;
         shift_ = level.column - item.column;
         tell(item.first, "indentation: " + name(item.first) + " stands " + blanks(by) +
                              " deeper than " + name(level.last) + " on line " +
                              std::to_string(line(level.last)) +
                              ", which has a value already; take away " + blanks(by));
+    }
+
+    std::optional<std::size_t> column_of(const BlockLine& line) const {
+        const auto first = line.dashes.empty() ? line.key : std::optional(line.dashes.front());
+        if (!first) return std::nullopt;
+        return text_.column(text_.tokens[*first]);
+    }
+    bool is_list_behind(std::size_t column) const {
+        constexpr std::size_t kFar = 100;  // lines
+        for (const BlockLine& line : behind_.first(std::min(kFar, behind_.size()))) {
+            const auto begin = column_of(line);
+            if (begin && *begin + 1 < column) return false;
+            if (begin == column && !line.dashes.empty()) return true;
+        }
+        return false;
+    }
+    /// The first item's dash, with the key behind it, stands a blank beside where the next keys
+    /// stand: more of them than this one, or this one in an even column. No other line stands as
+    /// the dash does.
+    bool is_dash_moved(const Level& item, const Level& list, const Level& map) const {
+        const std::size_t by =
+            std::max(item.column, map.column) - std::min(item.column, map.column);
+        const bool first = list.list && list.first == list.last && !map.list &&
+                           map.first == map.last && line(list.first) == line(map.first);
+        if (by != 1 || item.list || !first || is_list_behind(list.column)) return false;
+        const auto next = behind_.empty() ? std::nullopt : column_of(behind_.front());
+        return next == item.column || (item.column % 2 == 0 && next != map.column);
+    }
+    void tell_dash(const Level& list, const Level& map, const Level& item) {
+        const bool left = map.column < item.column;
+        const bool wide = !left && map.column - list.column > 2;
+        tell(list.first,
+             wide ? "indentation: more than 1 blank behind this '-'; take away 1, so that " +
+                        name(map.first) + " stands above " + name(item.first)
+                  : std::string("indentation: this '-' stands 1 blank too far ") +
+                        (left ? "left" : "right") + "; " + (left ? "add" : "take away") +
+                        " 1 blank, so that " + name(map.first) + " stands above " +
+                        name(item.first));
     }
 
     static std::string blanks(std::size_t count) {
@@ -281,13 +293,16 @@ class Columns {
     std::vector<Level> levels_;
     /// Of the line in work, modulo 2^64: what was told to be added, for all that stands on it.
     std::size_t shift_ = 0;
+    std::span<const BlockLine> behind_;
 };
 
 }  // namespace
 
 void find_columns(const Scanned& text, Findings& findings) {
     Columns columns(text, findings);
-    for (const BlockLine& line : block_lines(text)) columns.read(line);
+    const std::vector<BlockLine> lines = block_lines(text);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        columns.read(lines[i], std::span(lines).subspan(i + 1));
 }
 
 }  // namespace panelgate::yaml

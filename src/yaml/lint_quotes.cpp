@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -9,17 +10,42 @@ namespace {
 
 using Kind = Token::Kind;
 
-/// The text as it should stand, closed where the person most likely meant it.
-std::string closed(const Scanned& text, const Token& token) {
-    std::string_view inside = text.text(token);
-    const char mark = inside.front();
-    if (token.depth > 0) inside = inside.substr(0, inside.find_first_of(",]}"));
-    inside = inside.substr(0, inside.find(" #"));
-    const std::size_t last = inside.find_last_not_of(" \t\r");
-    inside = inside.substr(1, last == 0 ? 0 : last);
-    constexpr std::size_t kMost = 60;
-    if (inside.empty() || inside.size() > kMost) return std::string("a ") + mark + " is missing";
+constexpr std::size_t kLongest = 60;  ///< of a text that is shown whole
+
+/// The text as it should stand; `inside` the quotes.
+std::string closed(char mark, std::string_view inside) {
+    if (inside.empty() || inside.size() > kLongest) return std::string("a ") + mark + " is missing";
     return "write " + std::string(1, mark) + std::string(inside) + mark;
+}
+
+/// 3/4" and 6' are lengths; of a word, the quote is the end of a text.
+bool is_length(std::string_view word) {
+    word = word.substr(word.find_last_of(' ') + 1);
+    return word.find_first_not_of("0123456789.,/") == word.size() - 1;
+}
+
+/// `lines": []`: where a quote stands in a text that has none at its begin. An apostrophe may end
+/// a text of several words.
+std::size_t lone_quote(std::string_view word) {
+    for (const char mark : {'"', '\''}) {
+        if (std::ranges::count(word, mark) % 2 == 0) continue;
+        const std::size_t at = word.find(mark);
+        const bool is_apostrophe =
+            mark == '\'' && word.find(' ') != word.npos && word.ends_with("s'");
+        const bool is_end = word.ends_with(mark) && !is_apostrophe && !is_length(word);
+        if (is_end || word.substr(at + 1).starts_with(':')) return at;
+    }
+    return word.npos;
+}
+
+void find_unopened(const Scanned& text, const Token& token, Findings& findings) {
+    const std::string_view word = text.text(token);
+    const std::size_t end = lone_quote(word);
+    if (end == word.npos) return;
+    const std::string mark(1, word[end]);
+    findings.push_back({token.begin, "the quote " + mark + " behind " + quote(word.substr(0, end)) +
+                                         " is not opened; " +
+                                         closed(word[end], word.substr(0, end))});
 }
 
 /// What may stand behind a backslash (YAML 1.2, 5.7).
@@ -54,11 +80,15 @@ void find_behind(const Scanned& text, std::size_t i, Findings& findings) {
 }  // namespace
 
 void find_open_quotes(const Scanned& text, Findings& findings) {
-    for (const Token& token : text.tokens) {
+    for (std::size_t i = 0; i < text.tokens.size(); ++i) {
+        const Token& token = text.tokens[i];
+        const bool is_behind = i > 0 && text.tokens[i - 1].kind == Kind::quoted && !token.first;
+        if (token.kind == Kind::plain && !is_behind) find_unopened(text, token, findings);
         if (token.kind != Kind::quoted || token.state != Token::State::unclosed) continue;
-        const std::string mark(1, text.text(token).front());
-        findings.push_back({token.begin, "the quote " + mark + " opened here is not closed; " +
-                                             closed(text, token)});
+        const std::string_view word = text.text(token);
+        findings.push_back({token.begin, "the quote " + std::string(1, word.front()) +
+                                             " opened here is not closed; " +
+                                             closed(word.front(), word.substr(1))});
     }
 }
 

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <set>
 #include <string>
 #include <string_view>
@@ -46,13 +48,72 @@ void find_odd(const Scanned& text, std::size_t i, Findings& findings) {
                                          std::string(clip(word, 60)) + '"'});
 }
 
+/// What surrounds a file on a page or on a screen: a prompt, a fence, a comment of JSON.
+bool find_copied(const Token& token, std::string_view word, Findings& findings) {
+    const auto begins = [word](std::string_view with) { return word.starts_with(with); };
+    if (token.kind == Kind::anchor && begins("&nbsp;")) {
+        findings.push_back({token.begin, "'&nbsp;' is a blank of a web page; type blanks"});
+    } else if (!token.first) {
+        return false;
+    } else if (begins("//") || begins("/*")) {
+        findings.push_back({token.begin, "a comment begins with '#'"});
+    } else if (begins("```") || begins("$ ") || begins("cat >") || begins("cat <") ||
+               begins("sudo ") || word == "EOF") {
+        findings.push_back({token.begin, "this line is no part of the file; remove it"});
+    } else if (word == "..." && token.kind == Kind::plain) {
+        findings.push_back({token.begin,
+                            "'...' stands for something that was left out; write what "
+                            "is meant, or remove the line"});
+    } else {
+        return false;
+    }
+    return true;
+}
+
+/// As people call it.
+std::string sign_of(std::string_view sign) {
+    return sign == "*" ? "'*'" : name_of(code_point(sign));
+}
+
+/// Quotes as a word processor types them.
+bool is_typeset_quote(std::string_view character) {
+    static constexpr std::array<std::string_view, 8> kQuotes{
+        "\u201C", "\u201D", "\u201E", "\u2018", "\u2019", "\u201A", "\u00AB", "\u00BB"};
+    return std::ranges::find(kQuotes, character) != kQuotes.end();
+}
+
 }  // namespace
+
+void find_typeset_quotes(const Scanned& text, Findings& findings) {
+    for (const Token& token : text.tokens) {
+        if (token.kind != Kind::plain) continue;
+        const std::string_view word = text.text(token);
+        const std::string_view first = character_at(word, 0);
+        std::size_t last = word.size() - 1;
+        while (last > 0 && (static_cast<unsigned char>(word[last]) & 0xC0) == 0x80) --last;
+        if (last < first.size() || !is_typeset_quote(first) || !is_typeset_quote(word.substr(last)))
+            continue;
+        const std::string inside(clip(word.substr(first.size(), last - first.size()), 60));
+        findings.push_back({token.begin, name_of(code_point(first)) +
+                                             " is no quote of YAML; write \"" + inside + '"'});
+    }
+}
+
+void find_odd_dashes(const Scanned& text, Findings& findings) {
+    for (const Token& token : text.tokens) {
+        if (token.kind != Kind::dash || token.state != Token::State::stray) continue;
+        findings.push_back(
+            {token.begin, sign_of(text.text(token)) +
+                              " begins no item; type a '-' of the keyboard in its place"});
+    }
+}
 
 void find_odd_starts(const Scanned& text, Findings& findings) {
     std::set<std::string_view> anchors;
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
         const std::string_view word = text.text(token);
+        if (find_copied(token, word, findings)) continue;
         if (token.kind == Kind::anchor) anchors.insert(word.substr(1));
         if (token.kind == Kind::alias) find_alias(token, word.substr(1), anchors, findings);
         if (token.kind == Kind::odd) find_odd(text, i, findings);

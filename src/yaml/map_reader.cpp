@@ -1,7 +1,6 @@
 #include "panelgate/yaml/map_reader.hpp"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -12,12 +11,6 @@
 
 namespace panelgate::yaml {
 namespace {
-
-struct Unit {
-    std::string_view name;
-    Duration length;
-};
-constexpr std::array<Unit, 4> kUnits{{{"min", 60s}, {"s", 1s}, {"ms", 1ms}, {"us", 1us}}};
 
 std::string join(std::span<const std::string_view> words) {
     std::string text;
@@ -34,12 +27,22 @@ std::string shown(const Node& node) {
     return node.kind == Node::Kind::map ? "a map" : "nothing";
 }
 
+std::string such_as(std::string_view example) {
+    return example.empty() ? "" : " such as " + std::string(example);
+}
+
 std::string wrong(std::string_view key, std::string_view wanted, const Node& node) {
     const std::string name(key);
     if (node.kind == Node::Kind::null)
         return name + " has no value; it must be " + std::string(wanted);
     return name + " must be " + std::string(wanted) + ", not " + shown(node) +
            variable_hint(node.scalar);
+}
+
+std::string list_hint(const Node& node, std::string_view example) {
+    if (node.kind == Node::Kind::map) return "; begin each item with '- '";
+    if (std::string text = text_hint(node, '['); !text.empty() || !example.empty()) return text;
+    return "; write [" + std::string(clip(node.scalar, 40)) + "], or '- ' before each item";
 }
 
 /// Nobody counts 1440 minutes.
@@ -55,42 +58,14 @@ bool has_leading_zero(std::string_view text) {
 
 }  // namespace
 
-std::optional<std::int64_t> parse_integer(std::string_view text) {
-    const std::string_view digits = !text.empty() && text[0] == '-' ? text.substr(1) : text;
-    if (digits.empty() || (digits.size() > 1 && digits[0] == '0')) return std::nullopt;
-    std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    return value;
-}
-
-std::optional<Duration> parse_duration(std::string_view text) {
-    const std::size_t letters = text.find_first_not_of("0123456789");
-    if (letters == std::string_view::npos) return std::nullopt;
-    const auto count = parse_integer(text.substr(0, letters));
-    const auto unit = std::find_if(kUnits.begin(), kUnits.end(),
-                                   [&](const Unit& u) { return u.name == text.substr(letters); });
-    constexpr std::int64_t kMost = 1'000'000'000;
-    if (!count || unit == kUnits.end() || *count > kMost) return std::nullopt;
-    if (*count > Duration::max() / unit->length) return std::nullopt;
-    return *count * unit->length;
-}
-
-std::string format_duration(Duration duration) {
-    if (duration == Duration::zero()) return "0ms";
-    for (const Unit& unit : kUnits) {
-        if (duration % unit.length == Duration::zero())
-            return std::to_string(duration / unit.length) + std::string(unit.name);
-    }
-    return std::to_string(duration.count()) + "ns";
-}
-
-MapReader::MapReader(const Node& node, Problems& problems, std::string what)
+MapReader::MapReader(const Node& node, Problems& problems, std::string what,
+                     std::string_view example)
     : node_(&node), problems_(&problems), what_(std::move(what)) {
-    if (node.kind != Node::Kind::map) {
-        problems.add(node.mark, what_ + " must be a map of keys, not " + shown(node) +
-                                    blank_hint(node.scalar));
-    }
+    if (node.kind == Node::Kind::map) return;
+    const bool twice = node.items.size() == 1 && node.items[0].kind == Node::Kind::map;
+    problems.add(node.mark, what_ + " must be a map of keys" + such_as(example) + ", not " +
+                                shown(node) + (twice ? "; one '-' or [ is too many" : "") +
+                                blank_hint(node.scalar));
 }
 
 const Node* MapReader::find(std::string_view key) {
@@ -105,15 +80,23 @@ bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
 
 bool MapReader::require(std::string_view key) {
     if (has(key)) return true;
-    // finish() asks whether this is what was meant.
-    const auto was_meant = [&](const Entry& entry) {
-        return nearest(entry.key, std::span(&key, 1)) == key ||
-               entry.key.starts_with(std::string(key) + ':');
-    };
-    if (std::ranges::any_of(node_->entries, was_meant)) return false;
+    if (is_mistyped(key)) return false;
     // What is no map at all has been told already.
     if (node_->kind == Node::Kind::map)
         problems_->add(node_->mark, what_ + " needs '" + std::string(key) + '\'');
+    return false;
+}
+
+bool MapReader::is_mistyped(std::string_view key) const {
+    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
+        const Entry& entry = node_->entries[i];
+        const Entry* parent = shallow_parent(i);
+        if (entry.key == key) continue;
+        if (nearest(entry.key, std::span(&key, 1)) == key ||
+            entry.key.starts_with(std::string(key) + ':') ||
+            (parent != nullptr && parent->key == key))
+            return true;
+    }
     return false;
 }
 
@@ -149,7 +132,8 @@ std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_
     const auto value = node->quoted ? std::nullopt : parse_integer(node->scalar);
     if (value && *value >= min && *value <= max) return value;
     std::string why;
-    if (node->quoted && parse_integer(node->scalar)) why = " in quotes";
+    if (node->quoted && parse_integer(node->scalar))
+        why = " in quotes; write " + node->scalar + " without";
     if (has_leading_zero(node->scalar)) why = " (no leading zeros)";
     if (why.empty() && !value) why = number_hint(node->scalar, true);
     problem(key, wrong(key, wanted, *node) + why);
@@ -172,9 +156,10 @@ std::optional<double> MapReader::number(std::string_view key) {
     const std::size_t sign = node->scalar.starts_with('-') ? 1 : 0;
     const bool zeros = has_leading_zero(std::string_view(node->scalar).substr(sign));
     if (whole && !zeros && !node->quoted) return value;
-    const std::string why = zeros          ? " (no leading zeros)"
-                            : node->quoted ? " in quotes"
-                                           : number_hint(node->scalar, false);
+    const std::string why =
+        zeros          ? " (no leading zeros)"
+        : node->quoted ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
+                       : number_hint(node->scalar, false);
     problem(key, wrong(key, "a number", *node) + why);
     return std::nullopt;
 }
@@ -222,20 +207,19 @@ const Node* MapReader::child(std::string_view key) {
 
 const Node* MapReader::map(std::string_view key, std::string_view example) {
     const Node* node = child(key);
+    parents_.emplace_back(key);
     if (node == nullptr || node->kind == Node::Kind::map) return node;
-    const std::string such = example.empty() ? "" : " such as " + std::string(example);
-    problem(key, wrong(key, "a map of keys" + such, *node) + blank_hint(node->scalar));
+    const std::string text = text_hint(*node, '{') + none_hint(key, example, *node);
+    problem(key, wrong(key, "a map of keys" + such_as(example), *node) +
+                     (text.empty() ? blank_hint(node->scalar) : text));
     return nullptr;
 }
 
-const Node* MapReader::sequence(std::string_view key) {
+const Node* MapReader::sequence(std::string_view key, std::string_view example) {
     const Node* node = child(key);
+    parents_.emplace_back(key);
     if (node == nullptr || node->kind == Node::Kind::sequence) return node;
-    const bool is_map = node->kind == Node::Kind::map;
-    problem(key, wrong(key, "a list", *node) +
-                     (is_map ? "; begin each item with '- '"
-                             : "; write [" + std::string(clip(node->scalar, 40)) +
-                                   "], or '- ' before each item"));
+    problem(key, wrong(key, "a list" + such_as(example), *node) + list_hint(*node, example));
     return nullptr;
 }
 
@@ -250,23 +234,63 @@ void MapReader::problem(std::string_view key, std::string message) {
     problems_->add(mark(key), std::move(message));
 }
 
-void MapReader::finish() {
+/// Of a key in the column of one that should have it: `serial:` and `baud: 9600` on the next line.
+const Entry* MapReader::shallow_parent(std::size_t entry) const {
+    const Mark own = node_->entries[entry].mark;
+    constexpr std::size_t kFar = 20;  // keys; a file may be nothing but unknown ones
+    const std::size_t end = entry > kFar ? entry - kFar : 0;
+    while (entry-- > end) {
+        const Entry& above = node_->entries[entry];
+        if (above.mark.line >= own.line || above.mark.column != own.column) return nullptr;
+        if (std::ranges::find(parents_, above.key) != parents_.end())
+            return above.value.kind == Node::Kind::null ? &above : nullptr;
+        if (std::ranges::find(known_, above.key) != known_.end()) return nullptr;
+    }
+    return nullptr;
+}
+
+std::string MapReader::unknown(std::size_t entry) const {
+    const std::string& key = node_->entries[entry].key;
     const std::vector<std::string_view> known(known_.begin(), known_.end());
-    for (const Entry& entry : node_->entries) {
-        if (std::find(known.begin(), known.end(), entry.key) != known.end()) continue;
-        const std::string near = nearest(entry.key, known);
-        std::string message = "unknown key " + quote(entry.key) + " in " + what_;
-        const std::string blank = blank_hint(entry.key);
-        if (!blank.empty()) {
-            message += blank;
-        } else if (!near.empty()) {
-            message += "; did you mean '" + near + "'?";
-        } else {
-            message += "; known keys are ";
-            for (std::size_t i = 0; i < known.size(); ++i)
-                message += (i > 0 ? ", " : "") + std::string(known[i]);
-        }
-        problems_->add(entry.mark, std::move(message));
+    const std::string message = "unknown key " + quote(key) + " in " + what_;
+    const std::string blank = blank_hint(key);
+    if (!blank.empty()) return message + blank;
+    if (const Entry* parent = shallow_parent(entry))
+        return message + "; below " + quote(parent->key) + " (line " +
+               std::to_string(parent->mark.line) +
+               ") it must stand deeper: type 2 blanks before it";
+    const Entry& typed = node_->entries[entry];
+    if (const std::string place = place_of(typed, true); !place.empty()) return message + place;
+    const std::string near = nearest(key, known);
+    if (!near.empty()) return message + "; did you mean '" + near + "'?";
+    if (const std::string place = place_of(typed, false); !place.empty()) return message + place;
+    std::string list;
+    for (const std::string_view word : known)
+        list += (list.empty() ? "" : ", ") + std::string(word);
+    return message + "; known keys are " + list;
+}
+
+std::string MapReader::place_of(const Entry& entry, bool exactly) const {
+    for (const Elsewhere& place : elsewhere_) {
+        const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
+        if (entry.key != place.key && !near) continue;
+        const std::string key(place.key);
+        if (place.map.empty())
+            return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
+                   std::string(place.owner) + (near ? "?" : "");
+        const Node& value = entry.value;
+        const std::string shown =
+            value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
+        return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
+    }
+    return "";
+}
+
+void MapReader::finish() {
+    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
+        const Entry& entry = node_->entries[i];
+        if (std::ranges::find(known_, entry.key) == known_.end())
+            problems_->add(entry.mark, unknown(i));
     }
 }
 

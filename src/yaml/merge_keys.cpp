@@ -1,6 +1,7 @@
 #include "panelgate/yaml/merge_keys.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <set>
 #include <string>
 #include <utility>
@@ -10,9 +11,12 @@ namespace {
 
 void take_over(Node& map, std::set<std::string>& keys, Node from, Problems& problems) {
     if (from.kind != Node::Kind::map) {
+        const bool is_name = from.kind == Node::Kind::scalar && !from.scalar.empty() &&
+                             std::isalpha(static_cast<unsigned char>(from.scalar[0])) != 0;
         problems.add(from.mark,
                      "'<<' takes over a map of keys, such as <<: *name, or a list of such: "
-                     "<<: [*one, *other]");
+                     "<<: [*one, *other]" +
+                         (is_name ? "; write <<: *" + from.scalar : ""));
         return;
     }
     for (Entry& entry : from.entries) {

@@ -1,6 +1,7 @@
 #include "scan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "panelgate/yaml/settings.hpp"
@@ -73,7 +74,8 @@ class Scanner {
         const bool marker = at_ == line_ && blank(3) &&
                             (text_.substr(at_, 3) == "---" || text_.substr(at_, 3) == "...");
         if (marker) return add(Kind::document, at_ + 3);
-        if (c == '-' && blank(1)) return add_parent(Kind::dash);
+        if (c == '-' && blank(1)) return add_parent(Kind::dash, 1);
+        if (const std::size_t dash = odd_dash()) return add_parent(Kind::dash, dash);
         if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || behind_quote()))))
             return add(Kind::colon, at_ + 1);
         if (c == '[' || c == '{') return open();
@@ -94,9 +96,21 @@ class Scanner {
         add(Kind::plain, end);
     }
 
-    void add_parent(Kind kind) {
+    void add_parent(Kind kind, std::size_t length) {
         key_ = at_;
-        add(kind, at_ + 1);
+        add(kind, at_ + length, text_[at_] == '-' ? State::fine : State::stray);
+    }
+
+    /// How many bytes begin an item as only other programs would: with a longer dash, or a dot.
+    std::size_t odd_dash() const {
+        static constexpr std::array<std::string_view, 9> kDashes{
+            "*", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2022", "\u2212", "\u00B7"};
+        const bool begins = first_ || tokens_.empty() || tokens_.back().kind == Kind::dash;
+        if (!open_.empty() || !begins) return 0;
+        for (const std::string_view dash : kDashes) {
+            if (text_.substr(at_).starts_with(dash) && blank(dash.size())) return dash.size();
+        }
+        return 0;
     }
 
     bool behind_quote() const {
@@ -169,12 +183,9 @@ class Scanner {
     void quoted(char quote) {
         if (first_ || tokens_.back().kind == Kind::dash) key_ = begin_;
         const std::size_t end = quote_end(quote);
-        const bool swallows = end == std::string_view::npos || leaves_its_key(end);
-        add(Kind::quoted, swallows ? line_end(at_) : end, swallows ? State::unclosed : State::fine);
-        if (swallows) {
-            open_.clear();  // their ends are swallowed, too
-            return;
-        }
+        if (end == std::string_view::npos || leaves_its_key(end) || ends_at_a_begin(end))
+            return add(Kind::quoted, forgotten_end(), State::unclosed);
+        add(Kind::quoted, end);
         const std::size_t last = text_.substr(begin_, end - begin_).rfind('\n');
         if (last != std::string_view::npos) line_ = key_ = begin_ + last + 1;
     }
@@ -202,6 +213,33 @@ class Scanner {
             begin = text.find('\n', begin);
         }
         return false;
+    }
+
+    /// A text goes on right behind the quote: it is where the next text begins, if this one cannot
+    /// end there because it holds a line end, or a sign that stands between two texts.
+    bool ends_at_a_begin(std::size_t end) const {
+        if (end >= text_.size() || is_space(text_[end])) return false;
+        if (std::string_view(",:]}").find(text_[end]) != std::string_view::npos) return false;
+        const std::string_view inside = text_.substr(at_ + 1, end - at_ - 2);
+        const std::size_t last = inside.find_last_not_of(" \t\r\n");
+        return inside.find('\n') != std::string_view::npos ||
+               (last != std::string_view::npos &&
+                std::string_view(",:[{").find(inside[last]) != std::string_view::npos);
+    }
+    /// Where a person would have closed the quote: behind the key, the item in brackets, or at the
+    /// end of the line.
+    std::size_t forgotten_end() const {
+        const bool is_value = !first_ && tokens_.back().kind == Kind::colon;
+        std::size_t end = at_ + 1;
+        for (std::size_t i = end; i < text_.size() && text_[i] != '\n'; ++i) {
+            const char c = text_[i];
+            const char next = i + 1 < text_.size() ? text_[i + 1] : '\n';
+            const bool item = !open_.empty() && (c == ',' || c == ']' || c == '}');
+            const bool key = !is_value && c == ':' && is_space(next);
+            if (item || key || (c == '#' && is_blank(text_[i - 1]))) break;
+            if (!is_space(c)) end = i + 1;
+        }
+        return end;
     }
 
     /// All lines deeper than the key, or the dash, that they belong to.

@@ -24,7 +24,8 @@ struct Token {
         odd,      ///< begins with a character that begins no text: % @ ` ,
         document  ///< --- or ...
     };
-    /// unclosed: an `open` or a `quoted`; stray: a `close` of nothing.
+    /// unclosed: an `open` or a `quoted`; stray: a `close` of nothing, a `dash` that is another
+    /// character.
     enum class State : std::uint8_t { fine, unclosed, stray };
 
     Kind kind = Kind::plain;
@@ -36,8 +37,8 @@ struct Token {
 };
 
 /// The tokens of a text, at most so many that the limits of settings.hpp are reached before.
-/// Comments and directives are left out. What a forgotten quote or bracket would swallow is read as
-/// if it had been closed at the end of its line.
+/// Comments and directives are left out. What a forgotten bracket would swallow is read as if it
+/// had been closed at the end of its line; a forgotten quote, where a person would have closed it.
 std::vector<Token> scan(std::string_view text);
 
 /// Where the line of an offset begins.

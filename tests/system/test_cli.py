@@ -3,6 +3,7 @@ import json
 import os
 import pathlib
 import socket
+import subprocess
 import tempfile
 import unittest
 
@@ -45,6 +46,15 @@ class CommandLine(unittest.TestCase):
             self.assertIn(f"there is no command '{typed}'; did you mean '{near}'?", told)
         self.assertIn("Commands: run demo check", self.expect(USAGE, "fly").stderr)
         self.assertIn("a command is missing", self.expect(USAGE).stderr)
+
+    def test_a_mistyped_option_is_told_the_nearest(self):
+        for typed, near in (("--confg", "--config"), ("--formt=json", "--format"), ("-C", "-c")):
+            told = self.expect(USAGE, "check", typed, "x.yaml").stderr
+            self.assertIn(f"check has no option '{typed.partition('=')[0]}'; did you mean "
+                          f"'{near}'?", told)
+        self.assertIn("a file is given with -c: check -c x.yaml",
+                      self.expect(USAGE, "check", "x.yaml").stderr)
+        self.assertIn("a command is missing before '-c'", self.expect(USAGE, "-c", "x").stderr)
 
     def test_version_and_help_are_commands_too(self):
         version = self.expect(0, "--version").stdout
@@ -185,6 +195,37 @@ class Files(unittest.TestCase):
         gone = run("check", "-c", str(self.file) + "x", "--format", "json")
         self.assertEqual(gone.returncode, NO_INPUT)
         self.assertIn("No such file", json.loads(gone.stdout)["errors"][0]["message"])
+
+    def test_errors_as_json_are_text_whatever_the_name_of_the_file(self):
+        path = os.path.join(os.fsencode(self.file.parent), b"caf\xe9.yaml")
+        with open(path, "wb") as file:
+            file.write(good().replace("device: sim", "devise: sim").encode())
+        ended = subprocess.run([harness.PANELGATE, "check", "-c", path, "--format", "json"],
+                               capture_output=True, check=False)
+        told = json.loads(ended.stdout.decode("utf-8"))
+        self.assertTrue(told["errors"][0]["file"].endswith("caf\ufffd.yaml"))
+
+    def test_a_token_that_is_a_pipe_is_an_error_and_holds_nobody_up(self):
+        pipe = self.file.with_name("pipe")
+        os.mkfifo(pipe)
+        self.file.write_text(config.gateway(config.line(), http="listen: 127.0.0.1:0, tokens: "
+                             f"[{{name: ops, role: operator, file: {pipe}}}]"))
+        for command in ("check", "run"):
+            ended = run(command, "-c", str(self.file))
+            self.assertEqual(ended.returncode, BAD_CONFIG)
+            self.assertIn("not a pipe, a socket or a device", ended.stderr)
+
+    def test_a_configuration_may_come_through_a_pipe(self):
+        ended = subprocess.run([harness.PANELGATE, "check", "-c", "/dev/stdin"], input=good().encode(),
+                               capture_output=True, check=False)
+        self.assertEqual(ended.returncode, 0)
+
+    def test_a_line_is_simulated_in_one_place(self):
+        self.file.write_text(good())
+        link = ("--line", "floor1=" + str(self.file.with_name("tty")))
+        ended = run("simulate", "-c", str(self.file), *link, *link)
+        self.assertEqual(ended.returncode, USAGE)
+        self.assertIn("line 'floor1' has been given already", ended.stderr)
 
     def test_check_warns_of_a_token_that_others_can_read(self):
         token = self.file.with_name("token")

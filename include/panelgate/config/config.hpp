@@ -60,8 +60,11 @@ struct Files {
     virtual std::optional<std::string> read(const std::string& path) const = 0;
     /// Paths of the *.yaml files in a directory, sorted; nothing when it cannot be listed.
     virtual std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const = 0;
-    /// By everybody on the machine.
+    /// By everybody on the machine, though nobody has set it up for programs alone: container
+    /// platforms mount secrets read-only and readable, for one container.
     virtual bool is_readable_by_all(const std::string&) const { return false; }
+    /// There, and a pipe, a socket or a device: to read it might never end.
+    virtual bool is_special(const std::string&) const { return false; }
 };
 
 /// Text -> Config. Nothing is returned when `problems` got any entry. `environment` gives the

@@ -20,7 +20,9 @@ bool is_ipv6(const std::string& address);
 /// 0.0.0.0 or ::, in any spelling: all addresses of the machine.
 bool is_any_address(const std::string& address);
 
-/// "10.0.0.0/8" or a bare address: address and prefix length; nothing on anything else.
+/// "10.0.0.0/8" or a bare address: address and prefix length; nothing on anything else. Of an IPv4
+/// address that is written as IPv6 (::ffff:10.0.0.1) the prefix is 96 at least: what is shorter
+/// lets all of IPv4 in.
 struct Cidr {
     std::string address;
     unsigned prefix = 0;

@@ -4,12 +4,18 @@
 
 namespace panelgate::config {
 
-/// Files of the real file system. After a failed read errno says why.
+/// Files of the real file system. After a failed read errno says why; what is_special() is not read
+/// (EINVAL).
 class RealFiles final : public Files {
   public:
     std::optional<std::string> read(const std::string& path) const override;
     std::optional<std::vector<std::string>> list_yaml(const std::string& dir) const override;
     bool is_readable_by_all(const std::string& path) const override;
+    bool is_special(const std::string& path) const override;
+
+    /// As read(), and also from a pipe or a device, for as long as that takes: of what the command
+    /// line names.
+    static std::optional<std::string> read_any(const std::string& path);
 };
 
 }  // namespace panelgate::config

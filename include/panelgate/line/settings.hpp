@@ -34,7 +34,11 @@ struct Settings {
     Duration reopen_max = 1s;
 };
 
-/// "tcp://HOST:PORT", "tcp://[::1]:4001": nothing on anything else.
+/// Digits and dots that are no IPv4 address, such as 10.0.0.300: no name looks like this.
+bool is_broken_address(std::string_view host);
+
+/// "tcp://HOST:PORT", "tcp://[::1]:4001": nothing on anything else. The host is a name of letters,
+/// digits, '-', '_' and '.', or an address.
 struct TcpEndpoint {
     std::string host;
     std::string port;

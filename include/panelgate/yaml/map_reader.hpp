@@ -13,6 +13,13 @@
 
 namespace panelgate::yaml {
 
+/// Where a key stands that people write elsewhere.
+struct Elsewhere {
+    std::string_view key;
+    std::string_view map;    ///< key of the map that has it, beside where it was written; or
+    std::string_view owner;  ///< who has it: "a station"
+};
+
 /// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key
 /// is absent and when its value is wrong; a wrong value has then been added to the problems with
 /// its place and what would be right. finish() reports the keys nobody asked for, each with the
@@ -20,13 +27,18 @@ namespace panelgate::yaml {
 /// problems.
 class MapReader {
   public:
-    /// `what` names the map in messages: "a line", "serial". A node that is not a map is a problem.
-    MapReader(const Node& node, Problems& problems, std::string what);
+    /// `what` names the map in messages: "a line", "serial". A node that is not a map is a problem,
+    /// told with an example such as "{mode: off}".
+    MapReader(const Node& node, Problems& problems, std::string what,
+              std::string_view example = {});
     ~MapReader() = default;
     MapReader(const MapReader&) = delete;
     MapReader& operator=(const MapReader&) = delete;
 
     bool has(std::string_view key);
+    /// finish() will tell of a key that is probably this one, or belongs below it: that says more
+    /// than that it is missing.
+    bool is_mistyped(std::string_view key) const;
     /// Any scalar as it was written, quoted or not; an empty one is a problem.
     std::optional<std::string> text(std::string_view key);
     /// As text(), and its absence is a problem.
@@ -58,7 +70,10 @@ class MapReader {
     const Node* child(std::string_view key);
     /// As child(), and another kind is a problem, told with an example such as "{mode: off}".
     const Node* map(std::string_view key, std::string_view example = {});
-    const Node* sequence(std::string_view key);
+    const Node* sequence(std::string_view key, std::string_view example = {});
+
+    /// Keys that stand in another map: finish() says where. Must outlive this.
+    void elsewhere(std::span<const Elsewhere> keys) { elsewhere_ = keys; }
 
     /// Where the key's value stands (the map itself when the key is absent), for later problems.
     Mark mark(std::string_view key) const;
@@ -73,11 +88,16 @@ class MapReader {
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
     bool require(std::string_view key);
+    const Entry* shallow_parent(std::size_t entry) const;
+    std::string unknown(std::size_t entry) const;
+    std::string place_of(const Entry& entry, bool exactly) const;
 
     const Node* node_;
     Problems* problems_;
     std::string what_;
     std::vector<std::string> known_;
+    std::vector<std::string> parents_;  ///< of these, those with a map or a list
+    std::span<const Elsewhere> elsewhere_;
 };
 
 /// The text forms above, for scalars that are not map values. Nothing when the text is not one.

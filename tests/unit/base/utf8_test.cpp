@@ -26,5 +26,11 @@ TEST(Utf8, MeasuresTheSequenceAtTheBeginning) {
     EXPECT_EQ(utf8_sequence("\xFFx"), 0u);
 }
 
+TEST(Utf8, PutsASignForEveryByteThatIsNoText) {
+    EXPECT_EQ(as_utf8("caf\xC3\xA9"), "caf\xC3\xA9");
+    EXPECT_EQ(as_utf8("caf\xE9.yaml"), "caf\uFFFD.yaml");
+    EXPECT_EQ(as_utf8("\xE2\x82"), "\uFFFD\uFFFD");
+}
+
 }  // namespace
 }  // namespace panelgate

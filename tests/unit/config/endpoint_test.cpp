@@ -40,11 +40,14 @@ TEST(Cidr, ReadsNetworksAndBareAddresses) {
     EXPECT_EQ(parse_cidr("::1")->prefix, 128U);
     EXPECT_EQ(parse_cidr("0.0.0.0/0")->prefix, 0U);
     EXPECT_EQ(parse_cidr("fd00::/8")->prefix, 8U);
+    EXPECT_EQ(parse_cidr("::ffff:10.0.0.0/120")->prefix, 120U);
+    EXPECT_EQ(parse_cidr("::ffff:10.0.0.1")->prefix, 128U);
 }
 
 TEST(Cidr, RefusesEverythingElse) {
-    for (const char* text : {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0.0/-1", "10.0.0.0/08",
-                             "::/129", "10.0.0/8", "host/8", "10.0.0.0/8/8"})
+    for (const char* text :
+         {"", "/8", "10.0.0.0/", "10.0.0.0/33", "10.0.0.0/-1", "10.0.0.0/08", "::/129",
+          "::ffff:10.0.0.0/24", "::ffff:10.0.0.0/95", "10.0.0/8", "host/8", "10.0.0.0/8/8"})
         EXPECT_FALSE(parse_cidr(text)) << text;
 }
 

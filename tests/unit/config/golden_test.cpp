@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <ostream>
 #include <set>
@@ -47,12 +48,19 @@ std::vector<Place> places() {
 }
 
 std::optional<std::string> environment(const std::string& name) {
-    return name == "BAUD" ? std::optional<std::string>("38400") : std::nullopt;
+    static const std::map<std::string, std::string> kSet{{"BAUD", "38400"},
+                                                         {"BELL", "\a"},
+                                                         {"LIST", "[10.0.0.0/8, 192.168.0.0/16]"},
+                                                         {"PAIR", "10.0.0.0/8,192.168.0.0/16"},
+                                                         {"MAP", "{baud: 9600}"}};
+    const auto found = kSet.find(name);
+    return found == kSet.end() ? std::nullopt : std::optional(found->second);
 }
 
 /// What the user reads: the problems, or the warnings of a valid file.
 std::string told(const std::string& configuration) {
     const MemoryFiles files({{"/run/secrets/ops", "  secret-0123456789 \n"},
+                             {"/run/secrets/mounted", "secret-0123456789\n"},
                              {"/run/secrets/short", "secret\n"},
                              {"/public/ops", "secret-0123456789\n"},
                              {"/run/secrets/empty", " \n"},

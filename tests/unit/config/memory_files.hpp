@@ -28,10 +28,11 @@ class MemoryFiles final : public Files {
         return paths;
     }
 
-    /// Those of this folder.
+    /// Those of this folder, and one that a container platform gave.
     bool is_readable_by_all(const std::string& path) const override {
-        return path.starts_with("/public/");
+        return path.starts_with("/public/") || path == "/run/secrets/mounted";
     }
+    bool is_special(const std::string& path) const override { return path == "/run/pipe"; }
 
   private:
     std::map<std::string, std::string> texts_;

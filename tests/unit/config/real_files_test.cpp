@@ -1,6 +1,7 @@
 #include "panelgate/config/real_files.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <cerrno>
 #include <cstdlib>
@@ -39,8 +40,21 @@ TEST_F(RealFilesTest, SaysWhyAFileCannotBeRead) {
     EXPECT_EQ(errno, ENOENT);
     EXPECT_EQ(RealFiles().read(dir_.string()), std::nullopt);
     EXPECT_EQ(errno, EISDIR);
-    EXPECT_EQ(RealFiles().read("/dev/zero"), std::nullopt) << "endless";
+    EXPECT_EQ(RealFiles::read_any("/dev/zero"), std::nullopt) << "endless";
     EXPECT_EQ(errno, EFBIG);
+}
+
+TEST_F(RealFilesTest, DoesNotReadWhatMightNeverEnd) {
+    const std::string pipe = (dir_ / "pipe").string();
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    for (const std::string& path : {pipe, std::string("/dev/zero")}) {
+        EXPECT_TRUE(RealFiles().is_special(path)) << path;
+        EXPECT_EQ(RealFiles().read(path), std::nullopt) << path;
+        EXPECT_EQ(errno, EINVAL);
+    }
+    EXPECT_FALSE(RealFiles().is_special(put("x", "")));
+    EXPECT_FALSE(RealFiles().is_special(dir_.string()));
+    EXPECT_FALSE(RealFiles().is_special((dir_ / "absent").string()));
 }
 
 TEST_F(RealFilesTest, KnowsWhatEverybodyMayRead) {

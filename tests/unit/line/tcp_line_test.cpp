@@ -28,6 +28,15 @@ TEST(TcpDevice, IsAHostAndAPort) {
                              "tcp://host:65536", "tcp://host:40x", "tcp://::1:4001", "/dev/tty"}) {
         EXPECT_FALSE(parse_tcp_device(text)) << text;
     }
+    EXPECT_EQ(parse_tcp_device("tcp://[fe80::1%eth0]:4001")->host, "fe80::1%eth0");
+}
+
+TEST(TcpDevice, ANumericAddressThatIsNoneIsNoName) {
+    for (const char* host : {"10.0.0.300", "10.0.0", "10", "1.2.3.4.5", "[10.0.0.1]", "[fe80::g]",
+                             "my host", "admin@moxa", "m\u00F6xa"})
+        EXPECT_FALSE(parse_tcp_device("tcp://" + std::string(host) + ":4001")) << host;
+    for (const char* host : {"10.0.0.30", "moxa-1", "1.plant.example", "rack_2"})
+        EXPECT_TRUE(parse_tcp_device("tcp://" + std::string(host) + ":4001")) << host;
 }
 
 class TcpLineTest : public testing::Test, public Line::Events {

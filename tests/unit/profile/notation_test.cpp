@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -206,7 +207,8 @@ TEST(Notation, TellsHowAnAreaIsWritten) {
     EXPECT_EQ(error_of("omron-cp2e", "W0.16"), "'W0.16' is not written as W is: W0.00 to W127.15");
     EXPECT_EQ(error_of("omron-cp2e", "W0.1"), "'W0.1' is not written as W is: W0.00 to W127.15");
     EXPECT_EQ(error_of("generic", "400000"), "'400000' is not written as 4 is: 400001 to 465536");
-    EXPECT_EQ(error_of("generic", "41029"), "'41029' is not written as 4 is: 400001 to 465536");
+    EXPECT_EQ(error_of("generic", "41029"),
+              "'41029' is not written as 4 is: 400001 to 465536; write 401029");
     EXPECT_EQ(error_of("autonics-gplp-s", "UW1x"), "'UW1x' is not written as UW is: UW0 to UW6047");
     EXPECT_EQ(kind_of("autonics-gplp-s", "UW99999999999999999999"), NotationError::Kind::malformed);
 }
@@ -218,6 +220,35 @@ TEST(Notation, TellsWhichNotationsAPanelHas) {
               "'' is no notation of panasonic-gt; its notations look like GR0, GDT0, GDT9080");
     for (const char* text : {"UB", "U", " UB1", "UB-1", "UB+1"})
         EXPECT_EQ(kind_of("autonics-gplp-s", text), NotationError::Kind::unknown) << text;
+}
+
+TEST(Notation, TellsWhatToTypeForOtherPeoplesNotations) {
+    const auto hint = [](const std::string& profile, const std::string& text) {
+        const std::string message = error_of(profile, text);
+        return message.substr(std::min(
+            message.find(';',
+                         message.find("look like") == message.npos ? 0 : message.find("look like")),
+            message.size()));
+    };
+    EXPECT_EQ(hint("generic", "40101"), "; write 400101");
+    EXPECT_EQ(hint("autonics-gplp-s", "40101"), "; write UW100");
+    EXPECT_EQ(hint("autonics-gplp-s", "400101"), "; write UW100");
+    EXPECT_EQ(hint("generic", "4x101"), "; write 400101");
+    EXPECT_EQ(hint("generic", "100"),
+              "; holding register 100 is 400101 where the first is 0, 400100 where the first is 1");
+    EXPECT_EQ(hint("generic", "0"), "; holding register 0 is 400001 where the first is 0");
+    EXPECT_EQ(hint("autonics-gplp-s", "100"), "; write UW100 or UB100");
+    EXPECT_EQ(hint("panasonic-gt", "100"), "; write GR100 or GDT100");
+    EXPECT_EQ(hint("generic", "%MW100"), "; write 400101, where the first is 0");
+    EXPECT_EQ(hint("generic", "holding/100"), "; write 400101, where the first is 0");
+    EXPECT_EQ(hint("generic", "0x64"),
+              "; write 400101 for holding register 100, where the first is 0");
+    EXPECT_EQ(hint("panasonic-gt", "GDT 100"), "; write GDT100");
+    EXPECT_EQ(hint("generic", "400001-400010"),
+              "; write the first, 400001, and how many behind it: count: 10");
+    EXPECT_EQ(hint("generic", "400101.3"), "; write 400101, and bit: 3 for one of its bits");
+    for (const char* unknown : {"", "x", "70000", "-", "D100"})
+        EXPECT_EQ(hint("generic", unknown), "") << unknown;
 }
 
 TEST(Notation, TellsWhyNoFunctionReachesWhatAManualLists) {

@@ -120,8 +120,8 @@ TEST(Document, RefusesASecondDocument) {
 
 TEST(Document, TurnsASyntaxErrorIntoOneProblemAtItsCause) {
     EXPECT_EQ(read("a: b: c\n").problems,
-              "f.yaml:1:4: a text that holds ': ' must stand in quotes; write \"b: c\", or begin a "
-              "new line for a second key\n"
+              "f.yaml:1:4: two keys on one line; begin a deeper line for 'b', or write a: {b: c}; "
+              "one text that holds ': ' must stand in quotes: \"b: c\"\n"
               "  a: b: c\n"
               "     ^\n");
     EXPECT_EQ(read("lines: [\nb: 1\n").problems,

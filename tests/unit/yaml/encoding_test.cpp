@@ -102,5 +102,10 @@ TEST(Encoding, TheCaretStandsBelowWideCharacters) {
                   std::string("  \uD55C\uAD6D: %\n") + "        ^\n");
 }
 
+TEST(Encoding, ACrAloneEndsALine) {
+    EXPECT_EQ(decode("a: 1\rb: 2\r").text, "a: 1\nb: 2\n");
+    EXPECT_EQ(decode("a: 1\r\nb: 2\r\r\n").text, "a: 1\r\nb: 2\n\r\n");
+}
+
 }  // namespace
 }  // namespace panelgate::yaml

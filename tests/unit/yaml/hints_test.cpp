@@ -30,9 +30,17 @@ TEST(Hints, WriteANumberAsItIsRead) {
     EXPECT_EQ(number_hint("38.400", true), "; write 38400");
     EXPECT_EQ(number_hint("1.0", true), "; write 1");
     EXPECT_EQ(number_hint("9600 baud", true), "; write 9600");
-    for (const char* text : {"", "x10", "1/10", "ten", "-", "."})
+    EXPECT_EQ(number_hint("9.6e3", true), "; write 9600");
+    EXPECT_EQ(number_hint("9,600", true), "; write 9600");
+    EXPECT_EQ(number_hint("9.6k", true), "; write 9600");
+    EXPECT_EQ(number_hint("38k4", true), "; write 38400");
+    EXPECT_EQ(number_hint("\u22125", true), "; write -5");
+    for (const char* tenth : {"1/10", "/10", "x0.1", "*0.1", "10^-1"})
+        EXPECT_EQ(number_hint(tenth, false), "; write 0.1") << tenth;
+    for (const char* text : {"", "ten", "-", ".", "/", "1/0", "x", "^2"})
         EXPECT_EQ(number_hint(text, false), "") << text;
-    EXPECT_EQ(number_hint("1.5", true), "");
+    for (const char* text : {"1.5", "1.5.600", "k", "ten", "1/0"})
+        EXPECT_EQ(number_hint(text, true), "") << text;
 }
 
 TEST(Hints, WriteAVariableAsItIsRead) {
@@ -43,6 +51,7 @@ TEST(Hints, WriteAVariableAsItIsRead) {
 
 TEST(Hints, FindTheBlankThatIsMissing) {
     EXPECT_EQ(blank_hint("baud:9600"), "; a blank is missing after 'baud:'");
+    EXPECT_EQ(blank_hint("baud=9600"), "; write baud: 9600");
     EXPECT_EQ(blank_hint("tcp://x:1"), "");
     EXPECT_EQ(blank_hint("two words:1"), "");
 }

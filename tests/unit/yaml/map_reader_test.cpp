@@ -69,7 +69,7 @@ TEST(MapReader, RefusesEveryOtherSpellingOfANumber) {
     EXPECT_EQ(s.problems(),
               "f:1:4: a must be a whole number from 1 to 9, not '10'\n"
               "f:2:4: b must be a whole number from 1 to 9, not '007' (no leading zeros)\n"
-              "f:3:4: c must be a whole number from 1 to 9, not '7' in quotes\n"
+              "f:3:4: c must be a whole number from 1 to 9, not '7' in quotes; write 7 without\n"
               "f:4:4: d must be a whole number from 1 to 9, not '0x7'; write 7\n"
               "f:5:4: e must be a whole number from 1 to 9, not '7.0'; write 7\n"
               "f:6:4: f must be a whole number from 1 to 9, not 'many'\n"
@@ -87,7 +87,7 @@ TEST(MapReader, ReadsNumbersWithAFraction) {
     EXPECT_EQ(s.problems(),
               "f:4:4: d must be a number, not '00.5' (no leading zeros)\n"
               "f:5:4: e must be a number, not 'nan'\n"
-              "f:6:4: f must be a number, not '1' in quotes\n"
+              "f:6:4: f must be a number, not '1' in quotes; write 1 without\n"
               "f:7:4: g must be a number, not '1,5'; write 1.5\n"
               "f:8:4: h must be a number, not '-01' (no leading zeros)\n");
 }

@@ -1,0 +1,123 @@
+#include "address_hints.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/line/settings.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "panelgate/yaml/quote.hpp"
+
+namespace panelgate::config {
+namespace {
+
+bool is_port(std::string_view text) {
+    const auto port = yaml::parse_integer(text);
+    return port && *port >= 0 && *port <= 65535;
+}
+
+std::string write(std::string_view text) { return "; write " + std::string(text); }
+
+/// Without `http://` and what follows host and port.
+std::string_view bare(std::string_view text) {
+    const std::size_t scheme = text.find("://");
+    if (scheme != text.npos) text.remove_prefix(scheme + 3);
+    return text.substr(0, text.find('/'));
+}
+
+std::string port_hint(std::string_view port) {
+    return write("0.0.0.0:" + std::string(port)) +
+           " for all addresses of this machine, or 127.0.0.1:" + std::string(port) +
+           " for this machine alone";
+}
+
+std::string host_hint(const std::string& host, std::string_view port) {
+    if (host.empty() || host == "*") return port_hint(port);
+    if (host == "localhost") return write("127.0.0.1:" + std::string(port));
+    const auto address = parse_cidr(host);
+    if (address && is_ipv6(address->address))
+        return write("\"[" + host + "]:" + std::string(port) + "\", in quotes");
+    if (line::is_broken_address(host)) return "; " + yaml::quote(host) + " is no IP address";
+    return "; names are not looked up here: write an address of this machine";
+}
+
+/// How many bits of 255.255.255.0 are set, when they are the first.
+std::optional<int> prefix_of_mask(const std::string& mask) {
+    if (!parse_cidr(mask) || is_ipv6(mask)) return std::nullopt;
+    std::uint32_t bits = 0;
+    for (std::size_t at = 0, part = 0; part < 4; ++part) {
+        const std::size_t dot = std::min(mask.find('.', at), mask.size());
+        bits = (bits << 8U) | static_cast<std::uint32_t>(std::stoul(mask.substr(at, dot - at)));
+        at = dot + 1;
+    }
+    const int prefix = std::countl_one(bits);
+    if (std::popcount(bits) != prefix) return std::nullopt;
+    return prefix;
+}
+
+/// 10.0.* and 10.0.0
+std::string open_ended(std::string text) {
+    while (text.ends_with(".*")) text.resize(text.size() - 2);
+    if (text.ends_with('.')) text.pop_back();
+    const auto parts = static_cast<std::size_t>(std::ranges::count(text, '.')) + 1;
+    if (parts > 3) return "";
+    const std::string prefix = std::to_string(8 * parts);
+    for (std::size_t i = parts; i < 4; ++i) text += ".0";
+    const auto network = parse_cidr(text);
+    return network && !is_ipv6(network->address) ? write(text + '/' + prefix) : "";
+}
+
+}  // namespace
+
+std::string listen_hint(std::string_view typed) {
+    const std::string_view text = bare(typed);
+    if (is_port(text)) return port_hint(text);
+    const std::string whole(text);
+    if (parse_endpoint(text)) return write(text);
+    // ::1:502 is an address, too, but hardly meant as one.
+    const std::size_t last = whole.rfind(':');
+    const bool is_v6 = last != whole.npos && is_ipv6(whole.substr(0, last));
+    if (is_v6 && is_port(text.substr(last + 1)))
+        return host_hint(whole.substr(0, last), text.substr(last + 1));
+    if (parse_cidr(whole))
+        return "; add the port, such as " +
+               (is_ipv6(whole) ? "\"[" + whole + "]:502\"" : whole + ":502");
+    const std::size_t colon = text.find_last_of(": ");
+    if (colon == text.npos) return "";
+    const std::string_view port = text.substr(colon + 1);
+    std::string host(text.substr(0, text.find_last_not_of(": ", colon) + 1));
+    if (is_port(port)) return host_hint(host, port);
+    return yaml::parse_integer(port) ? "; a port is a number from 0 to 65535" : "";
+}
+
+std::string network_hint(std::string_view typed) {
+    std::string text(typed);
+    std::erase(text, ' ');
+    if (text == "*" || text == "all" || text == "any")
+        return "; to let everybody in, leave allow out";
+    if (text == "localhost") return write("127.0.0.1");
+    if (text.starts_with('[') && text.ends_with(']')) text = text.substr(1, text.size() - 2);
+    if (parse_cidr(text)) return write(text);
+    if (text.find(',') != text.npos) return "; write each network as an item of its own";
+    const std::size_t slash = std::min(text.find('/'), text.size());
+    const std::string host = text.substr(0, slash);
+    if (slash < text.size() && parse_cidr(host)) {
+        if (const auto prefix = prefix_of_mask(text.substr(slash + 1)))
+            return write(host + '/' + std::to_string(*prefix));
+        if (host.find('.') != host.npos && is_ipv6(host))
+            return "; an IPv4 network is written as such: 10.0.0.0/24";
+        return is_ipv6(host) ? "; behind the '/' stands a number from 0 to 128"
+                             : "; behind the '/' stands a number from 0 to 32";
+    }
+    if (const std::string network = open_ended(host); !network.empty()) return network;
+    if (const auto endpoint = parse_endpoint(text))
+        return write(endpoint->address) + ", without a port";
+    if (text.find('-') != text.npos && parse_cidr(text.substr(0, text.find('-'))))
+        return "; a range is written as networks, such as 192.168.1.0/28";
+    if (line::is_broken_address(host)) return "; " + yaml::quote(host) + " is no IP address";
+    return "";
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,51 @@
+#include "check_texts.hpp"
+
+#include <array>
+#include <cstddef>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace panelgate::config {
+namespace {
+
+/// C0, DEL, C1 (in UTF-8: C2 80 to C2 9F), and the two separators that end a line for a browser.
+std::optional<unsigned> control_character(std::string_view text) {
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const auto byte = static_cast<unsigned char>(text[i]);
+        const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
+        if (byte < 0x20 || byte == 0x7F) return byte;
+        if (byte == 0xC2 && next < 0xA0) return next;
+        if (text.substr(i).starts_with("\u2028")) return 0x2028;
+        if (text.substr(i).starts_with("\u2029")) return 0x2029;
+    }
+    return std::nullopt;
+}
+
+void refuse(std::string_view text, yaml::Mark mark, yaml::Problems& problems) {
+    const auto control = control_character(text);
+    if (!control) return;
+    if (*control == '\n') {
+        problems.add(mark, "a text of more than one line; write it on one line");
+        return;
+    }
+    std::array<char, 16> name{};
+    std::snprintf(name.data(), name.size(), "U+%04X", *control);
+    const std::string tab = *control == '\t' ? " (a tab)" : "";
+    problems.add(
+        mark, "control character " + std::string(name.data()) + tab + " in a text; leave it out");
+}
+
+}  // namespace
+
+void refuse_control_characters(const yaml::Node& tree, yaml::Problems& problems) {
+    refuse(tree.scalar, tree.mark, problems);
+    for (const yaml::Node& item : tree.items) refuse_control_characters(item, problems);
+    for (const yaml::Entry& entry : tree.entries) {
+        refuse(entry.key, entry.mark, problems);
+        refuse_control_characters(entry.value, problems);
+    }
+}
+
+}  // namespace panelgate::config

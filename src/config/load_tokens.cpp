@@ -1,0 +1,73 @@
+#include "load_tokens.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace panelgate::config {
+namespace {
+
+using yaml::MapReader;
+using yaml::Node;
+
+/// A token's secret: the file's text without blanks around it.
+std::string load_secret(Loading& loading, MapReader& in) {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    const auto file = in.required_text("file");
+    if (!file) return "";
+    if (loading.files.is_special(*file)) {
+        in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
+        return "";
+    }
+    const auto text = loading.files.read(*file);
+    if (!text) {
+        // Not the text: whoever took the token for its file has written that.
+        in.problem("file",
+                   "cannot read the token file; give the path of a file that holds the token and "
+                   "that this program may read");
+        return "";
+    }
+    const std::size_t first = text->find_first_not_of(kBlanks);
+    if (first == std::string::npos) {
+        in.problem("file", "the token file is empty");
+        return "";
+    }
+    std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
+    if (secret.find_first_of(kBlanks) != std::string::npos)
+        in.problem("file", "the token file " + *file + " must hold one token, without blanks");
+    return secret;
+}
+
+constexpr std::string_view kExample = "{name: ops, role: operator, file: /run/secrets/ops}";
+
+web::Token load_token(Loading& loading, const Node& node) {
+    MapReader in(node, loading.problems, "a token", kExample);
+    web::Token token;
+    token.name = in.required_text("name").value_or("");
+    constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
+        {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
+    if (in.required_text("role"))
+        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
+    token.secret = load_secret(loading, in);
+    in.finish();
+    return token;
+}
+
+}  // namespace
+
+void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
+    const Node* list =
+        in.sequence("tokens", "[{name: ops, role: operator, file: /run/secrets/ops}]");
+    if (list == nullptr) return;
+    for (const Node& node : list->items) {
+        web::Token token = load_token(loading, node);
+        if (!token.name.empty() &&
+            std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
+            loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
+        tokens.push_back(std::move(token));
+    }
+}
+
+}  // namespace panelgate::config

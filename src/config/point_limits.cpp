@@ -1,0 +1,131 @@
+#include "point_limits.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <string_view>
+#include <system_error>
+
+#include "panelgate/base/number_text.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using points::Point;
+using points::Type;
+
+RawRange signed_range(unsigned bits) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    const std::int64_t high = bits >= 64 ? kMost : (std::int64_t{1} << (bits - 1)) - 1;
+    return {-high - 1, high};
+}
+
+RawRange unsigned_range(unsigned bits) {
+    constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+    return {0, bits >= 63 ? kMost : (std::int64_t{1} << bits) - 1};
+}
+
+/// Of the value: what the type holds, by scale and offset.
+struct ValueRange {
+    double low = 0;
+    double high = 0;
+    bool contains(double value) const { return value >= low && value <= high; }
+    std::string text() const { return shown(low) + " to " + shown(high); }
+
+    /// 3276.7, though 32767 * 0.1 is a little more.
+    static std::string shown(double value) {
+        std::array<char, 32> digits{};
+        const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value,
+                                                std::chars_format::general, 15);
+        double rounded = value;
+        if (error == std::errc()) std::from_chars(digits.data(), end, rounded);
+        return number_text(rounded);
+    }
+};
+
+ValueRange value_range(const Point& point) {
+    const auto value = [&](double raw) { return raw * point.scale + point.offset; };
+    double low = 0;
+    double high = 0;
+    if (point.type == Type::f64) {
+        high = std::numeric_limits<double>::max();
+        low = -high;
+        return {low, high};
+    }
+    if (point.type == Type::f32) {
+        high = as_printed(std::numeric_limits<float>::max());
+        low = -high;
+    } else {
+        const RawRange range = label_range(point.type);
+        low = static_cast<double>(range.low);
+        // The signed 64 bits of a RawRange end before those of a u64 do.
+        high = point.type == Type::u64 ? 0x1p64 : static_cast<double>(range.high);
+    }
+    const auto [least, most] = std::minmax({value(low), value(high)});
+    return {least, most};
+}
+
+void check_limit(yaml::MapReader& in, std::string_view key, const Point& point,
+                 std::optional<double>& limit) {
+    const ValueRange range = value_range(point);
+    // A half of the last digit: 6553.5 is 65535 * 0.1, whatever the last bit of it is.
+    const double slack = std::max(std::abs(range.low), std::abs(range.high)) * 1e-12;
+    if (!limit || ValueRange{range.low - slack, range.high + slack}.contains(*limit)) return;
+    std::string type(label(point.type));
+    if (point.scale != 1) type += " with scale " + number_text(point.scale);
+    if (point.offset != 0)
+        type += (point.scale != 1 ? " and offset " : " with offset ") + number_text(point.offset);
+    in.problem(key, std::string(key) + " must be a value that the point can have, " + range.text() +
+                        " (" + type + "), not " + number_text(*limit));
+    limit.reset();
+}
+
+}  // namespace
+
+RawRange label_range(Type type) {
+    switch (type) {
+        case Type::bcd16:
+            return {0, 9'999};
+        case Type::bcd32:
+            return {0, 99'999'999};
+        case Type::i16:
+        case Type::i32:
+        case Type::i64:
+            return signed_range(16 * points::registers_of(type));
+        case Type::u16:
+        case Type::u32:
+        case Type::u64:
+            return unsigned_range(16 * points::registers_of(type));
+        case Type::boolean:
+        case Type::f32:
+        case Type::f64:
+        case Type::string:
+            return signed_range(64);
+    }
+    std::abort();
+}
+
+RawRange no_value_range(Type type) {
+    RawRange range = label_range(type);
+    const bool is_bcd = type == Type::bcd16 || type == Type::bcd32;
+    if (!is_integer(type) || is_bcd) return range;
+    range.low = signed_range(16 * points::registers_of(type)).low;
+    range.high = unsigned_range(16 * points::registers_of(type)).high;
+    return range;
+}
+
+void load_limits(yaml::MapReader& in, Point& point) {
+    point.min = in.number("min");
+    point.max = in.number("max");
+    if (point.min && point.max && *point.min > *point.max)
+        in.problem("min", "min is above max: nothing could be written");
+    if (point.type == Type::boolean || point.type == Type::string) return;
+    check_limit(in, "min", point, point.min);
+    check_limit(in, "max", point, point.max);
+}
+
+}  // namespace panelgate::config
