@@ -48,7 +48,7 @@ void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::
     const Open open{.job = job,
                     .submitted = now,
                     .served = truth_.served(job.station),
-                    .turn = frames_,
+                    .turn = turns_,
                     .write = !job.request.is_read(),
                     .sent = joins};
     open_.insert_or_assign(ticket, open);
@@ -61,7 +61,9 @@ void Checker::on_accepted(TimePoint now, arbiter::Ticket ticket, const arbiter::
 
 void Checker::on_refused(TimePoint now, const arbiter::Job& job, Fault fault) {
     const Client& client = clients_[job.client];
-    if (fault == Fault::offline && watch_.is_good(job.station, now))
+    // A late reply is told from what may follow it by a silence.
+    constexpr Duration kSilence = 50ms;
+    if (fault == Fault::offline && watch_.is_good(job.station, now - kSilence))
         fail("P4: a good station was refused as offline");
     if (fault != Fault::busy) return;
     if (client.polite) fail("P9: a polite client was refused");
@@ -152,7 +154,9 @@ void Checker::check_fault(TimePoint now, const Open& open, Fault fault) {
 void Checker::check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish) {
     const Bytes& reply = *finish.pdu;
     if (modbus::exception_of(reply)) {
-        if (!truth_.refused(open.job.station, open.job.request.pdu(), open.submitted))
+        const Bytes& asked = open.job.request.pdu();
+        const bool said = truth_.refused(open.job.station, asked, open.submitted);
+        if (!said && !is_luck(heard_for(open, reply)))
             fail("P1: an exception that the station did not send to this request");
         return;
     }

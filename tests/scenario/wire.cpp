@@ -36,7 +36,11 @@ Wire::FramePtr Wire::put(Said said) {
 
 TimePoint Wire::say(Said said) {
     const FramePtr frame = put(std::move(said));
-    witness_.on_said(frame->start, frame->bytes);
+    if (frame->damaged) {
+        witness_.on_garbled(agenda_.now());
+    } else {
+        witness_.on_said(frame->start, frame->bytes);
+    }
     deliver_in_chunks(frame);
     return frame->end;
 }
