@@ -40,7 +40,9 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
       end_confirmed_(!timing.confirm_end) {}
 
 bool Attempt::takes_along(TimePoint now, const Job& job) const {
-    const bool leaving = timing_.tolerance && now < timing_.sent;
+    // Rates may differ by 2 %: its last bit may have left that much sooner.
+    const Duration spare = (timing_.sent - timing_.started) * 2 / 100;
+    const bool leaving = timing_.tolerance && now < timing_.sent - spare;
     return leaving && group_.attempts == 1 && job.station == group_.station &&
            contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
 }
@@ -110,7 +112,9 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
         own_frame_seen_ = true;
         return Verdict::open;
     }
-    if (const auto copy = std::exchange(held_, std::nullopt)) stray_frame(*copy);
+    // Of two that are equal nobody knows which one it is.
+    if (const auto copy = std::exchange(held_, std::nullopt); copy && copy != reply)
+        stray_frame(*copy);
     reply_ = std::move(reply);
     return Verdict::replied;
 }
@@ -188,8 +192,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         judge_strays(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    // It proves no copy either: values may be equal.
-    if (held_ && usual_is_over && doubted_) return Verdict::wrong;
+    if (held_ && usual_is_over && doubted_) return Verdict::doubtful;
     if (held_ && usual_is_over) {
         reply_ = std::exchange(held_, std::nullopt);
         return Verdict::replied;
@@ -242,8 +245,11 @@ void Attempt::reject_reply() {
 void Attempt::hold_reply(Duration needed, bool doubted) {
     doubted_ = doubted;
     timing_.usual = std::min(timing_.usual, needed);
+    // The reply that a copy has kept its station from saying comes behind it.
+    if (doubted) timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
     held_ = std::exchange(reply_, std::nullopt);
     held_back_ = true;
+    held_at_ = last_byte_;
     disturbed_ = true;
 }
 

@@ -61,7 +61,8 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
             return holder.host == own && holder.source.counting > of_client + 1;
         },
         writes_too);
-    if (victim || !write) return victim;
+    // Writes come first, but the places of reads that every fifth turn needs are not theirs.
+    if (victim || !write || kReadTurn * reads_.counting() <= settings_.limit) return victim;
     return greediest(
         [&](const Holder& holder) {
             return holder.host == own ? holder.source.counting >= of_client

@@ -112,6 +112,35 @@ void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
     copies_.on_unasked(now, reply);
 }
 
+/// What this reply tells of whether the station says others twice.
+void Station::learn_of_copies(TimePoint now, const Attempt& attempt) {
+    const Group& group = attempt.group();
+    const bool held = attempt.was_held() && copies_.is_copy(now, attempt.reply());
+    if (attempt.reply() == group.doubted || (held && !group.request.is_read())) {
+        copies_.on_confirmed(group.request.pdu());
+    } else if (!group.doubted.empty()) {
+        copies_.on_denied(group.doubted_at, group.doubted);
+    }
+    copies_.on_reply(now, group.request.pdu(), attempt.reply());
+}
+
+/// What it owes behind this reply.
+void Station::settle_debt(TimePoint now, const Attempt& attempt) {
+    const Group& group = attempt.group();
+    const TimePoint sent = attempt.timing().sent;
+    if (attempt.reply() == group.doubted && owed_.size() <= 1) {
+        owed_.clear();  // both have come
+        not_before_ = now + copies_.take_doubt();
+    } else if (owes()) {
+        take_one(now, sent);
+    } else if (now < again_until_ && late_.worst() > Duration::zero()) {
+        // It may be what came damaged, once more, and the reply to this attempt is late.
+        owe(now, group.request.pdu(), sent);
+    } else {
+        not_before_ = std::max(not_before_, now + copies_.take_doubt());
+    }
+}
+
 Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Duration waited,
                                    Duration think) {
     const Group& group = attempt.group();
@@ -131,17 +160,12 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
     trail_.on_reply(now);
-    if (attempt.was_held() && copies_.is_copy(now, attempt.reply())) copies_.on_confirmed();
-    copies_.on_reply(now, group.request.pdu(), attempt.reply());
+    learn_of_copies(now, attempt);
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
     damaged_pdu_.clear();
-    if (owes()) {
-        take_one(now, attempt.timing().sent);
-    } else {
-        not_before_ = std::max(not_before_, now + copies_.take_doubt());
-    }
+    settle_debt(now, attempt);
     if (!group.span || exception) return result;
     std::uint32_t& longest = longest_read_[static_cast<std::size_t>(group.span->table)];
     longest = std::max(longest, group.span->count);
@@ -182,7 +206,8 @@ bool Station::may_retry(const Group& group) const {
     if (group.abandoned() || health_.offline() || failing() || stranger()) return false;
     if (suspect() && !group.first_silence) return false;
     const bool harmless = group.request.is_read() || settings_.retry_writes;
-    return harmless && group.attempts <= settings_.retries;
+    const int failed = group.attempts - (group.doubted.empty() ? 0 : 1);
+    return harmless && failed <= settings_.retries;
 }
 
 Duration Station::short_wait(std::optional<Duration> line) const {

@@ -12,12 +12,25 @@ namespace panelgate::arbiter {
 
 using Kind = StationEvent::Kind;
 
+namespace {
+
+/// Somebody could still be answered by another attempt.
+bool in_time(TimePoint now, const Group& group) {
+    return std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
+}
+
+}  // namespace
+
 void Arbiter::conclude(TimePoint now, Verdict verdict) {
     const std::vector<modbus::Unused> strays = active_->take_strays();
     ledger_.inside_attempt(true);
     if (verdict == Verdict::replied) settle(now);
     note(now, strays);
-    if (verdict != Verdict::open && verdict != Verdict::replied) fail(now, verdict);
+    if (verdict == Verdict::doubtful) {
+        ask_again(now);
+    } else if (verdict != Verdict::open && verdict != Verdict::replied) {
+        fail(now, verdict);
+    }
     ledger_.inside_attempt(false);
 }
 
@@ -40,11 +53,8 @@ void Arbiter::settle(TimePoint now) {
     const bool early = active_->replied_early();
     const bool too_early = early && !settings_.paced && pace_.believed();
     if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
-    if (station.may_be_copy(now, *active_)) {
-        const bool again = station.repeats_itself(now, *active_) &&
-                           active_->group().attempts == 1 && station.may_retry(active_->group());
-        return active_->hold_reply(station.needed(), again);
-    }
+    if (station.may_be_copy(now, *active_))
+        return active_->hold_reply(station.needed(), active_->group().may_doubt());
     pace_.on_reply(early);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
@@ -73,6 +83,20 @@ void Arbiter::settle(TimePoint now) {
         ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
 
+/// What came may be a copy of an earlier reply, and its own may still come. Nobody is to blame.
+void Arbiter::ask_again(TimePoint now) {
+    active_->remember_doubt();
+    Attempt attempt = take_active(now);
+    Group& group = attempt.group();
+    Station& station = stations_.of(group.station);
+    station.owe(now, group.request.pdu(), attempt.timing().sent);
+    group.silent_after = {};
+    if (in_time(now, group) && !group.abandoned())
+        return schedule_.retry(std::move(group), station.usual());
+    for (const Job& job : group.jobs)
+        ledger_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
+}
+
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     ledger_.on_failed(attempt, verdict);
@@ -96,9 +120,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     group.silent_after = verdict == Verdict::silent
                              ? std::min(now - sent, attempt.timing().patience) - latency_
                              : Duration::zero();
-    const bool in_time =
-        std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
-    if (in_time && affordable && station.may_retry(group)) {
+    if (in_time(now, group) && affordable && station.may_retry(group)) {
         station.on_retry(verdict == Verdict::silent);
         schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {

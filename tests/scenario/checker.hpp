@@ -50,6 +50,7 @@ class Checker : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint now, std::uint8_t station) override;
+    void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
     void on_garbled(TimePoint now) override { garbled_ = now; }
     void on_collision(TimePoint now, std::uint8_t station) override;
     void on_line_down(TimePoint now);
@@ -69,10 +70,14 @@ class Checker : public Witness {
     std::uint64_t frames() const { return frames_; }
     std::uint64_t collisions() const { return collisions_; }
     double good_share(TimePoint now) const { return costs_.good_share(now - started_); }
-    /// How long requests to sound panels have waited for their answers, hit ones too.
     /// Copies that came instead of an answer before anybody could know that this panel says its
     /// replies twice.
+    std::uint64_t first_copies() const { return first_copies_; }
+    /// Those of them that no gateway can know.
     std::uint64_t excused() const { return excused_; }
+    /// Answers of which nobody has said the like, and whose CRC was right by chance.
+    std::uint64_t lucky() const { return lucky_; }
+    /// How long requests to sound panels have waited for their answers, hit ones too.
     const std::vector<Duration>& waits() const { return waits_; }
     /// The longest that each station was not asked.
     const std::map<std::uint8_t, Duration>& longest_unasked() const { return longest_unasked_; }
@@ -84,7 +89,7 @@ class Checker : public Witness {
         arbiter::Job job;
         TimePoint submitted;
         std::uint64_t served = 0;  ///< by its station, when it was submitted
-        std::uint64_t turn = 0;    ///< frames sent until then
+        std::uint64_t turn = 0;    ///< turns until then
         bool write = false;
         bool sent = false;  ///< in a frame, and not known to wait again
         bool gone = false;  ///< its client
@@ -116,12 +121,13 @@ class Checker : public Witness {
     void mark_sent(std::uint8_t station, ByteView pdu, FrameKind what);
     bool joins_attempt(TimePoint now, const arbiter::Job& job) const;
     std::size_t waiting() const;
-    void check_turn(bool write);
+    void check_turn(TimePoint now, bool write);
     // What may be answered (checker.cpp)
     void check_reply(TimePoint now, const Open& open, const arbiter::Finish& finish);
     void check_values(TimePoint now, const Open& open, const arbiter::Finish& finish);
-    bool is_luck();
-    void check_write(TimePoint now, const Open& open);
+    Bytes heard_for(const Open& open, const Bytes& reply) const;
+    bool is_luck(ByteView heard);
+    void check_write(TimePoint now, const Open& open, const Bytes& reply);
     void check_fault(TimePoint now, const Open& open, Fault fault);
     void check_in_time(TimePoint now, const Open& open, const arbiter::Finish& finish);
     Duration gap() const;
@@ -148,7 +154,9 @@ class Checker : public Witness {
     std::unordered_set<std::uint8_t> repeat_writes_;  ///< stations that allow it
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
+    std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
+    std::uint64_t first_copies_ = 0;
     std::uint64_t excused_ = 0;
     TimePoint garbled_{};
     std::uint64_t lucky_ = 0;  ///< see is_luck()
@@ -162,7 +170,8 @@ class Checker : public Witness {
     TimePoint paused_from_{};
     TimePoint resumed_{};
     std::uint64_t last_read_turn_ = 0;
-    std::deque<TimePoint> last_turns_;  ///< when the last frames were sent
+    std::deque<TimePoint> last_turns_;  ///< when the last transactions began
+    std::uint64_t turns_ = 0;
     TimePoint started_{};
     std::uint64_t good_ = 0;
     std::uint64_t frames_ = 0;

@@ -38,10 +38,13 @@ void Checker::mark_sent(std::uint8_t station, ByteView pdu, FrameKind what) {
 }
 
 /// A read that comes while one which contains it is still leaving goes along with it, unless
-/// something older of its client waits for that station.
+/// something older of its client waits for that station: on a line that keeps pace. On another one
+/// nobody knows that the request has not left.
 bool Checker::joins_attempt(TimePoint now, const arbiter::Job& job) const {
     const auto own = test::read_span(job.station, job.request.pdu());
-    const bool leaving = now < attempt_.sent && !attempt_.again && settings_.share_reads;
+    const bool held_back = settings_.paced && settings_.share_reads;
+    const Duration spare = (attempt_.sent - attempt_.started) / 50;  // a rate that is off
+    const bool leaving = held_back && now < attempt_.sent - spare && !attempt_.again;
     if (!leaving || !own || !attempt_.span || !attempt_.span->contains(*own)) return false;
     return std::ranges::none_of(open_, [&](const auto& entry) {
         const Open& o = entry.second;
@@ -97,20 +100,24 @@ void Checker::on_settled() {
 
 /// P9: a waiting reader gets every fifth turn at least, unless its station rests for what it owes
 /// (P1), or has not answered when it was asked last: then it has a share of its own (P4); or it
-/// says its replies twice, and is let finish.
-void Checker::check_turn(bool write) {
+/// says its replies twice, and is let finish. A write that is repeated takes no other turn.
+void Checker::check_turn(TimePoint now, bool write) {
     constexpr std::uint64_t kWritesInARow = 4;
+    constexpr std::size_t kRemembered = 8;
+    ++turns_;
+    last_turns_.push_back(now);
+    if (last_turns_.size() > kRemembered) last_turns_.pop_front();
     if (!write) {
-        last_read_turn_ = frames_;
+        last_read_turn_ = turns_;
         return;
     }
-    if (frames_ - last_read_turn_ <= kWritesInARow) return;
+    if (turns_ - last_read_turn_ <= kWritesInARow) return;
     const TimePoint first = last_turns_[last_turns_.size() - 1 - kWritesInARow];
     const auto starves = std::ranges::find_if(open_, [&](const auto& entry) {
         const Open& o = entry.second;
         const auto client = clients_.find(o.job.client);
         return !o.sent && !o.gone && o.job.priority == PriorityClass::read &&
-               o.turn + kWritesInARow < frames_ && client != clients_.end() &&
+               o.turn + kWritesInARow < turns_ && client != clients_.end() &&
                client->second.single && watch_.is_good(o.job.station, o.submitted) &&
                !watch_.is_failing(o.job.station) && !doublers_.contains(o.job.station) &&
                watch_.rests_until(o.job.station) <= first;

@@ -54,13 +54,16 @@ void Checker::on_answered(TimePoint now) {
     if (watch_.is_good(attempt_.station, now)) costs_.on_answered(now, attempt_);
 }
 
-/// The first copy of all, in place of the answer to a question of the same shape, is that answer
-/// for any gateway. From the first one on that came when nobody was asked, or from an odd answer
-/// on, it can know better: but not from one behind a retry, which may be the reply to that.
+/// A copy tells that this station says its replies twice: but not one behind a retry, which may be
+/// the reply to that. The first one that comes in place of the answer to another request is found
+/// by asking once more. Where the very same is asked again it is that answer for any gateway, and
+/// what it has displaced comes one late: see open.hpp.
 void Checker::on_copy(TimePoint now, std::uint8_t station) {
     const bool awaited = !attempt_.answered && attempt_.station == station;
     if (!awaited && retried_.contains(station)) return;
     if (!doublers_.insert(station).second || !awaited) return;
+    ++first_copies_;
+    if (!attempt_.same) return;
     ++excused_;
     excused_from_[station] = now;
 }
@@ -84,6 +87,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     if (what != FrameKind::retry) was_silent = watch_.is_silent(station);
     if (what == FrameKind::retry) {
         retried_.insert(station);
+        watch_.on_again(now, station);
     } else {
         retried_.erase(station);
     }
@@ -102,13 +106,12 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     attempt_.heard = false;
     attempt_.span = test::read_span(station, pdu);
     attempt_.again = what == FrameKind::retry;
+    const Bytes before = std::exchange(asked_[station], Bytes(pdu.begin(), pdu.end()));
+    attempt_.same = std::ranges::equal(before, pdu);
     attempt_.owed = now < watch_.rests_until(station);
-    constexpr std::size_t kRemembered = 8;
-    last_turns_.push_back(now);
-    if (last_turns_.size() > kRemembered) last_turns_.pop_front();
     last_transmit_ = now;
     const bool write = !modbus::is_pure_read(pdu);
-    check_turn(write);
+    if (what != FrameKind::retry || !write) check_turn(now, write);
     if (write) check_write_sent(station, pdu);
     mark_sent(station, pdu, what);
     if (write) truth_.on_write_sent(now, station, pdu);

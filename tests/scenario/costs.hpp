@@ -21,6 +21,7 @@ struct Attempt {
     bool answered = true;
     bool heard = false;  ///< anything
     bool again = false;  ///< it was on the wire before
+    bool same = false;   ///< its station was asked the very same before
     bool owed = false;   ///< an earlier one may still be answered
     std::optional<arbiter::ReadSpan> span;
 };

@@ -10,10 +10,13 @@ void HouseLine::start(Events& events) {
 }
 
 void HouseLine::write(ByteView bytes) {
-    if (wire_.is_up()) wire_.send({bytes.begin(), bytes.end()});
+    if (!wire_.is_up()) return;
+    agenda_.tell("sent", bytes);
+    wire_.send({bytes.begin(), bytes.end()});
 }
 
 void HouseLine::come(ByteView bytes) {
+    agenda_.tell("heard", bytes);
     device_.insert(device_.end(), bytes.begin(), bytes.end());
     if (!held_) wake();
 }

@@ -41,10 +41,6 @@ bool HouseJudge::in_time(TimePoint deadline) const {
     });
 }
 
-void HouseJudge::check(const Truth::Read& read, std::uint16_t address, std::uint16_t value) {
-    if (const char* wrong = truth_.fault_of(read, address, value)) fail(wrong);
-}
-
 void HouseJudge::judge_exception(const Question& question) {
     if (!truth_.refused(question.station, question.pdu, question.at))
         fail("P1: an exception that the station did not send to this request");
@@ -70,17 +66,32 @@ void HouseJudge::judge_read(const Question& question, const Bytes& reply,
         read.since = *oldest;
         read.age = agenda_.now() - *oldest;
     }
-    for (std::size_t i = 0; i < count; ++i)
-        check(read, static_cast<std::uint16_t>(word(question.pdu, 1) + i), word(reply, 2 + 2 * i));
+    check(read, word(question.pdu, 1), ByteView(reply).subspan(2));
     ++good;
+}
+
+/// P1, P6. One in 65536 of what two speakers make of each other's frames passes the CRC: of what
+/// nobody has said that is forgiven, as long as it is that seldom.
+void HouseJudge::check(const Truth::Read& read, std::uint16_t first, ByteView values) {
+    constexpr std::uint64_t kSeldom = 10000;
+    for (std::size_t i = 0; 2 * i < values.size(); ++i) {
+        const auto address = static_cast<std::uint16_t>(first + i);
+        const char* wrong = truth_.fault_of(read, address, word(values, 2 * i));
+        if (wrong == nullptr) continue;
+        if (garbled_ == 0 || !truth_.is_chance(values)) return fail(wrong);
+        lucky_.insert({values.begin(), values.end()});
+        if (lucky_.size() > 1 + garbled_ / kSeldom) fail(wrong);
+        return;
+    }
 }
 
 void HouseJudge::judge_values(std::uint8_t station, std::uint16_t address,
                               const std::vector<std::uint16_t>& values, TimePoint sampled) {
     const TimePoint now = agenda_.now();
     const Truth::Read read{station, 3, now, sampled, 0, now - sampled};
-    for (std::size_t i = 0; i < values.size(); ++i)
-        check(read, static_cast<std::uint16_t>(address + i), values[i]);
+    Writer bytes;
+    for (const std::uint16_t value : values) bytes.u16(value);
+    check(read, address, bytes.take());
 }
 
 void HouseSeam::transact(bus::Request request, bus::AnswerHandler handler) {

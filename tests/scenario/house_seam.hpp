@@ -26,7 +26,8 @@ class HouseJudge final : public Witness {
         truth_.on_exception(now, station, pdu);
     }
     void on_copy(TimePoint, std::uint8_t) override {}
-    void on_garbled(TimePoint) override {}
+    void on_said(TimePoint now, ByteView bytes) override { truth_.on_said(now, bytes); }
+    void on_garbled(TimePoint) override { ++garbled_; }
     void on_collision(TimePoint, std::uint8_t) override {}
 
     /// A request on its way, and what was known of its station when it began.
@@ -65,11 +66,13 @@ class HouseJudge final : public Witness {
   private:
     static std::string key_of(const Question& q) { return scenario::key_of(q.station, q.pdu); }
     void judge_read(const Question& question, const Bytes& reply, std::optional<TimePoint> oldest);
-    void check(const Truth::Read& read, std::uint16_t address, std::uint16_t value);
+    void check(const Truth::Read& read, std::uint16_t first, ByteView values);
 
     const HousePlan& plan_;
     const Agenda& agenda_;
     Truth truth_;
+    std::uint64_t garbled_ = 0;
+    std::set<Bytes> lucky_;
     std::set<std::string> never_sent_;
     std::vector<std::pair<TimePoint, TimePoint>> pauses_;
     std::string violation_;

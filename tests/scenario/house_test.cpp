@@ -69,6 +69,13 @@ TEST_P(HouseTest, KeepsItsPromises) {
 INSTANTIATE_TEST_SUITE_P(Every, HouseTest, testing::ValuesIn(kHouseKinds),
                          [](const auto& info) { return std::string(label(info.param)); });
 
+/// Two speakers' bytes made a frame that passed its CRC.
+TEST_F(HouseTest, KnowsWhatNobodyHasSaid) {
+    House house(draw_house(HouseKind::loss, 437), HouseSeam::Flaw::none);
+    house.run();
+    EXPECT_EQ(house.violation(), "");
+}
+
 /// What a house that is broken on purpose is caught with, within some seeds.
 struct Broken {
     HouseSeam::Flaw flaw;

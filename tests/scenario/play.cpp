@@ -21,7 +21,9 @@ Outcome play(const Plan& plan, bool with_history) {
     outcome.frames = checker.frames();
     outcome.good = checker.good_answers();
     outcome.collisions = checker.collisions();
+    outcome.lucky = checker.lucky();
     outcome.excused = checker.excused();
+    outcome.first_copies = checker.first_copies();
     outcome.seconds = to_seconds(world.now() - start);
     outcome.good_share = checker.good_share(world.now());
     outcome.waits = checker.waits();

@@ -17,7 +17,10 @@ struct Outcome {
     std::uint64_t frames = 0;
     std::uint64_t good = 0;
     std::uint64_t collisions = 0;
-    std::uint64_t excused = 0;  ///< wrong values that no gateway could have excluded, at most
+    std::uint64_t lucky = 0;  ///< answers that nobody said, with a CRC that was right by chance
+    /// In place of an answer, of a panel that was not known to say its replies twice.
+    std::uint64_t first_copies = 0;
+    std::uint64_t excused = 0;  ///< those of them that no gateway can know
     double seconds = 0;
     double good_share = 0;        ///< of the time, for sound panels
     std::vector<Duration> waits;  ///< for answers of all panels but the odd one

@@ -57,6 +57,18 @@ void Truth::on_write_sent(TimePoint now, std::uint8_t station, ByteView pdu) {
     }
 }
 
+void Truth::on_said(TimePoint now, ByteView bytes) {
+    constexpr Duration kLate = 30s;  // no reply and no stall is as long
+    said_.emplace_back(now, Bytes(bytes.begin(), bytes.end()));
+    while (said_.front().first + kLate < now) said_.pop_front();
+}
+
+bool Truth::is_chance(ByteView bytes) const {
+    return std::ranges::none_of(said_, [&](const auto& entry) {
+        return !std::ranges::search(entry.second, bytes).empty();
+    });
+}
+
 std::uint64_t Truth::served(std::uint8_t station) const {
     const auto found = stations_.find(station);
     return found == stations_.end() ? 0 : found->second.served;

@@ -33,6 +33,12 @@ class Truth {
     /// A write to these cells leaves; 0 = of all stations that are known.
     void on_write_sent(TimePoint now, std::uint8_t station, ByteView pdu);
 
+    /// Somebody said this on the wire, or was about to when another spoke as well.
+    void on_said(TimePoint now, ByteView bytes);
+    /// Nobody said these bytes of late, one behind the other: what was heard passed the CRC by
+    /// chance.
+    bool is_chance(ByteView bytes) const;
+
     std::uint64_t served(std::uint8_t station) const;
     std::optional<TimePoint> executed(std::uint8_t station, ByteView pdu) const;
     /// It refused this very request at `since` or later.
@@ -66,6 +72,7 @@ class Truth {
               std::uint16_t value) const;
 
     std::map<std::uint8_t, Station> stations_;
+    std::deque<std::pair<TimePoint, Bytes>> said_;
     std::unordered_map<std::string, TimePoint> executed_;
 };
 

@@ -60,6 +60,7 @@ void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duratio
         bad[2 + random_.below(static_cast<unsigned>(bad.size()) - 2)] ^=
             static_cast<std::uint8_t>(1u << random_.below(8));
         all.push_back({Duration{}, said(std::move(bad))});
+        all.back().said.damaged = true;
         all.push_back({60ms, said({})});
     }
 }
@@ -67,8 +68,10 @@ void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duratio
 /// The reply itself, with what clings to it.
 Said Voice::main_part(const Bytes& reply, const Bytes& good) {
     const bool other = random_.chance(plan_.wrong_id);
-    Bytes frame =
-        damage(other ? modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 101), reply) : good);
+    const Bytes meant =
+        other ? modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 101), reply) : good;
+    Bytes frame = damage(meant);
+    bool damaged = frame != meant;
     bool whole = frame == good;
     if (random_.chance(plan_.padded_inside)) {
         Bytes longer = reply;
@@ -76,12 +79,13 @@ Said Voice::main_part(const Bytes& reply, const Bytes& good) {
         if (random_.chance(0.5) && reply[0] < 5)
             longer[1] = static_cast<std::uint8_t>(longer[1] + 2);
         frame = modbus::encode_adu(plan_.id, longer);
-        whole = false;
+        whole = damaged = false;
     }
     Said s = said({});
     if (random_.chance(plan_.glitch_before)) s.bytes.push_back(glitch());
     const std::size_t from = s.bytes.size();
     s.bytes.insert(s.bytes.end(), frame.begin(), frame.end());
+    s.damaged = damaged;
     if (whole) {
         s.answer_from = from;
         s.answer_to = s.bytes.size();

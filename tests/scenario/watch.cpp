@@ -1,6 +1,7 @@
 #include "watch.hpp"
 
 #include <algorithm>
+#include <bit>
 
 namespace panelgate::scenario {
 
@@ -31,6 +32,7 @@ void Watch::on_answered(TimePoint now, std::uint8_t station, Duration after) {
     Station& s = stations_[station];
     if (s.disturbed) s.settled = now;
     s.disturbed = s.silent = s.failing = false;
+    s.lately = static_cast<std::uint8_t>(s.lately << 1);
     s.slowest = std::max(s.slowest.value_or(after), after);
     slowest_ = std::max(slowest_.value_or(after), after);
 }
@@ -39,7 +41,14 @@ void Watch::on_unanswered(TimePoint now, std::uint8_t station, bool silent) {
     last_unanswered_ = now;
     Station& s = stations_[station];
     s.failing = true;
+    s.lately = static_cast<std::uint8_t>(s.lately << 1 | 1);
     s.silent = s.silent || silent;
+}
+
+void Watch::on_again(TimePoint now, std::uint8_t station) {
+    last_unanswered_ = now;
+    Station& s = stations_[station];
+    s.lately = static_cast<std::uint8_t>(s.lately | 1);
 }
 
 void Watch::on_owed(std::uint8_t station, TimePoint until) {
@@ -84,7 +93,9 @@ bool Watch::has_answered(std::uint8_t station) const {
 
 bool Watch::is_trusted(TimePoint now, std::uint8_t station) const {
     const Station* s = find(station);
-    return s != nullptr && s->slowest && !s->failing && now > last_unanswered_ + 10s;
+    if (s == nullptr || !s->slowest || s->failing) return false;
+    constexpr int kFew = 3;
+    return std::popcount(s->lately) <= kFew && now > last_unanswered_ + 10s;
 }
 
 std::optional<Duration> Watch::slowest(std::uint8_t station) const {

@@ -36,7 +36,10 @@ class Watch {
     bool is_silent(std::uint8_t station) const;
     bool is_known(std::uint8_t station) const;
     bool has_answered(std::uint8_t station) const;
-    /// It answered the last time, and no other has just fallen silent: several may have died.
+    /// Its last attempt is made once more: whatever came of it could not be believed.
+    void on_again(TimePoint now, std::uint8_t station);
+    /// It answered the last time and more often than not lately, and no other has just fallen
+    /// silent: several may have died.
     bool is_trusted(TimePoint now, std::uint8_t station) const;
     /// The longest that it has needed so far; of one that has never answered: any of the line.
     std::optional<Duration> slowest(std::uint8_t station) const;
@@ -51,6 +54,7 @@ class Watch {
         bool disturbed = false;
         bool silent = false;
         bool failing = false;
+        std::uint8_t lately = 0;  ///< the last 8 attempts, the latest lowest: 1 was in vain
         TimePoint rests{};
         TimePoint settled{};  ///< the last disturbance was over
         std::optional<Duration> slowest;

@@ -36,6 +36,11 @@ Wire::FramePtr Wire::put(Said said) {
 
 TimePoint Wire::say(Said said) {
     const FramePtr frame = put(std::move(said));
+    if (frame->damaged) {
+        witness_.on_garbled(agenda_.now());
+    } else {
+        witness_.on_said(frame->start, frame->bytes);
+    }
     deliver_in_chunks(frame);
     return frame->end;
 }

@@ -22,6 +22,7 @@ struct Said {
     std::size_t answer_from = 0;
     std::size_t answer_to = 0;
     bool copy = false;            ///< it was said before
+    bool damaged = false;         ///< not what its speaker meant
     std::size_t hole_before = 0;  ///< this byte comes later by
     Duration hole{};
     std::uint64_t connection = 0;  ///< it is heard on this one only

@@ -17,6 +17,8 @@ class Witness {
     virtual void on_exception(TimePoint now, std::uint8_t station, ByteView pdu) = 0;
     /// A second copy of an answer was delivered to its last byte.
     virtual void on_copy(TimePoint now, std::uint8_t station) = 0;
+    /// Somebody else than the gateway says this.
+    virtual void on_said(TimePoint now, ByteView bytes) = 0;
     /// Bytes were delivered that nobody said.
     virtual void on_garbled(TimePoint now) = 0;
     virtual void on_collision(TimePoint now, std::uint8_t station) = 0;

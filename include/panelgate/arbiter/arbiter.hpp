@@ -126,6 +126,7 @@ class Arbiter {
     void conclude(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
     void settle(TimePoint now);
+    void ask_again(TimePoint now);
     void fail(TimePoint now, Verdict verdict);
     void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);

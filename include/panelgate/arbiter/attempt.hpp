@@ -17,11 +17,12 @@ namespace panelgate::arbiter {
 
 /// What an attempt came to.
 enum class Verdict : std::uint8_t {
-    open,     ///< not yet
-    replied,  ///< reply() is the answer
-    silent,   ///< nothing of the station until its time was over
-    damaged,  ///< something that began like the reply, or like our own frame, and was neither
-    wrong,    ///< a good frame of the station that does not answer the request
+    open,      ///< not yet
+    replied,   ///< reply() is the answer
+    silent,    ///< nothing of the station until its time was over
+    damaged,   ///< something that began like the reply, or like our own frame, and was neither
+    wrong,     ///< a good frame of the station that does not answer the request
+    doubtful,  ///< what answers it may be a copy of an earlier reply: it is to be asked once more
 };
 
 /// One request on the wire: what is heard meanwhile, its instants, and in the end one verdict.
@@ -102,10 +103,15 @@ class Attempt {
     /// The reply is a copy of an earlier one: it counts as heard, and the attempt goes on.
     void reject_reply();
     /// It may be one: when nothing else comes until `needed` after the request, as long as the
-    /// station has ever needed, it is the answer all the same.
-    /// `doubted`: then it is asked once more instead.
+    /// station has ever needed, it is the answer all the same; or, when it is `doubted`, as long
+    /// behind it the attempt is doubtful.
     void hold_reply(Duration needed, bool doubted);
     bool was_held() const { return held_back_; }
+    /// Notes in its group what made it doubtful.
+    void remember_doubt() {
+        group_.doubted = std::exchange(held_, std::nullopt).value_or(Bytes{});
+        group_.doubted_at = held_at_;
+    }
 
     const EchoFilter& echo() const { return echo_; }
     /// The whole echo came back, and nothing of it was needed to make the reply whole.
@@ -156,6 +162,7 @@ class Attempt {
     std::optional<Bytes> reply_;
     std::optional<Bytes> held_;  ///< a reply that may be a copy
     bool held_back_ = false;
+    TimePoint held_at_{};
     bool doubted_ = false;  ///< what is held
     std::vector<modbus::Unused> strays_;
     Bytes damaged_bytes_;

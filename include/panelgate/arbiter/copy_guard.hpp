@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "panelgate/base/bytes.hpp"
@@ -75,14 +76,24 @@ class CopyGuard {
     /// This answer repeats that to another request, and the station has not shown yet that it gives
     /// equal ones.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
-        if (confirmed_ >= kConfirmations) return false;
+        if (confirmed_[kind_of(request)] >= kConfirmations) return false;
         return std::ranges::any_of(slots_, [&](const Slot& slot) {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
                    !std::ranges::equal(request, slot.request);
         });
     }
-    /// Nothing else came: it was no copy.
-    void on_confirmed() { ++confirmed_; }
+    /// It was no copy: a read was answered alike when it was asked once more; behind the answer to
+    /// anything else, which is not asked twice, no other one came.
+    void on_confirmed(ByteView request) { ++confirmed_[kind_of(request)]; }
+    /// What came at `at` repeated an earlier reply, and when it was asked once more the station
+    /// said something else. Once that may be a value that has just changed.
+    void on_denied(TimePoint at, ByteView reply) {
+        confirmed_ = {};
+        const bool again = denied_at_ && at - *denied_at_ <= kForget;
+        denied_at_ = at;
+        const TimePoint said = said_at(at, reply);
+        if (again && said != TimePoint{}) learn(at, at - said);
+    }
     /// How long after a reply the station is left alone.
     Duration hold() const { return learned_ * 3 / 2; }
     /// ... after this one, for what is in doubt too.
@@ -98,6 +109,8 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
+    /// Reads are believed by themselves: two writes to one place have the same answer.
+    static std::size_t kind_of(ByteView request) { return request[0] <= 4 ? 0 : 1; }
     std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
     const Slot& last() const { return slots_[last_index()]; }
     /// When it said this last; the beginning of time: not lately.
@@ -112,12 +125,13 @@ class CopyGuard {
     void learn(TimePoint now, Duration delay) {
         learned_ = std::max(learned_, delay);
         learned_at_ = now;
-        confirmed_ = 0;
+        confirmed_ = {};
     }
 
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
-    int confirmed_ = 0;
+    std::array<int, 2> confirmed_{};  ///< by kind_of()
+    std::optional<TimePoint> denied_at_;
     Duration doubt_{};
     Duration learned_{};  ///< from a reply to its second copy
     TimePoint learned_at_{};

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/span.hpp"
@@ -21,6 +22,8 @@ struct Group {
     int attempts = 0;
     TimePoint started{};      ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
+    Bytes doubted{};  ///< the attempt before was answered so, and it may be a copy; or nothing
+    TimePoint doubted_at{};  ///< when that came
     bool probe = false;
     bool first_silence = false;  ///< its station was well when it was first sent
     /// It only finds out about the echo, for this job, which waits in the queue.
@@ -46,6 +49,8 @@ struct Group {
         std::erase_if(jobs, late);
         return expired;
     }
+    /// What may be a copy is no answer to it before it was asked once more: a read, of clients.
+    bool may_doubt() const { return request.is_read() && doubted.empty() && !jobs.empty(); }
     /// Nobody waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
 };

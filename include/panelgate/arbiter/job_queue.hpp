@@ -30,8 +30,9 @@ namespace panelgate::arbiter {
 /// *Full.* A newcomer takes the place of the newest request of the greediest client of the
 /// greediest host, if these have more that counts than its own host, or else its own client, would
 /// have: a poll, else a read; a write only for a write, or when its host holds more than half. A
-/// write may also take the place of a poll or read of somebody who has as much as its own. What is
-/// taken away is the newest of its lane, but for reads behind it that would not make room.
+/// write may also take the place of a poll or read of somebody who has as much as its own, but for
+/// the last fifth of all places. What is taken away is the newest of its lane, but for reads behind
+/// it that would not make room.
 ///
 /// Pure, and a value. Tickets are unique and rise with each push. The tests that are handed in must
 /// not call the queue.

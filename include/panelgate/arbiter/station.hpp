@@ -106,17 +106,13 @@ class Station {
         return too_early && !again && copies_.is_copy(now, attempt.reply());
     }
     /// It repeats one, and copies come from this station, or it has not shown yet that it gives
-    /// equal answers to different requests.
+    /// equal answers to different requests. What was doubted and comes again is no copy.
     bool may_be_copy(TimePoint now, const Attempt& attempt) const {
-        return repeats_itself(now, attempt) ||
-               (!attempt.was_held() &&
-                copies_.suspicious(now, attempt.group().request.pdu(), attempt.reply()));
+        const Group& group = attempt.group();
+        if (attempt.was_held() || attempt.reply() == group.doubted) return false;
+        return copies_.repeats_itself(now, attempt.reply()) ||
+               copies_.suspicious(now, group.request.pdu(), attempt.reply());
     }
-    /// ... and copies come from this station.
-    bool repeats_itself(TimePoint now, const Attempt& attempt) const {
-        return !attempt.was_held() && copies_.repeats_itself(now, attempt.reply());
-    }
-
     // How it is to be asked
 
     const StationSettings& settings() const { return settings_; }
@@ -195,6 +191,8 @@ class Station {
     TimePoint answered_request(TimePoint now) const;
     void rest_for_owed(TimePoint now);
     void take_one(TimePoint now, TimePoint sent);
+    void learn_of_copies(TimePoint now, const Attempt& attempt);
+    void settle_debt(TimePoint now, const Attempt& attempt);
     Duration short_wait(std::optional<Duration> line) const;
 
     StationSettings settings_;

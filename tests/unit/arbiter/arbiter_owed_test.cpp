@@ -90,6 +90,59 @@ TEST_F(ArbiterTest, P1AStationThatSaysItsRepliesTwiceIsLeftAloneUntilTheSecondHa
     EXPECT_GE(next->at - replied, Duration(120ms));
 }
 
+/// Two reads of station 17, the second of which is answered like the first.
+class ArbiterDoubtTest : public ArbiterTest {
+  protected:
+    ArbiterDoubtTest() {
+        for (StationSettings& station : settings.stations) station.retries = 0;
+        script.submit(17, read_at(1), 1);
+        answer(kReply);
+        doubted = script.submit(17, read_at(2), 2);
+        answer(kReply);
+    }
+    void answer(const Bytes& reply) {
+        script.run_to_end_of_request();
+        script.run_for(3ms);
+        script.hear_reply(17, reply);
+    }
+
+    BusScript script{settings};
+    Ticket doubted = 0;
+};
+
+TEST_F(ArbiterDoubtTest, P1AnAnswerThatRepeatsAnotherOneIsAskedForOnceMoreWithoutARetry) {
+    EXPECT_FALSE(script.answered(doubted));
+    const auto again = script.next_sent(100ms);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(again->kind, FrameKind::retry);
+    EXPECT_EQ(again->adu, modbus::encode_adu(17, read_at(2)));
+    answer(reply_number(2));
+    EXPECT_EQ(script.answer(doubted).pdu.value(), reply_number(2)) << "the first was a copy";
+}
+
+TEST_F(ArbiterDoubtTest, P1WhatIsDoubtfulIsNoAnswerForThoseWhoHaveLeftEither) {
+    script.cancel(2);
+    EXPECT_FALSE(script.next_sent(100ms)) << "nobody asks again for nobody";
+    EXPECT_EQ(script.answer(doubted).pdu.error(), Fault::cancelled);
+}
+
+TEST_F(ArbiterDoubtTest, P5AnAnswerThatComesAgainWhenItIsAskedAgainIsBelievedAndNothingIsOwed) {
+    ASSERT_TRUE(script.next_sent(100ms));
+    answer(kReply);
+    EXPECT_EQ(script.answer(doubted).pdu.value(), kReply);
+    script.submit(17, read_at(3), 1);
+    EXPECT_TRUE(script.next_sent(60ms));
+}
+
+TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
+    ASSERT_TRUE(script.next_sent(100ms));
+    answer(reply_number(2));
+    script.submit(17, read_at(3), 1);
+    EXPECT_FALSE(script.next_sent(100ms)) << "one of two replies may still come";
+    script.hear_reply(17, reply_number(5));
+    EXPECT_TRUE(script.next_sent(100ms));
+}
+
 TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();

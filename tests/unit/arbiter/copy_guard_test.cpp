@@ -93,11 +93,36 @@ TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSp
     reply();
     for (int i = 0; i < CopyGuard::kConfirmations; ++i) {
         EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
-        guard_.on_confirmed();
+        guard_.on_confirmed(kOtherRequest);
     }
     EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
     unasked(20ms, kReply);
     EXPECT_TRUE(guard_.suspicious(now_ + 30ms, kOtherRequest, kReply));
+}
+
+TEST_F(CopyGuardTest, P1WhoGivesEqualAnswersToWritesIsNotBelievedWhenItIsRead) {
+    reply();
+    for (int i = 0; i < CopyGuard::kConfirmations; ++i)
+        guard_.on_confirmed("10 00 10 00 01 02 00 01"_hex);
+    EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
+}
+
+/// It could be a value that has just changed: the second time within minutes it is no longer one.
+TEST_F(CopyGuardTest, P1WhatWasDeniedTwiceWhenItWasAskedOnceMoreWasACopy) {
+    const auto deny = [&] {
+        reply();
+        for (int i = 0; i < CopyGuard::kConfirmations; ++i) guard_.on_confirmed(kOtherRequest);
+        guard_.on_denied(now_ + 20ms, kReply);
+    };
+    deny();
+    EXPECT_FALSE(guard_.known());
+    EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply)) << "no longer believed";
+    now_ += CopyGuard::kForget + 1s;
+    deny();
+    EXPECT_FALSE(guard_.known()) << "long ago";
+    now_ += 10s;
+    deny();
+    EXPECT_EQ(guard_.hold(), Duration(30ms));
 }
 
 TEST_F(CopyGuardTest, P1WhatIsInDoubtIsWaitedForBehindOneMoreReply) {

@@ -132,6 +132,18 @@ TEST_F(JobQueueLimits, P9PollsGoBeforeReadsAndReadsBeforeWrites) {
     EXPECT_TRUE(queue_.has(1, 1) && write_ != 0);
 }
 
+/// Else nobody would ever read beside more writers than there are places.
+TEST_F(JobQueueLimits, P9WritesLeaveAFifthOfThePlacesToReads) {
+    limits(5, 5);
+    for (Client client = 1; client <= 3; ++client) add(write(client, 1));
+    const Ticket first = add(read(4, 1));
+    const Ticket second = add(read(5, 1));
+    EXPECT_EQ(shed_for(write(6, 1)), second);
+    EXPECT_TRUE(refuses(write(7, 1)));
+    for (int i = 0; i < 4; ++i) next();
+    EXPECT_EQ(next(), first);
+}
+
 TEST_F(JobQueueLimits, P9AWriteGoesForAReadOnlyWhereOneHostHoldsMoreThanHalf) {
     limits(4, 4);
     for (std::uint8_t station = 1; station <= 3; ++station) add(write(1, station));

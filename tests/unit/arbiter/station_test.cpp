@@ -80,6 +80,30 @@ TEST_F(StationTest, P1EachAttemptIsOwedAReplyAndTheLastOneThatComesEndsTheRest) 
     EXPECT_TRUE(station_.may_ask(now_ + 20ms, kOther));
 }
 
+/// It may be what came damaged, said once more: then the reply to the repeated request still comes.
+TEST_F(StationTest, P1BehindADamagedReplyOneThatHasBeenLateOwesAReplyToTheRepeatedRequest) {
+    const auto repeat = [&] {
+        now_ += 2s;
+        station_.on_asked(now_, group_of(kId, kRead));
+        station_.on_damaged_reply(now_, kRead, now_ - 30ms);
+        now_ += 60ms;
+        const auto attempt =
+            test::answered(now_ - 30ms, now_, group_of(kId, kRead, 2), kOtherValue);
+        station_.on_reply(now_, attempt, 30ms, 25ms);
+    };
+    repeat();
+    EXPECT_TRUE(station_.may_ask(now_ + 150ms, kOther)) << "it has never been late";
+    for (int i = 0; i < 2; ++i) {
+        now_ += 2s;
+        miss(kRead);
+        station_.on_stray_frame(now_ + 50ms, kReply);
+    }
+    EXPECT_GT(station_.worst_lateness(), Duration(0));
+    repeat();
+    EXPECT_TRUE(station_.owes());
+    EXPECT_FALSE(station_.may_ask(now_ + kTimeout, kOther));
+}
+
 TEST_F(StationTest, P1WhatRepeatsTheReplyBeforeItMayBeACopyAndWhatIsOwedStillComes) {
     miss(kRead);
     answer(group_of(kId, kRead, 2), kReply);
