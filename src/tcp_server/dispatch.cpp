@@ -55,16 +55,16 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
         return refuse(Fault::denied, itself ? std::vector<Target>() : targets_of(unit, units));
     if (itself) return Diagnose{};
 
+    const bool broadcast = !units.broadcast_lines(unit).empty();
+    const Result<Target> target = units.route(unit);
+    if (request && target && !broadcast) return Forward{*target, std::move(*request)};
     std::vector<Target> targets = targets_of(unit, units);
     if (targets.empty()) return refuse(Fault::not_routed);
-    if (!units.broadcast_lines(unit).empty())
+    if (broadcast)
         return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets));
-    if (!request) {
-        // What is a request the bus refuses itself.
-        const bool denied = writes && !refusing(targets).empty();
-        return refuse(denied ? Fault::denied : request.error(), std::move(targets));
-    }
-    return Forward{targets.front(), std::move(*request)};
+    // What is a request the bus refuses itself.
+    const bool denied = writes && !refusing(targets).empty();
+    return refuse(denied ? Fault::denied : request.error(), std::move(targets));
 }
 
 }  // namespace panelgate::tcp_server

@@ -76,15 +76,15 @@ class CopyGuard {
     /// This answer repeats that to another request, and the station has not shown yet that it gives
     /// equal ones.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
-        if (confirmed_[kind_of(request)] >= kConfirmations) return false;
+        if (confirmed_[kind_of(request, reply)] >= kConfirmations) return false;
         return std::ranges::any_of(slots_, [&](const Slot& slot) {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
                    !std::ranges::equal(request, slot.request);
         });
     }
-    /// It was no copy: a read was answered alike when it was asked once more; behind the answer to
-    /// anything else, which is not asked twice, no other one came.
-    void on_confirmed(ByteView request) { ++confirmed_[kind_of(request)]; }
+    /// It was no copy: a read was answered alike when it was asked once more; behind what is not
+    /// asked twice, an exception or the answer to anything else, no other one came.
+    void on_confirmed(ByteView request, ByteView reply) { ++confirmed_[kind_of(request, reply)]; }
     /// What came at `at` repeated an earlier reply, and when it was asked once more the station
     /// said something else. Once that may be a value that has just changed.
     void on_denied(TimePoint at, ByteView reply) {
@@ -109,8 +109,12 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
-    /// Reads are believed by themselves: two writes to one place have the same answer.
-    static std::size_t kind_of(ByteView request) { return request[0] <= 4 ? 0 : 1; }
+    /// Values are believed by themselves: two writes to one place have the same answer, and all
+    /// exceptions of one kind are alike.
+    static std::size_t kind_of(ByteView request, ByteView reply) {
+        if (reply[0] != request[0]) return 2;
+        return request[0] <= 4 ? 0 : 1;
+    }
     std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
     const Slot& last() const { return slots_[last_index()]; }
     /// When it said this last; the beginning of time: not lately.
@@ -130,7 +134,7 @@ class CopyGuard {
 
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
-    std::array<int, 2> confirmed_{};  ///< by kind_of()
+    std::array<int, 3> confirmed_{};  ///< by kind_of()
     std::optional<TimePoint> denied_at_;
     Duration doubt_{};
     Duration learned_{};  ///< from a reply to its second copy

@@ -143,6 +143,21 @@ TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
     EXPECT_TRUE(script.next_sent(100ms));
 }
 
+/// A busy panel says so twice and then gives the value: that is no copy.
+TEST_F(ArbiterTest, P5AnExceptionThatRepeatsAnotherOneIsNotAskedForOnceMore) {
+    const auto refuse = [&](std::uint16_t address) {
+        const Ticket asked = bus.submit(17, read_at(address), 1);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear_reply(17, "83 06"_hex);
+        EXPECT_FALSE(bus.next_sent(100ms));
+        EXPECT_EQ(bus.answer(asked).pdu.value(), "83 06"_hex);
+    };
+    refuse(1);
+    refuse(2);
+    refuse(3);
+}
+
 TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();
