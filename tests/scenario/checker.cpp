@@ -124,6 +124,8 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
         check_reply(now, open, finish);
     } else {
         check_fault(now, open, finish.pdu.error());
+        // Its reply may still come before anybody else is asked.
+        if (finish.pdu.error() == Fault::timeout) watch_.on_given_up(now);
     }
 }
 
