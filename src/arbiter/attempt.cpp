@@ -48,19 +48,27 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
+    // Who looks late, or is told late, is no slower line.
+    const Duration slack = std::max<Duration>(2 * character(), 1ms);
     since_ += bytes.size();
+    looked_ = now;
     const TimePoint latest = now - since_ * character();
+    hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
     // More should have come by now: a hole, or a slower clock, as the next byte will tell.
-    if (const auto busy = busy_until(); busy && *busy <= now) began_.reset();
+    const auto busy = busy_until();
+    if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
     return verdict;
 }
 
+/// A reply that was cut short is noticed before twice the time that it has taken.
 std::optional<TimePoint> Attempt::busy_until() const {
+    constexpr Duration kLongest = 30ms;
     const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
-    if (!timing_.steady || missing == 0 || !began_) return std::nullopt;
-    return *began_ + (since_ + missing) * character();
+    if (!timing_.steady || hasty_ || missing == 0 || !began_) return std::nullopt;
+    return std::min<TimePoint>(*began_ + (since_ + missing) * character(),
+                               looked_ + std::max<Duration>(kLongest, looked_ - *began_));
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {

@@ -56,6 +56,7 @@ void Arbiter::settle(TimePoint now) {
     if (station.may_be_copy(now, *active_))
         return active_->hold_reply(station.needed(), station.asks_again(now, *active_));
     pace_.on_reply(early);
+    if (active_->hasty()) pace_.on_hasty();
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();

@@ -66,6 +66,8 @@ class Attempt {
     /// the rest of its header, or of all of it, takes as long at the line's rate. Who waits needs
     /// not look at each. Nothing: every byte may tell something.
     std::optional<TimePoint> busy_until() const;
+    /// More has come than the line's rate allows since the reply began.
+    bool hasty() const { return hasty_; }
 
     bool wants_end(TimePoint now) const { return !end_confirmed_ && now >= timing_.sent; }
     TimePoint end_wanted_at() const { return end_confirmed_ ? TimePoint::max() : timing_.sent; }
@@ -173,6 +175,8 @@ class Attempt {
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
+    TimePoint looked_{};  ///< when bytes came last
+    bool hasty_ = false;
     std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;
     bool disturbed_ = false;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <utility>
 
 #include "panelgate/base/bytes.hpp"
@@ -24,6 +23,7 @@ class CopyGuard {
     static constexpr Duration kForget = 2min;
     static constexpr Duration kSaidAgain = 150ms;  ///< behind a damaged reply, by some panels
     static constexpr int kConfirmations = 3;       ///< that make equal answers credible
+    static constexpr int kDenials = 3;             ///< that make them copies
 
     void on_reply(TimePoint now, Bytes request, Bytes reply) {
         if (now - learned_at_ > kForget) learned_ = {};
@@ -84,15 +84,19 @@ class CopyGuard {
     }
     /// It was no copy: a read was answered alike when it was asked once more; behind what is not
     /// asked twice, an exception or the answer to anything else, no other one came.
-    void on_confirmed(ByteView request, ByteView reply) { ++confirmed_[kind_of(request, reply)]; }
+    void on_confirmed(ByteView request, ByteView reply) {
+        ++confirmed_[kind_of(request, reply)];
+        denied_ = 0;
+    }
     /// What came at `at` repeated an earlier reply, and when it was asked once more the station
-    /// said something else. Once that may be a value that has just changed.
+    /// said something else. That may be a value that has just changed: three times in a row it is
+    /// a copy.
     void on_denied(TimePoint at, ByteView reply) {
         confirmed_ = {};
-        const bool again = denied_at_ && at - *denied_at_ <= kForget;
+        denied_ = at - denied_at_ <= kForget ? denied_ + 1 : 1;
         denied_at_ = at;
         const TimePoint said = said_at(at, reply);
-        if (again && said != TimePoint{}) learn(at, at - said);
+        if (denied_ >= kDenials && said != TimePoint{}) learn(at, at - said);
     }
     /// How long after a reply the station is left alone.
     Duration hold() const { return learned_ * 3 / 2; }
@@ -135,7 +139,8 @@ class CopyGuard {
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
     std::array<int, 3> confirmed_{};  ///< by kind_of()
-    std::optional<TimePoint> denied_at_;
+    TimePoint denied_at_{};
+    int denied_ = 0;  ///< in a row
     Duration doubt_{};
     Duration learned_{};  ///< from a reply to its second copy
     TimePoint learned_at_{};

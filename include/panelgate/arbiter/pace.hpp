@@ -3,8 +3,8 @@
 namespace panelgate::arbiter {
 
 /// Whether a line that is no real UART behaves like one: replies never begin before the request has
-/// left. One that did settles it, until the line is opened again; several in a row, and the line is
-/// not bound to its rate at all. Pure.
+/// left, and no bytes come faster than the line's rate. One that did settles it, until the line is
+/// opened again; several early ones in a row, and the line is not bound to its rate at all. Pure.
 class Pace {
   public:
     void on_reply(bool early) {
@@ -16,6 +16,9 @@ class Pace {
             early_ = 0;
         }
     }
+    void on_hasty() { hasty_ = true; }
+    /// Nothing has come sooner than the line's rate allows.
+    bool kept() const { return kept_ && !hasty_; }
     bool believed() const { return kept_ && timely_ >= kEnough; }
     /// One early reply may be a late one, to a request that was sent again.
     bool unbound() const { return early_ >= kEnough; }
@@ -26,6 +29,7 @@ class Pace {
     int timely_ = 0;
     int early_ = 0;  // in a row
     bool kept_ = true;
+    bool hasty_ = false;
 };
 
 }  // namespace panelgate::arbiter

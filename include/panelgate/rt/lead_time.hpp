@@ -8,7 +8,7 @@ namespace panelgate::rt {
 
 /// A system's timer rings late: the machine has to wake up, some 30 us where it idles. How much
 /// earlier it is to be set, so that who must be on time can watch the clock for the rest. As much
-/// as nine of ten are late; watching takes at most a thirtieth of the time. Pure.
+/// as two of three are late; watching takes at most a thirtieth of the time. Pure.
 class LeadTime {
   public:
     static constexpr Duration kMost = 80us;
@@ -17,7 +17,7 @@ class LeadTime {
     Duration lead() const { return allowance_ > Duration::zero() ? lead_ : Duration::zero(); }
     /// The timer rang so late, and for so long the clock was watched.
     void on_rung(TimePoint now, Duration late, Duration watched) {
-        constexpr Duration kUp = 900ns;  // nine times the way down: nine of ten are below
+        constexpr Duration kUp = 200ns;  // twice the way down: two of three are below
         constexpr Duration kDown = 100ns;
         lead_ = std::clamp(late > lead_ ? lead_ + kUp : lead_ - kDown, Duration::zero(), kMost);
         const Duration passed = std::min(now - last_, kShare * kSaved);

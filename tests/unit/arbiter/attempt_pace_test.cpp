@@ -82,6 +82,45 @@ TEST_F(AttemptPaceTest, WhatIsNoReplyIsWantedByteByByte) {
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
+TEST_F(AttemptPaceTest, WhatComesFasterThanTheLineIsWantedAtOnce) {
+    const Bytes long_reply = "11 03 C8"_hex;
+    attempt_ = [&] {
+        Settings line;
+        Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+        timing.patience = timing.usual = 500ms;
+        return Attempt(group_of(kStation, "03 00 6B 00 64"_hex), timing, {});
+    }();
+    now_ = start_;
+    attempt_.on_rx(now_, long_reply, [](ByteView) { return true; });
+    EXPECT_TRUE(busy());
+    EXPECT_FALSE(attempt_.hasty());
+    now_ += 1ms;  // an adapter on USB that knows of no rate
+    attempt_.on_rx(now_, Bytes(62, 7), [](ByteView) { return true; });
+    EXPECT_TRUE(attempt_.hasty());
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, ALongReplyIsLookedAtBeforeItsEndBecauseItMayHaveBeenCutShort) {
+    Settings line;
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = timing.usual = 500ms;
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 64"_hex), timing, {});
+    now_ = start_ + 3 * kCharacter;
+    attempt_.on_rx(now_, "11 03 C8"_hex, [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 3 * kCharacter + 30ms);
+    const std::size_t come = static_cast<std::size_t>(30ms / kCharacter);
+    now_ = start_ + (3 + come) * kCharacter;
+    attempt_.on_rx(now_, Bytes(come, 7), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 2 * (3 + come) * kCharacter) << "as long again";
+}
+
+TEST_F(AttemptPaceTest, WhenLessHasComeThanTheLineBringsEachByteIsWanted) {
+    hear(0, 3);
+    now_ = start_ + 10 * kCharacter;
+    attempt_.on_rx(now_, ByteView(kReply).subspan(3, 2), [](ByteView) { return true; });
+    EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
 TEST_F(AttemptPaceTest, OverTcpNothingComesAtTheRateOfTheLine) {
     attempt_ = attempt_of(true);
     hear(0, 1);

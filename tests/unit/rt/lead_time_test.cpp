@@ -5,10 +5,10 @@
 namespace panelgate::rt {
 namespace {
 
-TEST(LeadTime, FollowsWhatNineOfTenAreLate) {
+TEST(LeadTime, FollowsWhatTwoOfThreeAreLate) {
     LeadTime lead;
     TimePoint now{};
-    for (int i = 0; i < 10000; ++i) lead.on_rung(now += 10ms, i % 20 == 0 ? 2ms : 15us, 0us);
+    for (int i = 0; i < 10000; ++i) lead.on_rung(now += 10ms, i % 4 == 0 ? 2ms : 15us, 0us);
     EXPECT_GE(lead.lead(), 14us);
     EXPECT_LE(lead.lead(), 17us);
 }
