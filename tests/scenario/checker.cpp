@@ -111,6 +111,7 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
     // Who was sent before, in a joined read, is told so when it has to go. Not all that look as if
     // they went along with a frame were: what was split before goes alone.
     const auto is = [&](Fault fault) { return !finish.pdu && finish.pdu.error() == fault; };
+    if (is(Fault::timeout)) watch_.on_timeout(now);
     displaced_ = displaced_ || is(Fault::busy) || (open.sent && is(Fault::timeout));
     if (open.write) {
         const std::string key = key_of(open.job.station, open.job.request.pdu());
