@@ -76,15 +76,15 @@ class CopyGuard {
     /// This answer repeats that to another request, and the station has not shown yet that it gives
     /// equal ones.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
-        if (confirmed_[kind_of(request)] >= kConfirmations) return false;
+        if (confirmed_[kind_of(request, reply)] >= kConfirmations) return false;
         return std::ranges::any_of(slots_, [&](const Slot& slot) {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
                    !std::ranges::equal(request, slot.request);
         });
     }
-    /// It was no copy: a read was answered alike when it was asked once more; behind the answer to
-    /// anything else, which is not asked twice, no other one came.
-    void on_confirmed(ByteView request) { ++confirmed_[kind_of(request)]; }
+    /// It was no copy: a read had the same values when it was asked once more; behind anything
+    /// else, which is not asked twice, no other answer came.
+    void on_confirmed(ByteView request, ByteView reply) { ++confirmed_[kind_of(request, reply)]; }
     /// What came at `at` repeated an earlier reply, and when it was asked once more the station
     /// said something else. Once that may be a value that has just changed.
     void on_denied(TimePoint at, ByteView reply) {
@@ -109,8 +109,11 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
-    /// Reads are believed by themselves: two writes to one place have the same answer.
-    static std::size_t kind_of(ByteView request) { return request[0] <= 4 ? 0 : 1; }
+    /// Values are believed by themselves: two writes to one place have the same answer, and what is
+    /// refused is often refused alike.
+    static std::size_t kind_of(ByteView request, ByteView reply) {
+        return request[0] <= 4 && reply[0] == request[0] ? 0 : 1;
+    }
     std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
     const Slot& last() const { return slots_[last_index()]; }
     /// When it said this last; the beginning of time: not lately.

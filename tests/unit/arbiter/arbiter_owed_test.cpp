@@ -143,6 +143,20 @@ TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
     EXPECT_TRUE(script.next_sent(100ms));
 }
 
+TEST_F(ArbiterTest, P5ARefusalThatRepeatsAnotherOneIsNotAskedForAgain) {
+    const auto refuse = [&](unsigned number) {
+        const Ticket ticket = bus.submit(17, read_at(number), number);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear_reply(17, "83 06"_hex);
+        bus.run_for(50ms);
+        return ticket;
+    };
+    refuse(1);
+    EXPECT_EQ(bus.answer(refuse(2)).pdu.value(), "83 06"_hex);
+    EXPECT_EQ(bus.sent.size(), 2u);
+}
+
 TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();

@@ -93,7 +93,7 @@ TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSp
     reply();
     for (int i = 0; i < CopyGuard::kConfirmations; ++i) {
         EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
-        guard_.on_confirmed(kOtherRequest);
+        guard_.on_confirmed(kOtherRequest, kReply);
     }
     EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
     unasked(20ms, kReply);
@@ -103,7 +103,7 @@ TEST_F(CopyGuardTest, P1AStationThatWasSeenToGiveEqualAnswersIsBelievedUntilItSp
 TEST_F(CopyGuardTest, P1WhoGivesEqualAnswersToWritesIsNotBelievedWhenItIsRead) {
     reply();
     for (int i = 0; i < CopyGuard::kConfirmations; ++i)
-        guard_.on_confirmed("10 00 10 00 01 02 00 01"_hex);
+        guard_.on_confirmed("10 00 10 00 01 02 00 01"_hex, "10 00 10 00 01"_hex);
     EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
 }
 
@@ -111,7 +111,8 @@ TEST_F(CopyGuardTest, P1WhoGivesEqualAnswersToWritesIsNotBelievedWhenItIsRead) {
 TEST_F(CopyGuardTest, P1WhatWasDeniedTwiceWhenItWasAskedOnceMoreWasACopy) {
     const auto deny = [&] {
         reply();
-        for (int i = 0; i < CopyGuard::kConfirmations; ++i) guard_.on_confirmed(kOtherRequest);
+        for (int i = 0; i < CopyGuard::kConfirmations; ++i)
+            guard_.on_confirmed(kOtherRequest, kReply);
         guard_.on_denied(now_ + 20ms, kReply);
     };
     deny();
