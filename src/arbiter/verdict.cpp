@@ -54,7 +54,7 @@ void Arbiter::settle(TimePoint now) {
     const bool too_early = early && !settings_.paced && pace_.believed();
     if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
     if (station.may_be_copy(now, *active_))
-        return active_->hold_reply(station.needed(), station.asks_again(now, *active_));
+        return active_->hold_reply(station.needed(), active_->group().may_doubt(active_->reply()));
     pace_.on_reply(early);
     if (active_->hasty()) pace_.on_hasty();
     Attempt attempt = take_active(now);

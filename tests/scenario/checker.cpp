@@ -108,9 +108,11 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
         if (!finish.pdu && watch_.is_silent(open.job.station)) client->second.held_until = now;
     }
     check_in_time(now, open, finish);
-    // Who was sent before, in a joined read, is told so when it has to go.
-    const Fault of_displaced = open.sent ? Fault::timeout : Fault::busy;
-    displaced_ = displaced_ || (!finish.pdu && finish.pdu.error() == of_displaced);
+    // Who was sent before, in a joined read, is told so when it has to go. Not all that look as if
+    // they went along with a frame were: what was split before goes alone.
+    const auto is = [&](Fault fault) { return !finish.pdu && finish.pdu.error() == fault; };
+    if (is(Fault::timeout)) watch_.on_timeout(now);
+    displaced_ = displaced_ || is(Fault::busy) || (open.sent && is(Fault::timeout));
     if (open.write) {
         const std::string key = key_of(open.job.station, open.job.request.pdu());
         closed_writes_.insert(key);
@@ -124,8 +126,6 @@ void Checker::on_finish(TimePoint now, const arbiter::Finish& finish) {
         check_reply(now, open, finish);
     } else {
         check_fault(now, open, finish.pdu.error());
-        // Its reply may still come before anybody else is asked.
-        if (finish.pdu.error() == Fault::timeout) watch_.on_given_up(now);
     }
 }
 

@@ -23,6 +23,7 @@ struct OpenViolation {
 inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     // A reader's station rests in some of the turns, and its own writers have those that are left.
     {"company", "P9: five writes in a row"},
+    {"receiver", "P9: five writes in a row"},
     // A panel that is sound by itself fails beside noise that hits its frames without a collision
     // that the checker sees, where the station has no retries.
     {"voices", "P4: a sound"},
@@ -32,6 +33,7 @@ inline constexpr auto kOpenViolations = std::to_array<OpenViolation>({
     // Budgets and rests under several faults at once.
     {"wild", "P4: "},
     {"dead", "P5: nothing was sent"},
+    {"dead", "P4: silent stations take more"},
     // What is held back because it repeats another answer, and the silence behind copies.
     {"voices", "P5: the line was silent"},
     {"receiver", "P5: the line was silent"},

@@ -89,6 +89,7 @@ TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
         {Kind::wild, 215},
         // What was not believed was asked for again, and others were waited for less long.
         {Kind::wild, 207},
+        {Kind::loss, 482},
         // A damaged reply passed for an exception.
         {Kind::adaptive, 182},
         // A request had left sooner than computed, and a read joined it.

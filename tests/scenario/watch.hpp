@@ -36,8 +36,8 @@ class Watch {
     bool is_silent(std::uint8_t station) const;
     bool is_known(std::uint8_t station) const;
     bool has_answered(std::uint8_t station) const;
-    /// A request was sent and its time is over: others are waited for less long.
-    void on_given_up(TimePoint now) { last_unanswered_ = now; }
+    /// Somebody was told that nobody answered, even if the answer came later.
+    void on_timeout(TimePoint now) { last_unanswered_ = now; }
     /// Its last attempt is made once more: whatever came of it could not be believed.
     void on_again(TimePoint now, std::uint8_t station);
     /// It answered the last time and more often than not lately, and no other has just fallen

@@ -82,8 +82,8 @@ class CopyGuard {
                    !std::ranges::equal(request, slot.request);
         });
     }
-    /// It was no copy: a read was answered alike when it was asked once more; behind what is not
-    /// asked twice, an exception or the answer to anything else, no other one came.
+    /// It was no copy: a read had the same values when it was asked once more; behind anything
+    /// else, which is not asked twice, no other answer came.
     void on_confirmed(ByteView request, ByteView reply) {
         ++confirmed_[kind_of(request, reply)];
         denied_ = 0;
@@ -113,11 +113,10 @@ class CopyGuard {
         bool second = false;  ///< behind it came another one of its shape
         bool is_recent(TimePoint now) const { return !reply.empty() && now - at <= kLongest; }
     };
-    /// Values are believed by themselves: two writes to one place have the same answer, and all
-    /// exceptions of one kind are alike.
+    /// Values are believed by themselves: two writes to one place have the same answer, and what is
+    /// refused is often refused alike.
     static std::size_t kind_of(ByteView request, ByteView reply) {
-        if (reply[0] != request[0]) return 2;
-        return request[0] <= 4 ? 0 : 1;
+        return request[0] <= 4 && reply[0] == request[0] ? 0 : 1;
     }
     std::size_t last_index() const { return (next_ + kReplies - 1) % kReplies; }
     const Slot& last() const { return slots_[last_index()]; }
@@ -138,7 +137,7 @@ class CopyGuard {
 
     std::array<Slot, kReplies> slots_{};
     std::size_t next_ = 0;
-    std::array<int, 3> confirmed_{};  ///< by kind_of()
+    std::array<int, 2> confirmed_{};  ///< by kind_of()
     TimePoint denied_at_{};
     int denied_ = 0;  ///< in a row
     Duration doubt_{};

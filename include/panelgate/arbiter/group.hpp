@@ -49,8 +49,12 @@ struct Group {
         std::erase_if(jobs, late);
         return expired;
     }
-    /// What may be a copy is no answer to it before it was asked once more: a read, of clients.
-    bool may_doubt() const { return request.is_read() && doubted.empty() && !jobs.empty(); }
+    /// What may be a copy is no answer to it before it was asked once more: values, for clients. A
+    /// refusal is not asked for again; it may well be gone by then.
+    bool may_doubt(ByteView reply) const {
+        const bool values = request.is_read() && reply[0] == request.function();
+        return values && doubted.empty() && !jobs.empty();
+    }
     /// Nobody waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
 };

@@ -17,7 +17,6 @@
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
 #include "panelgate/base/pool.hpp"
-#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -113,13 +112,6 @@ class Station {
         if (attempt.was_held() || attempt.reply() == group.doubted) return false;
         return copies_.repeats_itself(now, attempt.reply()) ||
                copies_.suspicious(now, group.request.pdu(), attempt.reply());
-    }
-    /// Whether what may be a copy is asked for once more. An exception only where copies come from
-    /// this station: a busy panel repeats its own and then answers, which tells nothing.
-    bool asks_again(TimePoint now, const Attempt& attempt) const {
-        const bool value = !modbus::exception_of(attempt.reply());
-        return attempt.group().may_doubt() &&
-               (value || copies_.repeats_itself(now, attempt.reply()));
     }
 
     // How it is to be asked
