@@ -170,7 +170,15 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     if (!in.has("diagnostics_unit")) return;
     settings.diagnostics_unit.reset();
-    if (in.child("diagnostics_unit") == nullptr) return;
+    const Node* given = in.child("diagnostics_unit");
+    if (given == nullptr) return;
+    constexpr std::array<std::string_view, 4> kNone{"off", "none", "no", "false"};
+    if (std::ranges::find(kNone, given->scalar) != kNone.end()) {
+        in.problem("diagnostics_unit",
+                   "diagnostics_unit must be a whole number from 1 to 255, not " +
+                       yaml::quote(given->scalar) + "; write null for none");
+        return;
+    }
     const auto unit = in.integer("diagnostics_unit", 1, 255);
     if (!unit) return;
     settings.diagnostics_unit = static_cast<std::uint8_t>(*unit);
