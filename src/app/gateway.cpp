@@ -166,7 +166,7 @@ void Gateway::stop_accepting() {
     for (const auto& listener : listeners_) {
         listener->stop([this] { --open_listeners_; });
     }
-    if (http_) http_->stop();
+    if (http_) http_->stop(longest_answer());
 }
 
 bool Gateway::drained() const {

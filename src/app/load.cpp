@@ -23,7 +23,8 @@ std::optional<std::string> environment(const std::string& name) {
 Loaded load_file(const std::string& path) {
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
-        const std::string why = std::strerror(errno);
+        const std::string why =
+            errno == EPIPE ? "nobody writes to this pipe" : std::strerror(errno);
         std::cerr << "panelgate: cannot read " << path << ": " << why
                   << " (give another file with -c)\n";
         return {std::nullopt, kNoInput, {{path, {0, 0}, "cannot be read: " + why}}};

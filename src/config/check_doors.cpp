@@ -157,6 +157,10 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
                          "[192.168.10.0/24], or listen on 127.0.0.1:" +
                          std::to_string(http.port));
     }
+    if (http.anonymous == web::Role::none && http.tokens.empty())
+        loading.warn(mark_of(node, "anonymous"),
+                     "nobody can use this but /healthz and /readyz: anonymous is none and there is "
+                     "no token; add tokens, or say anonymous: viewer");
     const Node* tokens = find(node, "tokens");
     for (std::size_t i = 0; i < http.tokens.size(); ++i)
         warn_of_token(loading, tokens->items[i], http.tokens[i]);

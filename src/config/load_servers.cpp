@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -168,8 +170,16 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     if (!in.has("diagnostics_unit")) return;
     settings.diagnostics_unit.reset();
-    if (in.child("diagnostics_unit") == nullptr) return;
-    const auto unit = in.integer("diagnostics_unit", 0, 255);
+    const Node* given = in.child("diagnostics_unit");
+    if (given == nullptr) return;
+    constexpr std::array<std::string_view, 4> kNone{"off", "none", "no", "false"};
+    if (std::ranges::find(kNone, given->scalar) != kNone.end()) {
+        in.problem("diagnostics_unit",
+                   "diagnostics_unit must be a whole number from 1 to 255, not " +
+                       yaml::quote(given->scalar) + "; write null for none");
+        return;
+    }
+    const auto unit = in.integer("diagnostics_unit", 1, 255);
     if (!unit) return;
     settings.diagnostics_unit = static_cast<std::uint8_t>(*unit);
     if (settings.units.contains(*settings.diagnostics_unit))
@@ -201,6 +211,8 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
         in.problem("allow", "allow must name at least one network; leave it out for all");
 }
 
+constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
+
 void refuse_tls(MapReader& in) {
     if (in.has("tls"))
         in.problem("tls",
@@ -224,6 +236,9 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     settings.max_connections =
         static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
     refuse_tls(in);
+    refuse_empty(in, "lines", "name at least one line, or leave it out for all");
+    refuse_empty(in, "units", "write such as {101: floor1/31}, or leave it out");
+    refuse_empty(in, "allow", kNoNetwork);
     in.finish();
     return settings;
 }
@@ -259,6 +274,9 @@ void load_http(Loading& loading, MapReader& root) {
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
     refuse_tls(in);
+    refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
+    refuse_empty(in, "allow", kNoNetwork);
+    refuse_empty(in, "tokens", "give at least one token, or leave it out");
     in.finish();
     for (const tcp_server::Settings& other : loading.config.modbus_tcp) {
         if (settings.port == 0 || other.name() != settings.name()) continue;

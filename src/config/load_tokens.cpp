@@ -12,7 +12,13 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-/// A token's secret: the file's text without blanks around it.
+/// No header carries them; in text of two bytes a letter every second byte is one.
+bool has_control_character(std::string_view text) {
+    return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+}
+
+/// A token's secret: the file's text without blanks around it, and without the mark that editors
+/// put before UTF-8.
 std::string load_secret(Loading& loading, MapReader& in) {
     constexpr std::string_view kBlanks = " \t\r\n";
     const auto file = in.required_text("file");
@@ -21,7 +27,8 @@ std::string load_secret(Loading& loading, MapReader& in) {
         in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
         return "";
     }
-    const auto text = loading.files.read(*file);
+    auto text = loading.files.read(*file);
+    if (text && text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
     if (!text) {
         // Not the text: whoever took the token for its file has written that.
         in.problem("file",
@@ -37,6 +44,9 @@ std::string load_secret(Loading& loading, MapReader& in) {
     std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
     if (secret.find_first_of(kBlanks) != std::string::npos)
         in.problem("file", "the token file " + *file + " must hold one token, without blanks");
+    else if (has_control_character(secret))
+        in.problem("file", "the token file " + *file +
+                               " must be plain text (UTF-8); it holds control characters");
     return secret;
 }
 
@@ -66,6 +76,11 @@ void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& token
         if (!token.name.empty() &&
             std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
             loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
+        const auto same = std::ranges::find(tokens, token.secret, &web::Token::secret);
+        if (!token.secret.empty() && same != tokens.end() && same->name != token.name)
+            loading.problems.add(node.mark, "the tokens '" + same->name + "' and '" + token.name +
+                                                "' are the same text: nobody could tell them "
+                                                "apart; give each its own");
         tokens.push_back(std::move(token));
     }
 }

@@ -40,6 +40,10 @@ std::optional<bool> load_read_only(yaml::MapReader& in);
 std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
                          std::string_view noun);
 
+/// A key with nothing behind it, or with all of it commented out, says neither "all" nor "none": a
+/// problem that ends with `instead`. Call it when all keys have been read.
+void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view instead);
+
 void load_lines(Loading& loading, yaml::MapReader& root);
 void load_relays(Loading& loading, yaml::MapReader& root);
 void load_modbus_tcp(Loading& loading, yaml::MapReader& root);

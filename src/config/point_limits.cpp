@@ -84,6 +84,14 @@ void check_limit(yaml::MapReader& in, std::string_view key, const Point& point,
     limit.reset();
 }
 
+/// Whole raw numbers between them, if there is any: 0 and 10 with scale 10, but nothing of 1 to 9.
+bool has_value_between(const Point& point, double min, double max) {
+    const auto raw = [&](double value) { return (value - point.offset) / point.scale; };
+    const auto [low, high] = std::minmax({raw(min), raw(max)});
+    const double slack = std::max({1.0, std::abs(low), std::abs(high)}) * 1e-9;
+    return std::ceil(low - slack) <= std::floor(high + slack);
+}
+
 }  // namespace
 
 RawRange label_range(Type type) {
@@ -126,6 +134,11 @@ void load_limits(yaml::MapReader& in, Point& point) {
     if (point.type == Type::boolean || point.type == Type::string) return;
     check_limit(in, "min", point, point.min);
     check_limit(in, "max", point, point.max);
+    if (is_integer(point.type) && point.min && point.max && *point.min <= *point.max &&
+        !has_value_between(point, *point.min, *point.max))
+        in.problem("min", "the point has no value from " + number_text(*point.min) + " to " +
+                              number_text(*point.max) + " (scale " + number_text(point.scale) +
+                              "): nothing could be written");
 }
 
 }  // namespace panelgate::config

@@ -1,14 +1,18 @@
 #include "panelgate/config/real_files.hpp"
 
+#include <fcntl.h>
 #include <linux/magic.h>
+#include <poll.h>
+#include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <sys/vfs.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstddef>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
 namespace panelgate::config {
@@ -23,6 +27,38 @@ bool is_mounted_for_one(const std::string& path) {
     if (statfs(path.c_str(), &system) != 0) return false;
     const bool in_memory = system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC;
     return in_memory && (system.f_flags & ST_RDONLY) != 0;
+}
+
+/// Waits for one a moment where it can be missing: at a pipe that has a name. Else EPIPE.
+bool has_writer(int file) {
+    constexpr int kMoment = 1000;  // ms
+    struct stat status{};
+    struct statfs system{};
+    if (::fstat(file, &status) != 0 || ::fstatfs(file, &system) != 0) return false;
+    if (!S_ISFIFO(status.st_mode) || system.f_type == PIPEFS_MAGIC) return true;
+    pollfd written{file, POLLIN, 0};
+    const int ready = ::poll(&written, 1, kMoment);
+    if (ready == 0) errno = EPIPE;
+    return ready > 0;
+}
+
+/// From an open file, for as long as that takes; 16 MiB at most.
+std::optional<std::string> read_all(int file) {
+    constexpr std::size_t kMost = std::size_t{16} * 1024 * 1024;
+    const int flags = ::fcntl(file, F_GETFL);
+    if (flags < 0 || ::fcntl(file, F_SETFL, flags & ~O_NONBLOCK) != 0) return std::nullopt;
+    std::string text;
+    std::array<char, 16384> piece{};
+    for (;;) {
+        const ssize_t n = ::read(file, piece.data(), piece.size());
+        if (n == 0) return text;
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) return std::nullopt;
+        text.append(piece.data(), static_cast<std::size_t>(n));
+        if (text.size() <= kMost) continue;
+        errno = EFBIG;
+        return std::nullopt;
+    }
 }
 
 }  // namespace
@@ -40,23 +76,18 @@ std::optional<std::string> RealFiles::read(const std::string& path) const {
 }
 
 std::optional<std::string> RealFiles::read_any(const std::string& path) {
-    constexpr std::uintmax_t kMost = 16 * 1024 * 1024;
     std::error_code error;
     if (fs::is_directory(path, error)) {
         errno = EISDIR;
         return std::nullopt;
     }
-    errno = 0;
-    std::ifstream in(path, std::ios::binary);
-    if (!in) return std::nullopt;
-    std::string text;
-    for (std::istreambuf_iterator<char> at(in), end; at != end; ++at) {
-        if (text.size() >= kMost) {
-            errno = EFBIG;
-            return std::nullopt;
-        }
-        text += *at;
-    }
+    // A pipe without a writer would hold up the opening itself.
+    const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
+    if (file < 0) return std::nullopt;
+    auto text = has_writer(file) ? read_all(file) : std::nullopt;
+    const int why = errno;
+    ::close(file);
+    errno = why;
     return text;
 }
 

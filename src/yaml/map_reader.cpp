@@ -90,8 +90,8 @@ bool MapReader::require(std::string_view key) {
 bool MapReader::is_mistyped(std::string_view key) const {
     for (std::size_t i = 0; i < node_->entries.size(); ++i) {
         const Entry& entry = node_->entries[i];
+        if (entry.key == key || std::ranges::find(known_, entry.key) != known_.end()) continue;
         const Entry* parent = shallow_parent(i);
-        if (entry.key == key) continue;
         if (nearest(entry.key, std::span(&key, 1)) == key ||
             entry.key.starts_with(std::string(key) + ':') ||
             (parent != nullptr && parent->key == key))

@@ -14,7 +14,7 @@ class RealFiles final : public Files {
     bool is_special(const std::string& path) const override;
 
     /// As read(), and also from a pipe or a device, for as long as that takes: of what the command
-    /// line names.
+    /// line names. A named pipe that nobody writes to within a second is not read (EPIPE).
     static std::optional<std::string> read_any(const std::string& path);
 };
 

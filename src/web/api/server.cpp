@@ -30,7 +30,7 @@ boost::system::error_code Server::start() { return listener_->open(); }
 
 std::uint16_t Server::port() const { return listener_->port(); }
 
-void Server::stop() { listener_->stop(); }
+void Server::stop(Duration reading) { listener_->stop(reading); }
 
 const Counters& Server::counters() const { return listener_->counters(); }
 

@@ -75,14 +75,14 @@ bool HttpListener::make_room(const Caller& caller) {
     return arrival.probes_only;
 }
 
-void HttpListener::stop() {
+void HttpListener::stop(Duration reading) {
     acceptor_.close();
     const auto sessions = sessions_;
-    for (const auto& [id, session] : sessions) session->stop();
+    for (const auto& [id, session] : sessions) session->stop(reading);
 }
 
 void HttpListener::abandon() {
-    stop();
+    stop(Duration::zero());
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) session->abandon();
 }

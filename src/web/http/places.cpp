@@ -12,27 +12,35 @@ Places::Places(const Settings& settings)
 Places::Arrival Places::arrive(Id id, const std::string& address) {
     Arrival arrival;
     if (count(false, &address) >= limit_of_address_) {
-        arrival.leaves = longest_idle(false, &address);
+        arrival.leaves = first_to_leave(&address);
         arrival.probes_only = !arrival.leaves;
     } else if (count(false) >= limit_) {
-        arrival.leaves = longest_idle(false);
+        arrival.leaves = first_to_leave();
+        if (!arrival.leaves) arrival.leaves = suspect_of_another(address);
         arrival.probes_only = !arrival.leaves;
     }
-    if (arrival.probes_only && count(true) >= limit_of_probes_) arrival.leaves = longest_idle(true);
+    if (arrival.probes_only && count(true) >= limit_of_probes_)
+        arrival.leaves = longest(State::idle, true);
     if (arrival.leaves) leave(*arrival.leaves);
-    guests_[id] = {address, arrival.probes_only, false, ++turn_};
+    guests_[id] = {address, arrival.probes_only, State::idle, ++turn_};
     return arrival;
 }
 
-void Places::busy(Id id) {
+void Places::busy(Id id) { set(id, State::busy); }
+
+void Places::suspect(Id id) { set(id, State::suspect); }
+
+void Places::wrong(Id id) { set(id, State::wrong); }
+
+void Places::set(Id id, State state) {
     const auto guest = guests_.find(id);
-    if (guest != guests_.end() && !guest->second.probes_only) guest->second.busy = true;
+    if (guest != guests_.end() && !guest->second.probes_only) guest->second.state = state;
 }
 
 void Places::idle(Id id) {
     const auto guest = guests_.find(id);
-    if (guest == guests_.end() || !guest->second.busy) return;
-    guest->second.busy = false;
+    if (guest == guests_.end() || guest->second.state == State::idle) return;
+    guest->second.state = State::idle;
     guest->second.since = ++turn_;
 }
 
@@ -45,17 +53,30 @@ std::size_t Places::count(bool probes_only, const std::string* address) const {
     }));
 }
 
-std::optional<Places::Id> Places::longest_idle(bool probes_only, const std::string* address) const {
+std::optional<Places::Id> Places::first_to_leave(const std::string* address) const {
+    const auto wrong = longest(State::wrong, false, address);
+    return wrong ? wrong : longest(State::idle, false, address);
+}
+
+std::optional<Places::Id> Places::longest(State state, bool probes_only,
+                                          const std::string* address) const {
     std::optional<Id> found;
     std::uint64_t since = 0;
     for (const auto& [id, guest] : guests_) {
-        if (guest.busy || guest.probes_only != probes_only) continue;
+        if (guest.state != state || guest.probes_only != probes_only) continue;
         if (address && guest.address != *address) continue;
         if (found && guest.since > since) continue;
         found = id;
         since = guest.since;
     }
     return found;
+}
+
+std::optional<Places::Id> Places::suspect_of_another(const std::string& address) const {
+    for (const auto& [id, guest] : guests_) {
+        if (guest.state == State::suspect && guest.address != address) return id;
+    }
+    return std::nullopt;
 }
 
 }  // namespace panelgate::web

@@ -11,8 +11,9 @@
 namespace panelgate::web {
 
 /// Who may stay when many want to: so many connections, so many of them an address. To a full house
-/// whoever has had no request for longest gives its place; where all have one, there are a few
-/// places more that answer probes, and the newest of these displaces the oldest. Pure.
+/// whoever is held for a wrong token gives its place, then whoever has had no request for longest;
+/// where all have one, there are a few places more that answer probes, and the newest of these
+/// displaces the oldest. Pure.
 class Places {
   public:
     using Id = std::uint64_t;
@@ -27,18 +28,29 @@ class Places {
     /// A whole request is here: nobody takes its place before idle(). These do nothing for who has
     /// none.
     void busy(Id id);
+    /// Its address guesses tokens and its own has not been looked at: another address may take its
+    /// place. Not the same one, or a guess could displace what is right.
+    void suspect(Id id);
+    /// It waits for no more than to be told that its token is wrong.
+    void wrong(Id id);
     void idle(Id id);
     void leave(Id id);
 
   private:
+    enum class State : std::uint8_t { idle, busy, suspect, wrong };
     struct Guest {
         std::string address;
         bool probes_only = false;
-        bool busy = false;
+        State state = State::idle;
         std::uint64_t since = 0;  ///< turn at which it became idle, or came
     };
+    void set(Id id, State state);
     std::size_t count(bool probes_only, const std::string* address = nullptr) const;
-    std::optional<Id> longest_idle(bool probes_only, const std::string* address = nullptr) const;
+    /// Of all, or of one address.
+    std::optional<Id> first_to_leave(const std::string* address = nullptr) const;
+    std::optional<Id> longest(State state, bool probes_only,
+                              const std::string* address = nullptr) const;
+    std::optional<Id> suspect_of_another(const std::string& address) const;
 
     std::size_t limit_;
     std::size_t limit_of_address_;

@@ -112,16 +112,20 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     if (needed == Role::none || !request->headers.contains("authorization"))
         co_return check_access(*request, needed, settings);
     const std::string& address = request->caller->address();
-    asio::awaitable<void> turn = hold_up(shared->logins.turn(shared->site->now(), address));
-    co_await std::move(turn);
+    const Duration turn = shared->logins.turn(shared->site->now(), address);
+    if (turn > Duration::zero()) shared->places.suspect(request->caller->id());
+    asio::awaitable<void> waiting_for_turn = hold_up(turn);
+    co_await std::move(waiting_for_turn);
     // Whoever hangs up is told nothing by that.
     if (request->caller->has_left()) co_return std::nullopt;
+    shared->places.busy(request->caller->id());
     const auto refused = check_access(*request, needed, settings);
     // With a token, nothing but one that nobody has is a 401.
     const bool failed = refused && refused->status == 401;
     const Duration hold = shared->logins.hold(shared->site->now(), address);
     judge_login(*request, failed, *shared);
     if (failed) {
+        shared->places.wrong(request->caller->id());
         asio::awaitable<void> waiting = hold_up(hold);
         co_await std::move(waiting);
     }

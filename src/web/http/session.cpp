@@ -1,5 +1,6 @@
 #include "session.hpp"
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/error.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -47,7 +48,9 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
       caller_(std::move(caller)),
       probes_only_(probes_only),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
-      departure_(stream_.socket(), shared_->site->settings.half_close_grace) {
+      departure_(stream_.socket(), shared_->site->settings.half_close_grace),
+      last_moment_(stream_.get_executor()),
+      time_to_read_(shared_->site->settings.request_timeout) {
     ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
     local_ = stream_.socket().local_endpoint(ignored).address();
@@ -196,7 +199,8 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     ErrorCode error;
     departure_.request_ends();
     ++shared_->counters.requests[response.status];
-    stream_.expires_after(shared_->site->settings.request_timeout);
+    sending_ = true;
+    stream_.expires_after(time_to_read_);
     if (head || response.shared_body) {
         http::response<http::empty_body> message;
         set_head(message, response, keep_alive, shared_->site->product);
@@ -216,6 +220,8 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
     }
+    sending_ = false;
+    last_moment_.cancel();
     co_return !error && keep_alive;
 }
 
@@ -225,6 +231,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     constexpr Duration kHeartbeat = 15s;
     constexpr const char* kComment = ": \n\n";
     ++shared_->counters.requests[200];
+    sending_ = true;
     bool asked = false;
     asio::steady_timer bell(stream_.get_executor());
     listener->wake = [&bell] { bell.cancel(); };
@@ -239,7 +246,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         "X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n: panelgate\n\n";
     ErrorCode error;
     while (!error) {
-        stream_.expires_after(shared_->site->settings.request_timeout);
+        stream_.expires_after(time_to_read_);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
         if (error || listener->ended() || stopping_) break;
@@ -254,6 +261,8 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     departure_.ask_by(nullptr);
     listener->wake = nullptr;
     listener_.reset();
+    sending_ = false;
+    last_moment_.cancel();
 }
 
 /// Reads on after a refusal: closing with unread bytes would reset the connection, and the client
@@ -269,10 +278,17 @@ asio::awaitable<void> HttpSession::drain() {
     }
 }
 
-void HttpSession::stop() {
+void HttpSession::stop(Duration reading) {
     stopping_ = true;
+    time_to_read_ = std::min(time_to_read_, reading);
     if (listener_ && listener_->wake) listener_->wake();
     if (!busy_) close();
+    if (!sending_) return;
+    last_moment_.expires_after(time_to_read_);
+    last_moment_.async_wait([self = weak_from_this()](const ErrorCode& cancelled) {
+        const auto session = self.lock();
+        if (session && !cancelled && session->sending_) session->abandon();
+    });
 }
 
 void HttpSession::abandon() {

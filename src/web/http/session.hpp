@@ -3,6 +3,7 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -12,6 +13,7 @@
 
 #include "beast_message.hpp"
 #include "departure.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/web/http/site.hpp"
 #include "shared.hpp"
 
@@ -27,8 +29,9 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
 
     /// Serves until the client goes away, breaks the protocol, is idle for too long, or stop().
     static boost::asio::awaitable<void> run(std::shared_ptr<HttpSession> self);
-    /// Answers the request that runs, then closes; closes at once when none does.
-    void stop();
+    /// Answers the request that runs, then closes; closes at once when none does. From now on a
+    /// client has no longer than `reading` to take an answer.
+    void stop(Duration reading);
     /// Closes at once; whoever works for the client is told.
     void abandon();
 
@@ -58,9 +61,12 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::optional<Parser> parser_;
     Departure departure_;
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
-    bool asked_before_ = false;  ///< it is not the first request that is waited for
-    bool busy_ = false;          ///< a whole request is here and not yet answered
+    bool asked_before_ = false;              ///< it is not the first request that is waited for
+    bool sending_ = false;                   ///< an answer, or events
+    boost::asio::steady_timer last_moment_;  ///< after stop(): to take the answer
+    bool busy_ = false;                      ///< a whole request is here and not yet answered
     bool stopping_ = false;
+    Duration time_to_read_;  ///< of an answer
 };
 
 }  // namespace panelgate::web

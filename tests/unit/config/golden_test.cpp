@@ -60,6 +60,8 @@ std::optional<std::string> environment(const std::string& name) {
 /// What the user reads: the problems, or the warnings of a valid file.
 std::string told(const std::string& configuration) {
     const MemoryFiles files({{"/run/secrets/ops", "  secret-0123456789 \n"},
+                             {"/run/secrets/marked", "\xef\xbb\xbfsecret-0123456789\r\n"},
+                             {"/run/secrets/wide", std::string("\xff\xfes\0e\0c\0", 8)},
                              {"/run/secrets/mounted", "secret-0123456789\n"},
                              {"/run/secrets/short", "secret\n"},
                              {"/public/ops", "secret-0123456789\n"},

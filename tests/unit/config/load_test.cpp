@@ -154,7 +154,7 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
         "    max_connections: 3\n"
         "  - listen: 0.0.0.0:1503\n"
         "    lines: [b]\n"
-        "    diagnostics_unit: 0\n");
+        "    diagnostics_unit: 7\n");
     const tcp_server::Settings& first = config.modbus_tcp.at(0);
     EXPECT_EQ(first.address, "::1");
     EXPECT_EQ(first.port, 1502);
@@ -173,7 +173,7 @@ TEST(ConfigLoad, ReadsEveryKeyOfAListener) {
     EXPECT_EQ(first.allow[1].prefix, 32U);
     EXPECT_EQ(first.allow[2].address, "fd00::");
     EXPECT_EQ(first.max_connections, 3U);
-    EXPECT_EQ(config.modbus_tcp.at(1).diagnostics_unit, 0);
+    EXPECT_EQ(config.modbus_tcp.at(1).diagnostics_unit, 7);
     EXPECT_FALSE(config.http);
 }
 

@@ -2,11 +2,14 @@
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <future>
+#include <optional>
 #include <string>
 
 #include "support/temp_dir.hpp"
@@ -55,6 +58,35 @@ TEST_F(RealFilesTest, DoesNotReadWhatMightNeverEnd) {
     EXPECT_FALSE(RealFiles().is_special(put("x", "")));
     EXPECT_FALSE(RealFiles().is_special(dir_.string()));
     EXPECT_FALSE(RealFiles().is_special((dir_ / "absent").string()));
+}
+
+TEST_F(RealFilesTest, SaysThatReadingFails) {
+    EXPECT_EQ(RealFiles::read_any("/proc/self/mem"), std::nullopt);
+    EXPECT_EQ(errno, EIO);
+}
+
+TEST_F(RealFilesTest, WaitsForNoWriterOfAPipeForEver) {
+    const std::string pipe = (dir_ / "pipe").string();
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    EXPECT_EQ(RealFiles::read_any(pipe), std::nullopt);
+    EXPECT_EQ(errno, EPIPE);
+}
+
+TEST_F(RealFilesTest, ReadsWhatSomebodyWritesToAPipe) {
+    const std::string pipe = (dir_ / "pipe").string();
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    std::future<std::optional<std::string>> read =
+        std::async(std::launch::async, [&] { return RealFiles::read_any(pipe); });
+    std::ofstream(pipe) << "lines: []\n";
+    EXPECT_EQ(read.get(), "lines: []\n");
+}
+
+TEST_F(RealFilesTest, ReadsAnEmptyPipeWithoutAName) {
+    int ends[2];
+    ASSERT_EQ(::pipe(ends), 0);
+    ::close(ends[1]);
+    EXPECT_EQ(RealFiles::read_any("/dev/fd/" + std::to_string(ends[0])), "");
+    ::close(ends[0]);
 }
 
 TEST_F(RealFilesTest, KnowsWhatEverybodyMayRead) {

@@ -51,8 +51,9 @@ class Server {
     boost::system::error_code start();
     /// The port that is listened on; 0 before start().
     std::uint16_t port() const;
-    /// Closes the listener and idle connections; running requests are answered, then closed.
-    void stop();
+    /// Closes the listener and idle connections; running requests are answered, then closed. A
+    /// client has no longer than `reading` to take an answer.
+    void stop(Duration reading = 10s);
     /// Connections open now; after stop() it falls to 0.
     std::size_t connections() const;
     const Counters& counters() const;

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 
+#include "panelgate/base/time.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/access_list.hpp"
 #include "panelgate/web/http/counters.hpp"
@@ -28,8 +29,9 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     boost::system::error_code open();
     /// The port that is listened on; 0 before open().
     std::uint16_t port() const;
-    /// Closes the listener and idle connections; running requests are answered, then closed.
-    void stop();
+    /// Closes the listener and idle connections; running requests are answered, then closed. A
+    /// client has no longer than `reading` to take an answer.
+    void stop(Duration reading);
     /// Closes everything; answers still owed are not sent.
     void abandon();
     std::size_t connections() const { return sessions_.size(); }

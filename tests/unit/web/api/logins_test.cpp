@@ -1,3 +1,4 @@
+#include <list>
 #include <string>
 
 #include "http_rig.hpp"
@@ -51,6 +52,24 @@ TEST_F(LoginAttempts, ThatAreRightAreAnsweredAtOnceWhereWrongOnesAreHeld) {
     now += 1h;  // another turn
     EXPECT_EQ(status("right"), 200u);
     EXPECT_EQ(server->counters().requests.at(401), 3u) << "the fourth wrong one waits";
+    server.reset();
+}
+
+TEST_F(LoginAttempts, ThatAreHeldTakeNoPlaceFromThoseThatAreRight) {
+    settings.logins.hold = 1h;
+    settings.max_per_address = 3;
+    start();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
+    std::list<Client> guessing;
+    for (unsigned i = 1; i <= settings.max_per_address; ++i) {
+        guessing.push_back(connect());
+        guessing.back().send(
+            "GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
+        while (server->counters().login_failures < 3 + i) io.run_one();
+        now += 1h;  // another turn
+    }
+    EXPECT_EQ(status("right"), 200u);
+    EXPECT_TRUE(guessing.front().receive().error);
     server.reset();
 }
 

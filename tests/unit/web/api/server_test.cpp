@@ -241,6 +241,19 @@ TEST_F(WebServer, P3AnswersARunningRequestBeforeItStops) {
     EXPECT_EQ(server->connections(), 0u);
 }
 
+TEST_F(WebServer, WaitsForNoClientThatDoesNotReadWhenItStops) {
+    settings.request_timeout = 1h;
+    metrics.text = std::make_shared<const std::string>(std::size_t{16} * 1024 * 1024, 'x');
+    Client client = connect();
+    for (int i = 0; i < 3; ++i) client.send("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");
+    while (server->counters().requests.empty()) io.run_one();
+    io.poll();
+    server->stop(1ms);
+    io.run_for(30s);  // nothing is left to do long before
+    EXPECT_EQ(server->connections(), 0u);
+    io.restart();
+}
+
 TEST_F(WebServer, TakesNobodyElseAfterItStopped) {
     start();
     const std::uint16_t port = server->port();

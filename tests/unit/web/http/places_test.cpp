@@ -66,6 +66,35 @@ TEST_F(PlacesTest, DisplacesNobodyWhoHasARequest) {
     EXPECT_EQ(come(6, "c").leaves, 3u);
 }
 
+TEST_F(PlacesTest, TakesThePlaceOfAWrongTokenBeforeAllOthers) {
+    come(1, "b");
+    come(2, "a");
+    come(3, "a");
+    for (const Id id : {2u, 3u}) places->busy(id);
+    places->wrong(3);
+    EXPECT_EQ(come(4, "a").leaves, 3u);
+    places->busy(4);
+    EXPECT_TRUE(come(5, "a").probes_only) << "the place is taken once";
+    places->wrong(2);
+    EXPECT_EQ(come(6, "c").leaves, 2u) << "though the first has been idle for longer";
+}
+
+TEST_F(PlacesTest, TakesThePlaceOfAGuessingAddressForAnotherOnly) {
+    fill_and_keep_busy();
+    places->suspect(2);
+    EXPECT_TRUE(come(4, "a").probes_only);
+    const auto arrival = come(5, "c");
+    EXPECT_EQ(arrival.leaves, 2u);
+    EXPECT_FALSE(arrival.probes_only);
+}
+
+TEST_F(PlacesTest, KeepsThePlaceOfATokenThatWasFoundRight) {
+    fill_and_keep_busy();
+    places->suspect(2);
+    places->busy(2);
+    EXPECT_TRUE(come(4, "c").probes_only);
+}
+
 TEST_F(PlacesTest, HasAlwaysAPlaceForAProbe) {
     fill_and_keep_busy();
     for (Id id = 4; id < 100; ++id) {
