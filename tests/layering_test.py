@@ -18,6 +18,7 @@ LIBRARIES = {
     "Asio": ("boost/asio/", "boost/system/"),
     "Beast": ("boost/beast/", "boost/optional"),
     "Boost.JSON": ("boost/json",),
+    "Boost.Multiprecision": ("boost/multiprecision/",),
     "CLI11": ("CLI/",),
     "prometheus-cpp": ("prometheus/",),
     "spdlog": ("spdlog/", "fmt/"),

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "inventory.hpp"
-#include "panelgate/base/number_text.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -22,8 +21,8 @@ std::string text_of(const points::Point& point) {
     if (!point.unit.empty()) text += ", in " + point.unit;
     if (point.writable) {
         text += ", writable";
-        if (point.min) text += " from " + number_text(*point.min);
-        if (point.max) text += " to " + number_text(*point.max);
+        if (point.min) text += " from " + point.min->text();
+        if (point.max) text += " to " + point.max->text();
     }
     return text + '\n';
 }

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/base/number_text.hpp"
 
 namespace panelgate::config {
@@ -69,18 +70,27 @@ ValueRange value_range(const Point& point) {
     return {least, most};
 }
 
+/// With all the digits that are written.
+std::optional<Decimal> limit_of(yaml::MapReader& in, std::string_view key) {
+    const auto number = in.number(key);
+    if (!number) return std::nullopt;
+    const yaml::Node* written = in.child(key);
+    return written != nullptr ? Decimal::parse(written->scalar).value_or(*number) : *number;
+}
+
 void check_limit(yaml::MapReader& in, std::string_view key, const Point& point,
-                 std::optional<double>& limit) {
+                 std::optional<Decimal>& limit) {
     const ValueRange range = value_range(point);
     // A half of the last digit: 6553.5 is 65535 * 0.1, whatever the last bit of it is.
     const double slack = std::max(std::abs(range.low), std::abs(range.high)) * 1e-12;
-    if (!limit || ValueRange{range.low - slack, range.high + slack}.contains(*limit)) return;
+    if (!limit || ValueRange{range.low - slack, range.high + slack}.contains(limit->nearest()))
+        return;
     std::string type(label(point.type));
     if (point.scale != 1) type += " with scale " + number_text(point.scale);
     if (point.offset != 0)
         type += (point.scale != 1 ? " and offset " : " with offset ") + number_text(point.offset);
     in.problem(key, std::string(key) + " must be a value that the point can have, " + range.text() +
-                        " (" + type + "), not " + number_text(*limit));
+                        " (" + type + "), not " + limit->text());
     limit.reset();
 }
 
@@ -127,8 +137,8 @@ RawRange no_value_range(Type type) {
 }
 
 void load_limits(yaml::MapReader& in, Point& point) {
-    point.min = in.number("min");
-    point.max = in.number("max");
+    point.min = limit_of(in, "min");
+    point.max = limit_of(in, "max");
     if (point.min && point.max && *point.min > *point.max)
         in.problem("min", "min is above max: nothing could be written");
     if (point.type == Type::boolean || point.type == Type::string) return;

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "compare.hpp"
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/base/number_text.hpp"
 #include "panelgate/points/value.hpp"
 #include "registers.hpp"
@@ -18,12 +18,25 @@ namespace {
 
 WriteRefusal refusal(std::string message) { return {.message = std::move(message)}; }
 
-constexpr double kExactDouble = 9007199254740992.0;  ///< 2^53
-
 struct Limits {
-    double low = 0;
-    double high = 0;
+    Decimal low;
+    Decimal high;
 };
+
+/// A finite one.
+Decimal decimal_of(const Value& value) {
+    if (const bool* b = std::get_if<bool>(&value)) return *b ? 1 : 0;
+    if (const auto* i = std::get_if<std::int64_t>(&value)) return *i;
+    if (const auto* u = std::get_if<std::uint64_t>(&value)) return *u;
+    if (const double* d = std::get_if<double>(&value)) return *d;
+    return std::get<Decimal>(value);
+}
+
+template <class Number>
+Limits limits_of() {
+    return {Decimal(std::numeric_limits<Number>::lowest()),
+            Decimal(std::numeric_limits<Number>::max())};
+}
 
 /// Of the raw number.
 Limits limits_of(Type type) {
@@ -35,13 +48,13 @@ Limits limits_of(Type type) {
         case Type::i16:
             return {-32768, 32767};
         case Type::u32:
-            return {0, 4294967295.0};
+            return {0, std::int64_t{4294967295}};
         case Type::i32:
-            return {-2147483648.0, 2147483647.0};
+            return limits_of<int>();
         case Type::u64:
-            return {0, 18446744073709549568.0};  // the largest double below 2^64
+            return limits_of<std::uint64_t>();
         case Type::i64:
-            return {-9223372036854775808.0, 9223372036854774784.0};
+            return limits_of<std::int64_t>();
         case Type::bcd16:
             return {0, 9999};
         case Type::bcd32:
@@ -51,7 +64,7 @@ Limits limits_of(Type type) {
                     as_printed(std::numeric_limits<float>::max())};
         case Type::f64:
         case Type::string:
-            return {-std::numeric_limits<double>::max(), std::numeric_limits<double>::max()};
+            return limits_of<double>();
     }
     std::abort();
 }
@@ -66,153 +79,133 @@ std::string type_text(const Point& point) {
 
 std::string range_text(const Point& point) {
     const Limits limits = limits_of(point.type);
-    std::string low = number_text(from_raw(point, limits.low));
-    std::string high = number_text(from_raw(point, limits.high));
+    const Scaling scaling(point.scale, point.offset);
+    std::string low = scaling.value_of(limits.low).text();
+    std::string high = scaling.value_of(limits.high).text();
     if (point.scale < 0) std::swap(low, high);
-    if (is_plain(point) && point.type == Type::u64) high = "18446744073709551615";
-    if (is_plain(point) && point.type == Type::i64) {
-        low = "-9223372036854775808";
-        high = "9223372036854775807";
-    }
     return low + " to " + high + " (" + type_text(point) + ')';
 }
 
 bool within_limits(const Point& point, const Value& value) {
-    return !(point.min && is_below(value, *point.min)) &&
-           !(point.max && is_above(value, *point.max));
+    const Decimal number = decimal_of(value);
+    return !(point.min && number < *point.min) && !(point.max && number > *point.max);
+}
+
+bool within_type(Type type, const Decimal& raw) {
+    const Limits limits = limits_of(type);
+    return raw >= limits.low && raw <= limits.high;
 }
 
 /// "x must be at most 25"
 std::string limits_text(const Point& point) {
-    std::string range = point.min ? "at least " + number_text(*point.min)
-                                  : "at most " + number_text(point.max.value_or(0));
-    if (point.min && point.max)
-        range = "from " + number_text(*point.min) + " to " + number_text(*point.max);
+    std::string range = point.min ? "at least " + point.min->text()
+                                  : "at most " + point.max.value_or(Decimal()).text();
+    if (point.min && point.max) range = "from " + point.min->text() + " to " + point.max->text();
     return point.name + " must be " + range;
 }
 
-/// An integer that a 64-bit type takes as it is, without a detour over a double.
-std::optional<std::uint64_t> exact_bits(const Point& point, const Value& value) {
-    if (!is_plain(point)) return std::nullopt;
-    const auto* i = std::get_if<std::int64_t>(&value);
-    const auto* u = std::get_if<std::uint64_t>(&value);
-    constexpr auto kMostSigned =
-        static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-    if (point.type == Type::i64 && i != nullptr) return static_cast<std::uint64_t>(*i);
-    if (point.type == Type::i64 && u != nullptr && *u <= kMostSigned) return *u;
-    if (point.type == Type::u64 && u != nullptr) return *u;
-    if (point.type == Type::u64 && i != nullptr && *i >= 0) return static_cast<std::uint64_t>(*i);
-    return std::nullopt;
+WriteRefusal beyond_limits(const Point& point, const Value& value) {
+    return refusal(limits_text(point) + ", not " + to_string(value));
 }
 
-/// The raw number nearest to this, which is within the type's range.
-std::uint64_t nearest_bits(Type type, double raw) {
-    if (type == Type::u64) return static_cast<std::uint64_t>(std::round(raw));
-    return static_cast<std::uint64_t>(std::llround(raw));
-}
-
-/// The raw number whose value is exactly this; nothing when there is none.
-std::optional<std::uint64_t> exact_raw(const Point& point, const Value& value, double raw) {
-    if (auto bits = exact_bits(point, value)) return bits;
-    if (is_plain(point)) {
-        // Beyond 2^53 a double is whole whatever was meant.
-        const bool is_whole = raw == std::floor(raw) && std::abs(raw) <= kExactDouble;
-        return is_whole ? std::optional(nearest_bits(point.type, raw)) : std::nullopt;
-    }
-    const Scaling scaling(point.scale, point.offset);
-    std::optional<std::int64_t> exact;
-    if (const auto* i = std::get_if<std::int64_t>(&value)) {
-        exact = scaling.exact_raw_of(*i);
-    } else if (const auto* u = std::get_if<std::uint64_t>(&value)) {
-        exact = scaling.exact_raw_of(*u);
-    } else {
-        exact = scaling.exact_raw_of(*number_of(value));
-    }
-    if (exact) return static_cast<std::uint64_t>(*exact);
-    return std::nullopt;
-}
-
-/// "; the nearest that it can be are 21.5 and 21.6": of those that its limits allow.
-std::string neighbours_text(const Point& point, double below, double above) {
-    if (below > above) std::swap(below, above);
-    std::string list;
-    int count = 0;
-    for (const double one : {below, above}) {
-        if (!within_limits(point, one) || (count > 0 && below == above)) continue;
-        list += (count++ > 0 ? " and " : "") + number_text(one);
-    }
-    if (count == 0) return {};
-    return std::string("; the nearest that it can be ") + (count > 1 ? "are " : "is ") + list;
-}
-
-WriteRefusal inexact(const Point& point, const Value& value, double below, double above) {
-    return {.message = point.name + " cannot be exactly " + to_string(value) + " (" +
-                       type_text(point) + ')' + neighbours_text(point, below, above),
-            .inexact = true};
-}
-
-WriteRefusal inexact_whole(const Point& point, const Value& value, double raw) {
-    const Limits limits = limits_of(point.type);
-    if (std::abs(raw) > kExactDouble)
-        return {.message = point.name +
-                           " takes no fraction here: with so many digits it is not exact (" +
-                           type_text(point) + ')',
-                .inexact = true};
-    return inexact(point, value, from_raw(point, std::max(std::floor(raw), limits.low)),
-                   from_raw(point, std::min(std::ceil(raw), limits.high)));
-}
-
-/// What everybody is refused: not a number, outside what the configuration allows, outside the
-/// type.
-std::optional<WriteRefusal> judge_given(const Point& point, const Value& value, double raw) {
-    if (!std::isfinite(*number_of(value)))
-        return refusal(point.name + " takes finite numbers only");
-    if (!within_limits(point, value))
-        return refusal(limits_text(point) + ", not " + to_string(value));
-    const Limits limits = limits_of(point.type);
-    if (exact_bits(point, value) || (raw >= limits.low && raw <= limits.high)) return std::nullopt;
+/// Its raw number is.
+WriteRefusal beyond_type(const Point& point, const Value& value) {
+    if (!within_limits(point, value)) return beyond_limits(point, value);
     return refusal(point.name + " must be from " + range_text(point) + ", not " + to_string(value));
 }
 
-/// The same of what it is rounded to.
+/// The nearest on both sides, or the nearest float and the next.
+struct Neighbours {
+    std::optional<Value> one;
+    std::optional<Value> other;
+};
+
+/// "x cannot be exactly 21.55 (i16, scale 0.1); the nearest that it can be are 21.5 and 21.6": of
+/// those that its limits allow.
+WriteRefusal inexact(const Point& point, const Value& value, Neighbours nearest) {
+    auto& [one, other] = nearest;
+    if (one && other && decimal_of(*one) > decimal_of(*other)) std::swap(one, other);
+    if (one == other) other.reset();
+    std::string list;
+    int count = 0;
+    for (const auto& neighbour : {one, other}) {
+        if (!neighbour || !within_limits(point, *neighbour)) continue;
+        list += (count++ > 0 ? " and " : "") + to_string(*neighbour);
+    }
+    if (count > 0)
+        list = std::string("; the nearest that it can be ") + (count > 1 ? "are " : "is ") + list;
+    return {.message = point.name + " cannot be exactly " + to_string(value) + " (" +
+                       type_text(point) + ')' + list,
+            .inexact = true};
+}
+
+/// Of what is rounded, too.
 Encoded<Words> judge_written(const Point& point, const Value& value, Words words) {
     const auto written = decode(point, words);
     if (!written)
         return refusal(point.name + " cannot be " + to_string(value) + ": that means no value");
-    if (!within_limits(point, *written))
-        return refusal(limits_text(point) + "; " + to_string(value) + " would be written as " +
-                       to_string(*written));
-    return words;
+    if (within_limits(point, *written)) return words;
+    if (!within_limits(point, value)) return beyond_limits(point, value);
+    return refusal(limits_text(point) + "; " + to_string(value) + " would be written as " +
+                   to_string(*written));
+}
+
+/// The raw number is within the type's range.
+Words words_of(const Point& point, const Decimal& raw) {
+    const auto i = raw.as_int64();
+    const std::uint64_t bits = i ? static_cast<std::uint64_t>(*i) : raw.as_uint64().value_or(0);
+    return reordered(parted(is_bcd(point.type) ? to_bcd(bits) : bits, point.count()),
+                     point.word_order, false);
+}
+
+/// What a raw number is shown as, if it may be written.
+std::optional<Value> allowed(const Point& point, const Decimal& raw) {
+    if (!within_type(point.type, raw)) return std::nullopt;
+    auto value = decode(point, words_of(point, raw));
+    if (value && !within_limits(point, *value)) value.reset();
+    return value;
 }
 
 Encoded<Words> encode_whole(const Point& point, const Value& value, Rounding rounding) {
-    const double raw = Scaling(point.scale, point.offset).raw_of(*number_of(value));
-    if (auto refused = judge_given(point, value, std::round(raw))) return std::move(*refused);
-    auto number = exact_raw(point, value, raw);
-    if (!number && rounding == Rounding::exact) return inexact_whole(point, value, raw);
-    if (!number) number = nearest_bits(point.type, std::round(raw));
-    const std::uint64_t bits = is_bcd(point.type) ? to_bcd(*number) : *number;
-    return judge_written(point, value,
-                         reordered(parted(bits, point.count()), point.word_order, false));
+    const Scaling scaling(point.scale, point.offset);
+    const Decimal given = decimal_of(value);
+    const auto around = scaling.around(given);
+    const auto exact = scaling.exact_raw_of(given);
+    Decimal raw = exact.value_or(around.nearest);
+    if (!within_type(point.type, raw)) return beyond_type(point, value);
+    if (!exact && !allowed(point, raw) && within_limits(point, value)) {
+        const Decimal& other = raw == around.below ? around.above : around.below;
+        if (allowed(point, other)) raw = other;
+    }
+    if (!exact && rounding == Rounding::exact && allowed(point, raw))
+        return inexact(point, value, {allowed(point, around.below), allowed(point, around.above)});
+    return judge_written(point, value, words_of(point, raw));
 }
+
+Decimal as_shown(float number) { return as_printed(number); }
+Decimal as_shown(double number) { return number; }
 
 /// Of a number that a float is to hold, too: the float nearest to it, for nobody means the last bit
-/// of a fraction; but a whole number is meant exactly, and what is not 0 must not become 0 or lose
-/// most of its digits.
+/// of a fraction; but a whole number is meant exactly, as is a fraction where floats have none, and
+/// what is not 0 must not become 0 or lose most of its digits.
 template <class Float>
-bool is_held(const Point& point, const Value& value, double raw, Float number) {
+bool is_held(const Point& point, const Value& value, Float number) {
     if (!is_plain(point)) return true;
+    const Decimal given = decimal_of(value);
     const auto held = static_cast<double>(number);
-    if (is_same(value, held) || is_printed_as(value, number)) return true;
-    if (raw == std::floor(raw)) return false;
-    return std::abs(held) >= static_cast<double>(std::numeric_limits<Float>::min());
+    if (given == Decimal::exactly(held) || given == as_shown(number)) return true;
+    constexpr Float kWhole = 1 / std::numeric_limits<Float>::epsilon();
+    const Float size = std::abs(number);
+    return !given.is_whole() && size >= std::numeric_limits<Float>::min() && size < kWhole;
 }
 
-/// The float that is nearest on the other side of the value.
+/// With the float that is nearest on the other side of the value.
 template <class Float>
-Float beyond(const Value& value, Float number) {
+WriteRefusal inexact_float(const Point& point, const Value& value, Float number) {
     constexpr Float kMost = std::numeric_limits<Float>::max();
-    return std::nextafter(number, is_below(value, static_cast<double>(number)) ? -kMost : kMost);
+    const bool is_below = decimal_of(value) < Decimal::exactly(static_cast<double>(number));
+    const Float next = std::nextafter(number, is_below ? -kMost : kMost);
+    return inexact(point, value, {as_shown(number).nearest(), as_shown(next).nearest()});
 }
 
 Encoded<Words> encode_f32(const Point& point, const Value& value, double raw, Rounding rounding) {
@@ -220,19 +213,23 @@ Encoded<Words> encode_f32(const Point& point, const Value& value, double raw, Ro
     const float number = std::abs(raw) > static_cast<double>(kMost)
                              ? std::copysign(kMost, static_cast<float>(raw < 0 ? -1 : 1))
                              : static_cast<float>(raw);
-    if (rounding == Rounding::exact && !is_held(point, value, raw, number))
-        return inexact(point, value, as_printed(number), as_printed(beyond(value, number)));
+    if (rounding == Rounding::exact && !is_held(point, value, number))
+        return inexact_float(point, value, number);
     const auto bits = std::bit_cast<std::uint32_t>(number);
     return judge_written(point, value, reordered(parted(bits, 2), point.word_order, false));
 }
 
 Encoded<Words> encode_number(const Point& point, const Value& value, Rounding rounding) {
+    const double number = *number_of(value);
+    if (!std::isfinite(number)) return refusal(point.name + " takes finite numbers only");
     if (is_integer(point.type)) return encode_whole(point, value, rounding);
-    const double raw = Scaling(point.scale, point.offset).raw_of(*number_of(value));
-    if (auto refused = judge_given(point, value, raw)) return std::move(*refused);
+    const double raw = Scaling(point.scale, point.offset).raw_of(number);
+    if (!std::isfinite(raw) || !within_type(point.type, raw)) return beyond_type(point, value);
+    if (rounding == Rounding::exact && !within_limits(point, value))
+        return beyond_limits(point, value);
     if (point.type == Type::f32) return encode_f32(point, value, raw, rounding);
-    if (rounding == Rounding::exact && !is_held(point, value, raw, raw))
-        return inexact(point, value, raw, beyond(value, raw));
+    if (rounding == Rounding::exact && !is_held(point, value, raw))
+        return inexact_float(point, value, raw);
     const auto bits = std::bit_cast<std::uint64_t>(raw);
     return judge_written(point, value, reordered(parted(bits, 4), point.word_order, false));
 }
@@ -276,8 +273,9 @@ WriteRefusal no_label(const Point& point, const std::string& text) {
 }
 
 Encoded<Words> encode_bit(const Point& point, const Value& value) {
-    const double number = *number_of(value);
-    if (number == 0 || number == 1) return Words{static_cast<std::uint16_t>(number)};
+    const bool is_finite = std::isfinite(*number_of(value));
+    if (is_finite && decimal_of(value) == 0) return Words{0};
+    if (is_finite && decimal_of(value) == 1) return Words{1};
     return refusal(point.name + " takes true or false, not " + to_string(value));
 }
 
@@ -295,7 +293,7 @@ Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& valu
         const auto raw = raw_of_label(point, *text);
         if (!raw) return no_label(point, *text);
         given = *raw;  // raw, so it has to become a value first where there is a scale
-        if (!is_plain(point)) given = from_raw(point, static_cast<double>(*raw));
+        if (!is_plain(point)) given = Scaling(point.scale, point.offset).value_of(Decimal(*raw));
     }
     if (point.type == Type::boolean) return encode_bit(point, given);
     if (std::holds_alternative<bool>(given))

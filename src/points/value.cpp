@@ -10,6 +10,7 @@
 
 #include "panelgate/base/number_text.hpp"
 #include "registers.hpp"
+#include "scaling.hpp"
 #include "text.hpp"
 
 namespace panelgate::points {
@@ -56,6 +57,16 @@ std::optional<Value> scaled(const Point& point, double raw) {
     return Value(value);
 }
 
+/// As a double where that tells all the digits.
+Value told(const Decimal& value) {
+    const double number = value.nearest();
+    const bool is_small = std::abs(number) < 1e15;
+    if (is_small && Decimal(number) == value) return number;
+    if (const auto i = value.as_int64()) return *i;
+    if (const auto u = value.as_uint64()) return *u;
+    return value;
+}
+
 std::optional<Value> decode_double(const Point& point, double raw) {
     if (means_none(point, raw)) return std::nullopt;
     return scaled(point, raw);
@@ -78,6 +89,7 @@ std::optional<double> number_of(const Value& value) {
     if (const auto* i = std::get_if<std::int64_t>(&value)) return static_cast<double>(*i);
     if (const auto* u = std::get_if<std::uint64_t>(&value)) return static_cast<double>(*u);
     if (const double* d = std::get_if<double>(&value)) return *d;
+    if (const auto* decimal = std::get_if<Decimal>(&value)) return decimal->nearest();
     return std::nullopt;
 }
 
@@ -95,12 +107,10 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
     const auto raw = raw_of(point.type, bits);
     if (!raw || means_none(point, static_cast<std::uint64_t>(raw->number))) return std::nullopt;
     if (point.type == Type::boolean) return Value(raw->number != 0);
-    if (!is_plain(point)) {
-        return scaled(point, raw->is_unsigned ? static_cast<double>(raw->large)
-                                              : static_cast<double>(raw->number));
-    }
-    if (raw->is_unsigned) return Value(raw->large);
-    return Value(raw->number);
+    if (is_plain(point)) return raw->is_unsigned ? Value(raw->large) : Value(raw->number);
+    if (registers_of(point.type) < 4) return scaled(point, static_cast<double>(raw->number));
+    const Decimal number = raw->is_unsigned ? Decimal(raw->large) : Decimal(raw->number);
+    return told(Scaling(point.scale, point.offset).value_of(number));
 }
 
 std::optional<std::string> label_of(const Point& point, std::span<const std::uint16_t> items) {
@@ -118,6 +128,7 @@ std::string to_string(const Value& value) {
     if (const auto* i = std::get_if<std::int64_t>(&value)) return std::to_string(*i);
     if (const auto* u = std::get_if<std::uint64_t>(&value)) return std::to_string(*u);
     if (const double* d = std::get_if<double>(&value)) return number_text(*d);
+    if (const auto* decimal = std::get_if<Decimal>(&value)) return decimal->text();
     return std::get<std::string>(value);
 }
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -63,8 +64,8 @@ struct Point {
     double scale = 1;     ///< value = raw * scale + offset; not 0
     double offset = 0;
     std::string unit;
-    std::optional<double> min;  ///< of the value, checked when it is written
-    std::optional<double> max;
+    std::optional<Decimal> min;  ///< of the value, checked on what is written
+    std::optional<Decimal> max;
     bool writable = false;
     std::map<std::int64_t, std::string> labels;  ///< names of raw values
     std::vector<std::int64_t> no_value;          ///< raw values that say that there is none

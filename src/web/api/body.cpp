@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "json_reader.hpp"
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "repeated_member.hpp"
 
@@ -91,7 +92,8 @@ Parsed<std::int64_t> number_member(const json::object& object, std::string_view 
 Parsed<std::string> string_member(const json::object& object, std::string_view name) {
     const json::value* member = object.if_contains(name);
     if (member == nullptr) return problem(400, "the body lacks " + std::string(name));
-    if (!member->is_string()) return problem(400, std::string(name) + " must be a string");
+    if (!member->is_string() || exact_digits(*member))
+        return problem(400, std::string(name) + " must be a string");
     return std::string(member->get_string());
 }
 
@@ -124,6 +126,7 @@ Parsed<points::Value> value_of(std::string_view text) {
     if (value->is_int64()) return points::Value(value->get_int64());
     if (value->is_uint64()) return points::Value(value->get_uint64());
     if (value->is_double()) return points::Value(value->get_double());
+    if (const auto digits = exact_digits(*value)) return points::Value(*Decimal::parse(*digits));
     if (value->is_string()) return points::Value(std::string(value->get_string()));
     return problem(400, "value must be a number, true, false or a text");
 }

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
@@ -25,32 +26,6 @@ std::optional<Number> number_of(const std::string& text) {
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
     return number;
-}
-
-/// "1.50e3" as "1500"; nothing for a fraction, for what is longer than any integer, and for 0,
-/// whose sign a float keeps.
-std::optional<std::string> whole_digits(std::string_view text) {
-    constexpr std::int64_t kMost = 20;
-    const std::size_t mark = std::min(text.find_first_of("eE"), text.size());
-    const std::size_t point = std::min(text.find('.'), mark);
-    std::int64_t exponent = 0;
-    if (mark < text.size()) {
-        std::string power(text.substr(mark + 1));
-        if (power.starts_with('+')) power.erase(0, 1);
-        const auto given = number_of<std::int64_t>(power);
-        if (!given || *given > kMost || *given < -1'000'000) return std::nullopt;
-        exponent = *given;
-    }
-    if (point < mark) exponent -= static_cast<std::int64_t>(mark - point - 1);
-    std::string digits(text.substr(0, mark));
-    std::erase(digits, '.');
-    const bool negative = digits.starts_with('-');
-    digits.erase(0, std::min(digits.find_first_not_of("-0"), digits.size()));
-    for (; exponent < 0 && digits.ends_with('0'); ++exponent) digits.pop_back();
-    const auto length = static_cast<std::int64_t>(digits.size()) + exponent;
-    if (digits.empty() || exponent < 0 || length > kMost) return std::nullopt;
-    digits.append(static_cast<std::size_t>(exponent), '0');
-    return (negative ? "-" : "") + digits;
 }
 
 /// Makes the value, as boost::json's own handler does, but for numbers.
@@ -125,21 +100,18 @@ class Builder {
         return false;
     }
     bool push(const std::string& text) {
-        const auto digits = whole_digits(text);
-        if (const auto i = digits ? number_of<std::int64_t>(*digits) : std::nullopt) {
-            stack_.push_int64(*i);
-            return true;
-        }
-        if (const auto u = digits ? number_of<std::uint64_t>(*digits) : std::nullopt) {
-            stack_.push_uint64(*u);
-            return true;
-        }
         const auto number = number_of<double>(text);
-        if (!number) return false;
-        if (*number == 0 && text.find_first_of(".eE-") == text.npos) {
-            stack_.push_int64(0);
-        } else {
+        const auto exact = Decimal::parse(text);
+        if (!number || !exact) return false;
+        const bool is_negative_zero = *number == 0 && text.starts_with('-');
+        if (const auto i = exact->as_int64(); i && !is_negative_zero) {
+            stack_.push_int64(*i);
+        } else if (const auto u = exact->as_uint64(); u && !is_negative_zero) {
+            stack_.push_uint64(*u);
+        } else if (Decimal(*number) == *exact) {
             stack_.push_double(*number);
+        } else {
+            stack_.push_string(exact_number(exact->text()).get_string());
         }
         return true;
     }

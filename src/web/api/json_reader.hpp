@@ -21,7 +21,8 @@ struct JsonRead {
 };
 
 /// Numbers as they are written: whole ones are integers of 64 bits as far as they fit, 9e18 and
-/// 9007199254740993.0 included; others the nearest double. One beyond every double, and one that
+/// 9007199254740993.0 included; others doubles, or exact_number() where
+/// a double has not as many digits. One beyond every double, and one that
 /// would become 0, is a fault.
 JsonRead read_json(std::string_view text);
 

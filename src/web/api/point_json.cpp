@@ -3,13 +3,22 @@
 #include <variant>
 
 #include "answer.hpp"
+#include "panelgate/base/decimal.hpp"
+#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
 
-json::value json_of(const points::Value& value) {
-    return std::visit([](const auto& v) { return json::value(v); }, value);
-}
+namespace {
+
+struct Maker {
+    json::value operator()(const auto& value) const { return json::value(value); }
+    json::value operator()(const Decimal& value) const { return exact_number(value.text()); }
+};
+
+}  // namespace
+
+json::value json_of(const points::Value& value) { return std::visit(Maker(), value); }
 
 json::object point_json(const points::Point& point, const points::PointReading& reading) {
     json::object object;

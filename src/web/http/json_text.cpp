@@ -13,6 +13,8 @@ namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
+constexpr char kExactNumber = '\xFF';  ///< in front of its digits; never in UTF-8
+
 void append(std::string& text, const json::value& value);
 
 /// Most texts need no escape; a trace has thousands of them.
@@ -57,6 +59,10 @@ void append(std::string& text, const json::object& object) {
 void append(std::string& text, const json::value& value) {
     if (const json::array* array = value.if_array()) return append(text, *array);
     if (const json::object* object = value.if_object()) return append(text, *object);
+    if (const auto digits = exact_digits(value)) {
+        text += *digits;
+        return;
+    }
     if (const json::string* words = value.if_string())
         return append(text, json::string_view(*words));
     const double* number = value.if_double();
@@ -74,6 +80,16 @@ std::string json_text(const json::value& value) {
     std::string text;
     append(text, value);
     return text;
+}
+
+json::value exact_number(std::string_view digits) {
+    return json::value(kExactNumber + std::string(digits));
+}
+
+std::optional<std::string_view> exact_digits(const json::value& value) {
+    const json::string* words = value.if_string();
+    if (words == nullptr || words->empty() || words->front() != kExactNumber) return std::nullopt;
+    return std::string_view(*words).substr(1);
 }
 
 std::string excerpt(std::string text) {

@@ -98,7 +98,10 @@ TEST(Body, TakesANumberAsItIsWritten) {
     EXPECT_EQ(*value_of(R"({"value":1e19})"), Value(10'000'000'000'000'000'000u));
     EXPECT_EQ(*value_of(R"({"value":-9223372036854775808})"),
               Value(std::numeric_limits<std::int64_t>::min()));
-    EXPECT_EQ(*value_of(R"({"value":18446744073709551616})"), Value(0x1p64));
+    for (const char* digits : {"18446744073709551616", "9007199254740.993", "-1234567.00000000001"})
+        EXPECT_EQ(*value_of(std::string("{\"value\":") + digits + "}"),
+                  Value(*Decimal::parse(digits)));
+    EXPECT_EQ(*value_of(R"({"value":1e300})"), Value(1e300));
     EXPECT_EQ(*value_of(R"({"value":7.0385307e-26})"), Value(7.0385307e-26)) << "nearest";
     EXPECT_TRUE(std::signbit(std::get<double>(*value_of(R"({"value":-0.0})"))));
 }
@@ -116,6 +119,20 @@ TEST(Body, RefusesANumberThatNoneCouldBe) {
               "the body is not JSON: line 1, column 11: NaN is no number of JSON");
     for (const char* number : {"NaN", "Infinity", "-Infinity", "1e99999999999999999999"})
         EXPECT_EQ(value_of(std::string("{\"value\": ") + number + "}").error().status, 400u);
+}
+
+TEST(Body, TakesNoNumberOfManyDigitsForAText) {
+    EXPECT_EQ(registers_error(R"({"values":[1.00000000000000000001]})"),
+              "a register is a whole number from 0 to 65535, or from -32768, not "
+              "1.00000000000000000001");
+    const auto object = parse_object(R"({"t":1.00000000000000000001})");
+    EXPECT_EQ(string_member(*object, "t").error().detail, "t must be a string");
+    EXPECT_EQ(value_of("{\"value\":\"\xFF"
+                       "1\"}")
+                  .error()
+                  .status,
+              400u)
+        << "no UTF-8";
 }
 
 TEST(Body, GivesMembersOfTheirKind) {

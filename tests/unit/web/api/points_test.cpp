@@ -95,14 +95,31 @@ TEST_F(ApiPoints, WritesWhatIsExactUnlessItMayRoundAndTellsWhatWasWritten) {
                 HasSubstr("oil cannot be exactly 17 (u16, scale 10); the nearest that it can be "
                           "are 10 and 20; ?round=true writes the nearest"));
     EXPECT_EQ(ask("PUT", std::string(kOil) + "?round=yes", R"({"value":17})").status(), 400u);
-    const Reply beyond = ask("PUT", std::string(kOil) + "?round=true", R"({"value":25})");
+    const Reply beyond = ask("PUT", std::string(kOil) + "?round=true", R"({"value":29})");
     EXPECT_EQ(beyond.status(), 422u);
-    EXPECT_THAT(beyond.body(), HasSubstr("25 would be written as 30"));
+    EXPECT_THAT(beyond.body(), HasSubstr("oil must be from 0 to 25, not 29"));
     EXPECT_TRUE(bus.requests.empty());
     const Reply rounded = ask("PUT", std::string(kOil) + "?round=true", R"({"value":17})");
     EXPECT_EQ(rounded.json(),
               json_of(R"({"transmitted":true,"confirmed":true,"value":20,"label":"low"})"));
     EXPECT_EQ(last_pdu(), "06 00 07 00 02");
+}
+
+TEST_F(ApiPoints, RoundsToTheNearestThatItsLimitsAllow) {
+    points[0].scale = 10;
+    points[0].max = 25;
+    EXPECT_THAT(put(R"({"value":25})").body(), HasSubstr("is 20; ?round=true writes the nearest"));
+    const Reply rounded = ask("PUT", std::string(kOil) + "?round=true", R"({"value":25})");
+    EXPECT_EQ(rounded.json(), json_of(R"({"transmitted":true,"confirmed":true,"value":20})"));
+}
+
+TEST_F(ApiPoints, TakesAndTellsEveryDigit) {
+    points[0].type = points::Type::u64;
+    points[0].scale = 0.001;
+    points[0].max.reset();
+    const Reply reply = put(R"({"value":9007199254740.993})");
+    EXPECT_EQ(reply.status(), 200u) << reply.body();
+    EXPECT_THAT(reply.body(), HasSubstr("\"value\":9007199254740.993}"));
 }
 
 TEST_F(ApiPoints, KnowsNoOtherPoints) {
