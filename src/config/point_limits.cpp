@@ -145,9 +145,9 @@ void load_limits(yaml::MapReader& in, Point& point) {
     check_limit(in, "min", point, point.min);
     check_limit(in, "max", point, point.max);
     if (is_integer(point.type) && point.min && point.max && *point.min <= *point.max &&
-        !has_value_between(point, *point.min, *point.max))
-        in.problem("min", "the point has no value from " + number_text(*point.min) + " to " +
-                              number_text(*point.max) + " (scale " + number_text(point.scale) +
+        !has_value_between(point, point.min->nearest(), point.max->nearest()))
+        in.problem("min", "the point has no value from " + point.min->text() + " to " +
+                              point.max->text() + " (scale " + number_text(point.scale) +
                               "): nothing could be written");
 }
 
