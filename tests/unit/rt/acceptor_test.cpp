@@ -50,7 +50,12 @@ TEST_F(AcceptorTest, SaysWhatIsWrongAndStaysClosed) {
 TEST_F(AcceptorTest, AllAddressesOfBothKindsHaveRoomOnOnePort) {
     Acceptor six(io.get_executor(), [](tcp::socket) {}, [](const error_code&) {});
     if (six.open("::", 0, true)) GTEST_SKIP() << "no IPv6 here";
-    EXPECT_FALSE(acceptor.open("0.0.0.0", six.port()));
+    // Another program may have the same port of the other kind.
+    for (int i = 0; i < 10 && acceptor.open("0.0.0.0", six.port()); ++i) {
+        six.close();
+        ASSERT_FALSE(six.open("::", 0, true));
+    }
+    ASSERT_EQ(acceptor.port(), six.port());
     const std::uint16_t port = acceptor.port();
     six.close();
     EXPECT_FALSE(six.open("::", port, true));
