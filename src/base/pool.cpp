@@ -19,6 +19,8 @@
 namespace panelgate::pool {
 namespace {
 
+constexpr bool kPlainHeap = PANELGATE_PLAIN_HEAP == 1;
+
 // Sizes rise by kStep to kFine, and double from there on.
 constexpr std::size_t kStep = 16;
 constexpr std::size_t kFine = 1024;
@@ -73,7 +75,7 @@ void* take_new(std::size_t index) {
 }  // namespace
 
 void* take(std::size_t size) {
-    if (PANELGATE_PLAIN_HEAP || size > kLargest) return ::operator new(size);
+    if (kPlainHeap || size > kLargest) return ::operator new(size);
     const std::size_t index = index_of(size);
     Shelf& shelf = shelves.of[index];
     if (shelf.first == nullptr) return take_new(index);
@@ -84,12 +86,14 @@ void* take(std::size_t size) {
 }
 
 void give_back(void* block, std::size_t size) noexcept {
-    if (PANELGATE_PLAIN_HEAP || size > kLargest) return ::operator delete(block);
+    if (kPlainHeap || size > kLargest) return ::operator delete(block);
     const std::size_t index = index_of(size);
     Shelf& shelf = shelves.of[index];
     if (!shelves.open || shelf.kept >= kKept) return ::operator delete(block);
     shelf.first = ::new (block) Free{shelf.first};
     shelf.kept += size_of(index);
 }
+
+bool keeps_blocks() noexcept { return !kPlainHeap; }
 
 }  // namespace panelgate::pool

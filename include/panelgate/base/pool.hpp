@@ -25,6 +25,8 @@ inline constexpr std::size_t kKept = std::size_t{256} * 1024;    ///< bytes of e
 void* take(std::size_t size);
 /// A block of take(), with the size that it was taken for.
 void give_back(void* block, std::size_t size) noexcept;
+/// False where each block is the heap's own: this build is AddressSanitizer's.
+bool keeps_blocks() noexcept;
 
 }  // namespace pool
 
