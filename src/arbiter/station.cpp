@@ -151,8 +151,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     failing_.clear();
     missed_ = false;
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
-    // What answers a retry may be the reply to the attempt before: it tells nothing.
-    if (group.silent_after == Duration::zero()) slowest_.add(waited);
+    if (group.tells_pace()) slowest_.add(waited);
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();
@@ -226,6 +225,10 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         if (group.silent_after >= whole) return short_wait(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
+    // Who stopped inside a reply is alive, and may still be held up: the two attempts together wait
+    // as long as one.
+    if (group.cut_after > Duration::zero() && !health_.offline())
+        return std::max(short_wait(line), whole - group.cut_after);
     constexpr int kDear = 16;
     if (health_.offline() && slowest() && turnaround_.known() && probes_ % kDear != kDear - 1) {
         // What a network did to a few replies must not make probes dear: now and then one waits as

@@ -122,6 +122,8 @@ class Attempt {
     void teach(EchoMemory& memory) const;
     /// Its own reply has come, but damaged: what tells it from anything else is whole.
     bool came_damaged() const { return framer_.had_own_header(); }
+    /// What may have been its own reply began, and never became as long as that would be.
+    bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
     /// Something of the station was heard, good or not.
     bool heard() const { return heard_; }
     /// Bytes were heard that came before a reply could.
