@@ -81,6 +81,12 @@ std::string_view Source::line(int number) const {
     return line;
 }
 
+char Source::character(Mark mark) const {
+    const std::string_view all = line(mark.line);
+    const std::size_t at = offset_of_column(all, mark.column);
+    return at < all.size() ? all[at] : '\n';
+}
+
 std::string Source::excerpt(Mark mark) const {
     constexpr std::size_t kBefore = 70;
     constexpr std::size_t kShown = 100;
