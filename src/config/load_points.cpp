@@ -2,6 +2,7 @@
 #include <array>
 #include <cstdint>
 
+#include "check_points.hpp"
 #include "load_stations.hpp"
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/base/number_text.hpp"
@@ -233,6 +234,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     load_no_value(in, point);
     point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
     if (item) check_area(in, point, *item->area, *station.profile);
+    warn_of_idle_keys(loading, in, point);
     in.finish();
     if (item) station.points.push_back(std::move(point));
 }
