@@ -163,8 +163,9 @@ std::string_view without_order(std::string_view typed) {
 
 std::string synonym(std::string_view typed, std::span<const std::string_view> candidates) {
     for (const Synonym& synonym : kSynonyms) {
+        if (synonym.word != typed) continue;
         const bool known = std::ranges::find(candidates, synonym.meant) != candidates.end();
-        if (synonym.word == typed && known) return std::string(synonym.meant);
+        if (known) return std::string(synonym.meant);
     }
     return "";
 }

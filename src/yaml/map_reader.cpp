@@ -8,6 +8,7 @@
 #include "hints.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/yaml/quote.hpp"
+#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
 namespace {
@@ -255,10 +256,14 @@ const Entry* MapReader::shallow_parent(std::size_t entry) const {
     return nullptr;
 }
 
+std::string MapReader::is_unknown(std::string_view key) const {
+    return "unknown key " + quote(key) + " in " + what_;
+}
+
 std::string MapReader::unknown(std::size_t entry) const {
     const std::string& key = node_->entries[entry].key;
     const std::vector<std::string_view> known(known_.begin(), known_.end());
-    const std::string message = "unknown key " + quote(key) + " in " + what_;
+    const std::string message = is_unknown(key);
     const std::string blank = blank_hint(key);
     if (!blank.empty()) return message + blank;
     if (const Entry* parent = shallow_parent(entry))
@@ -302,11 +307,13 @@ void MapReader::refuse(std::string_view key, const std::string& why) {
 }
 
 void MapReader::finish() {
+    std::size_t told = 0;
     for (std::size_t i = 0; i < node_->entries.size(); ++i) {
         const Entry& entry = node_->entries[i];
         if (std::ranges::find(refused_, entry.key) != refused_.end()) continue;
-        if (std::ranges::find(known_, entry.key) == known_.end())
-            problems_->add(entry.mark, unknown(i));
+        if (std::ranges::find(known_, entry.key) != known_.end()) continue;
+        // Nobody reads more of them, and what was meant takes a while to find.
+        problems_->add(entry.mark, ++told > kMaxTold ? is_unknown(entry.key) : unknown(i));
     }
 }
 

@@ -99,6 +99,7 @@ class MapReader {
     const Node* scalar(std::string_view key, std::string_view wanted);
     bool require(std::string_view key);
     const Entry* shallow_parent(std::size_t entry) const;
+    std::string is_unknown(std::string_view key) const;
     std::string unknown(std::size_t entry) const;
     std::string place_of(const Entry& entry, bool exactly) const;
 
