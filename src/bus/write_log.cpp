@@ -34,11 +34,11 @@ std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& 
     return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu())};
 }
 
-std::optional<Deed> deed_of(ByteView pdu, const std::string& client) {
+std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
     if (modbus::is_pure_read(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return Deed{client, request ? place_of(*request) : std::string(), hex_of(pdu)};
+    return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu)};
 }
 
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {
