@@ -219,8 +219,17 @@ void refuse_tls(MapReader& in) {
     in.refuse("tls", "is not in this version; remove it and listen on a trusted network only");
 }
 
+/// Keys that people write where other programs have their serial lines.
+constexpr std::array<yaml::Elsewhere, 5> kElsewhere{
+    {{"type", {}, {}, "remove it: serial lines stand in 'lines'"},
+     {"method", {}, {}, "remove it: serial lines stand in 'lines'"},
+     {"device", {}, "a line, one of 'lines'"},
+     {"serial", {}, "a line, one of 'lines'"},
+     {"stations", {}, "a line, one of 'lines'"}}};
+
 tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a modbus_tcp listener", "{listen: 127.0.0.1:502}");
+    in.elsewhere(kElsewhere);
     tcp_server::Settings settings;
     load_listen(in, settings);
     load_listener_lines(loading, in, settings);

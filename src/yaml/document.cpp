@@ -56,6 +56,7 @@ class Builder final : public YAML::EventHandler {
         charge(mark_of(mark), {});
         Node node;
         node.mark = mark_of(mark);
+        node.comma = source_.byte(mark.line, mark.column) == ',';
         put(std::move(node), anchor);
     }
     void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -75,7 +76,7 @@ class Builder final : public YAML::EventHandler {
     void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   const std::string& value) override {
         check_tag(mark, tag);
-        if (tag == "!" && source_.character(mark_of(mark)) == '!')
+        if (tag == "!" && source_.byte(mark.line, mark.column) == '!')
             problems_.add(mark_of(mark),
                           "a '!' alone is no value; write one, or \"!\" for the text");
         charge(mark_of(mark), {1, value.size(), 0});
@@ -167,7 +168,7 @@ class Builder final : public YAML::EventHandler {
     }
     /// Nothing, between two commas of [a,, b] and {a: 1,, b: 2}: a problem, and nothing else.
     bool is_comma(const Node& node) {
-        if (node.kind != Node::Kind::null || source_.character(node.mark) != ',') return false;
+        if (node.kind != Node::Kind::null || !node.comma) return false;
         problems_.add(node.mark, "a ',' too many; remove it");
         return true;
     }
@@ -220,7 +221,10 @@ class Builder final : public YAML::EventHandler {
         }
         Entry entry = std::move(level.pending);
         // An empty value is marked at the next token, maybe lines below.
-        if (node.kind == Node::Kind::null) node.mark = entry.mark;
+        if (node.kind == Node::Kind::null) {
+            node.mark = entry.mark;
+            node.comma = false;
+        }
         entry.value = std::move(node);
         level.node.entries.push_back(std::move(entry));
     }

@@ -81,10 +81,11 @@ std::string_view Source::line(int number) const {
     return line;
 }
 
-char Source::character(Mark mark) const {
-    const std::string_view all = line(mark.line);
-    const std::size_t at = offset_of_column(all, mark.column);
-    return at < all.size() ? all[at] : '\n';
+char Source::byte(int line, int column) const {
+    if (line < 0 || static_cast<std::size_t>(line) >= lines_.size()) return '\n';
+    const std::size_t at =
+        lines_[static_cast<std::size_t>(line)] + static_cast<std::size_t>(column);
+    return at < text_.size() ? text_[at] : '\n';
 }
 
 std::string Source::excerpt(Mark mark) const {
