@@ -1,6 +1,8 @@
 #include <boost/json/array.hpp>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -95,6 +97,22 @@ json::value network_json(const Network& network) {
     return json::value(network.address + '/' + std::to_string(network.prefix));
 }
 
+json::value unit_json(std::optional<std::uint8_t> unit) {
+    return unit ? json::value(*unit) : json::value(nullptr);
+}
+
+const char* word(tcp_server::BroadcastMode mode) {
+    switch (mode) {
+        case tcp_server::BroadcastMode::reply:
+            return "reply";
+        case tcp_server::BroadcastMode::silent:
+            return "silent";
+        case tcp_server::BroadcastMode::deny:
+            return "deny";
+    }
+    std::abort();
+}
+
 json::object listener_json(const tcp_server::Settings& listener) {
     json::object units;
     for (const auto& [unit, target] : listener.units)
@@ -102,6 +120,8 @@ json::object listener_json(const tcp_server::Settings& listener) {
     return {{"listen", listener.name()},
             {"lines", each(listener.lines, text_json)},
             {"units", std::move(units)},
+            {"diagnostics_unit", unit_json(listener.diagnostics_unit)},
+            {"broadcast", word(listener.broadcast)},
             {"access", access(listener.read_only)},
             {"allow", each(listener.allow, network_json)}};
 }

@@ -69,6 +69,12 @@ std::string text_of(const std::vector<Network>& allow) {
     return text.empty() ? "everybody" : text;
 }
 
+std::string broadcasts_of(const tcp_server::Settings& listener) {
+    using Mode = tcp_server::BroadcastMode;
+    if (listener.read_only || listener.broadcast == Mode::deny) return "refused";
+    return listener.broadcast == Mode::silent ? "sent, and not answered" : "sent and answered";
+}
+
 std::string text_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
@@ -77,7 +83,9 @@ std::string text_of(const tcp_server::Settings& listener) {
         text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
                 std::to_string(target.station) + '\n';
     }
-    return text;
+    if (listener.diagnostics_unit)
+        text += "  unit " + std::to_string(*listener.diagnostics_unit) + " is the gateway itself\n";
+    return text + "  broadcasts are " + broadcasts_of(listener) + '\n';
 }
 
 std::string text_of(web::Role role) {

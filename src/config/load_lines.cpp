@@ -177,27 +177,31 @@ constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}"
 constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
 /// Keys that people write beside `device`.
-constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"baud", "serial", {}},
-                                                      {"data_bits", "serial", {}},
-                                                      {"parity", "serial", {}},
-                                                      {"stop_bits", "serial", {}},
-                                                      {"response_timeout", "timing", {}},
-                                                      {"frame_gap", "timing", {}},
-                                                      {"reply_hole", "timing", {}},
-                                                      {"broadcast_turnaround", "timing", {}},
-                                                      {"late_window", "timing", {}},
-                                                      {"think_time", "timing", {}},
-                                                      {"limit", "queue", {}},
-                                                      {"per_client", "queue", {}},
-                                                      {"deadline", "queue", {}},
-                                                      {"after", "offline", {}},
-                                                      {"probe_min", "offline", {}},
-                                                      {"probe_max", "offline", {}},
-                                                      {"mode", "rs485", {}},
-                                                      {"points", {}, "a station"},
-                                                      {"poll", {}, "a station"},
-                                                      {"profile", {}, "a station"},
-                                                      {"listen", {}, "modbus_tcp or http"}}};
+constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
+constexpr std::array<yaml::Elsewhere, 23> kElsewhere{
+    {{"baud", "serial", {}},
+     {"data_bits", "serial", {}},
+     {"parity", "serial", {}, {}, kParities},
+     {"stop_bits", "serial", {}},
+     {"response_timeout", "timing", {}},
+     {"frame_gap", "timing", {}},
+     {"reply_hole", "timing", {}},
+     {"broadcast_turnaround", "timing", {}},
+     {"late_window", "timing", {}},
+     {"think_time", "timing", {}},
+     {"limit", "queue", {}},
+     {"per_client", "queue", {}},
+     {"deadline", "queue", {}},
+     {"after", "offline", {}},
+     {"probe_min", "offline", {}},
+     {"probe_max", "offline", {}},
+     {"mode", "rs485", {}},
+     {"points", {}, "a station"},
+     {"poll", {}, "a station"},
+     {"profile", {}, "a station"},
+     {"listen", {}, "modbus_tcp or http"},
+     {"type", {}, {}, "remove it: 'device' says what the line is"},
+     {"method", {}, {}, "remove it: every line is RTU"}}};
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);

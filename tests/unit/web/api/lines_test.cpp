@@ -205,6 +205,18 @@ TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
         403u);
 }
 
+TEST_F(ApiLines, TellsWhatIsWrongWithABroadcastBeforeWhomItWouldReach) {
+    add_meter();
+    const auto status = [&](const char* body) {
+        return ask("POST", "/api/v1/lines/floor1/broadcast", body).status();
+    };
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":["x"]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"coils","values":[1]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"input-registers","address":1,"values":[1]})"), 422u);
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":[1]})"), 403u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
 TEST_F(ApiLines, P2WhatMayBeAMistakeInABodyIsNotExecuted) {
     EXPECT_EQ(ask("POST", "/api/v1/lines/floor1/broadcast",
                   R"({"table":"coils","address":1,"values":[1],"verfy":true})")
