@@ -54,6 +54,7 @@ json::object station_json(const config::Station& station,
             {"profile", station.profile->name},
             {"access", access(station.read_only)},
             {"guard", station.guard},
+            {"translate", station.translate ? "auto" : "off"},
             {"retry_writes", settings.retry_writes},
             {"max_age_ms", milliseconds(settings.max_age)},
             {"points", each(station.points, point_json)}};

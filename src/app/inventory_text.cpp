@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/profile/translate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -27,6 +28,16 @@ std::string text_of(const points::Point& point) {
     return text + '\n';
 }
 
+/// ", 5 goes out as 15, 6 goes out as 16"
+std::string translations_of(const config::Station& station) {
+    std::string text;
+    if (!station.translate || station.guard) return text;
+    for (const profile::Translation& one : profile::translations(*station.profile)) {
+        text += ", " + std::to_string(one.asked) + " goes out as " + std::to_string(one.sent);
+    }
+    return text;
+}
+
 std::string text_of(const config::Station& station, const arbiter::StationSettings& settings) {
     std::string text = "  station " + std::to_string(station.id) + ' ' + station.name + ", " +
                        station.profile->name + ", " + rights(station.read_only);
@@ -34,7 +45,7 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     if (settings.retry_writes) text += ", writes are repeated";
     if (settings.max_age > Duration::zero())
         text += ", answers up to " + format_duration(settings.max_age) + " old";
-    text += '\n';
+    text += translations_of(station) + '\n';
     for (const points::Point& point : station.points) text += text_of(point);
     for (const points::Poll& poll : station.polls) {
         text += "    poll " + poll.read + ", count " + std::to_string(poll.count) + ", every " +

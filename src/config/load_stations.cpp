@@ -158,6 +158,8 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     settings.vouched = station.profile->name != "generic";  // which says what anybody could
     settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
     station.guard = in.boolean("guard").value_or(false);
+    constexpr std::array<std::string_view, 2> kTranslate{"auto", "off"};
+    station.translate = in.choice_index("translate", kTranslate) != std::size_t{1};
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();

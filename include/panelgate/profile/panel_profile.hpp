@@ -55,6 +55,11 @@ struct Area {
     /// Name of the word area whose bits these are (UB: "UW"): bit n is bit n%16 of word n/16.
     std::string view_of;
     std::string source;  ///< manual and page
+
+    /// The functions of this table reach it.
+    bool reaches(modbus::Table other) const {
+        return table == other || std::ranges::find(also, other) != also.end();
+    }
 };
 
 struct FunctionRule {
