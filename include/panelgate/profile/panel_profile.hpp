@@ -9,6 +9,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::profile {
@@ -140,6 +141,7 @@ struct PanelProfile {
     std::uint8_t first_station = 1;
     std::uint8_t last_station = modbus::kMaxStation;
     Serial serial;
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
     std::vector<FunctionRule> functions;
     std::vector<Area> areas;
     Timing timing;
