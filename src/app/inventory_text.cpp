@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/config/client_timeout.hpp"
 #include "panelgate/profile/translate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
@@ -54,6 +55,26 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     return text;
 }
 
+/// What a client's own timeout has to be, and what would suit those that have a short one.
+std::string clients_of(const config::Line& line) {
+    const config::ClientTimeout client = config::client_timeout(line);
+    const std::string worst = format_duration(client.worst);
+    const std::string wanted = format_duration(config::kQuickClient);
+    std::string text = "  clients: every request is answered within " + worst + ", ";
+    if (client.worst < config::kQuickClient)
+        return text + "a timeout of " + wanted + " is enough\n";
+    text += "so their timeout has to be longer";
+    if (!client.quick) return text + "; " + wanted + " are too short for this wire\n";
+    const config::QuickSettings& quick = *client.quick;
+    text += "; for " + wanted + " set queue: {deadline: " + format_duration(quick.deadline) +
+            "}, timing: {response_timeout: " + format_duration(quick.response_timeout) +
+            "} and retries: " + std::to_string(quick.retries);
+    if (quick.most_registers)
+        text +=
+            ", and read at most " + std::to_string(*quick.most_registers) + " registers at once";
+    return text + '\n';
+}
+
 std::string text_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
     if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
@@ -62,7 +83,7 @@ std::string text_of(const config::Line& line) {
         text += text_of(line.stations[i], line.arbiter.stations[i]);
     return text +
            "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
-           '\n';
+           '\n' + clients_of(line);
 }
 
 std::string text_of(const points::Relay& relay) {
