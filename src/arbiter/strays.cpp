@@ -48,10 +48,10 @@ std::vector<Unused> Strays::take(std::uint8_t asked) {
 }
 
 /// A reply to the broadcast of a moment ago: a panel that does not know that it should be silent.
-bool Strays::answers_broadcast(const Unused& part) const {
+bool Strays::answers_broadcast(ByteView adu) const {
     constexpr unsigned kRecent = 4;  // requests sent since
     return !broadcast_.empty() && sent_since_ <= kRecent &&
-           modbus::answers(pdu_of(broadcast_), pdu_of(part.bytes));
+           modbus::answers(pdu_of(broadcast_), pdu_of(adu));
 }
 
 Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) const {
@@ -63,7 +63,7 @@ Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) 
     const Station* station = stations.find(part.station);
     const bool owed =
         station != nullptr && station->judge(now, pdu_of(part.bytes)) != Stray::unasked;
-    if (!owed && answers_broadcast(part)) return Part::broadcast_reply;
+    if (!owed && answers_broadcast(part.bytes)) return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
 
@@ -106,7 +106,8 @@ void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& sta
 }
 
 bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const {
-    if (std::ranges::equal(adu, last_frame_) || is_request(adu)) return false;
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu))
+        return false;
     const Station* station = stations.find(adu[0]);
     return station != nullptr && station->judge(now, pdu_of(adu)) == Stray::unasked;
 }

@@ -49,12 +49,12 @@ class Strays {
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
               Stations& stations, Quiet& quiet, Ledger& ledger) const;
     /// It is the reply that its station gives instead of the right one: not the echo, nor a copy,
-    /// nor what was owed.
+    /// nor what was owed, nor its answer to a broadcast.
     bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const;
 
   private:
     Ledger::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
-    bool answers_broadcast(const modbus::Unused& part) const;
+    bool answers_broadcast(ByteView adu) const;
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 

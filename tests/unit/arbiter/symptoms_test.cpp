@@ -192,6 +192,20 @@ TEST_F(SymptomsTest, WhoAnswersABroadcastIsNobodyWhoSpeaksUnasked) {
     EXPECT_EQ(of(18).unasked, 1u);
 }
 
+TEST_F(SymptomsTest, AnAnswerToABroadcastIsNotWhatTheNextRequestIsAnswered) {
+    bus().submit(0, "10 00 64 00 01 02 12 34"_hex);
+    bus().run_for(200ms);
+    const auto ticket = bus().submit(18, kRead);
+    bus().run_to_end_of_request();
+    bus().hear(modbus::encode_adu(18, "90 02"_hex));
+    bus().run_for(10ms);
+    bus().hear(modbus::encode_adu(18, kReply));
+    ASSERT_TRUE(bus().answered(ticket));
+    EXPECT_EQ(bus().answer(ticket).pdu.value(), kReply);
+    EXPECT_EQ(of(18).broadcast_replies, 1u);
+    EXPECT_EQ(of(18).wrong, 0u);
+}
+
 TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
     bus().submit(0, "06 00 01 00 03"_hex);
     bus().run_for(400ms);
