@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "inventory.hpp"
+#include "panelgate/config/client_timeout.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -56,9 +57,22 @@ json::object station_json(const config::Station& station,
             {"profile", station.profile->name},
             {"access", access(station.read_only)},
             {"guard", station.guard},
+            {"translate", station.translate ? "auto" : "off"},
             {"retry_writes", settings.retry_writes},
             {"max_age_ms", milliseconds(settings.max_age)},
             {"points", each(station.points, point_json)}};
+}
+
+json::object clients_json(const config::Line& line) {
+    const config::ClientTimeout client = config::client_timeout(line);
+    json::object made{{"answered_within_ms", milliseconds(client.worst)}};
+    if (!client.quick) return made;
+    json::object quick{{"deadline_ms", milliseconds(client.quick->deadline)},
+                       {"response_timeout_ms", milliseconds(client.quick->response_timeout)},
+                       {"retries", client.quick->retries}};
+    if (client.quick->most_registers) quick["most_registers"] = *client.quick->most_registers;
+    made["within_500_ms"] = std::move(quick);
+    return made;
 }
 
 json::object line_json(const config::Line& line) {
@@ -77,6 +91,7 @@ json::object line_json(const config::Line& line) {
     return {{"name", line.name},
             {"device", line.device.device},
             {"serial", to_string(line.device.serial)},
+            {"clients", clients_json(line)},
             {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},
             {"stations", std::move(stations)},
             {"polls", std::move(polls)}};

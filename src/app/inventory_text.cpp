@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/config/client_timeout.hpp"
+#include "panelgate/profile/translate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -27,6 +29,16 @@ std::string text_of(const points::Point& point) {
     return text + '\n';
 }
 
+/// ", 5 goes out as 15, 6 goes out as 16"
+std::string translations_of(const config::Station& station) {
+    std::string text;
+    if (!station.translate || station.guard) return text;
+    for (const profile::Translation& one : profile::translations(*station.profile)) {
+        text += ", " + std::to_string(one.asked) + " goes out as " + std::to_string(one.sent);
+    }
+    return text;
+}
+
 std::string text_of(const config::Station& station, const arbiter::StationSettings& settings) {
     std::string text = "  station " + std::to_string(station.id) + ' ' + station.name + ", " +
                        station.profile->name + ", " + rights(station.read_only);
@@ -34,13 +46,33 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     if (settings.retry_writes) text += ", writes are repeated";
     if (settings.max_age > Duration::zero())
         text += ", answers up to " + format_duration(settings.max_age) + " old";
-    text += '\n';
+    text += translations_of(station) + '\n';
     for (const points::Point& point : station.points) text += text_of(point);
     for (const points::Poll& poll : station.polls) {
         text += "    poll " + poll.read + ", count " + std::to_string(poll.count) + ", every " +
                 format_duration(poll.every) + '\n';
     }
     return text;
+}
+
+/// What a client's own timeout has to be, and what would suit those that have a short one.
+std::string clients_of(const config::Line& line) {
+    const config::ClientTimeout client = config::client_timeout(line);
+    const std::string worst = format_duration(client.worst);
+    const std::string wanted = format_duration(config::kQuickClient);
+    std::string text = "  clients: every request is answered within " + worst + ", ";
+    if (client.worst < config::kQuickClient)
+        return text + "a timeout of " + wanted + " is enough\n";
+    text += "so their timeout has to be longer";
+    if (!client.quick) return text + "; " + wanted + " are too short for this wire\n";
+    const config::QuickSettings& quick = *client.quick;
+    text += "; for " + wanted + " set queue: {deadline: " + format_duration(quick.deadline) +
+            "}, timing: {response_timeout: " + format_duration(quick.response_timeout) +
+            "} and retries: " + std::to_string(quick.retries);
+    if (quick.most_registers)
+        text +=
+            ", and read at most " + std::to_string(*quick.most_registers) + " registers at once";
+    return text + '\n';
 }
 
 std::string text_of(const config::Line& line) {
@@ -51,7 +83,7 @@ std::string text_of(const config::Line& line) {
         text += text_of(line.stations[i], line.arbiter.stations[i]);
     return text +
            "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
-           '\n';
+           '\n' + clients_of(line);
 }
 
 std::string text_of(const points::Relay& relay) {

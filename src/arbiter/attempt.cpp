@@ -28,11 +28,13 @@ Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::siz
     return timing;
 }
 
-Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
+Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
+                 const modbus::CrcOrders& orders)
     : group_(std::move(group)),
       timing_(timing),
+      orders_(orders),
       echo_(std::move(echo)),
-      framer_(group_.station, group_.request.pdu()),
+      framer_(group_.station, group_.request.pdu(), orders_),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
@@ -77,7 +79,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     if (echo_.complete() && !was_complete) began_ = now - (since_ = rest.size()) * character();
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
-        lender_.emplace(group_.station, group_.request.pdu());
+        lender_.emplace(group_.station, group_.request.pdu(), orders_);
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
@@ -131,8 +133,7 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
 /// The first frame that is our own confirms nothing, unless a part of the echo has come before it.
 bool Attempt::may_be_echo(ByteView reply) const {
     const bool accounted = !echo_possible_ || echo_.complete() || fragment_ || own_frame_seen_;
-    return !accounted &&
-           std::ranges::equal(modbus::encode_adu(group_.station, reply), echo_.frame());
+    return !accounted && std::ranges::equal(adu_of(reply), echo_.frame());
 }
 
 /// What is pending becomes strays. Was it what the station said instead of the reply?
@@ -150,7 +151,9 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
         // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
-        const bool other = !exception && part.bytes[1] != group_.request.function();
+        const int function = part.bytes[1] & ~modbus::kExceptionBit;
+        const bool other = !exception && function != group_.request.function();
+        refused_other_ = refused_other_ || (exception && function != group_.request.function());
         (other ? disturbed_ : wrong_) = true;
         strange_ = strange_ || other;
     }
@@ -160,7 +163,7 @@ void Attempt::collect() {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
-        const bool foreign = begins_with_request(parts[i].bytes, echo_.frame());
+        const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
         if (parts[i].kind == Unused::Kind::damaged && !foreign) {
             const bool in_front = i + behind < parts.size();
             if (in_front) noise_in_front_ += parts[i].bytes.size();
@@ -240,7 +243,7 @@ void Attempt::stray_frame(const Bytes& pdu) {
     Unused part;
     part.kind = Unused::Kind::own;
     part.station = group_.station;
-    part.bytes = modbus::encode_adu(group_.station, pdu);
+    part.bytes = adu_of(pdu);
     strays_.push_back(std::move(part));
 }
 

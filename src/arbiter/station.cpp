@@ -105,7 +105,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
 }
 
 void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
-    const Bytes* copy = copies_.copy_in(now, id, bytes);
+    const Bytes* copy = copies_.copy_in(now, id, bytes, settings_.crc_order);
     if (copy == nullptr) return;
     const Bytes reply = *copy;
     if (owes()) return copies_.on_either(now, reply);

@@ -12,6 +12,7 @@
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/translation.hpp"
 #include "panelgate/rt/log.hpp"
 #include "refusals.hpp"
 #include "request_counters.hpp"
@@ -40,6 +41,8 @@ struct Bus::State final : public line::Line::Events {
         std::uint8_t function = 0;
         TimePoint arrived;
         std::optional<Deed> deed{};
+        Bytes asked{};             ///< of a request that is translated: what its client wants
+        std::uint8_t sent_as = 0;  ///< ... and its function on the wire; 0: the one asked
     };
 
     State(asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
@@ -166,11 +169,17 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
         return refuse(std::move(entry), std::move(reply), std::move(refusal));
     }
     const PriorityClass priority = priority_of(request);
+    if (auto other = translated(settings.stations, request.station, what)) {
+        entry.asked = what.pdu();
+        entry.sent_as = other->function();
+        request.request = std::move(*other);
+    }
     arbiter::Job job{.station = request.station,
                      .request = std::move(request.request),
                      .client = request.client,
                      .host = request.host,
-                     .priority = priority};
+                     .priority = priority,
+                     .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function};
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
@@ -198,6 +207,10 @@ void Bus::State::act(arbiter::Finish& finish) {
     pending.erase(found);
     Answer result;
     result.pdu = std::move(finish.pdu);
+    if (entry.sent_as != 0) {
+        if (finish.transmitted) counters.translated(entry.station, entry.function, entry.sent_as);
+        if (result.pdu) result.pdu = modbus::translated_back(entry.asked, *result.pdu);
+    }
     result.transmitted = finish.transmitted;
     result.shared = finish.shared;
     if (finish.age) {

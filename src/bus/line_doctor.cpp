@@ -16,6 +16,8 @@ doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     facts.response_timeout = settings.unlisted.response_timeout;
     for (const arbiter::StationSettings& station : settings.stations) {
         facts.response_timeouts[station.id] = station.response_timeout;
+        if (station.crc_order == modbus::CrcOrder::high_first)
+            facts.crc_high_first.insert(station.id);
     }
     return facts;
 }

@@ -19,6 +19,7 @@ RequestCounters::RequestCounters(const Stations& stations) {
         stations_[id].station = station.name;
         stations_[id].configured = true;
         for (const std::uint8_t function : station.functions) stations_[id].requests[function];
+        for (const auto& functions : station.translations) stations_[id].translated[functions];
     }
 }
 

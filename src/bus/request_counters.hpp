@@ -20,6 +20,10 @@ class RequestCounters {
     explicit RequestCounters(const Stations& stations);
 
     void count(std::uint8_t station, std::uint8_t function, Outcome outcome, Duration took);
+    /// One that was counted went out as function `sent`.
+    void translated(std::uint8_t station, std::uint8_t function, std::uint8_t sent) {
+        ++of(station).translated[{function, sent}];
+    }
     void succeeded(std::uint8_t station, double wall);
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;

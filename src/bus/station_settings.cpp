@@ -21,6 +21,13 @@ std::string_view label(Rule rule) {
     std::abort();
 }
 
+std::optional<modbus::Request> translated(const Stations& stations, std::uint8_t id,
+                                          const modbus::Request& request) {
+    const auto listed = stations.find(id);
+    if (id == 0 || listed == stations.end() || !listed->second.translate) return std::nullopt;
+    return listed->second.translate(request);
+}
+
 std::string name_of(const Stations& stations, std::uint8_t id) {
     const auto listed = stations.find(id);
     return listed == stations.end() ? std::to_string(id) : listed->second.name;

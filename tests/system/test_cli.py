@@ -191,6 +191,8 @@ class Files(unittest.TestCase):
                       "station 20 oven, panasonic-gt, read only",
                       "point level: UW100, u16, every 1s, in m, writable from 1 to 2.5",
                       "poll UW0, count 32, every 5s", "other stations: refused",
+                      "clients: every request is answered within 2s, so their timeout has to be "
+                      "longer; for 500ms set queue: {deadline: 450ms}",
                       "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
                       "unit 101 is floor1/31", "unit 255 is the gateway itself",
@@ -201,6 +203,9 @@ class Files(unittest.TestCase):
         [line] = plan["lines"]
         self.assertEqual(line["polls"], [{"station": "press", "read": "UW0", "count": 32,
                                           "every_ms": 5000}])
+        clients = line["clients"]
+        self.assertEqual((clients["answered_within_ms"], clients["within_500_ms"]["deadline_ms"]),
+                         (2000, 450))
         self.assertEqual([s["access"] for s in line["stations"]], ["read_write", "read_only"])
         self.assertEqual(line["stations"][0]["points"][0]["name"], "level")
         self.assertEqual(plan["relays"][0]["to"], "press/UW200")

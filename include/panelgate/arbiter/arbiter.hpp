@@ -139,6 +139,7 @@ class Arbiter {
     void note(TimePoint now, const std::vector<modbus::Unused>& parts);
 
     Settings settings_;
+    modbus::CrcOrders orders_;
     Stations stations_;
     Schedule schedule_;
     Quiet quiet_;

@@ -11,6 +11,8 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
@@ -53,7 +55,8 @@ class Attempt {
     /// long it is waited for is added.
     static Timing timing_of(const Settings& line, TimePoint now, std::size_t size, Duration lead);
 
-    Attempt(Group group, const Timing& timing, EchoFilter echo);
+    Attempt(Group group, const Timing& timing, EchoFilter echo,
+            const modbus::CrcOrders& orders = {});
 
     Verdict on_rx(TimePoint now, ByteView bytes, const Ends& ends);
     /// Harmless when nothing is due.
@@ -124,6 +127,8 @@ class Attempt {
     bool came_damaged() const { return framer_.had_own_header(); }
     /// What may have been its own reply began, and never became as long as that would be.
     bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
+    /// The station refused with the number of a function that it was not asked.
+    bool refused_other() const { return refused_other_; }
     /// Something of the station was heard, good or not.
     bool heard() const { return heard_; }
     /// Bytes were heard that came before a reply could.
@@ -149,6 +154,10 @@ class Attempt {
     bool may_be_echo(ByteView reply) const;
     Verdict judge_pending(const Ends& ends);
     void stray_frame(const Bytes& pdu);
+    /// What the station has said when this is its reply.
+    Bytes adu_of(ByteView reply) const {
+        return modbus::encode_adu(group_.station, reply, orders_.of(group_.station));
+    }
     void judge_strays(std::size_t from, const Ends& ends);
     void collect();
     bool is_stale(TimePoint now, std::size_t size) const;
@@ -158,6 +167,7 @@ class Attempt {
 
     Group group_;
     Timing timing_;
+    modbus::CrcOrders orders_;
     EchoFilter echo_;
     modbus::ReplyFramer framer_;
     /// As framer_, for the case that the echo's last byte was lost and the reply's first was taken
@@ -188,6 +198,7 @@ class Attempt {
     std::size_t noise_in_front_ = 0;  ///< bytes
     bool borrowed_ = false;
     bool wrong_ = false;
+    bool refused_other_ = false;
     bool strange_ = false;  ///< the station said something that has nothing to do with the request
     bool end_confirmed_ = true;
 };

@@ -25,6 +25,7 @@ struct Station {
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
     bool guard = false;        ///< what the profile rules out is refused without using the bus
+    bool translate = true;     ///< what its panel lacks goes out as what does the same
     sim::Misbehaviour faults;  ///< of the simulated panel
     std::vector<points::Point> points;
     std::vector<points::Poll> polls;
