@@ -7,6 +7,7 @@
 
 #include "diagnostics.hpp"
 #include "dispatch.hpp"
+#include "own_state.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -34,17 +35,6 @@ Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
     return std::move(*pdu);
 }
 
-Bytes diagnose(ByteView request, const Shared& shared) {
-    Diagnostics state;
-    state.uptime = shared.clock.now() - shared.started;
-    state.version = shared.version;
-    for (const bus::BusClient* line : shared.units.lines()) {
-        const bus::LineStatus status = line->status();
-        state.lines.push_back({status.up, status.queue_depth, status.load_percent});
-    }
-    return answer_diagnostics(request, state);
-}
-
 /// Gathers what the lines say of one broadcast.
 struct BroadcastOutcome {
     std::size_t open = 0;  ///< lines that have not answered yet
@@ -69,8 +59,8 @@ struct BroadcastOutcome {
 
 }  // namespace
 
-Pipeline::Pipeline(std::shared_ptr<const Shared> shared, Caller caller,
-                   std::function<void()> on_answer, Transport transport)
+Pipeline::Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
+                   Transport transport)
     : shared_(std::move(shared)),
       caller_(std::move(caller)),
       on_answer_(std::move(on_answer)),
@@ -121,6 +111,8 @@ void Pipeline::take(modbus::Adu adu) {
         shared_->log(rt::LogLevel::debug, "retransmission joined", {{"client", client()}});
         return;
     }
+    ++shared_->counters.requests;
+    if (!modbus::is_answered(shared_->settings.framing, adu.unit)) ++shared_->counters.unanswered;
     waiting_.push_back(std::move(adu));
     admit();
 }
@@ -153,7 +145,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
                    },
                    [&](const Diagnose&) {
                        answer(adu, [pdu = adu.pdu, shared = shared_.get()] {
-                           return diagnose(pdu, *shared);
+                           return answer_diagnostics(pdu, own_state(*shared));
                        });
                    },
                    [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
@@ -163,7 +155,8 @@ void Pipeline::serve(const modbus::Adu& adu) {
 }
 
 void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
-    if (shared_->own_answers->may_give()) return replies_.push(adu.transaction, adu.unit, pdu());
+    if (shared_->own_answers->may_give())
+        return replies_.push(adu.transaction, adu.unit, counted(pdu()));
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
         const auto self = weak.lock();
@@ -174,7 +167,7 @@ void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
 }
 
 void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
-    replies_.push(adu.transaction, adu.unit, exception_reply(adu.pdu[0], fault));
+    replies_.push(adu.transaction, adu.unit, counted(exception_reply(adu.pdu[0], fault)));
 }
 
 void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
@@ -204,11 +197,20 @@ void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) 
         caller_.transact(line, 0, broadcasting.request, on_answer);
 }
 
+Bytes Pipeline::counted(Bytes reply) {
+    constexpr auto kBusy = static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
+    const auto code = modbus::exception_of(reply);
+    if (code) ++shared_->counters.exceptions;
+    if (code == kBusy) ++shared_->counters.busy;
+    return reply;
+}
+
 void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
     if (closed_) return;
     if (pdu) {
-        replies_.settle(ticket, *pdu);
+        replies_.settle(ticket, counted(std::move(*pdu)));
     } else {
+        ++shared_->counters.unanswered;
         replies_.drop(ticket);
     }
     admit();

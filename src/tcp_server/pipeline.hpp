@@ -32,7 +32,7 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
 
     /// `on_answer`: a bus has answered, so there may be a reply to send. Never called from inside
     /// take() or pop(), and not after close().
-    Pipeline(std::shared_ptr<const Shared> shared, Caller caller, std::function<void()> on_answer,
+    Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
              Transport transport = Transport::stream);
 
     /// One more request can be kept. Who takes none without room bounds the memory.
@@ -66,10 +66,11 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     /// The gateway's own answer, now or when it is its turn (OwnAnswers).
     using OwnPdu = InlineFunction<Bytes(), 48>;
     void answer(const modbus::Adu& adu, OwnPdu pdu);
+    Bytes counted(Bytes reply);
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
 
-    std::shared_ptr<const Shared> shared_;
+    std::shared_ptr<Shared> shared_;
     Caller caller_;
     std::function<void()> on_answer_;
     Transport transport_;

@@ -61,6 +61,10 @@ struct Settings {
     std::size_t garbage_limit = 1024;  ///< bytes in a row that are no request close the connection
     Duration output_timeout = 5min;    ///< a client that takes nothing for so long is closed
 
+    // For the identification of the gateway (2B/0E); may be empty.
+    std::string url;   ///< of its pages
+    std::string host;  ///< name of the machine
+
     std::string name() const { return endpoint_text(address, port); }
 };
 
