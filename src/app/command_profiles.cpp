@@ -1,4 +1,5 @@
 #include <iostream>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -7,9 +8,17 @@
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/profile/describe.hpp"
 #include "panelgate/profile/load_profile.hpp"
+#include "panelgate/tcp_server/register_map_text.hpp"
 
 namespace panelgate::app {
 namespace {
+
+constexpr std::string_view kGateway = "gateway";  // no panel, and yet it is asked like one
+
+void list(std::string_view name, std::string_view description) {
+    std::cout << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << description
+              << '\n';
+}
 
 /// nullptr, and told, when there is none of this name.
 const profile::PanelProfile* find(const profile::Catalogue& catalogue, const std::string& name) {
@@ -47,15 +56,18 @@ ExitCode profiles(const std::string& name, const std::string& dir) {
     const auto catalogue = load_catalogue(dir);
     if (!catalogue) return kBadConfig;
     if (!name.empty()) {
+        if (name == kGateway && catalogue->find(name) == nullptr) {
+            std::cout << tcp_server::describe_register_map();
+            return kFine;
+        }
         const profile::PanelProfile* profile = find(*catalogue, name);
         if (profile == nullptr) return kUsage;
         std::cout << profile::describe(*profile);
         return kFine;
     }
-    for (const auto& [known, profile] : catalogue->all()) {
-        std::cout << known << std::string(known.size() < 20 ? 20 - known.size() : 1, ' ')
-                  << profile.description << '\n';
-    }
+    for (const auto& [known, profile] : catalogue->all()) list(known, profile.description);
+    if (catalogue->find(kGateway) == nullptr)
+        list(kGateway, "the gateway's own unit: registers, counters, identification");
     return kFine;
 }
 

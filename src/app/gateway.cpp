@@ -1,6 +1,7 @@
 #include "gateway.hpp"
 
 #include <algorithm>
+#include <boost/asio/ip/host_name.hpp>
 #include <system_error>
 #include <utility>
 #include <variant>
@@ -100,11 +101,14 @@ void Gateway::add_relays() {
     });
 }
 
-void Gateway::add_listener(const tcp_server::Settings& settings) {
+void Gateway::add_listener(tcp_server::Settings settings) {
+    boost::system::error_code unknown;
+    settings.host = boost::asio::ip::host_name(unknown);
+    if (config_.http) settings.url = "http://" + config_.http->name() + '/';
     tcp_server::UnitMap units(settings, plant_.listener_lines());
     plant_.add_units(units);
     listeners_.push_back(std::make_unique<tcp_server::Listener>(
-        executor_, clock_, settings, std::move(units), PANELGATE_VERSION));
+        executor_, clock_, std::move(settings), std::move(units), PANELGATE_VERSION));
 }
 
 void Gateway::add_http(const web::Settings& settings) {

@@ -60,7 +60,7 @@ class Gateway {
     void add_line(const config::Line& line, bool simulate);
     void add_poller(const config::Line& line, bus::Bus& bus);
     void add_relays();
-    void add_listener(const tcp_server::Settings& settings);
+    void add_listener(tcp_server::Settings settings);
     void add_http(const web::Settings& settings);
     void add_doors();
     bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;

@@ -133,6 +133,8 @@ json::object listener_json(const tcp_server::Settings& listener) {
     for (const auto& [unit, target] : listener.units)
         units[std::to_string(unit)] = target.line + '/' + std::to_string(target.station);
     return {{"listen", listener.name()},
+            {"framing", modbus::label(listener.framing)},
+            {"udp", listener.udp},
             {"lines", each(listener.lines, text_json)},
             {"units", std::move(units)},
             {"diagnostics_unit", unit_json(listener.diagnostics_unit)},

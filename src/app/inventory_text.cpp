@@ -110,6 +110,9 @@ std::string broadcasts_of(const tcp_server::Settings& listener) {
 std::string text_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
+    if (listener.framing != modbus::Framing::tcp)
+        text += ", framing " + std::string(modbus::label(listener.framing));
+    if (listener.udp) text += ", udp too";
     text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
     for (const auto& [unit, target] : listener.units) {
         text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +

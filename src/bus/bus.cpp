@@ -362,6 +362,10 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     return status;
 }
 
+OutcomeCounts Bus::outcomes(std::uint8_t station) const {
+    return state_->counters.outcomes(station);
+}
+
 std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }

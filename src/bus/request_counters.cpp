@@ -39,6 +39,16 @@ void RequestCounters::succeeded(std::uint8_t station, double wall) {
     of(station).last_success_unix = wall;
 }
 
+OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
+    OutcomeCounts all;
+    const auto found = stations_.find(station);
+    if (found == stations_.end() || !found->second.configured) return all;
+    for (const auto& [function, counts] : found->second.requests) {
+        for (const Outcome outcome : kAllOutcomes) all[outcome] += counts[outcome];
+    }
+    return all;
+}
+
 std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
     std::vector<StationReport> reports;
     for (const auto& [id, counted] : stations_) {

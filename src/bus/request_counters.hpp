@@ -25,6 +25,8 @@ class RequestCounters {
         ++of(station).translated[{function, sent}];
     }
     void succeeded(std::uint8_t station, double wall);
+    /// Of all functions; none of a station that is not configured.
+    OutcomeCounts outcomes(std::uint8_t station) const;
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
 

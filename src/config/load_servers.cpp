@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "address_hints.hpp"
+#include "load_framing.hpp"
 #include "load_hosts.hpp"
 #include "load_tokens.hpp"
 #include "loader.hpp"
@@ -235,10 +236,7 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_listener_lines(loading, in, settings);
     load_units(loading, in, settings);
     check_overlap(loading, in, settings);
-    using Mode = tcp_server::BroadcastMode;
-    constexpr std::array<std::pair<std::string_view, Mode>, 3> kModes{
-        {{"reply", Mode::reply}, {"silent", Mode::silent}, {"deny", Mode::deny}}};
-    settings.broadcast = in.choice<Mode>("broadcast", kModes).value_or(settings.broadcast);
+    load_framing(in, settings);
     load_diagnostics(loading, in, settings);
     settings.read_only = load_read_only(in).value_or(false);
     load_allow(loading, in, settings.allow);

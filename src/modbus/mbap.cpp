@@ -26,45 +26,37 @@ bool is_legal(std::size_t length) { return length >= kMinMbapLength && length <=
 }  // namespace
 
 void MbapFramer::feed(ByteView bytes) {
-    if (!broken_) buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+    if (!broken_) waiting_.feed(bytes);
 }
 
 std::optional<MbapEvent> MbapFramer::next() {
-    const std::optional<Prefix> prefix = read_prefix(waiting());
+    const std::optional<Prefix> prefix = read_prefix(waiting_.view());
     if (!prefix) return std::nullopt;
     if (!is_legal(prefix->length)) {
         broken_ = true;
-        take(waiting().size());
+        waiting_.take(waiting_.size());
         return MbapEvent(Broken{});
     }
     const std::size_t size = kMbapPrefix + prefix->length;
-    if (waiting().size() < size) return std::nullopt;
+    if (waiting_.size() < size) return std::nullopt;
     if (prefix->protocol != 0) {
-        take(size);
+        waiting_.take(size);
         return MbapEvent(SkippedProtocol{});
     }
-    const ByteView body = waiting().subspan(kMbapPrefix, prefix->length);
+    const ByteView body = waiting_.view().subspan(kMbapPrefix, prefix->length);
     const ByteView pdu = body.subspan(1);
     Adu adu;
     adu.transaction = prefix->transaction;
     adu.unit = body[0];
     adu.pdu.assign(pdu.begin(), pdu.end());
-    take(size);
+    waiting_.take(size);
     return MbapEvent(std::move(adu));
 }
 
 bool MbapFramer::partial() const {
-    if (waiting().empty()) return false;
-    const std::optional<Prefix> prefix = read_prefix(waiting());
-    return !prefix || (is_legal(prefix->length) && waiting().size() < kMbapPrefix + prefix->length);
-}
-
-/// Moves the rest to the front only when at least as much was taken: each byte moves O(1) times.
-void MbapFramer::take(std::size_t count) {
-    taken_ += count;
-    if (taken_ < buffer_.size() - taken_) return;
-    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(taken_));
-    taken_ = 0;
+    if (waiting_.empty()) return false;
+    const std::optional<Prefix> prefix = read_prefix(waiting_.view());
+    return !prefix || (is_legal(prefix->length) && waiting_.size() < kMbapPrefix + prefix->length);
 }
 
 Bytes encode_mbap(std::uint16_t transaction, std::uint8_t unit, ByteView pdu) {

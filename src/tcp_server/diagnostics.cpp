@@ -1,98 +1,155 @@
 #include "diagnostics.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <string_view>
+#include <vector>
 
+#include "identification.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "register_map.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
 
 using modbus::ExceptionCode;
 
-constexpr std::uint16_t kMapVersion = 1;
-constexpr std::size_t kMaxRegisters = 125;  // of one read, AP 6.3
-// Device identification, AP 6.21.
-constexpr std::uint8_t kBasicStream = 0x01;
-constexpr std::uint8_t kIndividual = 0x04;
-constexpr std::uint8_t kConformity = 0x81;  // basic, stream and individual access
+constexpr std::size_t kMostRegisters = 125;  // of one read, AP 6.3
+constexpr std::size_t kMostInputs = 2000;    // AP 6.2
+constexpr std::uint8_t kServerId = 'P';      // AP 6.13: the device's own
+constexpr std::uint8_t kRunning = 0xFF;
+// Sub-functions of 08, AP 6.8.1.
+constexpr std::uint16_t kReturnQueryData = 0x00;
 
 Bytes refuse(ByteView request, ExceptionCode code) {
     return modbus::encode_exception(request[0], code);
 }
 
-std::uint16_t clamp16(double value) {
-    return static_cast<std::uint16_t>(std::clamp(std::round(value), 0.0, 65535.0));
-}
-
-std::vector<std::uint16_t> register_map(const Diagnostics& state) {
-    const auto uptime = static_cast<std::uint32_t>(to_seconds(state.uptime));
-    std::vector<std::uint16_t> map = {kMapVersion, static_cast<std::uint16_t>(state.lines.size()),
-                                      static_cast<std::uint16_t>(uptime >> 16),
-                                      static_cast<std::uint16_t>(uptime & 0xFFFF)};
-    for (const Diagnostics::Line& line : state.lines) {
-        map.push_back(line.up ? 1 : 0);
-        map.push_back(clamp16(static_cast<double>(line.queue_depth)));
-        map.push_back(clamp16(line.load_percent * 10));
-    }
-    return map;
+/// What a read of `most` items at once out of `items` is refused for, if it is.
+std::optional<ExceptionCode> objection(std::size_t first, std::size_t count, std::size_t most,
+                                       std::size_t items) {
+    if (count == 0 || count > most) return ExceptionCode::illegal_data_value;
+    if (first + count > items) return ExceptionCode::illegal_data_address;
+    return std::nullopt;
 }
 
 Bytes read_registers(ByteView request, const Diagnostics& state) {
     Reader in(request.subspan(1));
     const std::size_t first = in.u16();
     const std::size_t count = in.u16();
-    const std::vector<std::uint16_t> map = register_map(state);
-    if (count == 0 || count > kMaxRegisters) {
-        return refuse(request, ExceptionCode::illegal_data_value);
-    }
-    if (first + count > map.size()) return refuse(request, ExceptionCode::illegal_data_address);
+    if (const auto code = objection(first, count, kMostRegisters, kMapRegisters))
+        return refuse(request, *code);
+    RegisterMap map(state);
     Writer out;
     out.u8(request[0]).u8(static_cast<unsigned>(2 * count));
-    for (std::size_t i = first; i < first + count; ++i) out.u16(map[i]);
+    for (std::size_t i = first; i < first + count; ++i) out.u16(map.at(i));
     return out.take();
 }
 
-Bytes identify(ByteView request, const Diagnostics& state) {
-    const std::array<std::string_view, 3> objects = {"panelgate", "panelgate", state.version};
-    const std::uint8_t code = request[2];
-    std::size_t first = request[3];
-    if (code < kBasicStream || code > kIndividual) {
-        return refuse(request, ExceptionCode::illegal_data_value);
-    }
-    if (first >= objects.size()) {
-        if (code == kIndividual) return refuse(request, ExceptionCode::illegal_data_address);
-        first = 0;  // a stream restarts at the beginning (AP 6.21)
-    }
-    const std::size_t end = code == kIndividual ? first + 1 : objects.size();
+Bytes read_inputs(ByteView request, const Diagnostics& state) {
+    Reader in(request.subspan(1));
+    const std::size_t first = in.u16();
+    const std::size_t count = in.u16();
+    if (const auto code = objection(first, count, kMostInputs, kMapInputs))
+        return refuse(request, *code);
+    RegisterMap map(state);
+    std::vector<bool> inputs;
+    for (std::size_t i = first; i < first + count; ++i) inputs.push_back(map.input(i));
+    const Bytes packed = modbus::pack_bits(inputs);
     Writer out;
-    out.u8(request[0]).u8(modbus::kMeiDeviceIdentification).u8(code).u8(kConformity);
-    out.u8(0).u8(0).u8(static_cast<unsigned>(end - first));  // nothing follows
-    for (std::size_t i = first; i < end; ++i) {
-        const std::string_view text = objects[i].substr(0, 64);
-        out.u8(static_cast<unsigned>(i)).u8(static_cast<unsigned>(text.size()));
-        for (const char c : text) out.u8(static_cast<unsigned char>(c));
-    }
+    out.u8(request[0]).u8(static_cast<unsigned>(packed.size())).raw(packed);
     return out.take();
+}
+
+/// The counter that a sub-function of 08 returns; nothing: it does something else.
+std::optional<std::uint64_t> counter_of(std::uint16_t sub_function, const Counters& counters) {
+    switch (sub_function) {
+        case 0x02:  // diagnostic register
+        case 0x10:  // negative acknowledgements
+        case 0x12:  // overruns of characters
+            return 0;
+        case 0x0B:
+            return counters.requests + counters.protocol_errors;
+        case 0x0C:
+            return counters.protocol_errors;
+        case 0x0D:
+            return counters.exceptions;
+        case 0x0E:
+            return counters.requests;
+        case 0x0F:
+            return counters.unanswered;
+        case 0x11:
+            return counters.busy;
+        default:
+            return std::nullopt;
+    }
+}
+
+Bytes diagnose(ByteView request, const Counters& counters) {
+    Reader in(request.subspan(1));
+    const std::uint16_t sub_function = in.u16();
+    const std::uint16_t data = in.u16();
+    if (sub_function == kReturnQueryData) return Bytes(request.begin(), request.end());
+    const auto counter = counter_of(sub_function, counters);
+    if (!counter) return refuse(request, ExceptionCode::illegal_function);
+    if (data != 0 || request.size() != 5) return refuse(request, ExceptionCode::illegal_data_value);
+    Writer out;
+    out.u8(request[0]).u16(sub_function).u16(static_cast<std::uint16_t>(*counter));
+    return out.take();
+}
+
+/// AP 6.9: not busy, and how many requests were completed without an exception.
+Bytes count_events(ByteView request, const Counters& counters) {
+    Writer out;
+    out.u8(request[0]).u16(0);
+    out.u16(static_cast<std::uint16_t>(counters.requests - counters.exceptions));
+    return out.take();
+}
+
+Bytes report_id(ByteView request, const std::string& version) {
+    const std::string text = "panelgate " + version.substr(0, 32);
+    Writer out;
+    out.u8(request[0]).u8(static_cast<unsigned>(2 + text.size())).u8(kServerId).u8(kRunning);
+    for (const char c : text) out.u8(static_cast<unsigned char>(c));
+    return out.take();
+}
+
+/// Those of the functions that it has.
+bool has(ByteView request) {
+    switch (request[0]) {
+        case modbus::kReadDiscreteInputs:
+        case modbus::kReadHoldingRegisters:
+        case modbus::kReadInputRegisters:
+        case modbus::kDiagnostics:
+        case modbus::kGetCommEventCounter:
+        case modbus::kReportServerId:
+            return true;
+        case modbus::kEncapsulatedInterface:
+            return request.size() < 2 || request[1] == modbus::kMeiDeviceIdentification;
+        default:
+            return false;
+    }
 }
 
 }  // namespace
 
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state) {
-    const bool registers =
-        request[0] == modbus::kReadHoldingRegisters || request[0] == modbus::kReadInputRegisters;
-    const bool identification =
-        request[0] == modbus::kEncapsulatedInterface &&
-        (request.size() < 2 || request[1] == modbus::kMeiDeviceIdentification);
-    if (!registers && !identification) return refuse(request, ExceptionCode::illegal_function);
-    const std::size_t length = registers ? 5 : 4;
-    if (request.size() != length) {
-        return refuse(request, ExceptionCode::illegal_data_value);
+    if (!has(request)) return refuse(request, ExceptionCode::illegal_function);
+    if (!modbus::check_request(request)) return refuse(request, ExceptionCode::illegal_data_value);
+    switch (request[0]) {
+        case modbus::kReadDiscreteInputs:
+            return read_inputs(request, state);
+        case modbus::kDiagnostics:
+            return diagnose(request, state.counters);
+        case modbus::kGetCommEventCounter:
+            return count_events(request, state.counters);
+        case modbus::kReportServerId:
+            return report_id(request, state.version);
+        case modbus::kEncapsulatedInterface:
+            return identify(request, state);
+        default:
+            return read_registers(request, state);
     }
-    return registers ? read_registers(request, state) : identify(request, state);
 }
 
 }  // namespace panelgate::tcp_server

@@ -1,40 +1,51 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/health.hpp"
+#include "panelgate/base/outcome.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/tcp_server/counters.hpp"
 
 namespace panelgate::tcp_server {
 
-/// What the gateway tells about itself.
+/// What the gateway tells about itself: all of it as one listener sees it.
 struct Diagnostics {
     struct Line {
+        std::string name;
         bool up = false;
         std::size_t queue_depth = 0;
         double load_percent = 0;
     };
+    struct Station {
+        Health state = Health::unknown;
+        std::optional<std::size_t> line;  ///< index in `lines`; nothing: not of this listener
+        std::uint8_t id = 0;
+        std::optional<Duration> last_answer;  ///< how long ago
+        OutcomeCounts outcomes;               ///< of all who ask
+    };
+
     Duration uptime{};
     std::vector<Line> lines;  ///< of this listener, in the order of its settings
+    Counters counters;
     std::string version;
+    std::string url;   ///< of its pages; may be empty
+    std::string host;  ///< name of the machine; may be empty
+    /// The listed station behind a unit; nothing: there is none. May be left out.
+    std::function<std::optional<Station>(std::uint8_t unit)> station;
 };
 
 /// The reply of the diagnostics unit. Never touches a bus. Pure.
 ///
-/// 03 and 04 read one register map (input and holding registers alike):
-///
-///     0           version of this map: 1
-///     1           number of lines N of this listener
-///     2, 3        uptime in seconds, high word first
-///     4 + 3i      line i (from 0, in the order of the configuration): 1 up, 0 down
-///     5 + 3i      its queue depth, at most 65535
-///     6 + 3i      its load in 0.1 % of the wire, at most 65535
-///
-/// Anything beyond is exception 02. 2B/0E is the basic device identification (AP 6.21): vendor,
-/// product code, version. Every other function is exception 01, also those that only a serial
-/// device has (SER-01); a malformed one of the three 03.
+/// 02, 03 and 04 read the map of register_map.hpp; 08 gives its counters (AP 6.8), 11 and 17 answer
+/// for the gateway, 2B/0E has the objects of identification.hpp. Every other function is exception
+/// 01, also those that only a serial device has (SER-01); a malformed one of these 03.
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state);
 
 }  // namespace panelgate::tcp_server

@@ -51,9 +51,8 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
     const bool itself = settings.diagnostics_unit == unit && !units.is_alias(unit);
     const bool writes = !modbus::is_pure_read(pdu);  // also of one that is malformed
-    if (writes && settings.read_only)
-        return refuse(Fault::denied, itself ? std::vector<Target>() : targets_of(unit, units));
-    if (itself) return Diagnose{};
+    if (itself) return Diagnose{};                   // nothing of it can be written
+    if (writes && settings.read_only) return refuse(Fault::denied, targets_of(unit, units));
 
     const bool broadcast = !units.broadcast_lines(unit).empty();
     const Result<Target> target = units.route(unit);

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "caller.hpp"
+#include "datagrams.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
@@ -76,6 +77,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
                   shared_->log(rt::LogLevel::warn, "cannot accept", {{"reason", why.message()}});
               }) {
         shared_->counters.listener = shared_->settings.name();
+        if (!shared_->settings.udp) return;
+        datagrams_ = std::make_shared<Datagrams>(executor, shared_, [this] { tell_when_empty(); });
     }
 
     void start();
@@ -94,6 +97,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     std::shared_ptr<Shared> shared_;
     rt::AccessList allowed_;
     rt::Acceptor acceptor_;
+    std::shared_ptr<Datagrams> datagrams_;  ///< null without settings.udp
     std::set<std::shared_ptr<Session>> sessions_;
     std::function<void()> done_;
     bool full_ = false;  ///< told in the log
@@ -103,6 +107,12 @@ void Listener::Core::start() {
     const Settings& settings = shared_->settings;
     const error_code error = acceptor_.open(settings.address, settings.port, settings.ipv6_only);
     if (error) throw std::system_error(error, "cannot listen on " + settings.name());
+    if (!datagrams_) return;
+    const error_code of_udp =
+        datagrams_->open(settings.address, acceptor_.port(), settings.ipv6_only);
+    if (!of_udp) return;
+    acceptor_.close();
+    throw std::system_error(of_udp, "cannot receive datagrams on " + settings.name());
 }
 
 Counters Listener::Core::counters() const {
@@ -152,7 +162,7 @@ void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
 }
 
 void Listener::Core::tell_when_empty() {
-    if (!done_ || !sessions_.empty()) return;
+    if (!done_ || !sessions_.empty() || (datagrams_ && !datagrams_->idle())) return;
     asio::post(acceptor_.get_executor(), std::exchange(done_, nullptr));
 }
 
@@ -161,6 +171,7 @@ void Listener::Core::stop(std::function<void()> done) {
     done_ = std::move(done);
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // finish() may erase
     for (const auto& session : sessions) session->finish();
+    if (datagrams_) datagrams_->finish();
     tell_when_empty();
 }
 
@@ -168,6 +179,7 @@ void Listener::Core::close_now() {
     acceptor_.close();
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
     for (const auto& session : sessions) session->close();
+    if (datagrams_) datagrams_->close();
 }
 
 Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Settings settings,

@@ -1,13 +1,17 @@
 #include "pipeline.hpp"
 
 #include <cstdint>
+#include <cstdlib>
 #include <utility>
 #include <variant>
 
 #include "diagnostics.hpp"
 #include "dispatch.hpp"
+#include "own_state.hpp"
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -29,17 +33,6 @@ Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
         return exception_reply(function, Fault::malformed);
     }
     return std::move(*pdu);
-}
-
-Bytes diagnose(ByteView request, const Shared& shared) {
-    Diagnostics state;
-    state.uptime = shared.clock.now() - shared.started;
-    state.version = shared.version;
-    for (const bus::BusClient* line : shared.units.lines()) {
-        const bus::LineStatus status = line->status();
-        state.lines.push_back({status.up, status.queue_depth, status.load_percent});
-    }
-    return answer_diagnostics(request, state);
 }
 
 /// Gathers what the lines say of one broadcast.
@@ -66,17 +59,60 @@ struct BroadcastOutcome {
 
 }  // namespace
 
-Pipeline::Pipeline(std::shared_ptr<const Shared> shared, Caller caller,
-                   std::function<void()> on_answer)
-    : shared_(std::move(shared)), caller_(std::move(caller)), on_answer_(std::move(on_answer)) {}
+Pipeline::Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
+                   Transport transport)
+    : shared_(std::move(shared)),
+      caller_(std::move(caller)),
+      on_answer_(std::move(on_answer)),
+      transport_(transport),
+      replies_(shared_->settings.framing) {}
 
-/// A reply takes room until the client has taken it: who reads slowly is asked for slowly.
+/// A reply takes room until the client has taken it: who reads slowly is asked for slowly. So do
+/// repetitions, or whoever says one thing without end would be listened to without end.
 bool Pipeline::has_room() const {
     const Settings& settings = shared_->settings;
-    return replies_.size() + waiting_.size() < settings.in_flight + settings.waiting;
+    return replies_.size() + waiting_.size() + joined_ < settings.in_flight + settings.waiting;
+}
+
+/// May a repetition of this one get its answer?
+bool Pipeline::may_join(ByteView pdu) const {
+    const Settings& settings = shared_->settings;
+    if (!modbus::has_transactions(settings.framing)) return false;
+    switch (settings.retransmissions) {
+        case Retransmissions::join_writes:
+            return transport_ == Transport::datagrams || !modbus::is_pure_read(pdu);
+        case Retransmissions::join:
+            return true;
+        case Retransmissions::pass:
+            return false;
+    }
+    std::abort();
+}
+
+/// Only with the last one of its transaction id: clients that give all the same id mean on, off,
+/// on.
+bool Pipeline::is_joined(const modbus::Adu& adu) const {
+    if (!may_join(adu.pdu)) return false;
+    for (std::size_t i = waiting_.size(); i-- > 0;) {
+        if (waiting_[i].transaction == adu.transaction) return waiting_[i] == adu;
+    }
+    return replies_.newest_is(adu.transaction, adu.unit, adu.pdu).value_or(false);
+}
+
+/// One that goes to the bus.
+ReplyQueue::Ticket Pipeline::open(const modbus::Adu& adu) {
+    const bool known_again = may_join(adu.pdu);
+    return replies_.open(adu.transaction, adu.unit, known_again ? adu.pdu : Bytes());
 }
 
 void Pipeline::take(modbus::Adu adu) {
+    if (is_joined(adu)) {
+        ++joined_;
+        shared_->log(rt::LogLevel::debug, "retransmission joined", {{"client", client()}});
+        return;
+    }
+    ++shared_->counters.requests;
+    if (!modbus::is_answered(shared_->settings.framing, adu.unit)) ++shared_->counters.unanswered;
     waiting_.push_back(std::move(adu));
     admit();
 }
@@ -84,6 +120,7 @@ void Pipeline::take(modbus::Adu adu) {
 void Pipeline::pop() {
     replies_.pop();
     admit();
+    if (empty()) joined_ = 0;
 }
 
 /// Everything waits for a place on the buses, also what needs none: a refusal or the gateway's own
@@ -108,7 +145,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
                    },
                    [&](const Diagnose&) {
                        answer(adu, [pdu = adu.pdu, shared = shared_.get()] {
-                           return diagnose(pdu, *shared);
+                           return answer_diagnostics(pdu, own_state(*shared));
                        });
                    },
                    [&](Forward forwarding) { forward(adu, std::move(forwarding)); },
@@ -118,7 +155,8 @@ void Pipeline::serve(const modbus::Adu& adu) {
 }
 
 void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
-    if (shared_->own_answers->may_give()) return replies_.push(adu.transaction, adu.unit, pdu());
+    if (shared_->own_answers->may_give())
+        return replies_.push(adu.transaction, adu.unit, counted(pdu()));
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
         const auto self = weak.lock();
@@ -129,12 +167,12 @@ void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
 }
 
 void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
-    replies_.push(adu.transaction, adu.unit, exception_reply(adu.pdu[0], fault));
+    replies_.push(adu.transaction, adu.unit, counted(exception_reply(adu.pdu[0], fault)));
 }
 
 void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
     if (turning_away_) return refuse(adu, Fault::cancelled);
-    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+    const ReplyQueue::Ticket ticket = open(adu);
     caller_.transact(forwarding.target.bus, forwarding.target.station,
                      std::move(forwarding.request),
                      [weak = weak_from_this(), ticket, function = adu.pdu[0]](bus::Answer answer) {
@@ -145,7 +183,7 @@ void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
 
 void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) {
     if (turning_away_) return refuse(adu, Fault::cancelled);
-    const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
+    const ReplyQueue::Ticket ticket = open(adu);
     const auto outcome = std::make_shared<BroadcastOutcome>();
     outcome->open = broadcasting.lines.size();
     const auto on_answer = [weak = weak_from_this(), outcome, ticket,
@@ -159,14 +197,24 @@ void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) 
         caller_.transact(line, 0, broadcasting.request, on_answer);
 }
 
+Bytes Pipeline::counted(Bytes reply) {
+    constexpr auto kBusy = static_cast<std::uint8_t>(modbus::ExceptionCode::server_device_busy);
+    const auto code = modbus::exception_of(reply);
+    if (code) ++shared_->counters.exceptions;
+    if (code == kBusy) ++shared_->counters.busy;
+    return reply;
+}
+
 void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
     if (closed_) return;
     if (pdu) {
-        replies_.settle(ticket, std::move(*pdu));
+        replies_.settle(ticket, counted(std::move(*pdu)));
     } else {
+        ++shared_->counters.unanswered;
         replies_.drop(ticket);
     }
     admit();
+    if (empty()) joined_ = 0;
     on_answer_();
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -26,12 +27,18 @@ namespace panelgate::tcp_server {
 /// judged when their turn comes, so nothing overtakes. Answers that come after its end are dropped.
 class Pipeline : public std::enable_shared_from_this<Pipeline> {
   public:
+    /// The network may bring a datagram twice, so there all repetitions are joined by default.
+    enum class Transport : std::uint8_t { stream, datagrams };
+
     /// `on_answer`: a bus has answered, so there may be a reply to send. Never called from inside
     /// take() or pop(), and not after close().
-    Pipeline(std::shared_ptr<const Shared> shared, Caller caller, std::function<void()> on_answer);
+    Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
+             Transport transport = Transport::stream);
 
     /// One more request can be kept. Who takes none without room bounds the memory.
     bool has_room() const;
+    /// A retransmission of one that is not answered yet has no answer of its own
+    /// (settings.retransmissions).
     void take(modbus::Adu adu);
     /// The next reply ADU whose turn has come, null when there is none; valid until pop().
     const Bytes* front() const { return replies_.front(); }
@@ -48,6 +55,9 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     void close();
 
   private:
+    bool may_join(ByteView pdu) const;
+    bool is_joined(const modbus::Adu& adu) const;
+    ReplyQueue::Ticket open(const modbus::Adu& adu);
     void admit();
     void serve(const modbus::Adu& adu);
     void forward(const modbus::Adu& adu, Forward forwarding);
@@ -56,14 +66,17 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     /// The gateway's own answer, now or when it is its turn (OwnAnswers).
     using OwnPdu = InlineFunction<Bytes(), 48>;
     void answer(const modbus::Adu& adu, OwnPdu pdu);
+    Bytes counted(Bytes reply);
     /// The reply to an open request; nothing: it gets none.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
 
-    std::shared_ptr<const Shared> shared_;
+    std::shared_ptr<Shared> shared_;
     Caller caller_;
     std::function<void()> on_answer_;
+    Transport transport_;
     PoolDeque<modbus::Adu> waiting_;  ///< not judged yet
     ReplyQueue replies_;
+    std::size_t joined_ = 0;  ///< repetitions, since it was empty
     bool turning_away_ = false;
     bool closed_ = false;
 };

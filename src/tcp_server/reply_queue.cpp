@@ -1,24 +1,24 @@
 #include "reply_queue.hpp"
 
+#include <algorithm>
 #include <utility>
-
-#include "panelgate/modbus/mbap.hpp"
 
 namespace panelgate::tcp_server {
 
-ReplyQueue::Ticket ReplyQueue::open(std::uint16_t transaction, std::uint8_t unit) {
-    slots_.push_back(Slot{transaction, unit, false, {}});
+ReplyQueue::Ticket ReplyQueue::open(std::uint16_t transaction, std::uint8_t unit, Bytes pdu) {
+    slots_.push_back(Slot{transaction, unit, std::move(pdu), false, {}});
     ++unanswered_;
     return first_ + slots_.size() - 1;
 }
 
-void ReplyQueue::push(std::uint16_t transaction, std::uint8_t unit, Bytes pdu) {
-    settle(open(transaction, unit), std::move(pdu));
+void ReplyQueue::push(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
+    settle(open(transaction, unit), pdu);
 }
 
-void ReplyQueue::settle(Ticket ticket, Bytes pdu) {
+void ReplyQueue::settle(Ticket ticket, const Bytes& pdu) {
     Slot& slot = at(ticket);
-    slot.adu = modbus::encode_mbap(slot.transaction, slot.unit, pdu);
+    if (modbus::is_answered(framing_, slot.unit))
+        slot.adu = modbus::encode_reply(framing_, slot.transaction, slot.unit, pdu);
     close(slot);
 }
 
@@ -29,6 +29,16 @@ void ReplyQueue::close(Slot& slot) {
     --unanswered_;
     while (ready_ < slots_.size() && slots_[ready_].settled) ++ready_;
     step_over_silent();
+}
+
+std::optional<bool> ReplyQueue::newest_is(std::uint16_t transaction, std::uint8_t unit,
+                                          ByteView pdu) const {
+    for (std::size_t i = slots_.size(); i-- > 0;) {
+        const Slot& slot = slots_[i];
+        if (slot.transaction == transaction)
+            return slot.unit == unit && std::ranges::equal(slot.request, pdu);
+    }
+    return std::nullopt;
 }
 
 void ReplyQueue::pop() {

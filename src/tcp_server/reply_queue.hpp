@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
+#include "panelgate/modbus/framing.hpp"
 
 namespace panelgate::tcp_server {
 
@@ -12,15 +14,19 @@ namespace panelgate::tcp_server {
 /// when all before it have left. Pure.
 class ReplyQueue {
   public:
+    explicit ReplyQueue(modbus::Framing framing = modbus::Framing::tcp) : framing_(framing) {}
+
     /// Names one request for as long as the connection lives.
     using Ticket = std::uint64_t;
 
-    /// A request that will be answered later.
-    Ticket open(std::uint16_t transaction, std::uint8_t unit);
+    /// A request that will be answered later. `pdu`: kept for newest_is(), if it is to be known
+    /// again.
+    Ticket open(std::uint16_t transaction, std::uint8_t unit, Bytes pdu = {});
     /// A request whose reply is known at once; it only waits for its turn.
-    void push(std::uint16_t transaction, std::uint8_t unit, Bytes pdu);
-    /// The reply PDU of an open request, 1..253 bytes. Once for each ticket.
-    void settle(Ticket ticket, Bytes pdu);
+    void push(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu);
+    /// The reply PDU of an open request, 1..253 bytes. Once for each ticket. In the serial modes
+    /// nobody at unit 0 answers: that is a drop().
+    void settle(Ticket ticket, const Bytes& pdu);
     /// An open request that gets no reply (a silent broadcast).
     void drop(Ticket ticket);
 
@@ -30,6 +36,9 @@ class ReplyQueue {
     /// front() has left.
     void pop();
 
+    /// Whether the last request with this transaction id, of those whose replies have not left, is
+    /// this one and was opened with its PDU; nothing: there is none.
+    std::optional<bool> newest_is(std::uint16_t transaction, std::uint8_t unit, ByteView pdu) const;
     bool empty() const { return slots_.empty(); }
     /// Requests whose replies have not left.
     std::size_t size() const { return slots_.size(); }
@@ -41,6 +50,7 @@ class ReplyQueue {
     struct Slot {
         std::uint16_t transaction = 0;
         std::uint8_t unit = 0;
+        Bytes request;  ///< PDU; empty: it is never known again
         bool settled = false;
         Bytes adu;  ///< empty when nothing is to be sent
     };
@@ -48,6 +58,7 @@ class ReplyQueue {
     void close(Slot& slot);
     void step_over_silent();
 
+    modbus::Framing framing_;
     PoolDeque<Slot> slots_;
     Ticket first_ = 0;       ///< of slots_.front()
     std::size_t ready_ = 0;  ///< slots at the front that are settled; the first has an ADU

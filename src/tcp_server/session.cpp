@@ -27,7 +27,8 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
     : socket_(std::move(socket)),
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
-      partial_alarm_(shared_->clock.make_alarm()),
+      reader_(make_request_reader(shared_->settings)),
+      due_alarm_(shared_->clock.make_alarm()),
       output_alarm_(shared_->clock.make_alarm()) {}
 
 void Session::start(Caller caller) {
@@ -43,7 +44,7 @@ void Session::start(Caller caller) {
 void Session::finish() {
     if (closed_) return;
     if (input_state_ == Input::served) input_state_ = Input::discarded;
-    forget_partial_adu();
+    forget_due();
     pipeline_->turn_away();
     go_on();
 }
@@ -53,15 +54,14 @@ void Session::close() {
     const std::shared_ptr<Session> self = shared_from_this();
     error_code ignored;
     socket_.close(ignored);
-    partial_alarm_->cancel();
+    due_alarm_->cancel();
     output_alarm_->cancel();
     pipeline_->close();
     if (const ClosedHandler handler = std::exchange(on_closed_, nullptr)) handler(self);
 }
 
-void Session::fail(std::string_view reason, bool protocol_error) {
-    if (protocol_error) ++shared_->counters.protocol_errors;
-    shared_->log(rt::LogLevel::info, "connection closed",
+void Session::fail(std::string_view reason, rt::LogLevel level) {
+    shared_->log(level, "connection closed",
                  {{"client", pipeline_->client()}, {"reason", std::string(reason)}});
     close();
 }
@@ -69,7 +69,7 @@ void Session::fail(std::string_view reason, bool protocol_error) {
 /// After whatever has happened: takes what there is room for, sends what may leave, reads on.
 void Session::go_on() {
     if (closed_) return;
-    if (input_state_ == Input::served) take_adus();
+    if (input_state_ == Input::served) take_requests();
     write();
     read();
 }
@@ -93,61 +93,63 @@ void Session::on_read(const error_code& error, std::size_t size) {
     if (closed_) return;
     if (error == asio::error::eof) return on_end_of_input();
     if (error) return close();
-    if (input_state_ == Input::served) framer_.feed(ByteView(input_.data(), size));
+    if (input_state_ == Input::served)
+        reader_->feed(shared_->clock.now(), ByteView(input_.data(), size));
     go_on();
 }
 
-/// Serves the whole ADUs that are there, as far as there is room.
-void Session::take_adus() {
-    bool progress = false;
+/// Serves the whole requests that are there, as far as there is room.
+void Session::take_requests() {
+    const TimePoint now = shared_->clock.now();
     while (pipeline_->has_room()) {
-        auto event = framer_.next();
+        auto event = reader_->next(now);
         if (!event) break;
-        progress = true;
-        if (std::holds_alternative<modbus::Broken>(*event)) {
-            return fail("length outside 2..254", true);
-        }
-        if (std::holds_alternative<modbus::SkippedProtocol>(*event)) {
-            if (!skip_protocol()) return;
+        if (auto* adu = std::get_if<modbus::Adu>(&*event)) {
+            pipeline_->take(std::move(*adu));
             continue;
         }
-        bad_protocol_ids_ = 0;
-        pipeline_->take(std::get<modbus::Adu>(std::move(*event)));
+        ++shared_->counters.protocol_errors;
+        if (const auto* end = std::get_if<Unusable>(&*event)) return fail(end->reason, end->level);
     }
-    guard_partial_adu(progress);
+    watch_reader();
 }
 
-/// MBAP-06. Does the connection live on?
-bool Session::skip_protocol() {
-    if (++bad_protocol_ids_ >= shared_->settings.bad_protocol_ids) {
-        fail("protocol id is not 0", true);
-        return false;
-    }
-    ++shared_->counters.protocol_errors;
-    return true;
+/// Time counts only while the client could send more.
+void Session::watch_reader() {
+    if (!pipeline_->has_room()) reader_->pause();
+    const auto due = pipeline_->has_room() ? reader_->due() : std::nullopt;
+    if (due == due_) return;
+    forget_due();
+    if (!due) return;
+    due_ = due;
+    due_alarm_->arm(*due, [self = shared_from_this()] { self->on_due(); });
 }
 
-/// An ADU has partial_adu_timeout from its first byte to its last (MBAP-07): the alarm is armed
-/// anew only when another ADU begins, or when the rest can be read again after a time without room.
-void Session::guard_partial_adu(bool progress) {
-    if (!pipeline_->has_room() || !framer_.partial()) return forget_partial_adu();
-    if (watching_partial_ && !progress) return;
-    watching_partial_ = true;
-    partial_alarm_->arm(shared_->clock.now() + shared_->settings.partial_adu_timeout,
-                        [self = shared_from_this()] { self->fail("half-sent ADU", true); });
+/// What has come in time is no less in time because nobody has looked at it yet.
+void Session::on_due() {
+    due_.reset();
+    error_code ignored;
+    if (reading_ && socket_.available(ignored) != 0) return;  // take_requests() looks again
+    reader_->on_due(shared_->clock.now());
+    go_on();
 }
 
-void Session::forget_partial_adu() {
-    if (std::exchange(watching_partial_, false)) partial_alarm_->cancel();
+void Session::forget_due() {
+    if (std::exchange(due_, std::nullopt)) due_alarm_->cancel();
 }
 
 /// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
 /// has left looks the same until it answers the first reply with a reset (P2).
 void Session::on_end_of_input() {
-    const bool cut_off = input_state_ == Input::served && framer_.partial();
+    if (input_state_ == Input::served) {
+        reader_->on_end();
+        take_requests();
+        if (closed_) return;
+    }
+    const bool cut_off = input_state_ == Input::served && reader_->partial();
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;
-    forget_partial_adu();
+    forget_due();
     watch_for_reset();
     write();
 }
@@ -172,7 +174,7 @@ void Session::write() {
         if (taken < adu->size()) return write_later(ByteView(*adu).subspan(taken));
         ++written_;
         pipeline_->pop();
-        if (input_state_ == Input::served) take_adus();
+        if (input_state_ == Input::served) take_requests();
         if (closed_) return;
     }
     if (input_state_ != Input::served && pipeline_->empty()) close();
@@ -205,7 +207,7 @@ void Session::watch_output() {
                            self->watching_output_ = false;
                            if (!self->writing_) return;
                            if (self->written_ == written && self->not_taken() == held) {
-                               return self->fail("client does not read", false);
+                               return self->fail("client does not read");
                            }
                            self->watch_output();
                        });

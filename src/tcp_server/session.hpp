@@ -5,13 +5,16 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string_view>
 
 #include "caller.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/settings.hpp"
 #include "pipeline.hpp"
+#include "request_reader.hpp"
 #include "shared.hpp"
 
 namespace panelgate::tcp_server {
@@ -45,16 +48,16 @@ class Session : public std::enable_shared_from_this<Session> {
     void on_read(const boost::system::error_code& error, std::size_t size);
     void on_end_of_input();
     void watch_for_reset();
-    void take_adus();
-    bool skip_protocol();
-    void guard_partial_adu(bool progress);
-    void forget_partial_adu();
+    void take_requests();
+    void watch_reader();
+    void on_due();
+    void forget_due();
     void write();
     void write_later(ByteView rest);
     void on_written(const boost::system::error_code& error);
     void watch_output();
     int not_taken();
-    void fail(std::string_view reason, bool protocol_error);
+    void fail(std::string_view reason, rt::LogLevel level = rt::LogLevel::info);
 
     boost::asio::ip::tcp::socket socket_;
     std::shared_ptr<Shared> shared_;
@@ -65,10 +68,10 @@ class Session : public std::enable_shared_from_this<Session> {
     std::array<std::uint8_t, 4096> input_{};
     bool reading_ = false;
     bool watching_for_reset_ = false;
-    modbus::MbapFramer framer_;  ///< empty but for an unfinished ADU whenever a read starts
-    int bad_protocol_ids_ = 0;   ///< in a row
-    std::unique_ptr<rt::Alarm> partial_alarm_;
-    bool watching_partial_ = false;  ///< the alarm is armed
+    /// Empty but for an unfinished request whenever a read starts.
+    std::unique_ptr<RequestReader> reader_;
+    std::unique_ptr<rt::Alarm> due_alarm_;
+    std::optional<TimePoint> due_;  ///< the alarm is armed
 
     bool writing_ = false;       ///< the rest of the pipeline's front()
     std::uint64_t written_ = 0;  ///< replies

@@ -64,6 +64,7 @@ class Bus final : public BusClient {
     LineStatus status() const override;
     std::vector<ClientShare> clients() const override;
     StationStatus station_status(std::uint8_t station) const override;
+    OutcomeCounts outcomes(std::uint8_t station) const override;
     std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
     std::vector<TraceFrame> trace(std::size_t last) const override;
     std::vector<TraceDecision> decisions(std::size_t last) const override;

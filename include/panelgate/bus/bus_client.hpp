@@ -13,6 +13,7 @@
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/health.hpp"
 #include "panelgate/base/inline_function.hpp"
+#include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/wall_time.hpp"
@@ -139,6 +140,11 @@ class BusClient {
     /// What each client has used of the line: the greediest first, at most 100.
     virtual std::vector<ClientShare> clients() const { return {}; }
     virtual StationStatus station_status(std::uint8_t station) const = 0;
+    /// What became of all requests to a station that the configuration lists.
+    virtual OutcomeCounts outcomes(std::uint8_t station) const {
+        static_cast<void>(station);
+        return {};
+    }
     /// The last frames, oldest first, at most `last`.
     virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;
     /// The last decisions, oldest first, at most `last`.

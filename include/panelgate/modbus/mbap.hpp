@@ -5,6 +5,7 @@
 #include <optional>
 #include <variant>
 
+#include "panelgate/base/byte_queue.hpp"
 #include "panelgate/base/bytes.hpp"
 
 namespace panelgate::modbus {
@@ -45,11 +46,7 @@ class MbapFramer {
     bool partial() const;
 
   private:
-    ByteView waiting() const { return ByteView(buffer_).subspan(taken_); }
-    void take(std::size_t count);
-
-    Bytes buffer_;
-    std::size_t taken_ = 0;  ///< bytes at the front of buffer_ that are done with
+    ByteQueue waiting_;
     bool broken_ = false;
 };
 

@@ -16,7 +16,8 @@ class any_io_executor;
 
 namespace panelgate::tcp_server {
 
-/// One Modbus/TCP port and its connections (README, Modbus/TCP). One thread: everything runs on the
+/// One port for Modbus over TCP (README, Modbus/TCP), in the framing of its settings, and its
+/// connections; with settings.udp also for datagrams. One thread: everything runs on the
 /// executor given. The clock and the buses in the map outlive it; answers that come after its end
 /// are dropped.
 class Listener {

@@ -41,6 +41,8 @@ class UnitMap {
     /// Where a request to this unit is broadcast: all lines of the listener for unit 0 without an
     /// alias, the one line of an alias to station 0; nowhere for any other unit.
     std::vector<bus::BusClient*> broadcast_lines(std::uint8_t unit) const;
+    /// An alias, or a station that the configuration lists.
+    bool is_listed(std::uint8_t unit) const { return is_alias(unit) || listed_[unit]; }
     bool is_alias(std::uint8_t unit) const { return aliases_.contains(unit); }
     /// The listener's own lines, in the order of the settings.
     const std::vector<bus::BusClient*>& lines() const { return lines_; }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -93,6 +94,20 @@ class Client {
         EXPECT_TRUE(reply || closed_) << "neither a reply nor the end came";
         return reply;
     }
+    /// As many bytes have come.
+    bool has_bytes(std::size_t count) {
+        pull();
+        return raw_.size() >= count;
+    }
+    /// The next bytes as they are, as many; fewer: the connection was closed.
+    Bytes receive_bytes(std::size_t count) {
+        run_until(context_, [&] { return has_bytes(count) || closed_; });
+        const std::size_t given = std::min(count, raw_.size());
+        const auto end = raw_.begin() + static_cast<std::ptrdiff_t>(given);
+        Bytes bytes(raw_.begin(), end);
+        raw_.erase(raw_.begin(), end);
+        return bytes;
+    }
     /// Sends a request and gives the PDU of the next reply.
     Bytes ask(std::uint8_t unit, const Bytes& pdu) {
         request(++last_transaction_, unit, pdu);
@@ -127,11 +142,13 @@ class Client {
         if (error == asio::error::connection_reset) reset_ = true;
         received_ += n;
         framer_.feed(ByteView(chunk.data(), n));
+        raw_.insert(raw_.end(), chunk.begin(), chunk.begin() + n);
     }
 
     asio::io_context& context_;
     tcp::socket socket_;
     modbus::MbapFramer framer_;
+    Bytes raw_;
     std::uint16_t last_transaction_ = 100;
     std::size_t received_ = 0;
     bool closed_ = false;

@@ -94,5 +94,93 @@ TEST_F(SmallPipeline, P5WhatNeedsNoLineIsAnsweredAFewTimesAMillisecond) {
     EXPECT_TRUE(pipeline->empty());
 }
 
+/// Each is answered when the bus has answered; how many answers come?
+class RepeatedRequests : public SmallPipeline {
+  protected:
+    RepeatedRequests() {
+        shared->settings.in_flight = 8;
+        shared->settings.waiting = 8;
+    }
+    std::size_t answers() {
+        answer_all();
+        std::size_t count = 0;
+        for (; pipeline->front() != nullptr; ++count) pipeline->pop();
+        EXPECT_TRUE(pipeline->empty());
+        return count;
+    }
+    const modbus::Adu write{7, 1, "06 0001 0002"_hex};
+    const modbus::Adu read{8, 1, "03 0000 0001"_hex};
+};
+
+TEST_F(RepeatedRequests, P2ARetransmittedWriteGetsTheOneAnswerAndNoSecondFrame) {
+    for (int i = 0; i < 3; ++i) pipeline->take(write);
+    EXPECT_EQ(bus.seen.size(), 1U);
+    EXPECT_EQ(answers(), 1U);
+    pipeline->take(write);
+    EXPECT_EQ(bus.seen.size(), 2U) << "the first is answered: this is another one";
+    EXPECT_EQ(answers(), 1U);
+}
+
+TEST_F(RepeatedRequests, P9WhoRepeatsWithoutEndIsNotListenedToWithoutEnd) {
+    for (int i = 0; i < 100 && pipeline->has_room(); ++i) pipeline->take(write);
+    EXPECT_FALSE(pipeline->has_room());
+    EXPECT_EQ(bus.seen.size(), 1U);
+    EXPECT_EQ(answers(), 1U);
+    EXPECT_TRUE(pipeline->has_room());
+}
+
+TEST_F(RepeatedRequests, P2OneThatStillWaitsForItsTurnIsKnownAgain) {
+    shared->settings.in_flight = 1;
+    pipeline->take(read);
+    pipeline->take(write);
+    pipeline->take(write);
+    answer_all();
+    pipeline->pop();
+    EXPECT_EQ(bus.seen.size(), 2U);
+    EXPECT_EQ(answers(), 1U);
+}
+
+TEST_F(RepeatedRequests, AnotherIdUnitOrValueIsAnotherRequest) {
+    pipeline->take(write);
+    pipeline->take({8, write.unit, write.pdu});
+    pipeline->take({9, 2, write.pdu});
+    pipeline->take({7, 1, "06 0001 0003"_hex});
+    EXPECT_EQ(bus.seen.size(), 4U);
+    EXPECT_EQ(answers(), 4U);
+}
+
+TEST_F(RepeatedRequests, WhoGivesAllTheSameIdMayWriteOnOffOn) {
+    pipeline->take(write);
+    pipeline->take({7, 1, "06 0001 0000"_hex});
+    pipeline->take(write);
+    EXPECT_EQ(bus.seen.size(), 3U);
+    EXPECT_EQ(answers(), 3U);
+}
+
+TEST_F(RepeatedRequests, ReadsAreAnsweredEachUnlessTheyAreToBeJoined) {
+    pipeline->take(read);
+    pipeline->take(read);
+    EXPECT_EQ(answers(), 2U) << "the arbiter shares their transaction";
+    shared->settings.retransmissions = Retransmissions::join;
+    pipeline->take(read);
+    pipeline->take(read);
+    EXPECT_EQ(answers(), 1U);
+}
+
+TEST_F(RepeatedRequests, PassGivesEachATurnOfItsOwn) {
+    shared->settings.retransmissions = Retransmissions::pass;
+    pipeline->take(write);
+    pipeline->take(write);
+    EXPECT_EQ(bus.seen.size(), 2U);
+    EXPECT_EQ(answers(), 2U);
+}
+
+TEST_F(RepeatedRequests, WithoutTransactionIdsNoneIsKnownAgain) {
+    shared->settings.framing = modbus::Framing::rtu;
+    pipeline->take({0, 1, write.pdu});
+    pipeline->take({0, 1, write.pdu});
+    EXPECT_EQ(bus.seen.size(), 2U);
+}
+
 }  // namespace
 }  // namespace panelgate::tcp_server

@@ -211,11 +211,11 @@ TEST_F(Session, AnswersForItselfAtTheDiagnosticsUnit) {
     bus1.line.queue_depth = 5;
     start();
     Client client = connect();
-    EXPECT_EQ(client.ask(255, "03 0000 0002"_hex), "03 04 0001 0001"_hex);
+    EXPECT_EQ(client.ask(255, "03 0000 0002"_hex), "03 04 0002 0001"_hex);
     EXPECT_EQ(client.ask(255, "04 0004 0002"_hex), "04 04 0001 0005"_hex);
-    EXPECT_EQ(client.ask(255, "03 0007 0001"_hex), "83 02"_hex);
+    EXPECT_EQ(client.ask(255, "03 0007 0001"_hex), "03 02 0000"_hex);
     EXPECT_EQ(client.ask(255, "06 0000 0001"_hex), "86 01"_hex);
-    EXPECT_EQ(client.ask(255, "2b 0e 04 02"_hex), "2b 0e 04 81 00 00 01 02 05 312e322e33"_hex);
+    EXPECT_EQ(client.ask(255, "2b 0e 04 02"_hex), "2b 0e 04 83 00 00 01 02 05 312e322e33"_hex);
     EXPECT_TRUE(bus1.seen.empty());
 }
 

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "panelgate/base/byte_queue.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/serial_adu.hpp"
+
+namespace panelgate::modbus {
+
+/// Modbus ASCII (serial line V1.02, 2.5.2): ':', two hex digits a byte, LRC, CR LF.
+inline constexpr std::size_t kMaxAsciiAdu = 513;  ///< characters, with the longest PDU
+inline constexpr std::size_t kMinAsciiAdu = 9;    ///< ':', station, function, LRC, CR LF
+
+/// Longitudinal redundancy check (V1.02, 2.5.2.2): two's complement of the sum of the bytes. Over a
+/// message with its LRC it is 0.
+std::uint8_t lrc(ByteView bytes);
+
+/// A whole frame in upper-case digits, to be written at once. `pdu` has 1 to 253 bytes.
+Bytes encode_ascii(std::uint8_t station, ByteView pdu);
+
+/// The standard has upper-case digits only (V1.02, 2.5.2).
+enum class HexDigits : std::uint8_t { upper_only, any_case };
+
+/// Finds frames in a stream of characters, requests and replies alike. A ':' always begins a frame;
+/// what does not become a good one is dropped and counted, and nobody is told more: a slave does
+/// not answer it. Take with next() until it gives nothing before feeding more; then it holds one
+/// unfinished frame at most. Work is linear in the characters.
+class AsciiFramer {
+  public:
+    /// `pause`: the longest between two characters of a frame (V1.02, 2.5.2.1).
+    explicit AsciiFramer(HexDigits digits = HexDigits::upper_only, Duration pause = 1s)
+        : digits_(digits), pause_(pause) {}
+
+    /// Characters that have come at `now`; it never goes back.
+    void feed(TimePoint now, ByteView characters);
+    std::optional<SerialAdu> next();
+
+    /// A frame has begun and is not whole.
+    bool partial() const { return state_ != State::between; }
+    /// Characters since the last good frame that belong to none.
+    std::size_t discarded() const { return discarded_; }
+    /// Frames that have begun and were no good, since the last call.
+    std::size_t take_faults();
+
+  private:
+    enum class State : std::uint8_t { between, digits, at_end };
+    bool take(std::uint8_t character);
+    void take_digit(std::uint8_t character);
+    void begin();
+    void drop();
+
+    HexDigits digits_;
+    Duration pause_;
+    ByteQueue text_;
+    TimePoint last_{};  ///< character
+    State state_ = State::between;
+    Bytes bytes_;            ///< of the frame, so far
+    bool half_ = false;      ///< the last byte misses its second digit
+    std::size_t begun_ = 0;  ///< characters of the frame, so far
+    std::size_t discarded_ = 0;
+    std::size_t faults_ = 0;
+};
+
+}  // namespace panelgate::modbus

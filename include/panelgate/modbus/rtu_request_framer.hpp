@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+
+#include "panelgate/base/byte_queue.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
+#include "panelgate/modbus/serial_adu.hpp"
+
+namespace panelgate::modbus {
+
+/// How long an RTU request is (address to CRC), as far as its own first bytes tell; the same three
+/// cases as of a reply. 08/0000 may carry any number of words and ends by silence, as do functions
+/// that the standard does not define.
+using RequestLength = ReplyLength;
+RequestLength request_length(ByteView frame);
+
+/// Finds requests in what a client says, as a slave does, but without the silence around frames
+/// that a stream does not keep: the function and the header give the length, the CRC judges. What
+/// begins no good frame is stepped over byte by byte. A start that still waits for bytes holds up
+/// the later ones, or bytes inside a request could pass for one; a silence gives it up where a good
+/// frame stands behind it, and ends requests without a length rule. Those are only looked for
+/// behind a good frame or a silence. Take with next() until it gives nothing before feeding more;
+/// then it holds 256 bytes at most.
+class RtuRequestFramer {
+  public:
+    void feed(ByteView bytes) { heard_.feed(bytes); }
+    std::optional<SerialAdu> next();
+    /// Nothing has come for a while: next() may give more now.
+    void on_silence();
+    /// Gives up what is pending: its rest will not come.
+    void drop_pending();
+
+    /// Bytes wait for more, or for a silence.
+    bool partial() const { return !heard_.empty(); }
+    /// Bytes since the last good frame that belong to none.
+    std::size_t discarded() const { return discarded_; }
+    /// How often something was stepped over behind a good frame or a silence, since the last call.
+    std::size_t take_faults();
+
+  private:
+    struct Judgement {
+        enum class Kind : std::uint8_t { frame, open, nothing };
+        Kind kind = Kind::nothing;
+        std::size_t size = 0;  ///< of a frame
+    };
+    Judgement judge(ByteView start) const;
+    std::size_t size_by_silence() const;
+    SerialAdu take(std::size_t size);
+    void step_over(std::size_t count);
+
+    ByteQueue heard_;
+    std::size_t ended_by_silence_ = 0;  ///< size of the frame at the front; 0: none
+    bool aligned_ = true;               ///< a frame begins at the front, if it is one
+    std::size_t discarded_ = 0;
+    std::size_t faults_ = 0;
+};
+
+}  // namespace panelgate::modbus

@@ -1,0 +1,148 @@
+#include "panelgate/modbus/rtu_request_framer.hpp"
+
+#include <utility>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::modbus {
+namespace {
+
+using Kind = RequestLength::Kind;
+
+RequestLength known(std::size_t length) { return {Kind::known, length}; }
+
+/// `overhead`, and what the byte at `count` says.
+RequestLength counted(ByteView b, std::size_t count, std::size_t overhead) {
+    return b.size() <= count ? RequestLength{} : known(overhead + b[count]);
+}
+
+/// With one word of data, as nearly all are.
+bool is_usual_loopback(ByteView b) {
+    constexpr std::size_t kSize = kReadRequestAdu;
+    return b.size() >= kSize && b[1] == kDiagnostics && crc_ok(b.first(kSize));
+}
+
+bool is_frame(ByteView b) { return b.size() >= kMinAdu && b.size() <= kMaxRtuAdu && crc_ok(b); }
+
+/// Size of the good frame of a known length that begins here; 0: there is none.
+std::size_t known_frame(ByteView b) {
+    const RequestLength length = request_length(b);
+    if (length.kind != Kind::known || length.length > b.size()) return 0;
+    return is_frame(b.first(length.length)) ? length.length : 0;
+}
+
+}  // namespace
+
+RequestLength request_length(ByteView b) {
+    if (b.size() < 2) return {};
+    switch (b[1]) {
+        case kReadCoils:
+        case kReadDiscreteInputs:
+        case kReadHoldingRegisters:
+        case kReadInputRegisters:
+        case kWriteSingleCoil:
+        case kWriteSingleRegister:
+            return known(kReadRequestAdu);
+        case kReadExceptionStatus:
+        case kGetCommEventCounter:
+        case kGetCommEventLog:
+        case kReportServerId:
+            return known(kMinAdu);
+        case kDiagnostics:
+            if (b.size() < 4) return {};
+            return b[2] == 0 && b[3] == 0 ? RequestLength{Kind::by_silence, 0}
+                                          : known(kReadRequestAdu);
+        case kWriteMultipleCoils:
+        case kWriteMultipleRegisters:
+            return counted(b, 6, 9);
+        case kReadFileRecord:
+        case kWriteFileRecord:
+            return counted(b, 2, 5);
+        case kMaskWriteRegister:
+            return known(10);
+        case kReadWriteMultipleRegisters:
+            return counted(b, 10, 13);
+        case kReadFifoQueue:
+            return known(6);
+        case kEncapsulatedInterface:
+            if (b.size() < 3) return {};
+            return b[2] == kMeiDeviceIdentification ? known(7) : RequestLength{Kind::by_silence, 0};
+        default:
+            return {Kind::by_silence, 0};
+    }
+}
+
+std::optional<SerialAdu> RtuRequestFramer::next() {
+    if (ended_by_silence_ != 0) return take(std::exchange(ended_by_silence_, 0));
+    while (!heard_.empty()) {
+        const Judgement judgement = judge(heard_.view());
+        if (judgement.kind == Judgement::Kind::frame) return take(judgement.size);
+        if (judgement.kind == Judgement::Kind::open) break;
+        step_over(1);
+    }
+    return std::nullopt;
+}
+
+RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
+    const RequestLength length = request_length(start);
+    if (length.kind == Kind::need_more) return {Judgement::Kind::open};
+    if (length.kind == Kind::by_silence) {
+        if (is_usual_loopback(start)) return {Judgement::Kind::frame, kReadRequestAdu};
+        const bool may_be = aligned_ && start.size() <= kMaxRtuAdu;
+        return {may_be ? Judgement::Kind::open : Judgement::Kind::nothing};
+    }
+    if (length.length > kMaxRtuAdu) return {};
+    if (length.length > start.size()) return {Judgement::Kind::open};
+    if (!crc_ok(start.first(length.length))) return {};
+    return {Judgement::Kind::frame, length.length};
+}
+
+void RtuRequestFramer::on_silence() {
+    if (heard_.empty()) aligned_ = true;
+    ended_by_silence_ = size_by_silence();
+    if (ended_by_silence_ != 0) return;
+    for (std::size_t start = 1; start < heard_.size(); ++start) {
+        if (known_frame(heard_.view().subspan(start)) != 0) return step_over(start);
+    }
+}
+
+/// Size of the frame at the front that nothing but a silence tells: it ends with what has come, or
+/// where a frame of a known length begins. 0: there is none.
+std::size_t RtuRequestFramer::size_by_silence() const {
+    const ByteView all = heard_.view();
+    if (!aligned_) return 0;
+    if (is_frame(all)) return all.size();
+    if (request_length(all).kind != Kind::by_silence) return 0;
+    for (std::size_t end = all.size(); end >= kMinAdu; --end) {
+        if (is_frame(all.first(end)) && known_frame(all.subspan(end)) != 0) return end;
+    }
+    return 0;
+}
+
+SerialAdu RtuRequestFramer::take(std::size_t size) {
+    const RtuFrame frame = *decode_adu(heard_.view().first(size));
+    SerialAdu adu;
+    adu.station = frame.station;
+    adu.pdu.assign(frame.pdu.begin(), frame.pdu.end());
+    heard_.take(size);
+    discarded_ = 0;
+    aligned_ = true;
+    return adu;
+}
+
+void RtuRequestFramer::step_over(std::size_t count) {
+    if (std::exchange(aligned_, false)) ++faults_;
+    discarded_ += count;
+    heard_.take(count);
+}
+
+void RtuRequestFramer::drop_pending() {
+    ended_by_silence_ = 0;
+    if (!heard_.empty()) step_over(heard_.size());
+    aligned_ = true;
+}
+
+std::size_t RtuRequestFramer::take_faults() { return std::exchange(faults_, 0); }
+
+}  // namespace panelgate::modbus

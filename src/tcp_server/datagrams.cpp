@@ -1,0 +1,182 @@
+#include "datagrams.hpp"
+
+#include <algorithm>
+#include <boost/asio/error.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <iterator>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "caller.hpp"
+#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/bus/bus_client.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+namespace asio = boost::asio;
+using asio::ip::udp;
+using boost::system::error_code;
+
+constexpr int kDatagramsAtOnce = 64;  // then others have their turn
+
+/// The one ADU that the datagram is.
+std::optional<modbus::Adu> adu_of(ByteView datagram) {
+    modbus::MbapFramer framer;
+    framer.feed(datagram);
+    auto event = framer.next();
+    if (!event || !std::holds_alternative<modbus::Adu>(*event)) return std::nullopt;
+    auto adu = std::get<modbus::Adu>(std::move(*event));
+    const std::size_t size = modbus::kMbapPrefix + 1 + adu.pdu.size();
+    if (size != datagram.size()) return std::nullopt;
+    return adu;
+}
+
+}  // namespace
+
+Datagrams::Datagrams(const asio::any_io_executor& executor, std::shared_ptr<Shared> shared,
+                     std::function<void()> on_idle)
+    : socket_(executor),
+      shared_(std::move(shared)),
+      allowed_(shared_->settings.allow),
+      on_idle_(std::move(on_idle)) {}
+
+error_code Datagrams::open(const std::string& address, std::uint16_t port, bool ipv6_only) {
+    error_code error;
+    const Endpoint endpoint(asio::ip::make_address(address, error), port);
+    if (!error) socket_.open(endpoint.protocol(), error);
+    if (!error && endpoint.address().is_v6())
+        socket_.set_option(asio::ip::v6_only(ipv6_only), error);
+    if (!error) socket_.non_blocking(true, error);
+    if (!error) socket_.bind(endpoint, error);
+    if (error) {
+        error_code ignored;
+        socket_.close(ignored);
+    } else {
+        ask_for_own_address(socket_);
+        receive();
+    }
+    return error;
+}
+
+void Datagrams::receive() {
+    socket_.async_wait(udp::socket::wait_read, [weak = weak_from_this()](const error_code& error) {
+        const auto self = weak.lock();
+        if (self && !error && self->socket_.is_open()) self->on_readable();
+    });
+}
+
+void Datagrams::on_readable() {
+    for (int i = 0; i < kDatagramsAtOnce && socket_.is_open(); ++i) {
+        bool failed = false;
+        const auto received = receive_datagram(socket_, input_, failed);
+        if (!received && !failed) break;
+        if (received && !finishing_) take(*received);
+    }
+    if (socket_.is_open()) receive();
+}
+
+void Datagrams::take(const Received& received) {
+    const Endpoint& from = received.from;
+    if (!allowed_.allows(from.address())) {
+        return shared_->log(rt::LogLevel::info, "datagram refused",
+                            {{"client", endpoint_text(from.address().to_string(), from.port())},
+                             {"reason", "not in the allow list"}});
+    }
+    auto adu = adu_of(ByteView(input_).first(received.size));
+    if (!adu) return drop();
+    Peer* sender = peer(from);
+    if (sender == nullptr || !sender->pipeline->has_room()) return drop();
+    sender->heard = shared_->clock.now();
+    sender->asked = received.to;
+    sender->pipeline->take(std::move(*adu));
+    answer(from);
+}
+
+Datagrams::Peer* Datagrams::peer(const Endpoint& from) {
+    if (const auto known = peers_.find(from); known != peers_.end()) return &known->second;
+    if (!make_room(from)) return nullptr;
+    const std::string address = from.address().to_string();
+    Caller caller(endpoint_text(address, from.port()) + " udp", bus::host_of(address));
+    const auto on_answer = [weak = weak_from_this(), from] {
+        if (const auto self = weak.lock()) self->answer(from);
+    };
+    Peer made{std::make_shared<Pipeline>(shared_, std::move(caller), on_answer,
+                                         Pipeline::Transport::datagrams)};
+    return &peers_.emplace(from, std::move(made)).first->second;
+}
+
+/// Addresses of senders prove nothing, so one of them has few places, and who waits for nothing
+/// gives its place up.
+bool Datagrams::make_room(const Endpoint& from) {
+    const asio::ip::address address = from.address();
+    const auto of_address = std::ranges::count_if(
+        peers_, [&](const auto& peer) { return peer.first.address() == address; });
+    forget_idle(shared_->clock.now());
+    const Settings& settings = shared_->settings;
+    if (static_cast<std::size_t>(of_address) >= settings.udp_peers_per_address &&
+        !forget_longest_idle(&address))
+        return false;
+    return peers_.size() < settings.max_connections || forget_longest_idle(nullptr);
+}
+
+void Datagrams::forget_idle(TimePoint now) {
+    std::erase_if(peers_, [&](const auto& peer) {
+        const bool gone =
+            peer.second.pipeline->empty() && now - peer.second.heard >= shared_->settings.udp_idle;
+        if (gone) peer.second.pipeline->close();
+        return gone;
+    });
+}
+
+/// Of one address, or of all. Nobody was forgotten: all of them wait for answers.
+bool Datagrams::forget_longest_idle(const asio::ip::address* address) {
+    auto longest = peers_.end();
+    for (auto peer = peers_.begin(); peer != peers_.end(); ++peer) {
+        if (address != nullptr && peer->first.address() != *address) continue;
+        if (!peer->second.pipeline->empty()) continue;
+        if (longest == peers_.end() || peer->second.heard < longest->second.heard) longest = peer;
+    }
+    if (longest == peers_.end()) return false;
+    longest->second.pipeline->close();
+    peers_.erase(longest);
+    return true;
+}
+
+void Datagrams::answer(const Endpoint& to) {
+    const auto found = peers_.find(to);
+    if (found == peers_.end() || !socket_.is_open()) return;
+    const std::shared_ptr<Pipeline> pipeline = found->second.pipeline;
+    const OwnAddress asked = found->second.asked;
+    while (const Bytes* adu = pipeline->front()) {
+        send_datagram(socket_, *adu, to, asked);
+        pipeline->pop();
+    }
+    if (finishing_ && idle()) on_idle_();
+}
+
+bool Datagrams::idle() const {
+    return std::ranges::all_of(peers_,
+                               [](const auto& peer) { return peer.second.pipeline->empty(); });
+}
+
+void Datagrams::finish() {
+    finishing_ = true;
+    const Peers peers = peers_;
+    for (const auto& [endpoint, peer] : peers) {
+        peer.pipeline->turn_away();
+        answer(endpoint);
+    }
+    if (idle() && on_idle_) on_idle_();
+}
+
+void Datagrams::close() {
+    error_code ignored;
+    socket_.close(ignored);
+    for (auto& [endpoint, peer] : std::exchange(peers_, {})) peer.pipeline->close();
+    if (const auto told = std::exchange(on_idle_, nullptr)) told();
+}
+
+}  // namespace panelgate::tcp_server

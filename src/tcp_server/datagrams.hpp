@@ -1,0 +1,70 @@
+#pragma once
+
+#include <array>
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <boost/system/error_code.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+
+#include "datagram_io.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/rt/access_list.hpp"
+#include "pipeline.hpp"
+#include "shared.hpp"
+
+namespace panelgate::tcp_server {
+
+/// Modbus/TCP's ADUs in datagrams, one in each; answers go to the sender. Whoever sends (address
+/// and port) has a pipeline like a connection, until it has been idle for a while. What is no ADU,
+/// or comes without room, is dropped and counted: the sender asks again. One thread; held by a
+/// shared_ptr.
+class Datagrams : public std::enable_shared_from_this<Datagrams> {
+  public:
+    /// `on_idle`: after finish(), all that was taken has been answered; perhaps more than once.
+    /// Also by close(), and then never again.
+    Datagrams(const boost::asio::any_io_executor& executor, std::shared_ptr<Shared> shared,
+              std::function<void()> on_idle);
+
+    /// Binds and receives. What is wrong, or nothing; then it may be tried again.
+    boost::system::error_code open(const std::string& address, std::uint16_t port, bool ipv6_only);
+    /// Takes no more, answers what is on the lines, turns away what waits.
+    void finish();
+    /// At once; requests that wait are taken back from their buses. May be called twice.
+    void close();
+    /// Nobody waits for an answer.
+    bool idle() const;
+
+  private:
+    using Endpoint = boost::asio::ip::udp::endpoint;
+    struct Peer {
+        std::shared_ptr<Pipeline> pipeline;
+        TimePoint heard{};
+        OwnAddress asked{};  ///< which answers then
+    };
+    using Peers = std::map<Endpoint, Peer>;
+
+    void receive();
+    void on_readable();
+    void take(const Received& received);
+    Peer* peer(const Endpoint& from);
+    bool make_room(const Endpoint& from);
+    void forget_idle(TimePoint now);
+    bool forget_longest_idle(const boost::asio::ip::address* address);
+    void answer(const Endpoint& to);
+    void drop() { ++shared_->counters.protocol_errors; }
+
+    boost::asio::ip::udp::socket socket_;
+    std::shared_ptr<Shared> shared_;
+    rt::AccessList allowed_;
+    std::function<void()> on_idle_;
+    Peers peers_;
+    std::array<std::uint8_t, modbus::kMaxTcpAdu + 1> input_{};  ///< one more: it is too long
+    bool finishing_ = false;
+};
+
+}  // namespace panelgate::tcp_server

@@ -1,0 +1,255 @@
+#include <boost/asio/ip/udp.hpp>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "loopback.hpp"
+
+namespace panelgate::tcp_server {
+namespace {
+
+using asio::ip::udp;
+
+/// Somebody who sends datagrams.
+class Sender {
+  public:
+    Sender(asio::io_context& context, std::uint16_t port, const char* own_address = "127.0.0.1",
+           const char* server = "127.0.0.1")
+        : context_(context),
+          socket_(context, udp::endpoint(asio::ip::make_address(own_address), 0)) {
+        socket_.connect(udp::endpoint(asio::ip::make_address(server), port));
+        socket_.non_blocking(true);
+    }
+    void send(const Bytes& datagram) { socket_.send(asio::buffer(datagram)); }
+    void request(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
+        send(modbus::encode_mbap(transaction, unit, pdu));
+    }
+    /// The next datagram, or nothing after far too long.
+    std::optional<Bytes> receive() {
+        Bytes datagram(1024, 0);
+        error_code error = asio::error::would_block;
+        run_until(context_, [&] {
+            datagram.resize(1024);
+            datagram.resize(socket_.receive(asio::buffer(datagram), 0, error));
+            return !error;
+        });
+        return error ? std::nullopt : std::optional(datagram);
+    }
+    bool has_input() const { return socket_.available() != 0; }
+
+  private:
+    asio::io_context& context_;
+    udp::socket socket_;
+};
+
+class DatagramsTest : public Loopback {
+  protected:
+    DatagramsTest() { settings.udp = true; }
+    Sender sender(const char* own_address = "127.0.0.1") {
+        return Sender(context, listener->port(), own_address);
+    }
+    bool run_until_dropped(std::uint64_t count) {
+        return run_until([&] { return listener->counters().protocol_errors == count; });
+    }
+    static Bytes adu(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
+        return modbus::encode_mbap(transaction, unit, pdu);
+    }
+};
+
+TEST_F(DatagramsTest, OneDatagramIsOneAduAndItsSenderIsAnswered) {
+    start();
+    Sender first = sender();
+    Sender second = sender();
+    first.request(1, 1, read_pdu(10));
+    ASSERT_TRUE(run_until_held(1));
+    second.request(1, 1, read_pdu(20));
+    ASSERT_TRUE(run_until_held(2));
+    bus1.answer(1, reply_to_read(20));
+    bus1.answer(0, reply_to_read(10));
+    EXPECT_EQ(first.receive(), adu(1, 1, reply_to_read(10)));
+    EXPECT_EQ(second.receive(), adu(1, 1, reply_to_read(20)));
+    first.request(2, 248, read_pdu(1));
+    EXPECT_EQ(first.receive(), adu(2, 248, "83 0a"_hex));
+}
+
+TEST_F(DatagramsTest, ConnectionsAreServedOnTheSamePort) {
+    bus1.instant = reply_to_read(7);
+    start();
+    Client client = connect();
+    EXPECT_EQ(client.ask(1, read_pdu(7)), reply_to_read(7));
+    Sender other = sender();
+    other.request(1, 1, read_pdu(7));
+    EXPECT_EQ(other.receive(), adu(1, 1, reply_to_read(7)));
+}
+
+TEST_F(DatagramsTest, WithoutTheKeyNobodyListens) {
+    settings.udp = false;
+    start();
+    udp::socket probe(context, udp::endpoint(asio::ip::address_v4::loopback(), listener->port()));
+    EXPECT_TRUE(probe.is_open()) << "the port is free";
+}
+
+TEST_F(DatagramsTest, WhatIsNoAduIsDroppedAndCounted) {
+    bus1.instant = reply_to_read(7);
+    start();
+    Sender client = sender();
+    const Bytes good = adu(1, 1, read_pdu(7));
+    const std::vector<Bytes> bad = {{},                                    // nothing in it
+                                    Bytes(good.begin(), good.end() - 1),   // short
+                                    good + "00"_hex,                       // long
+                                    good + good,                           // two
+                                    "0001 0001 0006 01 03 0007 0001"_hex,  // another protocol
+                                    "0001 0000 0001 01"_hex,               // no function
+                                    adu(1, 1, Bytes(254, 0x41)),           // longer than any ADU
+                                    Bytes(1000, 0x41)};
+    for (std::size_t i = 0; i < bad.size(); ++i) {
+        client.send(bad[i]);
+        ASSERT_TRUE(run_until_dropped(i + 1)) << i;
+    }
+    client.send(good);
+    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(7)));
+    EXPECT_EQ(bus1.seen.size(), 1U);
+}
+
+TEST_F(DatagramsTest, P2ADatagramThatComesTwiceHasOneAnswer) {
+    start();
+    Sender client = sender();
+    for (int i = 0; i < 3; ++i) client.request(1, 1, read_pdu(7));
+    for (int i = 0; i < 3; ++i) client.request(2, 1, "06 0001 0002"_hex);
+    client.request(3, 1, read_pdu(8));
+    ASSERT_TRUE(run_until_held(3));
+    bus1.answer(0, reply_to_read(7));
+    bus1.answer(0, "06 0001 0002"_hex);
+    bus1.answer(0, reply_to_read(8));
+    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(7)));
+    EXPECT_EQ(client.receive(), adu(2, 1, "06 0001 0002"_hex));
+    EXPECT_EQ(client.receive(), adu(3, 1, reply_to_read(8)));
+    EXPECT_FALSE(client.has_input());
+}
+
+TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsNotHeard) {
+    settings.in_flight = 2;
+    settings.waiting = 3;
+    start();
+    Sender client = sender();
+    for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
+    ASSERT_TRUE(run_until_dropped(3));
+    for (std::uint16_t i = 0; i < 5; ++i) {
+        ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
+        ASSERT_LE(bus1.held.size(), 2U);
+        bus1.answer(0, reply_to_read(i));
+        EXPECT_EQ(client.receive(), adu(i, 1, reply_to_read(i)));
+    }
+    EXPECT_EQ(bus1.seen.size(), 5U);
+}
+
+TEST_F(DatagramsTest, P9OneAddressHasAFewPlacesAndWhoWaitsForNothingGivesItsUp) {
+    settings.udp_peers_per_address = 2;
+    start();
+    Sender first = sender();
+    Sender second = sender();
+    Sender third = sender();
+    Sender elsewhere = sender("127.0.0.2");
+    first.request(1, 1, read_pdu(1));
+    second.request(1, 1, read_pdu(2));
+    ASSERT_TRUE(run_until_held(2));
+    third.request(1, 1, read_pdu(3));
+    ASSERT_TRUE(run_until_dropped(1)) << "both places are taken";
+    elsewhere.request(1, 1, read_pdu(4));
+    ASSERT_TRUE(run_until_held(3));
+    bus1.answer(0, reply_to_read(1));
+    EXPECT_EQ(first.receive(), adu(1, 1, reply_to_read(1)));
+    third.request(2, 1, read_pdu(3));
+    ASSERT_TRUE(run_until_held(3));
+    EXPECT_EQ(bus1.cancelled.size(), 1U) << "the first has asked for nothing else";
+}
+
+TEST_F(DatagramsTest, P9AllOfThemTogetherAreBoundedToo) {
+    settings.max_connections = 2;
+    start();
+    std::vector<Sender> senders;
+    for (const char* address : {"127.0.0.2", "127.0.0.3", "127.0.0.4"})
+        senders.push_back(sender(address));
+    for (Sender& one : senders) one.request(1, 1, read_pdu(1));
+    EXPECT_TRUE(run_until_dropped(1));
+    EXPECT_EQ(bus1.seen.size(), 2U);
+}
+
+TEST_F(DatagramsTest, WhoHasBeenIdleIsForgotten) {
+    bus1.instant = reply_to_read(1);
+    start();
+    Sender first = sender();
+    first.request(1, 1, read_pdu(1));
+    EXPECT_TRUE(first.receive());
+    clock.advance(settings.udp_idle);
+    Sender second = sender();
+    second.request(1, 1, read_pdu(1));
+    EXPECT_TRUE(second.receive());
+    EXPECT_EQ(bus1.cancelled.size(), 1U);
+}
+
+TEST_F(DatagramsTest, TheAddressThatWasAskedAnswers) {
+    bus1.instant = reply_to_read(1);
+    for (const char* all : {"0.0.0.0", "::"}) {
+        settings.address = all;
+        start();
+        Sender client(context, listener->port(), "127.0.0.1", "127.0.0.9");
+        client.request(1, 1, read_pdu(1));
+        EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(1))) << all;
+    }
+}
+
+TEST_F(DatagramsTest, WhoIsNotInTheListIsNotAnswered) {
+    settings.allow = {{"127.0.0.1", 32}};
+    bus1.instant = reply_to_read(1);
+    start();
+    Sender stranger = sender("127.0.0.2");
+    stranger.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until([&] { return log.count("datagram refused") == 1; }));
+    Sender known = sender();
+    known.request(1, 1, read_pdu(1));
+    EXPECT_TRUE(known.receive());
+    EXPECT_FALSE(stranger.has_input());
+    EXPECT_EQ(bus1.seen.size(), 1U);
+}
+
+TEST_F(DatagramsTest, P3WhatIsOutstandingAtTheEndIsAnswered) {
+    settings.in_flight = 1;
+    start();
+    Sender client = sender();
+    client.request(1, 1, read_pdu(1));
+    client.request(2, 1, read_pdu(2));
+    ASSERT_TRUE(run_until_held(1));
+    bool stopped = false;
+    listener->stop([&] { stopped = true; });
+    context.restart();
+    context.poll();
+    EXPECT_FALSE(stopped);
+    bus1.answer(0, reply_to_read(1));
+    EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(1)));
+    EXPECT_EQ(client.receive(), adu(2, 1, "83 0a"_hex)) << "it has never started";
+    EXPECT_TRUE(run_until([&] { return stopped; }));
+}
+
+TEST_F(DatagramsTest, P2CutOffItTakesItsRequestsBack) {
+    start();
+    Sender client = sender();
+    client.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until_held(1));
+    listener->close_now();
+    EXPECT_EQ(bus1.cancelled.size(), 1U);
+    EXPECT_TRUE(bus1.held.empty());
+}
+
+TEST_F(DatagramsTest, APortThatSomebodyElseHasIsToldAndNothingIsOpen) {
+    start();
+    const std::uint16_t port = listener->port();
+    listener.reset();
+    udp::socket taken(context, udp::endpoint(asio::ip::address_v4::loopback(), port));
+    settings.port = port;
+    EXPECT_THROW(start(), std::system_error);
+    EXPECT_EQ(listener->port(), 0);
+}
+
+}  // namespace
+}  // namespace panelgate::tcp_server
