@@ -195,6 +195,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
             problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
         return std::nullopt;
     }
+    drop_extensions(tree);  // before anything of them is judged
     yaml::Problems unset(problems.file());
     yaml::expand_variables(tree, environment, unset);
     refuse_control_characters(tree, unset);

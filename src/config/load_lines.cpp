@@ -117,7 +117,7 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
 
 /// /dev/ttyUSB0:9600 and the like; paths by name have colons, too.
 void check_path(MapReader& in, const std::string& path) {
-    const std::size_t end = path.find_first_of(":,; ");
+    const std::size_t end = path.find_first_of(":,; \t");
     if (!path.starts_with("/dev/tty") || end == path.npos) return;
     if (end + 1 == path.size()) {
         in.problem("device", "device must be a path alone, not " + yaml::quote(path) + "; write " +

@@ -17,6 +17,14 @@ bool has_control_character(std::string_view text) {
     return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
 }
 
+/// The path that a variable brought: nobody sees it in the configuration. A text that is none may
+/// be the token itself.
+std::string path_of(const Node* file) {
+    const bool is_path =
+        file != nullptr && !file->variable.empty() && file->scalar.starts_with('/');
+    return is_path ? ' ' + file->scalar : "";
+}
+
 /// A token's secret: the file's text without blanks around it, and without the mark that editors
 /// put before UTF-8.
 std::string load_secret(Loading& loading, MapReader& in) {
@@ -31,9 +39,9 @@ std::string load_secret(Loading& loading, MapReader& in) {
     if (text && text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
     if (!text) {
         // Not the text: whoever took the token for its file has written that.
-        in.problem("file",
-                   "cannot read the token file; give the path of a file that holds the token and "
-                   "that this program may read");
+        in.problem("file", "cannot read the token file" + path_of(in.child("file")) +
+                               "; give the path of a file that holds the token and "
+                               "that this program may read");
         return "";
     }
     const std::size_t first = text->find_first_not_of(kBlanks);

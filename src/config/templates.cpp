@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -64,6 +65,21 @@ void add_missing(Node& map, const Node& from) {
     }
 }
 
+/// What an alias repeats keeps the places of its keys.
+using Place = std::pair<int, int>;
+Place place_of(const Entry& entry) { return {entry.mark.line, entry.mark.column}; }
+
+/// `lines` may be null.
+template <class Do>
+void for_stations(Node* lines, const Do& todo) {
+    if (lines == nullptr) return;
+    for (Node& line : lines->items) {
+        Node* stations = find(line, "stations");
+        if (stations == nullptr) continue;
+        for (Node& station : stations->items) todo(station);
+    }
+}
+
 struct Template {
     yaml::Mark mark;
     Node body;
@@ -109,10 +125,18 @@ class Templates {
         }
     }
 
-    std::vector<Node> take_unused() {
+    /// `lines` may have taken something of them over by a merge key.
+    std::vector<Node> take_unused(Node* lines) {
+        std::set<Place> taken;
+        for_stations(lines, [&](const Node& station) {
+            for (const Entry& entry : station.entries) taken.insert(place_of(entry));
+        });
         std::vector<Node> unused;
         for (auto& [name, one] : templates_) {
-            if (one.used) continue;
+            const bool merged = std::ranges::any_of(one.body.entries, [&](const Entry& entry) {
+                return taken.contains(place_of(entry));
+            });
+            if (one.used || merged) continue;
             loading_.warn(one.mark, "no station has template: " + name);
             if (one.body.kind == Node::Kind::map) unused.push_back(std::move(one.body));
         }
@@ -164,14 +188,8 @@ std::vector<Node> apply_templates(Loading& loading, Node& tree) {
     Templates templates(loading);
     if (auto list = take(tree, "templates")) templates.read(*list);
     Node* lines = find(tree, "lines");
-    if (lines != nullptr) {
-        for (Node& line : lines->items) {
-            Node* stations = find(line, "stations");
-            if (stations == nullptr) continue;
-            for (Node& station : stations->items) templates.apply(station);
-        }
-    }
-    return templates.take_unused();
+    for_stations(lines, [&](Node& station) { templates.apply(station); });
+    return templates.take_unused(lines);
 }
 
 }  // namespace panelgate::config

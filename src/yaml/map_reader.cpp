@@ -1,6 +1,7 @@
 #include "panelgate/yaml/map_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -55,6 +56,13 @@ std::string limit(Duration duration) {
     const bool hours = duration > 1h && duration % 1h == Duration::zero();
     return format_duration(duration) +
            (hours ? " (" + std::to_string(duration / 1h) + " h)" : std::string());
+}
+
+/// +5 (YAML 1.2, 10.3.2)
+std::string_view without_plus(std::string_view text) {
+    constexpr std::string_view kNumber = ".0123456789";
+    const bool plus = text.size() > 1 && text[0] == '+' && kNumber.find(text[1]) != text.npos;
+    return plus ? text.substr(1) : text;
 }
 
 bool has_leading_zero(std::string_view text) {
@@ -134,10 +142,10 @@ std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
     const Node* node = scalar(key, wanted);
     if (node == nullptr) return std::nullopt;
-    const auto value = node->quoted ? std::nullopt : parse_integer(node->scalar);
+    const auto value = node->is_text() ? std::nullopt : parse_integer(without_plus(node->scalar));
     if (value && *value >= min && *value <= max) return value;
     std::string why;
-    if (node->quoted && parse_integer(node->scalar))
+    if (node->is_text() && parse_integer(node->scalar))
         why = " in quotes; write " + node->scalar + " without";
     if (has_leading_zero(node->scalar)) why = " (no leading zeros)";
     if (why.empty() && !value) why = number_hint(node->scalar, true);
@@ -155,16 +163,17 @@ std::optional<double> MapReader::number(std::string_view key) {
     const Node* node = scalar(key, "a number");
     if (node == nullptr) return std::nullopt;
     double value = 0;
-    const char* end = node->scalar.data() + node->scalar.size();
-    const auto [stop, error] = std::from_chars(node->scalar.data(), end, value);
+    const std::string_view typed = without_plus(node->scalar);
+    const char* end = typed.data() + typed.size();
+    const auto [stop, error] = std::from_chars(typed.data(), end, value);
     const bool whole = error == std::errc() && stop == end && std::isfinite(value);
-    const std::size_t sign = node->scalar.starts_with('-') ? 1 : 0;
-    const bool zeros = has_leading_zero(std::string_view(node->scalar).substr(sign));
-    if (whole && !zeros && !node->quoted) return value;
+    const std::size_t sign = typed.starts_with('-') ? 1 : 0;
+    const bool zeros = has_leading_zero(typed.substr(sign));
+    if (whole && !zeros && !node->is_text()) return value;
     const std::string why =
-        zeros          ? " (no leading zeros)"
-        : node->quoted ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
-                       : number_hint(node->scalar, false);
+        zeros             ? " (no leading zeros)"
+        : node->is_text() ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
+                          : number_hint(node->scalar, false);
     problem(key, wrong(key, "a number", *node) + why);
     return std::nullopt;
 }
@@ -172,8 +181,11 @@ std::optional<double> MapReader::number(std::string_view key) {
 std::optional<bool> MapReader::boolean(std::string_view key) {
     const Node* node = scalar(key, "true or false");
     if (node == nullptr) return std::nullopt;
-    if (!node->quoted && node->scalar == "true") return true;
-    if (!node->quoted && node->scalar == "false") return false;
+    constexpr std::array<std::string_view, 3> kTrue{"true", "True", "TRUE"};
+    constexpr std::array<std::string_view, 3> kFalse{"false", "False", "FALSE"};
+    const bool plain = !node->is_text();
+    if (plain && std::ranges::find(kTrue, node->scalar) != kTrue.end()) return true;
+    if (plain && std::ranges::find(kFalse, node->scalar) != kFalse.end()) return false;
     problem(key, wrong(key, "true or false", *node) + boolean_hint(*node));
     return std::nullopt;
 }
@@ -238,6 +250,9 @@ Mark MapReader::mark(std::string_view key) const {
 }
 
 void MapReader::problem(std::string_view key, std::string message) {
+    for (const Entry& entry : node_->entries) {
+        if (entry.key == key) message += origin_hint(entry.value, message);
+    }
     problems_->add(mark(key), std::move(message));
 }
 
