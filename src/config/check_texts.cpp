@@ -24,12 +24,29 @@ std::optional<unsigned> control_character(std::string_view text) {
     return std::nullopt;
 }
 
+/// The text of a block begins as a list or a map does.
+bool is_yaml(std::string_view text) {
+    const std::string_view first = text.substr(0, text.find('\n'));
+    const std::size_t colon = first.find(':');
+    const bool is_key =
+        colon != first.npos && colon > 0 &&
+        first.substr(0, colon).find_first_not_of("abcdefghijklmnopqrstuvwxyz_") == first.npos &&
+        (colon + 1 == first.size() || first[colon + 1] == ' ');
+    return first.starts_with("- ") || is_key;
+}
+
 /// `variable`: whose value the text is, or none's.
 void refuse(std::string_view text, yaml::Mark mark, const std::string& variable,
             yaml::Problems& problems) {
     const auto control = control_character(text);
     if (!control) return;
     const std::string in = variable.empty() ? " in a text" : " in the value of ${" + variable + '}';
+    if (*control == '\n' && is_yaml(text)) {
+        problems.add(mark,
+                     "a text, by the '|' or '>' behind the key; remove that sign for what "
+                     "stands below to be a list, or keys");
+        return;
+    }
     if (*control == '\n') {
         problems.add(mark, variable.empty() ? "a text of more than one line; write it on one line"
                                             : "a line break" + in + "; give the variable one line");

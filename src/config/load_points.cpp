@@ -222,7 +222,23 @@ std::string load_unit(MapReader& in) {
     return in.text("unit").value_or("");
 }
 
+/// `temperature: UW100` for a point: told.
+bool refuse_short_form(Loading& loading, const Node& node) {
+    constexpr std::array<std::string_view, 14> kKeys{
+        "name",   "at",  "bit", "type", "length",   "word_order", "scale",
+        "offset", "min", "max", "unit", "writable", "labels",     "every"};
+    if (node.entries.size() != 1 || node.entries[0].value.kind != Node::Kind::scalar) return false;
+    const auto& [name, mark, at] = node.entries[0];
+    const bool is_key = std::ranges::find(kKeys, name) != kKeys.end();
+    if (is_key || at.scalar.find_first_of("0123456789") == at.scalar.npos) return false;
+    loading.problems.add(node.mark, "a point must be a map of name and at; write {name: " +
+                                        (is_point_name(name) ? name : "NAME") +
+                                        ", at: " + at.scalar + '}');
+    return true;
+}
+
 void load_point(Loading& loading, const Node& node, Station& station) {
+    if (refuse_short_form(loading, node)) return;
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
     point.name = in.required_text("name").value_or("");

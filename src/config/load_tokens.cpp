@@ -26,10 +26,10 @@ std::string path_of(const Node* file) {
 }
 
 /// A token's secret: the file's text without blanks around it, and without the mark that editors
-/// put before UTF-8.
-std::string load_secret(Loading& loading, MapReader& in) {
+/// put before UTF-8. `elsewhere`: it stands where it must not, which is told.
+std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
     constexpr std::string_view kBlanks = " \t\r\n";
-    const auto file = in.required_text("file");
+    const auto file = elsewhere ? in.text("file") : in.required_text("file");
     if (!file) return "";
     if (loading.files.is_special(*file)) {
         in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
@@ -60,15 +60,27 @@ std::string load_secret(Loading& loading, MapReader& in) {
 
 constexpr std::string_view kExample = "{name: ops, role: operator, file: /run/secrets/ops}";
 
+constexpr std::string_view kInFile =
+    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "read, and here file: with its path";
+constexpr std::array<yaml::Elsewhere, 4> kElsewhere{{{"token", {}, {}, kInFile},
+                                                     {"secret", {}, {}, kInFile},
+                                                     {"password", {}, {}, kInFile},
+                                                     {"value", {}, {}, kInFile}}};
+
 web::Token load_token(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a token", kExample);
+    in.elsewhere(kElsewhere);
+    const bool elsewhere = std::ranges::any_of(node.entries, [](const yaml::Entry& entry) {
+        return std::ranges::find(kElsewhere, entry.key, &yaml::Elsewhere::key) != kElsewhere.end();
+    });
     web::Token token;
     token.name = in.required_text("name").value_or("");
     constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
         {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
     if (in.required_text("role"))
         token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
-    token.secret = load_secret(loading, in);
+    token.secret = load_secret(loading, in, elsewhere);
     in.finish();
     return token;
 }

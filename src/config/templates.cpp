@@ -1,6 +1,7 @@
 #include "templates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
 #include <optional>
@@ -97,6 +98,7 @@ class Templates {
                                   "templates must be a map of stations by name, such as "
                                   "templates: {meter: {profile: generic}}");
         }
+        move_bodies(list);
         for (Entry& entry : list.entries) read_one(entry);
     }
 
@@ -144,6 +146,31 @@ class Templates {
     }
 
   private:
+    /// The keys of a station behind a name without a body are meant as this.
+    void move_bodies(Node& list) {
+        constexpr std::array<std::string_view, 11> kKeys{
+            "profile", "access",   "timing", "retries", "retry_writes", "max_age",
+            "guard",   "simulate", "poll",   "points",  "translate"};
+        std::vector<Entry> kept;
+        for (Entry& entry : list.entries) {
+            Entry* name = kept.empty() ? nullptr : &kept.back();
+            const bool open = name != nullptr &&
+                              (name->value.kind == Node::Kind::null || opened_.contains(name->key));
+            if (!open || std::ranges::find(kKeys, entry.key) == kKeys.end()) {
+                kept.push_back(std::move(entry));
+                continue;
+            }
+            loading_.problems.add(entry.mark, "'" + entry.key + "' must stand deeper than '" +
+                                                  name->key + "' (line " +
+                                                  std::to_string(name->mark.line) +
+                                                  "), whose body it is: type 2 blanks before it");
+            opened_.insert(name->key);
+            name->value.kind = Node::Kind::map;
+            name->value.entries.push_back(std::move(entry));
+        }
+        list.entries = std::move(kept);
+    }
+
     void read_one(Entry& entry) {
         if (!is_name(entry.key))
             loading_.problems.add(entry.mark,
@@ -180,6 +207,7 @@ class Templates {
     Loading& loading_;
     std::map<std::string, Template> templates_;
     Size given_;
+    std::set<std::string> opened_;  ///< whose bodies do not stand deeper
 };
 
 }  // namespace

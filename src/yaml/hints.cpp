@@ -262,6 +262,9 @@ std::string number_blank_hint(std::string_view key) {
 }
 
 std::string blank_hint(std::string_view text) {
+    if (text.starts_with("<<") && text.find('*') != text.npos)
+        return write("<<: " + std::string(text.substr(text.find('*'))));
+    if (text.starts_with('(')) return "; the brackets of a map are { and }";
     const std::size_t colon = text.find_first_of(":=");
     const auto is_letter = [](char c) {
         return c == '_' || c == '-' || (lower_of(c) >= 'a' && lower_of(c) <= 'z');

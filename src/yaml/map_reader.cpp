@@ -51,6 +51,12 @@ std::string two_values(const Node& node) {
     return quote(node.scalar) + " is two values in { }; put a text that holds a ',' in quotes";
 }
 
+/// {id 5, name: press}
+bool lacks_colon(const Entry& entry, std::string_view key) {
+    return entry.value.kind == Node::Kind::null && entry.key.size() > key.size() + 1 &&
+           entry.key.starts_with(std::string(key) + ' ');
+}
+
 /// Nobody counts 1440 minutes.
 std::string limit(Duration duration) {
     const bool hours = duration > 1h && duration % 1h == Duration::zero();
@@ -105,7 +111,7 @@ bool MapReader::is_mistyped(std::string_view key) const {
         const Entry& entry = node_->entries[i];
         if (entry.key == key || std::ranges::find(known_, entry.key) != known_.end()) continue;
         const Entry* parent = shallow_parent(i);
-        if (nearest(entry.key, std::span(&key, 1)) == key ||
+        if (nearest(entry.key, std::span(&key, 1)) == key || lacks_colon(entry, key) ||
             entry.key.starts_with(std::string(key) + ':') ||
             (parent != nullptr && parent->key == key))
             return true;
@@ -229,7 +235,12 @@ const Node* MapReader::map(std::string_view key, std::string_view example) {
     parents_.emplace_back(key);
     if (node == nullptr || node->kind == Node::Kind::map) return node;
     const std::string text = text_hint(*node, '{') + none_hint(key, example, *node);
+    const bool is_list = node->kind == Node::Kind::sequence && !node->items.empty() &&
+                         std::ranges::all_of(node->items, [](const Node& item) {
+                             return item.kind == Node::Kind::map;
+                         });
     problem(key, wrong(key, "a map of keys" + such_as(example), *node) +
+                     (is_list ? "; remove the '-' (or the [ ]) around its keys" : "") +
                      (text.empty() ? blank_hint(node->scalar) : text));
     return nullptr;
 }
@@ -281,6 +292,11 @@ std::string MapReader::unknown(std::size_t entry) const {
     const std::string message = is_unknown(key);
     const std::string blank = blank_hint(key);
     if (!blank.empty()) return message + blank;
+    for (const std::string_view word : known) {
+        if (lacks_colon(node_->entries[entry], word))
+            return message + "; a ':' is missing: write " + std::string(word) + ": " +
+                   key.substr(word.size() + 1);
+    }
     if (const Entry* parent = shallow_parent(entry))
         return message + "; below " + quote(parent->key) + " (line " +
                std::to_string(parent->mark.line) +
