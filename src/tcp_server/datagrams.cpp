@@ -10,7 +10,7 @@
 #include <utility>
 #include <variant>
 
-#include "caller.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
 

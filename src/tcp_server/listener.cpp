@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "caller.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "datagrams.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"

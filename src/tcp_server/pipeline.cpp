@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "diagnostics.hpp"
-#include "dispatch.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "own_state.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/framing.hpp"

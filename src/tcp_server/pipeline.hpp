@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "caller.hpp"
-#include "dispatch.hpp"
+#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/inline_function.hpp"

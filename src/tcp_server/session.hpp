@@ -8,7 +8,7 @@
 #include <optional>
 #include <string_view>
 
-#include "caller.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"

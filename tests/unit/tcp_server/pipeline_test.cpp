@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "caller.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "held_bus.hpp"
 #include "shared.hpp"
 #include "support/hex.hpp"

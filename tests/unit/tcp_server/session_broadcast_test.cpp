@@ -1,4 +1,4 @@
-#include "dispatch.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "loopback.hpp"
 
 namespace panelgate::tcp_server {
