@@ -35,6 +35,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, b
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
+    for (const serial_server::Settings& settings : config_.serial_masters)
+        add_serial_master(settings);
     if (config_.http) add_http(*config_.http);
 }
 
@@ -111,6 +113,15 @@ void Gateway::add_listener(tcp_server::Settings settings) {
         executor_, clock_, std::move(settings), std::move(units), PANELGATE_VERSION));
 }
 
+/// Who else answers on the master's line is not ours to speak for: only what is listed is served.
+void Gateway::add_serial_master(const serial_server::Settings& settings) {
+    auto lines = plant_.listener_lines();
+    for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
+    serial_masters_.push_back(std::make_unique<serial_server::SerialMaster>(
+        clock_, settings, tcp_server::UnitMap(settings.access, lines),
+        line::make_tty_line(executor_, clock_, settings.device)));
+}
+
 void Gateway::add_http(const web::Settings& settings) {
     web::Providers providers;
     const auto copy = [this] {
@@ -150,6 +161,7 @@ void Gateway::start() {
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
+    for (const auto& master : serial_masters_) master->start();
     add_doors();
     openings_.start();
     ready_ = true;
@@ -170,22 +182,27 @@ void Gateway::stop_accepting() {
     for (const auto& listener : listeners_) {
         listener->stop([this] { --open_listeners_; });
     }
+    for (const auto& master : serial_masters_) master->finish();
     if (http_) http_->stop(longest_answer());
 }
 
 bool Gateway::drained() const {
-    return open_listeners_ == 0 && (!http_ || http_->connections() == 0);
+    const auto idle = [](const auto& master) { return master->idle(); };
+    return open_listeners_ == 0 && std::ranges::all_of(serial_masters_, idle) &&
+           (!http_ || http_->connections() == 0);
 }
 
 std::size_t Gateway::owing() const {
     std::size_t count = http_ ? http_->connections() : 0;
     for (const auto& listener : listeners_) count += listener->counters().connections;
+    for (const auto& master : serial_masters_) count += master->idle() ? 0 : 1;
     return count;
 }
 
 void Gateway::stop() {
     lag_.stop();
     for (const auto& listener : listeners_) listener->close_now();
+    for (const auto& master : serial_masters_) master->stop();
     http_.reset();
     relays_->stop();
     for (const auto& poller : pollers_) poller->stop();
@@ -202,6 +219,8 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const
     }
     if (points.next(snapshot.points, clock_.now())) return true;
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
+    for (const auto& master : serial_masters_)
+        snapshot.serial_masters.push_back(master->counters());
     snapshot.relays = relay_samples(relays_->status());
     if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;

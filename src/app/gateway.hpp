@@ -18,6 +18,7 @@
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/loop_lag.hpp"
+#include "panelgate/serial_server/serial_master.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
@@ -61,6 +62,7 @@ class Gateway {
     void add_poller(const config::Line& line, bus::Bus& bus);
     void add_relays();
     void add_listener(tcp_server::Settings settings);
+    void add_serial_master(const serial_server::Settings& settings);
     void add_http(const web::Settings& settings);
     void add_doors();
     bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;
@@ -79,6 +81,7 @@ class Gateway {
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     std::unique_ptr<points::Relays> relays_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    std::vector<std::unique_ptr<serial_server::SerialMaster>> serial_masters_;
     std::unique_ptr<Scrapes> scrapes_;
     web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;

@@ -1,5 +1,7 @@
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -69,6 +71,15 @@ std::string text_of(const std::vector<Network>& allow) {
     return text.empty() ? "everybody" : text;
 }
 
+std::string text_of(const std::map<std::uint8_t, tcp_server::UnitTarget>& units) {
+    std::string text;
+    for (const auto& [unit, target] : units) {
+        text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
+                std::to_string(target.station) + '\n';
+    }
+    return text;
+}
+
 std::string text_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
@@ -76,11 +87,18 @@ std::string text_of(const tcp_server::Settings& listener) {
         text += ", framing " + std::string(modbus::label(listener.framing));
     if (listener.udp) text += ", udp too";
     text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
-    for (const auto& [unit, target] : listener.units) {
-        text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
-                std::to_string(target.station) + '\n';
-    }
-    return text;
+    return text + text_of(listener.units);
+}
+
+std::string text_of(const serial_server::Settings& master) {
+    std::string text = "serial master " + master.name + ": " + master.device.device + ", " +
+                       to_string(master.device.serial) + ", " +
+                       std::string(modbus::label(master.access.framing)) + ':';
+    for (const std::string& line : master.access.lines) text += ' ' + line;
+    const bool silent = master.on_failure == serial_server::OnFailure::silence;
+    text += ", " + rights(master.access.read_only) + ", told of failures by " +
+            (silent ? "silence" : "exceptions") + '\n';
+    return text + text_of(master.access.units);
 }
 
 std::string text_of(web::Role role) {
@@ -113,6 +131,7 @@ std::string inventory_text(const config::Config& config) {
     for (const config::Line& line : config.lines) text += text_of(line);
     for (const points::Relay& relay : config.relays) text += text_of(relay);
     for (const tcp_server::Settings& listener : config.modbus_tcp) text += text_of(listener);
+    for (const serial_server::Settings& master : config.serial_masters) text += text_of(master);
     if (config.http) text += text_of(*config.http);
     return text;
 }

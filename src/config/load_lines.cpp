@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "line_hints.hpp"
+#include "load_port.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -228,6 +229,23 @@ Line load_line(Loading& loading, const Node& node) {
 }
 
 }  // namespace
+
+bool load_port(Loading& loading, MapReader& in, line::Settings& port) {
+    Line line;  // what a port has is a part of it
+    line.device.device = port.device = in.required_text("device").value_or("");
+    if (!port.device.empty() && port.device[0] != '/') {
+        const bool remote = port.device.starts_with("tcp://");
+        in.problem("device", "device must be a serial device such as /dev/ttyUSB1, not " +
+                                 yaml::quote(port.device) +
+                                 (remote ? "; a master's silences do not come through a network"
+                                         : device_hint(port.device)));
+    } else {
+        check_path(in, port.device);
+    }
+    const bool serial_known = load_serial(loading, in, port.serial);
+    load_rs485(loading, in, line, port.rs485);
+    return serial_known;
+}
 
 void load_lines(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("lines", kListExample);

@@ -11,6 +11,7 @@
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/rt/settings.hpp"
+#include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/http/settings.hpp"
@@ -47,6 +48,7 @@ struct Config {
     std::vector<Line> lines;
     std::vector<points::Relay> relays;
     std::vector<tcp_server::Settings> modbus_tcp;
+    std::vector<serial_server::Settings> serial_masters;
     std::optional<web::Settings> http;
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
