@@ -10,9 +10,9 @@
 #include <utility>
 #include <variant>
 
-#include "panelgate/tcp_server/caller.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
