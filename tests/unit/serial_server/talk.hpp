@@ -51,8 +51,9 @@ struct Talk {
             pass(hole);
         }
     }
-    void answer(const std::optional<Bytes>& pdu) {
-        machine.on_answer(now, asks.back().ticket, pdu);
+    void answer(const std::optional<Bytes>& pdu) { answer_to(asks.back().ticket, pdu); }
+    void answer_to(std::uint64_t ticket, const std::optional<Bytes>& pdu) {
+        machine.on_answer(now, ticket, pdu);
         drain();
     }
     /// All deadlines on the way are met.
