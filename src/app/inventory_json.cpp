@@ -74,6 +74,7 @@ json::object line_json(const config::Line& line) {
     }
     return {{"name", line.name},
             {"device", line.device.device},
+            {"mode", line.listens ? "listen" : "master"},
             {"serial", to_string(line.device.serial)},
             {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},
             {"stations", std::move(stations)},

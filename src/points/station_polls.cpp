@@ -103,7 +103,7 @@ std::vector<std::size_t> StationPolls::on_write(TimePoint now,
     std::vector<std::size_t> outdated;
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         Reading& reading = readings_[i];
-        if (!changes(items, wants_[i].span)) continue;
+        if (!may_change(memory_, items, wants_[i].span)) continue;
         const bool was_old = reading.outdated();
         reading.written = now;
         if (!was_old && reading.outdated()) outdated.push_back(i);
@@ -117,21 +117,23 @@ void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& 
             const modbus::Span& span = plan_[i].span;
             const bool direct = items && items->overlaps(span);
             if (direct != themselves || spares(items, span)) continue;
-            if (is_outdated(plan_[i]) || !changes(items, span)) schedule_.hasten(i, now);
+            if (is_outdated(plan_[i]) || !may_change(memory_, items, span))
+                schedule_.hasten(i, now);
         }
     }
 }
 
-bool StationPolls::changes(const std::optional<modbus::Span>& written,
-                           const modbus::Span& items) const {
-    if (!written || !memory_.shown_as) return modbus::may_change(written, items);
-    return std::ranges::any_of(memory_.shown_as(*written),
+bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+                const modbus::Span& items) {
+    if (!written || !memory.shown_as) return modbus::may_change(written, items);
+    return std::ranges::any_of(memory.shown_as(*written),
                                [&](const modbus::Span& shown) { return shown.overlaps(items); });
 }
 
 bool StationPolls::spares(const std::optional<modbus::Span>& written,
                           const modbus::Span& items) const {
-    return memory_.known ? !changes(written, items) : !modbus::may_change(written, items);
+    return memory_.known ? !may_change(memory_, written, items)
+                         : !modbus::may_change(written, items);
 }
 
 bool StationPolls::is_outdated(const PlannedRead& read) const {

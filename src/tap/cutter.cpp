@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/crc16.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
@@ -142,7 +142,7 @@ std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool s
             open = open || !silence;
             return 0;
         case ReplyLength::Kind::by_silence:
-            return start == 0 && aligned_ ? size_by_gap(start, silence, open) : 0;
+            return start == 0 && aligned_ ? size_by_gap(silence, open) : 0;
         case ReplyLength::Kind::known:
             break;
     }
@@ -154,23 +154,48 @@ std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool s
     return modbus::crc_ok(frame.first(length.length)) ? length.length : 0;
 }
 
-/// What nothing but a silence ends: a gap behind it, or all that has come before a silence, or,
-/// where an adapter has joined frames, the shortest that is good.
-std::size_t Cutter::size_by_gap(std::size_t start, bool silence, bool& open) const {
-    const ByteView frame = ByteView(heard_).subspan(start);
-    const std::size_t most = std::min(frame.size(), kLongest);
-    for (std::size_t size = modbus::kMinAdu; size <= most; ++size) {
-        if (is_gap_behind(start + size - 1) && modbus::crc_ok(frame.first(size))) return size;
+/// What nothing but a silence ends: with a gap behind it, or where a frame begins that can be
+/// nothing else; or all that has come before a silence. Only at the front, where a frame is due.
+std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
+    const ByteView all(heard_);
+    for (const std::size_t size : good_ends(0)) {
+        if (is_gap_behind(size - 1) || goes_on_well(size, true)) return size;
     }
     if (!silence) {
-        open = open || frame.size() <= kLongest;
+        open = open || all.size() <= kLongest;
         return 0;
     }
-    if (frame.size() <= kLongest && modbus::crc_ok(frame)) return frame.size();
-    for (std::size_t size = modbus::kMinAdu; size <= most; ++size) {
-        if (modbus::crc_ok(frame.first(size))) return size;
+    const std::vector<std::size_t> ends = good_ends(0);
+    if (ends.empty()) return 0;
+    if (ends.back() == all.size()) return ends.back();
+    std::size_t end = 0;  // a zero behind a good frame leaves it good
+    while (end + 1 < ends.size() && ends[end + 1] == ends[end] + 1) ++end;
+    return ends[end];
+}
+
+/// Where a good frame that begins here could end.
+std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
+    const ByteView frame = ByteView(heard_).subspan(start);
+    std::vector<std::size_t> ends;
+    std::uint16_t crc = modbus::crc16(ByteView());
+    for (std::size_t i = 0; i < std::min(frame.size(), kLongest); ++i) {
+        crc = modbus::crc16(crc, frame.subspan(i, 1));
+        if (crc == 0 && i + 1 >= modbus::kMinAdu) ends.push_back(i + 1);
     }
-    return 0;
+    return ends;
+}
+
+/// A frame of a known length begins here, or one that only such a frame ends.
+bool Cutter::goes_on_well(std::size_t start, bool through_another) const {
+    const ByteView frame = ByteView(heard_).subspan(start);
+    if (frame.size() < modbus::kMinAdu || frame[0] > modbus::kMaxStation) return false;
+    for (const ReplyLength& length : {request_length(frame), modbus::reply_length(frame)}) {
+        const bool whole = length.kind == ReplyLength::Kind::known && length.length <= frame.size();
+        if (whole && modbus::crc_ok(frame.first(length.length))) return true;
+    }
+    if (!through_another) return false;
+    return std::ranges::any_of(good_ends(start),
+                               [&](std::size_t size) { return goes_on_well(start + size, false); });
 }
 
 bool Cutter::is_gap_behind(std::size_t place) const {

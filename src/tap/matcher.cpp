@@ -7,6 +7,7 @@
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::tap {
 namespace {
@@ -19,6 +20,11 @@ Bytes copy_of(ByteView bytes) { return Bytes(bytes.begin(), bytes.end()); }
 
 /// The normal reply to it would be the same bytes.
 bool is_its_own_echo(ByteView pdu) { return modbus::answers(pdu, pdu) && modbus::is_known(pdu[0]); }
+
+bool has_form_of_reply(ByteView frame) {
+    const modbus::ReplyLength length = modbus::reply_length(frame);
+    return length.kind == modbus::ReplyLength::Kind::by_silence || length.length == frame.size();
+}
 
 }  // namespace
 
@@ -160,7 +166,10 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.request = request;
     made.reply = copy_of(reply);
     made.end = End::answered;
-    made.doubtful = in_doubt || late || copied;
+    const bool unheard = asked.damaged_bytes >= modbus::kMinAdu;  // a request, perhaps
+    const bool overdue = piece.begin - asked.end >= patience(habits);
+    const bool same = !modbus::is_known(request[0]) && copy_of(reply) == request;
+    made.doubtful = in_doubt || same || late || copied || unheard || overdue;
     made.asked = asked.begin;
     made.sent = asked.end;
     made.replied = piece.begin;
@@ -186,15 +195,17 @@ void Matcher::on_request(Piece piece) {
         piece.begin - asked_->end < patience(of(asked_->question.station))) {
         return on_reply(std::move(piece));
     }
-    const bool doubtful = echo && may_be_echo(habits, piece);
+    const bool doubtful = may_be_reply(habits, piece);
     give_up_for(piece);
     ask(piece, doubtful);
 }
 
 /// Nobody asked, as far as was heard.
-bool Matcher::may_be_echo(const Habits& habits, const Piece& piece) const {
+bool Matcher::may_be_reply(const Habits& habits, const Piece& piece) const {
     if (asked_) return false;
-    return noise_ || habits.is_owed(piece.end, pdu_of(piece)) || piece.bytes == habits.last_reply;
+    if (noise_ && has_form_of_reply(piece.bytes)) return true;
+    return is_its_own_echo(pdu_of(piece)) &&
+           (habits.is_owed(piece.end, pdu_of(piece)) || piece.bytes == habits.last_reply);
 }
 
 /// The master goes on with another request.
@@ -212,9 +223,8 @@ void Matcher::give_up_for(const Piece& request) {
 
 void Matcher::give_up(TimePoint now) {
     const Asked asked = *std::exchange(asked_, std::nullopt);
-    // What came damaged has come, and an echo asks nothing.
-    if (!asked.damaged && !asked.doubtful)
-        of(asked.question.station).owes(asked.begin, asked.question.pdu);
+    // An echo asks nothing.
+    if (!asked.doubtful) of(asked.question.station).owes(asked.begin, asked.question.pdu);
     Transaction made;
     made.station = asked.question.station;
     made.request = asked.question.pdu;
@@ -267,6 +277,7 @@ void Matcher::on_reply(Piece piece) {
 void Matcher::on_damaged(Piece piece) {
     if (asked_) {
         asked_->damaged = true;
+        asked_->damaged_bytes += piece.bytes.size();
     } else {
         noise_ = true;
     }

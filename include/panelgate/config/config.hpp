@@ -24,6 +24,7 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
+    bool listens = false;      ///< its line is only listened to
     bool guard = false;        ///< what the profile rules out is refused without using the bus
     sim::Misbehaviour faults;  ///< of the simulated panel
     std::vector<points::Point> points;
@@ -36,6 +37,7 @@ struct Line {
     Kind kind = Kind::serial;
     line::Settings device;
     arbiter::Settings arbiter;  ///< every station's timing resolved
+    bool listens = false;       ///< its master is somebody else: nothing is ever sent
     bool refuse_unlisted = false;
     bool simulated_echo = false;  ///< the simulated adapter hears itself
     std::vector<Station> stations;

@@ -61,7 +61,9 @@ class Cutter {
     Verdict judge(std::size_t start, const Question* question, bool silence) const;
     std::size_t size_of(std::size_t start, const modbus::ReplyLength& length, bool silence,
                         bool& open) const;
-    std::size_t size_by_gap(std::size_t start, bool silence, bool& open) const;
+    std::size_t size_by_gap(bool silence, bool& open) const;
+    std::vector<std::size_t> good_ends(std::size_t start) const;
+    bool goes_on_well(std::size_t start, bool through_another) const;
     bool is_gap_behind(std::size_t place) const;
     bool is_request(std::size_t start, std::size_t size) const;
     Piece cut(std::size_t size, const Verdict& verdict);

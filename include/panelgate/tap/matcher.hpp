@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -36,7 +37,8 @@ class Matcher {
         TimePoint begin;
         TimePoint end;
         bool damaged = false;  ///< bytes that are no frame were heard behind it
-        bool wrong = false;    ///< its station said something else
+        std::size_t damaged_bytes = 0;
+        bool wrong = false;  ///< its station said something else
         bool doubtful = false;
     };
     enum class Reading : std::uint8_t { answer, request, open };
@@ -52,7 +54,7 @@ class Matcher {
     void ask(const Piece& piece, bool doubtful);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
-    bool may_be_echo(const Habits& habits, const Piece& piece) const;
+    bool may_be_reply(const Habits& habits, const Piece& piece) const;
     Reading read(const Piece& piece) const;
     Duration quick(const Habits& habits) const;
     Duration patience(const Habits& habits) const;
