@@ -1,5 +1,6 @@
 #include "panelgate/bus/listening_bus.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "heard_stations.hpp"
@@ -25,7 +26,7 @@ namespace {
 tap::Settings tap_settings(const arbiter::Settings& line) {
     tap::Settings settings;
     settings.serial = line.serial;
-    settings.hole = line.reply_hole;
+    settings.hole = std::max(settings.hole, line.reply_hole);
     return settings;
 }
 
@@ -71,6 +72,7 @@ struct ListeningBus::State final : public line::Line::Events {
     }
     void act(tap::Frame& frame);
     void act(const tap::Transaction& made);
+    void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed);
     void refuse(Request request, AnswerHandler handler);
     Refusal refusal(std::uint8_t station) const;
     LineCounts counts() const { return {heard.wire(), heard.line().broadcasts, *line}; }
@@ -151,12 +153,17 @@ Refusal ListeningBus::State::refusal(std::uint8_t station) const {
             modbus::ExceptionCode::gateway_path_unavailable, settings.name};
 }
 
+/// What nobody may ask here: for the metrics, the log and who watches.
+void ListeningBus::State::account(std::uint8_t station, std::uint8_t function,
+                                  const std::optional<Deed>& deed) {
+    counters.count(station, function, Outcome::refused, Duration::zero());
+    if (deed) log_deed(settings, station, *deed, Outcome::refused);
+    observe(TransactionEvent{station, function, Outcome::refused, Duration::zero()});
+}
+
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
-    counters.count(request.station, function, Outcome::refused, Duration::zero());
-    if (const auto deed = deed_of(request, names))
-        log_deed(settings, request.station, *deed, Outcome::refused);
-    observe(TransactionEvent{request.station, function, Outcome::refused, Duration::zero()});
+    account(request.station, function, deed_of(request, names));
     Answer answer;
     answer.refusal = refusal(request.station);
     answer.pdu = answer_to(*answer.refusal, function);
@@ -182,9 +189,7 @@ void ListeningBus::transact(Request request, AnswerHandler handler) {
 
 void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     if (pdu.empty()) return;
-    state_->counters.count(station, pdu[0], Outcome::refused, Duration::zero());
-    if (const auto deed = deed_of(pdu, state_->names.of(client)))
-        log_deed(state_->settings, station, *deed, Outcome::refused);
+    state_->account(station, pdu[0], deed_of(pdu, client, state_->names));
 }
 
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }

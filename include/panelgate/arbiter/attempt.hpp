@@ -175,9 +175,9 @@ class Attempt {
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
-    TimePoint looked_{};  ///< when bytes came last
-    bool hasty_ = false;
     std::size_t since_ = 0;  ///< bytes since then
+    TimePoint looked_{};     ///< when bytes came last
+    bool hasty_ = false;
     bool heard_ = false;
     bool disturbed_ = false;
     bool fragment_ = false;
