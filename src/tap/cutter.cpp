@@ -18,6 +18,9 @@ using modbus::ReplyLength;
 /// The longest request that a panel takes: 0F with 255 data bytes.
 constexpr std::size_t kLongest = modbus::kMaxLongRequestPdu + modbus::kAduOverhead;
 
+/// Of a function without a length rule. The more sizes are tried, the sooner a CRC fits by chance.
+constexpr std::size_t kLongestUnknown = 128;
+
 ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - modbus::kAduOverhead); }
 
 std::uint8_t plain(std::uint8_t function) {
@@ -126,6 +129,8 @@ Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool 
         const std::size_t size = size_of(start, request_length(frame), silence, open);
         if (size != 0 && (aligned || makes_sense(frame[0], pdu_of(frame.first(size)))))
             return {Verdict::Kind::frame, size, Piece::Kind::request};
+        // A zero behind a good frame leaves it good: its first seven bytes may pass for a reply.
+        if (open) return waits;
     }
     const std::size_t size = size_of(start, modbus::reply_length(frame), silence, open);
     if (size != 0 && (aligned || !is_exception(frame) || is_exception_known(frame)))
@@ -158,17 +163,20 @@ std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool s
 /// nothing else; or all that has come before a silence. Only at the front, where a frame is due.
 std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
     const ByteView all(heard_);
-    for (const std::size_t size : good_ends(0)) {
-        if (is_gap_behind(size - 1) || goes_on_well(size, true)) return size;
+    const std::vector<std::size_t> ends = good_ends(0);
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+        // A zero behind a good frame leaves it good.
+        const bool last = i + 1 == ends.size() || ends[i + 1] != ends[i] + 1;
+        if (last && is_gap_behind(ends[i] - 1)) return ends[i];
+        if (goes_on_well(ends[i], true)) return ends[i];
     }
     if (!silence) {
-        open = open || all.size() <= kLongest;
+        open = open || all.size() <= kLongestUnknown;
         return 0;
     }
-    const std::vector<std::size_t> ends = good_ends(0);
     if (ends.empty()) return 0;
     if (ends.back() == all.size()) return ends.back();
-    std::size_t end = 0;  // a zero behind a good frame leaves it good
+    std::size_t end = 0;
     while (end + 1 < ends.size() && ends[end + 1] == ends[end] + 1) ++end;
     return ends[end];
 }
@@ -178,7 +186,7 @@ std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     std::vector<std::size_t> ends;
     std::uint16_t crc = modbus::crc16(ByteView());
-    for (std::size_t i = 0; i < std::min(frame.size(), kLongest); ++i) {
+    for (std::size_t i = 0; i < std::min(frame.size(), kLongestUnknown); ++i) {
         crc = modbus::crc16(crc, frame.subspan(i, 1));
         if (crc == 0 && i + 1 >= modbus::kMinAdu) ends.push_back(i + 1);
     }
@@ -210,7 +218,7 @@ bool Cutter::is_request(std::size_t start, std::size_t size) const {
     if (is_exception(frame)) return false;
     const ReplyLength length = request_length(frame);
     const bool fits = length.kind == ReplyLength::Kind::by_silence || length.length == size;
-    return fits && makes_sense(frame[0], pdu_of(frame));
+    return fits && (!modbus::is_known(frame[1]) || makes_sense(frame[0], pdu_of(frame)));
 }
 
 Piece Cutter::cut(std::size_t size, const Verdict& verdict) {

@@ -12,16 +12,17 @@
 namespace panelgate::tap {
 namespace {
 
+/// Sooner than any master gives up: an adapter's latency timer, and a panel that thinks.
+constexpr Duration kQuickest = 30ms;
+
 ByteView pdu_of(const Piece& piece) {
     return ByteView(piece.bytes).subspan(1, piece.bytes.size() - modbus::kAduOverhead);
 }
 
 Bytes copy_of(ByteView bytes) { return Bytes(bytes.begin(), bytes.end()); }
 
-/// The normal reply to it would be the same bytes.
-bool is_its_own_echo(ByteView pdu) { return modbus::answers(pdu, pdu) && modbus::is_known(pdu[0]); }
-
 bool has_form_of_reply(ByteView frame) {
+    if (frame[0] == 0) return false;  // nobody answers a broadcast
     const modbus::ReplyLength length = modbus::reply_length(frame);
     return length.kind == modbus::ReplyLength::Kind::by_silence || length.length == frame.size();
 }
@@ -101,7 +102,10 @@ bool Matcher::resolve(Piece& piece) {
         answer(std::move(piece), true);
         return true;
     }
-    const bool goes_on = piece.kind != Piece::Kind::damaged && behind < waited - waited / 4;
+    // Frames of functions without a length rule may be lost between, where an adapter joins them.
+    const bool known = modbus::is_known(asked_->question.pdu.front());
+    const bool goes_on =
+        known && piece.kind != Piece::Kind::damaged && behind < waited - waited / 4;
     answer(std::move(held), !goes_on);
     // It was read as an answer to what is answered now.
     if (piece.kind == Piece::Kind::answer)
@@ -134,16 +138,15 @@ Matcher::Reading Matcher::read(const Piece& piece) const {
 
 /// A master waits longer than this.
 Duration Matcher::quick(const Habits& habits) const {
-    constexpr Duration kLeast = 30ms;  // an adapter's latency timer, and a panel that thinks
     const Duration usual = habits.longest_think().value_or(Duration::zero());
-    return std::min(patience(habits), std::max<Duration>(2 * usual + 10ms, kLeast));
+    return std::min(patience(habits), std::max<Duration>(2 * usual + 10ms, kQuickest));
 }
 
 /// A master waits no longer than this.
 Duration Matcher::patience(const Habits& habits) const {
     auto least = habits.give_up.least();
     if (!least) least = give_up_.least();
-    return least ? *least - *least / 8 : settings_.usual_give_up;
+    return least ? *least - *least / 16 : settings_.usual_give_up;
 }
 
 std::optional<TimePoint> Matcher::resolved_at() const {
@@ -168,8 +171,10 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     made.end = End::answered;
     const bool unheard = asked.damaged_bytes >= modbus::kMinAdu;  // a request, perhaps
     const bool overdue = piece.begin - asked.end >= patience(habits);
-    const bool same = !modbus::is_known(request[0]) && copy_of(reply) == request;
-    made.doubtful = in_doubt || same || late || copied || unheard || overdue;
+    // Of a function without a length rule: frames between may be lost where an adapter joins them.
+    const bool unruled =
+        !modbus::is_known(request[0]) && (think > kQuickest || std::ranges::equal(reply, request));
+    made.doubtful = in_doubt || unruled || late || copied || unheard || overdue;
     made.asked = asked.begin;
     made.sent = asked.end;
     made.replied = piece.begin;
@@ -189,23 +194,25 @@ void Matcher::answer(Piece piece, bool in_doubt) {
 }
 
 void Matcher::on_request(Piece piece) {
-    Habits& habits = of(piece.bytes.front());
-    const bool echo = is_its_own_echo(pdu_of(piece));
-    if (echo && asked_ && habits.is_owed(piece.end, pdu_of(piece)) &&
+    const Habits& habits = of(piece.bytes.front());
+    // A master that waits does not ask: it is an old reply that looks like a request.
+    if (asked_ && is_old_reply(habits, piece) &&
         piece.begin - asked_->end < patience(of(asked_->question.station))) {
         return on_reply(std::move(piece));
     }
-    const bool doubtful = may_be_reply(habits, piece);
+    const bool again = asked_ && asked_->question.station == piece.bytes.front() &&
+                       std::ranges::equal(asked_->question.pdu, pdu_of(piece));
+    const bool noise = asked_ ? asked_->damaged : noise_;
+    const bool doubtful =
+        (noise && has_form_of_reply(piece.bytes)) || (!again && is_old_reply(habits, piece));
     give_up_for(piece);
     ask(piece, doubtful);
 }
 
-/// Nobody asked, as far as was heard.
-bool Matcher::may_be_reply(const Habits& habits, const Piece& piece) const {
-    if (asked_) return false;
-    if (noise_ && has_form_of_reply(piece.bytes)) return true;
-    return is_its_own_echo(pdu_of(piece)) &&
-           (habits.is_owed(piece.end, pdu_of(piece)) || piece.bytes == habits.last_reply);
+/// A late one, or a copy, by what was asked and answered before.
+bool Matcher::is_old_reply(const Habits& habits, const Piece& piece) const {
+    if (!has_form_of_reply(piece.bytes)) return false;
+    return piece.bytes == habits.last_reply || habits.is_owed(piece.end, pdu_of(piece));
 }
 
 /// The master goes on with another request.
@@ -223,8 +230,7 @@ void Matcher::give_up_for(const Piece& request) {
 
 void Matcher::give_up(TimePoint now) {
     const Asked asked = *std::exchange(asked_, std::nullopt);
-    // An echo asks nothing.
-    if (!asked.doubtful) of(asked.question.station).owes(asked.begin, asked.question.pdu);
+    of(asked.question.station).owes(asked.begin, asked.question.pdu);
     Transaction made;
     made.station = asked.question.station;
     made.request = asked.question.pdu;
@@ -270,6 +276,7 @@ void Matcher::on_reply(Piece piece) {
         return note(FrameKind::copy, station, piece);
     }
     const bool late = habits.settle(piece.end, pdu_of(piece));
+    if (late) habits.last_reply = piece.bytes;
     if (!late && asked_ && asked_->question.station == station) asked_->wrong = true;
     note(late ? FrameKind::late : FrameKind::foreign, station, piece);
 }

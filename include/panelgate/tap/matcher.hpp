@@ -54,7 +54,7 @@ class Matcher {
     void ask(const Piece& piece, bool doubtful);
     void give_up(TimePoint now);
     void give_up_for(const Piece& request);
-    bool may_be_reply(const Habits& habits, const Piece& piece) const;
+    bool is_old_reply(const Habits& habits, const Piece& piece) const;
     Reading read(const Piece& piece) const;
     Duration quick(const Habits& habits) const;
     Duration patience(const Habits& habits) const;

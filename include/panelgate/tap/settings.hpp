@@ -10,8 +10,8 @@ namespace panelgate::tap {
 struct Settings {
     SerialFormat serial;
     /// The longest silence inside a frame, as it is heard here: adapters and busy machines put
-    /// pauses anywhere.
-    Duration hole = 60ms;
+    /// pauses anywhere. Nobody waits for a tap: where the line goes on, what follows tells sooner.
+    Duration hole = 250ms;
     /// A request without an answer is given up by then, whatever its master does.
     Duration patience = 10s;
     /// How long after its request a reply may still come, although its master has gone on.

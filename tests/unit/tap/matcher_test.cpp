@@ -151,6 +151,13 @@ TEST(Matcher, FindsFramesThatAnAdapterHasJoined) {
                             "0: 0600640007 -> unasked"));
 }
 
+TEST(Matcher, DoesNotTakeTheBeginningOfARequestForAReply) {
+    Line line;
+    line.say(10ms, 4, "0302A6000F");  // its CRC ends with 00: without that a reply of one register
+    line.say(3ms, 4, "831E");
+    EXPECT_THAT(line.told(), ElementsAre("4: 0302a6000f -> 831e"));
+}
+
 TEST(Matcher, KnowsThatNobodyAnswersABroadcast) {
     Line line;
     line.say(10ms, 0, "0600640007");
@@ -278,6 +285,7 @@ TEST(Matcher, TellsALateReplyAndACopyFromOthers) {
     line.say(3ms, 31, "030400050006");
     line.say(3ms, 31, "030400050006");
     line.say(3ms, 7, "03020001");
+    line.wait(1s);  // it could go on as a request
     EXPECT_THAT(line.told(),
                 ElementsAre("31: 0300640001 -> silent", "31: 0300c80002 -> 030400050006"));
     EXPECT_THAT(line.frames,
@@ -342,6 +350,7 @@ TEST(Matcher, ForgetsWhatIsOpenWhenTheLineIsLost) {
     line.say(10ms, 31, kRead);
     line.lose();
     line.say(3ms, 31, kReply);
+    line.wait(1s);
     EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent ?"));
     EXPECT_EQ(line.frames.back(), FrameKind::foreign);
 }
