@@ -90,6 +90,7 @@ json::object line_json(const config::Line& line) {
     }
     return {{"name", line.name},
             {"device", line.device.device},
+            {"mode", line.listens ? "listen" : "master"},
             {"serial", to_string(line.device.serial)},
             {"clients", clients_json(line)},
             {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},

@@ -78,9 +78,11 @@ std::string clients_of(const config::Line& line) {
 std::string text_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
     if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
+    if (line.listens) text += ", only listened to";
     text += '\n';
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         text += text_of(line.stations[i], line.arbiter.stations[i]);
+    if (line.listens) return text;
     return text +
            "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
            '\n' + clients_of(line);

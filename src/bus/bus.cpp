@@ -88,7 +88,7 @@ struct Bus::State final : public line::Line::Events {
     void on_deadline(TimePoint now);
     void settled(TimePoint now) {
         load.record(now, arbiter.counters().busy);
-        if (up) doctor.look(now, arbiter, *line);
+        if (up) doctor.look(now, counts());
         if (calls == 0) answers.hand_over();
     }
     /// Somebody calls: whatever it leads to, nobody is answered before it ends.
@@ -101,6 +101,9 @@ struct Bus::State final : public line::Line::Events {
     void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
                  Outcome outcome, Duration took);
     void answer(Pending pending, Answer answer);
+    LineCounts counts() const {
+        return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
+    }
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
@@ -137,7 +140,7 @@ void Bus::State::on_up() {
     arbiter.confirm_ends(line->unsent().has_value());
     drive.hear([this](TimePoint now) {
         arbiter.on_line_up(now);
-        doctor.begin(now, arbiter, *line);
+        doctor.begin(now, counts());
     });
 }
 
@@ -344,7 +347,7 @@ LineStatus Bus::status() const {
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
-    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
+    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->counts());
     status.findings = state_->doctor.findings();
     return status;
 }

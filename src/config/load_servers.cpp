@@ -55,7 +55,9 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
     if (list == nullptr) {
-        for (const Line& line : loading.config.lines) settings.lines.push_back(line.name);
+        for (const Line& line : loading.config.lines) {
+            if (!line.listens) settings.lines.push_back(line.name);
+        }
         return;
     }
     for (const Node& item : list->items) {
