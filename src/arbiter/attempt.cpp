@@ -65,16 +65,28 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
 /// A reply that was cut short is noticed before twice the time that it has taken.
 std::optional<TimePoint> Attempt::busy_until() const {
     constexpr Duration kLongest = 30ms;
-    const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
-    if (!timing_.steady || hasty_ || missing == 0 || !began_) return std::nullopt;
-    return std::min<TimePoint>(*began_ + (since_ + missing) * character(),
+    if (!timing_.steady || hasty_ || !began_) return std::nullopt;
+    const std::size_t rest = missing();
+    if (rest == 0) return std::nullopt;
+    return std::min<TimePoint>(*began_ + (since_ + rest) * character(),
                                looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+}
+
+std::size_t Attempt::missing() const {
+    const std::size_t echo = echo_.missing();
+    if (!timing_.as_asked) return echo > 0 ? echo : framer_.missing();
+    if (!echo_.pending()) return echo > 0 ? echo : framer_.missing_as_asked();
+    return std::max(group_.request.reply_length().value_or(0), echo_.held() + echo) - echo_.held();
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
-    if (echo_.complete() && !was_complete) began_ = now - (since_ = rest.size()) * character();
+    if (echo_.complete() && !was_complete) {
+        since_ = rest.size();
+        began_.reset();
+        if (since_ > 0) began_ = now - since_ * character();
+    }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
         lender_.emplace(group_.station, group_.request.pdu());

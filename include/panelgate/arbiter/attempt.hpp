@@ -43,6 +43,7 @@ class Attempt {
         std::optional<Duration> tolerance;
         SerialFormat serial;
         bool steady = false;       ///< bytes come one by one, at the line's rate
+        bool as_asked = false;     ///< what begins is the reply that was asked for, as a rule
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
@@ -64,7 +65,8 @@ class Attempt {
 
     /// Bytes that come before then tell nothing: what may be the reply (or our echo) has begun, and
     /// the rest of its header, or of all of it, takes as long at the line's rate. Who waits needs
-    /// not look at each. Nothing: every byte may tell something.
+    /// not look at each. An exception where none was foreseen (Timing::as_asked) is noticed when
+    /// the reply would have been there. Nothing: every byte may tell something.
     std::optional<TimePoint> busy_until() const;
     /// More has come than the line's rate allows since the reply began.
     bool hasty() const { return hasty_; }
@@ -141,6 +143,8 @@ class Attempt {
   private:
     void drop_what_ended(TimePoint now, std::size_t size);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
+    /// Bytes, until what has begun tells more. 0: each may tell.
+    std::size_t missing() const;
     Duration character() const { return character_time(timing_.serial); }
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);

@@ -17,10 +17,11 @@ const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
 /// What has to be looked at and what need not, while a reply of 11 bytes comes.
 class AttemptPaceTest : public testing::Test {
   protected:
-    static Attempt attempt_of(bool may_stall, EchoFilter echo = {}) {
+    static Attempt attempt_of(bool may_stall, EchoFilter echo = {}, bool as_asked = false) {
         Settings line;
         line.may_stall = may_stall;
         Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+        timing.as_asked = as_asked;
         timing.patience = timing.usual = 500ms;
         return {group_of(kStation, "03 00 6B 00 03"_hex), timing, std::move(echo)};
     }
@@ -53,6 +54,13 @@ TEST_F(AttemptPaceTest, ThreeLooksAtAReplyAreEnough) {
     hear(1, 3);
     EXPECT_EQ(busy(), 11 * kCharacter) << "all of it";
     EXPECT_EQ(hear(3, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, TwoLooksAreEnoughWhereTheReplyIsWhatWasAskedFor) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter) << "all of it";
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
 }
 
 TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
@@ -125,6 +133,30 @@ TEST_F(AttemptPaceTest, OverTcpNothingComesAtTheRateOfTheLine) {
     attempt_ = attempt_of(true);
     hear(0, 1);
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, WhatBeginsLikeAnEchoThatNobodyExpectsIsLookedAtWhenTheReplyIsThere) {
+    attempt_ =
+        attempt_of(false, {"11 03 00 6B 00 03 76 87"_hex, EchoFilter::Expect::perhaps}, true);
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, AnEchoThatIsCertainIsLookedAtWhenAllOfItIsThere) {
+    const Bytes frame = "11 03 00 6B 00 03 76 87"_hex;
+    attempt_ = attempt_of(false, {frame, EchoFilter::Expect::certainly}, true);
+    start_ = attempt_.timing().started;
+    now_ = start_ + kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).first(1), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 8 * kCharacter);
+    now_ = start_ + 8 * kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).subspan(1), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), std::nullopt);
+    start_ = attempt_.timing().sent + 5ms;
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
 }
 
 TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
