@@ -50,26 +50,39 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     // Who looks late, or is told late, is no slower line.
     const Duration slack = std::max<Duration>(2 * character(), 1ms);
+    const auto planned = next_look();
     since_ += bytes.size();
     looked_ = now;
     const TimePoint latest = now - since_ * character();
     hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
+    if (planned && planned->end && now >= planned->at && !end_look_)
+        end_look_ = {planned->reply, since_ * character() >= planned->reply};
     // More should have come by now: a hole, or a slower clock, as the next byte will tell.
     const auto busy = busy_until();
     if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
     return verdict;
 }
 
-/// A reply that was cut short is noticed before twice the time that it has taken.
-std::optional<TimePoint> Attempt::busy_until() const {
-    constexpr Duration kLongest = 30ms;
+std::optional<Attempt::NextLook> Attempt::next_look() const {
     if (!timing_.steady || hasty_ || !began_) return std::nullopt;
     const std::size_t rest = missing();
     if (rest == 0) return std::nullopt;
-    return std::min<TimePoint>(*began_ + (since_ + rest) * character(),
-                               looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+    NextLook next;
+    next.reply = (since_ + rest) * character();
+    next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
+    next.at = *began_ + next.reply;
+    if (next.end) next.at -= timing_.notice + timing_.drift.early(next.reply);
+    return next;
+}
+
+/// A reply that was cut short is noticed before twice the time that it has taken.
+std::optional<TimePoint> Attempt::busy_until() const {
+    constexpr Duration kLongest = 30ms;
+    const auto next = next_look();
+    if (!next) return std::nullopt;
+    return std::min(next->at, looked_ + std::max<Duration>(kLongest, looked_ - *began_));
 }
 
 std::size_t Attempt::missing() const {

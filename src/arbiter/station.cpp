@@ -165,6 +165,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
+    if (const auto& look = attempt.end_look()) clock_drift_.on_look(look->reply, look->whole);
     odd_ = exception ? kOdd : std::max(odd_ - 1, 0);
     damaged_pdu_.clear();
     settle_debt(now, attempt);

@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -43,6 +44,8 @@ class Attempt {
         std::optional<Duration> tolerance;
         SerialFormat serial;
         bool steady = false;       ///< bytes come one by one, at the line's rate
+        Duration notice{};         ///< the line's Notice
+        Drift drift;               ///< what looks at the station's replies have told
         bool as_asked = false;     ///< what begins is the reply that was asked for, as a rule
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
@@ -68,6 +71,13 @@ class Attempt {
     /// not look at each. An exception where none was foreseen (Timing::as_asked) is noticed when
     /// the reply would have been there. Nothing: every byte may tell something.
     std::optional<TimePoint> busy_until() const;
+    /// What the first look at the end of a reply that was slept through has told: how long the
+    /// reply is at the line's rate, and whether it was all there.
+    struct EndLook {
+        Duration reply{};
+        bool whole = false;
+    };
+    const std::optional<EndLook>& end_look() const { return end_look_; }
     /// More has come than the line's rate allows since the reply began.
     bool hasty() const { return hasty_; }
 
@@ -145,6 +155,12 @@ class Attempt {
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
     /// Bytes, until what has begun tells more. 0: each may tell.
     std::size_t missing() const;
+    struct NextLook {
+        TimePoint at;
+        Duration reply{};  ///< at the line's rate, from its beginning until then
+        bool end = false;  ///< at all of it
+    };
+    std::optional<NextLook> next_look() const;
     Duration character() const { return character_time(timing_.serial); }
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
@@ -180,6 +196,7 @@ class Attempt {
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
     TimePoint looked_{};  ///< when bytes came last
+    std::optional<EndLook> end_look_;
     bool hasty_ = false;
     std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;

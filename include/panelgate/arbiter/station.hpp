@@ -11,6 +11,7 @@
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/late_window.hpp"
 #include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/arbiter/station_health.hpp"
@@ -157,6 +158,7 @@ class Station {
     Duration response_timeout() const { return timeout(); }
     /// Its last replies were what was asked for, no exceptions, and not damaged.
     bool answers_as_asked() const { return odd_ == 0; }
+    const Drift& clock_drift() const { return clock_drift_; }
     modbus::Request probe() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {
@@ -223,6 +225,7 @@ class Station {
     std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
     Slowest slowest_;  ///< from request to first sign of the reply
     TimePoint failed_{};
+    Drift clock_drift_;
     int failed_in_a_row_ = 0;
     int odd_ = 0;          ///< so many more replies until answers_as_asked()
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended

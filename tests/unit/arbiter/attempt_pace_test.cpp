@@ -63,6 +63,42 @@ TEST_F(AttemptPaceTest, TwoLooksAreEnoughWhereTheReplyIsWhatWasAskedFor) {
     EXPECT_EQ(hear(1, 11), Verdict::replied);
 }
 
+TEST_F(AttemptPaceTest, TellsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
+    for (const std::size_t there : {std::size_t{10}, std::size_t{11}}) {
+        attempt_ = attempt_of(false, {}, true);
+        hear(0, 1);
+        EXPECT_FALSE(attempt_.end_look());
+        hear(1, there, kCharacter);
+        ASSERT_TRUE(attempt_.end_look());
+        EXPECT_EQ(attempt_.end_look()->reply, 11 * kCharacter);
+        EXPECT_EQ(attempt_.end_look()->whole, there == 11);
+        EXPECT_EQ(busy(), std::nullopt) << "the last byte is wanted when it comes";
+    }
+}
+
+TEST_F(AttemptPaceTest, ALookBeforeItsTimeTellsNothingOfTheEnd) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    hear(1, 5);
+    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_EQ(busy(), 11 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, WhoseRepliesAreOverSoonerIsLookedAtSooner) {
+    Drift drift;
+    for (int i = 0; i < 50; ++i) drift.on_look(11 * kCharacter, true);
+    Settings line;
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = timing.usual = 500ms;
+    timing.notice = 40us;
+    timing.drift = drift;
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
+    hear(0, 1);
+    EXPECT_EQ(busy(), 3 * kCharacter) << "the header has come when it has come";
+    hear(1, 3);
+    EXPECT_EQ(busy(), 11 * kCharacter - 40us - drift.early(11 * kCharacter));
+}
+
 TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
     attempt_.on_rx(now_ = start_ + 3 * kCharacter, "11 83 02"_hex, [](ByteView) { return true; });
     EXPECT_EQ(busy(), 5 * kCharacter);
