@@ -73,7 +73,8 @@ std::optional<Attempt::NextLook> Attempt::next_look() const {
     next.reply = (since_ + rest) * character();
     next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
     next.at = *began_ + next.reply;
-    if (next.end) next.at -= timing_.notice + timing_.drift.early(next.reply);
+    const Duration early = timing_.notice + timing_.drift.early(next.reply);
+    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one tells nothing
     return next;
 }
 

@@ -44,7 +44,7 @@ class Drift {
     }
 
   private:
-    static constexpr int kStep = 8;  ///< ppm a millisecond
+    static constexpr int kStep = 3;  ///< ppm a millisecond
 
     int ppm_ = 0;
 };

@@ -99,6 +99,21 @@ TEST_F(AttemptPaceTest, WhoseRepliesAreOverSoonerIsLookedAtSooner) {
     EXPECT_EQ(busy(), 11 * kCharacter - 40us - drift.early(11 * kCharacter));
 }
 
+TEST_F(AttemptPaceTest, AShortReplyIsSleptThroughAllTheSame) {
+    Settings line;
+    line.serial.baud = 921600;
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = timing.usual = 500ms;
+    timing.notice = Notice::kMost;
+    timing.as_asked = true;
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
+    const Duration character = character_time(line.serial);
+    const Duration reply = 11 * character;
+    now_ = start_;
+    attempt_.on_rx(now_, ByteView(kReply).first(1), [](ByteView) { return true; });
+    EXPECT_EQ(attempt_.busy_until(), now_ - character + reply - reply / 4);
+}
+
 TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
     attempt_.on_rx(now_ = start_ + 3 * kCharacter, "11 83 02"_hex, [](ByteView) { return true; });
     EXPECT_EQ(busy(), 5 * kCharacter);
