@@ -209,7 +209,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.usual = std::min(station.usual() + latency_, timing.patience);
         timing.notice = notice_.early();
         timing.drift = station.clock_drift();
-        timing.as_asked = station.answers_as_asked() && echo_memory_.known();
+        timing.as_asked = surprised_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
     ledger_.written(group, false);

@@ -57,8 +57,11 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
-    if (planned && planned->end && now >= planned->at && !end_look_)
-        end_look_ = {planned->reply, since_ * character() >= planned->reply};
+    if (planned && planned->end && now >= planned->at && !end_look_) {
+        const bool whole = since_ * character() >= planned->reply;
+        overslept_ = verdict == Verdict::replied && !whole;
+        if (!overslept_) end_look_ = {planned->reply, whole};
+    }
     // More should have come by now: a hole, or a slower clock, as the next byte will tell.
     const auto busy = busy_until();
     if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
@@ -258,6 +261,7 @@ void Attempt::teach(EchoMemory& memory) const {
 }
 
 Duration Attempt::waited(TimePoint now) const {
+    if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = wire_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }

@@ -146,6 +146,7 @@ class Arbiter {
     Strays strays_;
     Pace pace_;
     Notice notice_;
+    int surprised_ = 0;  ///< replies: where one station refuses something, others may do so, too
     Reception reception_;
     EchoMemory echo_memory_;
     Ledger ledger_;

@@ -78,6 +78,8 @@ class Attempt {
         bool whole = false;
     };
     const std::optional<EndLook>& end_look() const { return end_look_; }
+    /// It was an exception that nobody had foreseen.
+    bool overslept() const { return overslept_; }
     /// More has come than the line's rate allows since the reply began.
     bool hasty() const { return hasty_; }
 
@@ -197,6 +199,7 @@ class Attempt {
     std::optional<TimePoint> began_;
     TimePoint looked_{};  ///< when bytes came last
     std::optional<EndLook> end_look_;
+    bool overslept_ = false;  ///< its reply is shorter than foreseen: an exception
     bool hasty_ = false;
     std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;

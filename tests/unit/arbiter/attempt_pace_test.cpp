@@ -76,6 +76,17 @@ TEST_F(AttemptPaceTest, TellsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
     }
 }
 
+TEST_F(AttemptPaceTest, AnExceptionThatNobodyForesawTellsNothingOfTheEndAndWhenItBeganIsKnown) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    now_ = start_ + 11 * kCharacter;
+    const Bytes rest = "83 02 C1 34"_hex;
+    EXPECT_EQ(attempt_.on_rx(now_, rest, [](ByteView) { return true; }), Verdict::replied);
+    EXPECT_TRUE(attempt_.overslept());
+    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter);
+}
+
 TEST_F(AttemptPaceTest, ALookBeforeItsTimeTellsNothingOfTheEnd) {
     attempt_ = attempt_of(false, {}, true);
     hear(0, 1);
