@@ -198,7 +198,7 @@ void Arbiter::start(TimePoint now, Group group) {
     Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
     timing.pause = now - quiet_.since();
     timing.confirm_end = confirm_ends_;
-    timing.steady = !settings_.may_stall && (settings_.paced || pace_.kept());
+    timing.steady = timing.steady && (settings_.paced || pace_.kept());
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
         station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));

@@ -116,8 +116,7 @@ void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
 void Station::learn_of_copies(TimePoint now, const Attempt& attempt) {
     const Group& group = attempt.group();
     const bool held = attempt.was_held() && copies_.is_copy(now, attempt.reply());
-    const bool values = group.request.is_read() && !modbus::exception_of(attempt.reply());
-    if (attempt.reply() == group.doubted || (held && !values)) {
+    if (attempt.reply() == group.doubted || (held && !group.is_values(attempt.reply()))) {
         copies_.on_confirmed(group.request.pdu(), attempt.reply());
     } else if (!group.doubted.empty()) {
         copies_.on_denied(group.doubted_at, group.doubted);

@@ -95,6 +95,8 @@ struct Bus::State final : public line::Line::Events {
         verb();
         --calls;
     }
+    void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
+                 Outcome outcome, Duration took);
     void answer(Pending pending, Answer answer);
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
@@ -185,10 +187,8 @@ void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal>
 
 void Bus::State::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     if (pdu.empty()) return;
-    counters.count(station, pdu[0], Outcome::refused, Duration::zero());
-    if (const auto deed = deed_of(pdu, arbiter.client_names().of(client)))
-        log_deed(settings, station, *deed, Outcome::refused);
-    observe(TransactionEvent{station, pdu[0], Outcome::refused, Duration::zero()});
+    account(station, pdu[0], deed_of(pdu, client, arbiter.client_names()), Outcome::refused,
+            Duration::zero());
 }
 
 void Bus::State::act(arbiter::Finish& finish) {
@@ -250,14 +250,20 @@ void Bus::State::check_delivery(TimePoint now) {
         line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
+/// For the metrics, the log and who watches.
+void Bus::State::account(std::uint8_t station, std::uint8_t function,
+                         const std::optional<Deed>& deed, Outcome outcome, Duration took) {
+    counters.count(station, function, outcome, took);
+    if (deed) log_deed(settings, station, *deed, outcome);
+    observe(TransactionEvent{station, function, outcome, took});
+}
+
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    counters.count(entry.station, entry.function, outcome, took);
-    if (entry.deed) log_deed(settings, entry.station, *entry.deed, outcome);
-    observe(TransactionEvent{entry.station, entry.function, outcome, took});
+    account(entry.station, entry.function, entry.deed, outcome, took);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) counters.succeeded(entry.station, wall_seconds_of(wall.at(now)));
     if (!result.pdu && result.pdu.error() == Fault::line_down)

@@ -32,9 +32,9 @@ std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& 
     return deed;
 }
 
-std::optional<Deed> deed_of(ByteView pdu, const std::string& client) {
+std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
     if (modbus::is_pure_read(pdu)) return std::nullopt;
-    return Deed{client, {}, hex_of(pdu)};
+    return Deed{names.of(client), {}, hex_of(pdu)};
 }
 
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {

@@ -20,9 +20,7 @@ bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
     if (!write.items) return true;
     const modbus::Span target{route.relay.to.table, route.relay.to.address, route.relay.count};
     if (write.items->overlaps(target)) return true;
-    if (!route.to_memory.shown_as) return false;
-    return std::ranges::any_of(route.to_memory.shown_as(*write.items),
-                               [&](const modbus::Span& shown) { return shown.overlaps(target); });
+    return route.to_memory.changes(*write.items, target).value_or(false);
 }
 
 /// Why an answer is none; empty when it is one.

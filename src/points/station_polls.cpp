@@ -46,6 +46,13 @@ std::string_view label(Quality quality) {
     std::abort();
 }
 
+std::optional<bool> SharedMemory::changes(const modbus::Span& written,
+                                          const modbus::Span& items) const {
+    if (!shown_as) return std::nullopt;
+    return std::ranges::any_of(shown_as(written),
+                               [&](const modbus::Span& shown) { return shown.overlaps(items); });
+}
+
 Quality quality_of(const Reading& reading, Duration every, TimePoint now) {
     if (!reading.sampled) return Quality::bad;
     const Duration age = now - *reading.sampled;
@@ -124,9 +131,8 @@ void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& 
 
 bool StationPolls::changes(const std::optional<modbus::Span>& written,
                            const modbus::Span& items) const {
-    if (!written || !memory_.shown_as) return modbus::may_change(written, items);
-    return std::ranges::any_of(memory_.shown_as(*written),
-                               [&](const modbus::Span& shown) { return shown.overlaps(items); });
+    const auto known = written ? memory_.changes(*written, items) : std::nullopt;
+    return known ? *known : modbus::may_change(written, items);
 }
 
 bool StationPolls::spares(const std::optional<modbus::Span>& written,

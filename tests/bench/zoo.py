@@ -3,7 +3,8 @@
 
 For each habit and rate: transactions a second of the healthy four and their times, with one client a
 panel, beside the same line without the habit and a plain libmodbus master on an identical line.
-Everything but the serial format (8N1) is the gateway's default. Fails when a value was wrong, when a
+Everything but the serial format (8N1) is the gateway's default, and the deadline at 1200 baud, where
+five reads take 1.5 of its 2 s without any habit. Fails when a value was wrong, when a
 read of a healthy panel was refused, when p90 of one is not below three times what it was without the
 habit, when they lose more than a fifth of the line (where the odd one is only slow: beyond the time
 that it takes), or when a plain master serves them more often.
@@ -83,6 +84,10 @@ def options():
     return ("--think", THINK)
 
 
+def keys(baud):
+    return {"queue": "{deadline: 10s}"} if baud <= 1200 else {}
+
+
 async def broadcast(port, end):
     """Once a second, so that who answers broadcasts has some to answer."""
     client = await Client.connect(port)
@@ -108,7 +113,7 @@ def seen_of(readers, since, seconds):
 def through_gateway(baud, name, seconds, warm):
     """Seen, and what the line doctor said; `name` None: without any habit."""
     units, habits = units_of(name), settings_of(name) if name else {}
-    with zoo_line.odd_line(baud, units, habits, zoo=options()) as line:
+    with zoo_line.odd_line(baud, units, habits, zoo=options(), **keys(baud)) as line:
         port = line.program.modbus_port()
         beside = (lambda end: broadcast(port, end)) if name == "bcast-reply" else None
         since = time.monotonic() + warm

@@ -197,11 +197,11 @@ class Attempt {
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
-    TimePoint looked_{};  ///< when bytes came last
+    std::size_t since_ = 0;  ///< bytes since then
+    TimePoint looked_{};     ///< when bytes came last
     std::optional<EndLook> end_look_;
     bool overslept_ = false;  ///< its reply is shorter than foreseen: an exception
     bool hasty_ = false;
-    std::size_t since_ = 0;  ///< bytes since then
     bool heard_ = false;
     bool disturbed_ = false;
     bool fragment_ = false;

@@ -52,8 +52,11 @@ struct Group {
     /// What may be a copy is no answer to it before it was asked once more: values, for clients. A
     /// refusal is not asked for again; it may well be gone by then.
     bool may_doubt(ByteView reply) const {
-        const bool values = request.is_read() && reply[0] == request.function();
-        return values && doubted.empty() && !jobs.empty();
+        return is_values(reply) && doubted.empty() && !jobs.empty();
+    }
+    /// This reply to it holds values: it is a read, and not refused.
+    bool is_values(ByteView reply) const {
+        return request.is_read() && reply[0] == request.function();
     }
     /// Nobody waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }

@@ -45,6 +45,9 @@ struct SharedMemory {
     std::function<std::vector<modbus::Span>(const modbus::Span&)> shown_as;
     /// False: there may be more of it that nobody knows.
     bool known = true;
+
+    /// Does a write of the one change the other? Nothing: that is not known.
+    std::optional<bool> changes(const modbus::Span& written, const modbus::Span& items) const;
 };
 
 /// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.

@@ -7,10 +7,10 @@
 #include <boost/system/error_code.hpp>
 #include <charconv>
 #include <cstdint>
-#include <limits>
 #include <system_error>
 #include <utility>
 
+#include "json_handler.hpp"
 #include "panelgate/base/decimal.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
@@ -18,35 +18,25 @@ namespace panelgate::web {
 namespace {
 
 using boost::system::error_code;
-using View = boost::json::string_view;
 
-template <class Number>
-std::optional<Number> number_of(const std::string& text) {
-    Number number{};
+std::optional<double> double_of(const std::string& text) {
+    double number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
     return number;
 }
 
 /// Makes the value, as boost::json's own handler does, but for numbers.
-class Builder {
+class Builder : public JsonHandler {
   public:
-    static constexpr std::size_t max_object_size = std::numeric_limits<std::size_t>::max();
-    static constexpr std::size_t max_array_size = max_object_size;
-    static constexpr std::size_t max_key_size = max_object_size;
-    static constexpr std::size_t max_string_size = max_object_size;
-
     bool on_document_begin(error_code&) {
         stack_.reset();
         return true;
     }
-    bool on_document_end(error_code&) { return true; }
-    bool on_object_begin(error_code&) { return true; }
     bool on_object_end(std::size_t count, error_code&) {
         stack_.push_object(count);
         return true;
     }
-    bool on_array_begin(error_code&) { return true; }
     bool on_array_end(std::size_t count, error_code&) {
         stack_.push_array(count);
         return true;
@@ -82,8 +72,6 @@ class Builder {
         stack_.push_null();
         return true;
     }
-    bool on_comment_part(View, error_code&) { return true; }
-    bool on_comment(View, error_code&) { return true; }
 
     boost::json::value release() { return stack_.release(); }
 
@@ -100,7 +88,7 @@ class Builder {
         return false;
     }
     bool push(const std::string& text) {
-        const auto number = number_of<double>(text);
+        const auto number = double_of(text);
         const auto exact = Decimal::parse(text);
         if (!number || !exact) return false;
         const bool is_negative_zero = *number == 0 && text.starts_with('-');

@@ -4,26 +4,20 @@
 #include <boost/json/basic_parser_impl.hpp>
 #include <boost/system/errc.hpp>
 #include <boost/system/error_code.hpp>
-#include <cstdint>
-#include <limits>
 #include <set>
 #include <utility>
 #include <vector>
+
+#include "json_handler.hpp"
 
 namespace panelgate::web {
 namespace {
 
 using boost::system::error_code;
-using View = boost::json::string_view;
 
 /// Sees the names of each open object. As many as the text has; the parser limits the depth.
-class Names {
+class Names : public JsonHandler {
   public:
-    static constexpr std::size_t max_object_size = std::numeric_limits<std::size_t>::max();
-    static constexpr std::size_t max_array_size = max_object_size;
-    static constexpr std::size_t max_key_size = max_object_size;
-    static constexpr std::size_t max_string_size = max_object_size;
-
     bool on_object_begin(error_code&) {
         open_.emplace_back();
         return true;
@@ -44,21 +38,6 @@ class Names {
         error = boost::system::errc::make_error_code(boost::system::errc::invalid_argument);
         return false;
     }
-
-    bool on_document_begin(error_code&) { return true; }
-    bool on_document_end(error_code&) { return true; }
-    bool on_array_begin(error_code&) { return true; }
-    bool on_array_end(std::size_t, error_code&) { return true; }
-    bool on_string_part(View, std::size_t, error_code&) { return true; }
-    bool on_string(View, std::size_t, error_code&) { return true; }
-    bool on_number_part(View, error_code&) { return true; }
-    bool on_int64(std::int64_t, View, error_code&) { return true; }
-    bool on_uint64(std::uint64_t, View, error_code&) { return true; }
-    bool on_double(double, View, error_code&) { return true; }
-    bool on_bool(bool, error_code&) { return true; }
-    bool on_null(error_code&) { return true; }
-    bool on_comment_part(View, error_code&) { return true; }
-    bool on_comment(View, error_code&) { return true; }
 
     /// The name that ended the parsing.
     std::optional<std::string> repeated;

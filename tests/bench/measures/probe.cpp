@@ -23,23 +23,14 @@
 #include <string>
 #include <vector>
 
-namespace {
+#include "rtu_frame.hpp"
 
-using Bytes = std::vector<std::uint8_t>;
+namespace {
 
 std::int64_t now_ns() {
     timespec t{};
     clock_gettime(CLOCK_MONOTONIC, &t);
     return t.tv_sec * 1'000'000'000LL + t.tv_nsec;
-}
-
-std::uint16_t crc16(const Bytes& data) {
-    unsigned crc = 0xFFFF;
-    for (const std::uint8_t byte : data) {
-        crc ^= byte;
-        for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1;
-    }
-    return static_cast<std::uint16_t>(crc);
 }
 
 [[noreturn]] void fail(const char* what) {
@@ -86,9 +77,7 @@ Bytes framed(bool tcp, int unit, const Bytes& pdu, std::uint16_t turn) {
     frame.push_back(static_cast<std::uint8_t>(unit));
     frame.insert(frame.end(), pdu.begin(), pdu.end());
     if (!tcp) {
-        const std::uint16_t crc = crc16(frame);
-        frame.push_back(static_cast<std::uint8_t>(crc));
-        frame.push_back(static_cast<std::uint8_t>(crc >> 8));
+        append_crc(frame);
     }
     return frame;
 }

@@ -11,19 +11,11 @@
 #include <cstdio>
 #include <vector>
 
+#include "rtu_frame.hpp"
+
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t kRead = 8;  // a request of function 03 with its CRC
-
-std::uint16_t crc16(const Bytes& data) {
-    unsigned crc = 0xFFFF;
-    for (const std::uint8_t byte : data) {
-        crc ^= byte;
-        for (int bit = 0; bit < 8; ++bit) crc = crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1;
-    }
-    return static_cast<std::uint16_t>(crc);
-}
 
 Bytes reply_to(const std::uint8_t* request) {
     const unsigned address = request[2] << 8 | request[3];
@@ -34,9 +26,7 @@ Bytes reply_to(const std::uint8_t* request) {
         reply.push_back(static_cast<std::uint8_t>(value >> 8));
         reply.push_back(static_cast<std::uint8_t>(value));
     }
-    const std::uint16_t crc = crc16(reply);
-    reply.push_back(static_cast<std::uint8_t>(crc));
-    reply.push_back(static_cast<std::uint8_t>(crc >> 8));
+    append_crc(reply);
     return reply;
 }
 
