@@ -110,7 +110,10 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
-    if (rest.empty()) return Verdict::open;
+    if (rest.empty()) {
+        if (echo_.pending() && !held_since_) held_since_ = now;
+        return Verdict::open;
+    }
     if (now < timing_.sent) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
@@ -119,6 +122,9 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     }
     drop_what_ended(now, rest.size());
     if (!heard_) first_byte_ = now;
+    // What was held back as an echo was the beginning, where nothing but us delays the rest.
+    if (!heard_ && timing_.steady && held_since_ && !echo_.complete())
+        first_byte_ = std::min(now, std::max(*held_since_, timing_.sent));
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);

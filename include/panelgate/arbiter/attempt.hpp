@@ -193,6 +193,7 @@ class Attempt {
     Bytes stale_;
     TimePoint computed_end_;
     TimePoint first_byte_;
+    std::optional<TimePoint> held_since_;  ///< the first byte that the echo filter held back
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.

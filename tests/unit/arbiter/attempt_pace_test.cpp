@@ -203,6 +203,7 @@ TEST_F(AttemptPaceTest, WhatBeginsLikeAnEchoThatNobodyExpectsIsLookedAtWhenTheRe
     hear(0, 1);
     EXPECT_EQ(busy(), 11 * kCharacter);
     EXPECT_EQ(hear(1, 11), Verdict::replied);
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter) << "it began with the first byte";
 }
 
 TEST_F(AttemptPaceTest, AnEchoThatIsCertainIsLookedAtWhenAllOfItIsThere) {
