@@ -6,7 +6,6 @@
 #include "heard_stations.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/client_names.hpp"
-#include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"
 #include "panelgate/modbus/exception.hpp"
@@ -14,6 +13,7 @@
 #include "panelgate/tap/matcher.hpp"
 #include "refusals.hpp"
 #include "request_counters.hpp"
+#include "trace_book.hpp"
 #include "wall.hpp"
 #include "write_log.hpp"
 
@@ -52,12 +52,11 @@ struct ListeningBus::State final : public line::Line::Events {
           matcher(tap_settings(settings.arbiter)),
           heard(settings.stations, settings.arbiter.offline.after),
           counters(settings.stations),
-          recorder(settings.trace_frames),
-          decisions(settings.trace_decisions),
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
           wall(clock),
+          book(settings, wall),
           drive(clock, *line, matcher, *this) {}
 
     void on_up() override;
@@ -87,13 +86,11 @@ struct ListeningBus::State final : public line::Line::Events {
     HeardStations heard;
     RequestCounters counters;
     arbiter::ClientNames names;
-    std::uint64_t happened = 0;  ///< the last sequence number of a frame or decision
-    FlightRecorder recorder;
-    DecisionRecorder decisions;  ///< whose frames are whose is one here
     mutable LineDoctor doctor;
     LoadMeter load;
     Refusals refusals;
     Wall wall;
+    TraceBook book;  ///< whose frames are whose is a decision here
     line::Drive<tap::Matcher, State> drive;
     bool up = false;
     std::string why_down = "not opened yet";
@@ -117,26 +114,13 @@ void ListeningBus::State::on_down(const std::string& why) {
 
 void ListeningBus::State::act(tap::Frame& frame) {
     heard.count(frame);
-    if (rt::log_enabled(rt::LogLevel::trace)) {
-        rt::log(rt::LogLevel::trace, "frame",
-                {{"line", settings.name},
-                 {"what", std::string(label(frame.kind))},
-                 {"bytes", to_hex(frame.bytes)}});
-    }
-    RecordedFrame recorded;
-    recorded.sequence = ++happened;
-    recorded.at = frame.at;
-    recorded.kind = frame.kind;
-    recorded.bytes = std::move(frame.bytes);
-    recorded.time = wall.at(frame.at);
-    recorder.add(std::move(recorded));
+    book.note(frame.at, frame.kind, std::move(frame.bytes));
 }
 
 /// What is perhaps no request at all is no request of the line's.
 void ListeningBus::State::act(const tap::Transaction& made) {
     heard.count(made);
-    if (made.doubtful)
-        decisions.add({++happened, made.ended, words_of_doubt(made), wall.at(made.ended)});
+    if (made.doubtful) book.decide(made.ended, words_of_doubt(made));
     if (made.end == tap::End::answered || !made.doubtful) {
         const Outcome outcome = outcome_of(made);
         const Duration took = made.ended - made.asked;
@@ -195,12 +179,12 @@ void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId cli
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
 
 std::vector<TraceDecision> ListeningBus::decisions(std::size_t last) const {
-    return state_->decisions.last(last);
+    return state_->book.decisions().last(last);
 }
 
 std::vector<TraceDecision> ListeningBus::decisions_since(std::uint64_t sequence,
                                                          std::size_t most) const {
-    return state_->decisions.since(sequence, most);
+    return state_->book.decisions().since(sequence, most);
 }
 
 void ListeningBus::name_client(ClientId client, std::string name) {
@@ -229,11 +213,11 @@ std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) cons
 }
 
 std::vector<TraceFrame> ListeningBus::trace(std::size_t last) const {
-    return in_words(state_->recorder.last(last));
+    return state_->book.frames(last);
 }
 
 std::vector<TraceFrame> ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return in_words(state_->recorder.since(sequence, most));
+    return state_->book.frames_since(sequence, most);
 }
 
 LineReport ListeningBus::report() const {

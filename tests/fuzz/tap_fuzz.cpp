@@ -31,8 +31,8 @@ void judge(const Transaction& made, Totals&) {
 }  // namespace
 
 /// Whatever is heard, in whatever pieces and at whatever times: what is paired answers its request,
-/// each byte is told once, and nothing is kept behind a silence. The first byte of a piece tells its
-/// size and the pause before it; "F" in front of a piece seals its bytes with a CRC.
+/// each byte is told once, and nothing is kept behind a silence. The first byte of a piece tells
+/// its size and the pause before it; "F" in front of a piece seals its bytes with a CRC.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     Matcher matcher(Settings{SerialFormat{38400, 8, Parity::none, 1}});
     TimePoint now{1h};
