@@ -90,6 +90,7 @@ void print_demo_help(const config::Config& config, const Gateway& gateway) {
               << "Also: " << url << "/metrics and " << url << "/api/v1/lines/floor1/trace?last=20\n"
               << "Ctrl-C ends it.\n"
               << std::flush;
+    std::cout.clear();  // where nobody takes it, it runs all the same
 }
 
 /// Replaces the address of `settings` by ADDR:PORT; false (and told) when that is not one.

@@ -88,6 +88,7 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
         return kUnavailable;
     }
     std::cout << panels.text() << "Ctrl-C ends it.\n" << std::flush;
+    std::cout.clear();  // where nobody takes it, they run all the same
     return loop.run({.begin = [] {},
                      .done = [] { return true; },
                      .finish = [&] { panels.stop(); },

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "address_families.hpp"
+#include "panelgate/bus/listening_bus.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
@@ -59,14 +60,20 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     settings.arbiter.may_stall = remote;
     auto wire = remote ? line::make_tcp_line(executor_, clock_, std::move(device))
                        : line::make_tty_line(executor_, clock_, std::move(device));
-    buses_.push_back(
-        std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
+    if (line.listens) {
+        buses_.push_back(std::make_unique<bus::ListeningBus>(executor_, clock_, std::move(settings),
+                                                             std::move(wire)));
+    } else {
+        buses_.push_back(
+            std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
+    }
     plant_.add(line, *buses_.back(), simulated);
-    add_poller(line, *buses_.back());
+    add_points(line, *buses_.back());
 }
 
 void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, plant_, line, event);
+    if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write == nullptr) return;
     const auto listener = write_listeners_.find(line);
@@ -74,10 +81,36 @@ void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) 
     if (relay_listener_) relay_listener_(line, *write);
 }
 
+void Gateway::add_points(const config::Line& line, bus::LineBus& bus) {
+    auto wanted = polled_stations(line);
+    if (wanted.empty()) return;
+    if (line.listens) return add_heard(line, wanted);
+    add_poller(line, std::move(wanted), bus);
+}
+
+void Gateway::add_heard(const config::Line& line,
+                        const std::vector<points::PolledStation>& wanted) {
+    for (const points::PolledStation& one : wanted) {
+        const auto [heard, added] = heard_.try_emplace({line.name, one.id}, one.wants, one.memory);
+        Station& station = plant_.at(line.name, one.id);
+        const config::Station& configured = *station.configured;
+        station.points.emplace(configured.points, configured.polls, heard->second.readings());
+    }
+}
+
+/// A broadcast is to all of them.
+void Gateway::hear(const std::string& line, const tap::Transaction& heard) {
+    for (auto& [place, values] : heard_) {
+        if (place.first != line || (heard.station != 0 && heard.station != place.second)) continue;
+        const auto wants = values.on_heard(heard);
+        if (!wants.empty())
+            publish_points(events_, plant_.at(line, place.second), wants, clock_.now());
+    }
+}
+
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
-void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
-    auto polled = polled_stations(line);
-    if (polled.empty()) return;
+void Gateway::add_poller(const config::Line& line, std::vector<points::PolledStation> polled,
+                         bus::LineBus& bus) {
     pollers_.push_back(std::make_unique<points::Poller>(clock_, bus, std::move(polled)));
     points::Poller& poller = *pollers_.back();
     for (const config::Station& station : line.stations) {

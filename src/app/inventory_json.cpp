@@ -1,10 +1,13 @@
 #include <boost/json/array.hpp>
 #include <chrono>
+#include <cstdint>
 #include <cstdlib>
+#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "inventory.hpp"
+#include "panelgate/config/client_timeout.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -54,9 +57,22 @@ json::object station_json(const config::Station& station,
             {"profile", station.profile->name},
             {"access", access(station.read_only)},
             {"guard", station.guard},
+            {"translate", station.translate ? "auto" : "off"},
             {"retry_writes", settings.retry_writes},
             {"max_age_ms", milliseconds(settings.max_age)},
             {"points", each(station.points, point_json)}};
+}
+
+json::object clients_json(const config::Line& line) {
+    const config::ClientTimeout client = config::client_timeout(line);
+    json::object made{{"answered_within_ms", milliseconds(client.worst)}};
+    if (!client.quick) return made;
+    json::object quick{{"deadline_ms", milliseconds(client.quick->deadline)},
+                       {"response_timeout_ms", milliseconds(client.quick->response_timeout)},
+                       {"retries", client.quick->retries}};
+    if (client.quick->most_registers) quick["most_registers"] = *client.quick->most_registers;
+    made["within_500_ms"] = std::move(quick);
+    return made;
 }
 
 json::object line_json(const config::Line& line) {
@@ -74,7 +90,9 @@ json::object line_json(const config::Line& line) {
     }
     return {{"name", line.name},
             {"device", line.device.device},
+            {"mode", line.listens ? "listen" : "master"},
             {"serial", to_string(line.device.serial)},
+            {"clients", clients_json(line)},
             {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},
             {"stations", std::move(stations)},
             {"polls", std::move(polls)}};
@@ -93,6 +111,22 @@ json::value text_json(const std::string& text) { return json::value(text); }
 
 json::value network_json(const Network& network) {
     return json::value(network.address + '/' + std::to_string(network.prefix));
+}
+
+json::value unit_json(std::optional<std::uint8_t> unit) {
+    return unit ? json::value(*unit) : json::value(nullptr);
+}
+
+const char* word(tcp_server::BroadcastMode mode) {
+    switch (mode) {
+        case tcp_server::BroadcastMode::reply:
+            return "reply";
+        case tcp_server::BroadcastMode::silent:
+            return "silent";
+        case tcp_server::BroadcastMode::deny:
+            return "deny";
+    }
+    std::abort();
 }
 
 json::object units_json(const tcp_server::Settings& access) {
@@ -120,6 +154,8 @@ json::object listener_json(const tcp_server::Settings& listener) {
             {"udp", listener.udp},
             {"lines", each(listener.lines, text_json)},
             {"units", units_json(listener)},
+            {"diagnostics_unit", unit_json(listener.diagnostics_unit)},
+            {"broadcast", word(listener.broadcast)},
             {"access", access(listener.read_only)},
             {"allow", each(listener.allow, network_json)}};
 }

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/config/client_timeout.hpp"
+#include "panelgate/profile/translate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
@@ -29,6 +31,16 @@ std::string text_of(const points::Point& point) {
     return text + '\n';
 }
 
+/// ", 5 goes out as 15, 6 goes out as 16"
+std::string translations_of(const config::Station& station) {
+    std::string text;
+    if (!station.translate || station.guard) return text;
+    for (const profile::Translation& one : profile::translations(*station.profile)) {
+        text += ", " + std::to_string(one.asked) + " goes out as " + std::to_string(one.sent);
+    }
+    return text;
+}
+
 std::string text_of(const config::Station& station, const arbiter::StationSettings& settings) {
     std::string text = "  station " + std::to_string(station.id) + ' ' + station.name + ", " +
                        station.profile->name + ", " + rights(station.read_only);
@@ -36,7 +48,7 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     if (settings.retry_writes) text += ", writes are repeated";
     if (settings.max_age > Duration::zero())
         text += ", answers up to " + format_duration(settings.max_age) + " old";
-    text += '\n';
+    text += translations_of(station) + '\n';
     for (const points::Point& point : station.points) text += text_of(point);
     for (const points::Poll& poll : station.polls) {
         text += "    poll " + poll.read + ", count " + std::to_string(poll.count) + ", every " +
@@ -45,15 +57,37 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     return text;
 }
 
+/// What a client's own timeout has to be, and what would suit those that have a short one.
+std::string clients_of(const config::Line& line) {
+    const config::ClientTimeout client = config::client_timeout(line);
+    const std::string worst = format_duration(client.worst);
+    const std::string wanted = format_duration(config::kQuickClient);
+    std::string text = "  clients: every request is answered within " + worst + ", ";
+    if (client.worst < config::kQuickClient)
+        return text + "a timeout of " + wanted + " is enough\n";
+    text += "so their timeout has to be longer";
+    if (!client.quick) return text + "; " + wanted + " are too short for this wire\n";
+    const config::QuickSettings& quick = *client.quick;
+    text += "; for " + wanted + " set queue: {deadline: " + format_duration(quick.deadline) +
+            "}, timing: {response_timeout: " + format_duration(quick.response_timeout) +
+            "} and retries: " + std::to_string(quick.retries);
+    if (quick.most_registers)
+        text +=
+            ", and read at most " + std::to_string(*quick.most_registers) + " registers at once";
+    return text + '\n';
+}
+
 std::string text_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
     if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
+    if (line.listens) text += ", only listened to";
     text += '\n';
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         text += text_of(line.stations[i], line.arbiter.stations[i]);
+    if (line.listens) return text;
     return text +
            "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
-           '\n';
+           '\n' + clients_of(line);
 }
 
 std::string text_of(const points::Relay& relay) {
@@ -80,6 +114,12 @@ std::string text_of(const std::map<std::uint8_t, tcp_server::UnitTarget>& units)
     return text;
 }
 
+std::string broadcasts_of(const tcp_server::Settings& listener) {
+    using Mode = tcp_server::BroadcastMode;
+    if (listener.read_only || listener.broadcast == Mode::deny) return "refused";
+    return listener.broadcast == Mode::silent ? "sent, and not answered" : "sent and answered";
+}
+
 std::string text_of(const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
@@ -87,7 +127,10 @@ std::string text_of(const tcp_server::Settings& listener) {
         text += ", framing " + std::string(modbus::label(listener.framing));
     if (listener.udp) text += ", udp too";
     text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
-    return text + text_of(listener.units);
+    text += text_of(listener.units);
+    if (listener.diagnostics_unit)
+        text += "  unit " + std::to_string(*listener.diagnostics_unit) + " is the gateway itself\n";
+    return text + "  broadcasts are " + broadcasts_of(listener) + '\n';
 }
 
 std::string text_of(const serial_server::Settings& master) {

@@ -1,3 +1,6 @@
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
@@ -10,6 +13,7 @@
 
 #include "commands.hpp"
 #include "panelgate/base/suggest.hpp"
+#include "usage.hpp"
 
 namespace {
 
@@ -53,13 +57,9 @@ class CommandLine {
             std::ranges::reverse(words);  // as CLI11 takes them
             cli_.parse(std::move(words));
         } catch (const CLI::ParseError& error) {
-            const bool asked_for =
-                error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success);
-            if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) &&
-                has_command(command))
-                return unexpected(*cli_.get_subcommand(command));
-            cli_.exit(error);  // prints the help, the version, or what is wrong
-            return asked_for ? kFine : kUsage;
+            if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success))
+                return mistaken(command, error);
+            cli_.exit(error);  // prints the help or the version
         }
         return code_;
     }
@@ -81,6 +81,15 @@ class CommandLine {
         const std::string near =
             nearest(typed, std::vector<std::string_view>(known.begin(), known.end()));
         return near.empty() ? "" : "; did you mean '" + near + "'?";
+    }
+
+    ExitCode mistaken(const std::string& command, const CLI::ParseError& error) const {
+        const bool extra = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+        const CLI::App& asked = *cli_.get_subcommand(command);
+        if (extra && !asked.remaining().empty()) return unexpected(asked);
+        std::cerr << "panelgate: " << command << ": " << usage_fault(error) << "; `panelgate help "
+                  << command << "` says what it takes\n";
+        return kUsage;
     }
 
     /// What `command` did not understand, the first of it.
@@ -218,9 +227,19 @@ class CommandLine {
     std::string profiles_dir_;
 };
 
+/// Of those three, what was closed is opened again as what can be neither read nor written: else a
+/// socket would get its number, and our texts.
+void keep_standard_descriptors() {
+    for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+        if (::fcntl(fd, F_GETFD) >= 0) continue;
+        ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);  // the lowest that is free
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+    keep_standard_descriptors();
     try {
         const int code = CommandLine().parse({argv + 1, argv + argc});
         if (code != kFine || std::cout.flush()) return code;

@@ -17,6 +17,7 @@ std::unique_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor ex
     sim::Settings settings;
     settings.serial = line.device.serial;
     settings.echo = line.simulated_echo;
+    settings.crc_orders = arbiter::crc_orders(line.arbiter);
     for (const config::Station& station : line.stations)
         settings.faults[station.id] = station.faults;
     auto bus = std::make_unique<sim::SimulatedBus>(std::move(executor), clock, settings,

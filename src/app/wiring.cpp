@@ -7,6 +7,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/profile/judge.hpp"
 #include "panelgate/profile/shown_as.hpp"
+#include "panelgate/profile/translate.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -33,6 +34,18 @@ bus::Guard guard_of(const profile::PanelProfile& profile) {
         const auto rule = rule_of(profile::judge(profile, request));
         if (!rule) return std::nullopt;
         return bus::Objection{*rule, profile::explain(profile, request)};
+    };
+}
+
+/// The profile outlives it.
+void add_translation(bus::StationSettings& station, const profile::PanelProfile& profile) {
+    for (const profile::Translation& possible : profile::translations(profile)) {
+        station.translations.emplace_back(possible.asked, possible.sent);
+        station.functions.push_back(possible.asked);
+    }
+    if (station.translations.empty()) return;
+    station.translate = [&profile](const modbus::Request& request) {
+        return profile::translate(profile, request);
     };
 }
 
@@ -74,6 +87,7 @@ bus::Settings bus_settings(const config::Line& line) {
         made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
         made.functions = functions_of(*station.profile);
         if (station.guard) made.guard = guard_of(*station.profile);
+        if (station.translate && !station.guard) add_translation(made, *station.profile);
     }
     return settings;
 }

@@ -11,10 +11,11 @@ namespace panelgate::arbiter {
 
 Arbiter::Arbiter(Settings settings)
     : settings_(std::move(settings)),
+      orders_(crc_orders(settings_)),
       stations_(settings_),
       schedule_(settings_),
       quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu), silent_interval(settings_.serial)),
-      strays_(settings_.serial),
+      strays_(settings_.serial, orders_),
       reception_(settings_),
       echo_memory_(settings_.echo),
       ledger_(settings_) {
@@ -190,7 +191,7 @@ bool Arbiter::start_next(TimePoint now) {
 }
 
 void Arbiter::start(TimePoint now, Group group) {
-    Bytes adu = modbus::encode_adu(group.station, group.request.pdu());
+    Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
     if (++group.attempts == 1) group.started = now;
     for (Job& job : group.jobs) {
         if (job.attempts++ == 0) ledger_.on_started(now, job);
@@ -207,6 +208,9 @@ void Arbiter::start(TimePoint now, Group group) {
                 !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
+        timing.notice = notice_.early();
+        timing.drift = station.clock_drift();
+        timing.as_asked = surprised_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
     ledger_.written(group, false);
@@ -215,7 +219,7 @@ void Arbiter::start(TimePoint now, Group group) {
     quiet_.on_sent(timing.sent, group.station);
     strays_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
-    active_.emplace(std::move(group), timing, std::move(echo));
+    active_.emplace(std::move(group), timing, std::move(echo), orders_);
     ledger_.transmit(now, *active_, std::move(adu), std::move(why));
 }
 

@@ -28,11 +28,13 @@ Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::siz
     return timing;
 }
 
-Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo)
+Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
+                 const modbus::CrcOrders& orders)
     : group_(std::move(group)),
       timing_(timing),
+      orders_(orders),
       echo_(std::move(echo)),
-      framer_(group_.station, group_.request.pdu()),
+      framer_(group_.station, group_.request.pdu(), orders_),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
@@ -50,38 +52,70 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     // Who looks late, or is told late, is no slower line.
     const Duration slack = std::max<Duration>(2 * character(), 1ms);
+    const auto planned = next_look();
     since_ += bytes.size();
     looked_ = now;
     const TimePoint latest = now - since_ * character();
     hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
+    if (planned && planned->end && now >= planned->at && !end_look_) {
+        const bool whole = since_ * character() >= planned->reply;
+        overslept_ = verdict == Verdict::replied && !whole;
+        if (!overslept_) end_look_ = {planned->reply, whole};
+    }
     // More should have come by now: a hole, or a slower clock, as the next byte will tell.
     const auto busy = busy_until();
     if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
     return verdict;
 }
 
+std::optional<Attempt::NextLook> Attempt::next_look() const {
+    if (!timing_.steady || hasty_ || !began_) return std::nullopt;
+    const std::size_t rest = missing();
+    if (rest == 0) return std::nullopt;
+    NextLook next;
+    next.reply = (since_ + rest) * character();
+    next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
+    next.at = *began_ + next.reply;
+    const Duration early = timing_.notice + timing_.drift.early(next.reply);
+    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one tells nothing
+    return next;
+}
+
 /// A reply that was cut short is noticed before twice the time that it has taken.
 std::optional<TimePoint> Attempt::busy_until() const {
     constexpr Duration kLongest = 30ms;
-    const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
-    if (!timing_.steady || hasty_ || missing == 0 || !began_) return std::nullopt;
-    return std::min<TimePoint>(*began_ + (since_ + missing) * character(),
-                               looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+    const auto next = next_look();
+    if (!next) return std::nullopt;
+    return std::min(next->at, looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+}
+
+std::size_t Attempt::missing() const {
+    const std::size_t echo = echo_.missing();
+    if (!timing_.as_asked) return echo > 0 ? echo : framer_.missing();
+    if (!echo_.pending()) return echo > 0 ? echo : framer_.missing_as_asked();
+    return std::max(group_.request.reply_length().value_or(0), echo_.held() + echo) - echo_.held();
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
-    if (echo_.complete() && !was_complete) began_ = now - (since_ = rest.size()) * character();
+    if (echo_.complete() && !was_complete) {
+        since_ = rest.size();
+        began_.reset();
+        if (since_ > 0) began_ = now - since_ * character();
+    }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
-        lender_.emplace(group_.station, group_.request.pdu());
+        lender_.emplace(group_.station, group_.request.pdu(), orders_);
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
-    if (rest.empty()) return Verdict::open;
+    if (rest.empty()) {
+        if (echo_.pending() && !held_since_) held_since_ = now;
+        return Verdict::open;
+    }
     if (now < timing_.sent) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
@@ -90,6 +124,9 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     }
     drop_what_ended(now, rest.size());
     if (!heard_) first_byte_ = now;
+    // What was held back as an echo was the beginning, where nothing but us delays the rest.
+    if (!heard_ && timing_.steady && held_since_ && !echo_.complete())
+        first_byte_ = std::min(now, std::max(*held_since_, timing_.sent));
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
@@ -131,8 +168,7 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
 /// The first frame that is our own confirms nothing, unless a part of the echo has come before it.
 bool Attempt::may_be_echo(ByteView reply) const {
     const bool accounted = !echo_possible_ || echo_.complete() || fragment_ || own_frame_seen_;
-    return !accounted &&
-           std::ranges::equal(modbus::encode_adu(group_.station, reply), echo_.frame());
+    return !accounted && std::ranges::equal(adu_of(reply), echo_.frame());
 }
 
 /// What is pending becomes strays. Was it what the station said instead of the reply?
@@ -150,7 +186,9 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
         // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
-        const bool other = !exception && part.bytes[1] != group_.request.function();
+        const int function = part.bytes[1] & ~modbus::kExceptionBit;
+        const bool other = !exception && function != group_.request.function();
+        refused_other_ = refused_other_ || (exception && function != group_.request.function());
         (other ? disturbed_ : wrong_) = true;
         strange_ = strange_ || other;
     }
@@ -160,7 +198,7 @@ void Attempt::collect() {
     const std::size_t behind = framer_.parts_behind();
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
-        const bool foreign = begins_with_request(parts[i].bytes, echo_.frame());
+        const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
         if (parts[i].kind == Unused::Kind::damaged && !foreign) {
             const bool in_front = i + behind < parts.size();
             if (in_front) noise_in_front_ += parts[i].bytes.size();
@@ -232,6 +270,7 @@ void Attempt::teach(EchoMemory& memory) const {
 }
 
 Duration Attempt::waited(TimePoint now) const {
+    if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = wire_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }
@@ -240,7 +279,7 @@ void Attempt::stray_frame(const Bytes& pdu) {
     Unused part;
     part.kind = Unused::Kind::own;
     part.station = group_.station;
-    part.bytes = modbus::encode_adu(group_.station, pdu);
+    part.bytes = adu_of(pdu);
     strays_.push_back(std::move(part));
 }
 

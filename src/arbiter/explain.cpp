@@ -25,13 +25,18 @@ std::string who(const Job& job, const ClientNames& names) {
 std::string turn(const Reason& reason) {
     const std::string text =
         who(reason.priority, ClientNames::words(reason.client), reason.station) + ": ";
+    const std::string instead =
+        reason.asked_function == 0
+            ? ""
+            : ", instead of function " + std::to_string(reason.asked_function);
     if (reason.kind == Reason::Kind::again)
-        return text + "attempt " + std::to_string(reason.attempt);
+        return text + "attempt " + std::to_string(reason.attempt) + instead;
     return text + "next in turn after " + ms(reason.waited) + ", " +
            std::to_string(reason.waiting) + " wait" +
            (reason.passed_over ? ", ahead of a higher class that has had its turns" : "") +
            (reason.answers > 1 ? ", answers " + std::to_string(reason.answers) + " requests in one"
-                               : "");
+                               : "") +
+           instead;
 }
 
 }  // namespace
@@ -47,6 +52,7 @@ Reason start(TimePoint now, const Group& group, const JobQueue& queue, const Cli
     reason.kind = group.attempts > 1 ? Reason::Kind::again : Reason::Kind::turn;
     reason.priority = leader.priority;
     reason.station = leader.station;
+    reason.asked_function = leader.asked_function;
     reason.passed_over = queue.last_was_passed_over();
     reason.attempt = group.attempts;
     reason.waited = now - leader.arrived;

@@ -24,6 +24,7 @@ FrameKind kind_of(Ledger::Part what) {
             return FrameKind::late;
         case Ledger::Part::copy:
             return FrameKind::copy;
+        case Ledger::Part::broadcast_reply:
         case Ledger::Part::unasked:
         case Ledger::Part::unknown:
             return FrameKind::foreign;
@@ -40,7 +41,8 @@ FrameKind kind_of(const Group& group) {
 
 }  // namespace
 
-Ledger::Ledger(const Settings& settings) : explain_(settings.explain) {
+Ledger::Ledger(const Settings& settings)
+    : explain_(settings.explain), orders_(crc_orders(settings)) {
     for (const StationSettings& station : settings.stations) stations_[station.id];
     stations_[kUnlisted];
 }
@@ -114,10 +116,11 @@ void Ledger::on_echo_mismatch(TimePoint now, std::uint8_t station) {
 void Ledger::on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
                       Duration lateness) {
     const bool known = what == Part::late || what == Part::copy || what == Part::unasked;
+    const bool nobodys = what == Part::unasked || what == Part::unknown || what == Part::request ||
+                         what == Part::broadcast_reply;
     of(known ? part.station : asked).discarded_bytes += part.bytes.size();
     if (what == Part::late) ++of(part.station).late_frames;
-    if (what == Part::unasked || what == Part::unknown || what == Part::request)
-        ++of(asked).foreign_frames;
+    if (nobodys) ++of(asked).foreign_frames;
     count_stray(part, what, asked, lateness);
     actions_.push_back(Note{now, kind_of(what), part.bytes, {}});
 }

@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/span.hpp"
@@ -19,9 +20,9 @@ inline constexpr std::uint8_t kUnlisted = 0;  ///< in the counters
 /// These bytes begin with another master's request: not our own frame, which an adapter that is
 /// said to have no echo may give. What is heard is cut into replies elsewhere, and a request glued
 /// to its reply would pass for damage.
-inline bool begins_with_request(ByteView heard, ByteView own) {
+inline bool begins_with_request(ByteView heard, ByteView own, const modbus::CrcOrders& orders) {
     const std::size_t size = modbus::request_adu_length(heard);
-    return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size)) &&
+    return size != 0 && size <= heard.size() && modbus::crc_ok(heard.first(size), orders) &&
            !std::ranges::equal(heard.first(size), own);
 }
 

@@ -105,7 +105,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
 }
 
 void Station::on_damaged_bytes(TimePoint now, std::uint8_t id, ByteView bytes) {
-    const Bytes* copy = copies_.copy_in(now, id, bytes);
+    const Bytes* copy = copies_.copy_in(now, id, bytes, settings_.crc_order);
     if (copy == nullptr) return;
     const Bytes reply = *copy;
     if (owes()) return copies_.on_either(now, reply);
@@ -151,8 +151,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     failing_.clear();
     missed_ = false;
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
-    // What answers a retry may be the reply to the attempt before: it tells nothing.
-    if (group.silent_after == Duration::zero()) slowest_.add(waited);
+    if (group.tells_pace()) slowest_.add(waited);
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();
@@ -164,6 +163,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
+    if (const auto& look = attempt.end_look()) clock_drift_.on_look(look->reply, look->whole);
+    odd_ = exception ? kOdd : std::max(odd_ - 1, 0);
     damaged_pdu_.clear();
     settle_debt(now, attempt);
     if (!group.span || exception) return result;
@@ -185,6 +186,7 @@ void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
     failed_ = now;
+    if (verdict != Verdict::silent) odd_ = kOdd;
     if (health_.offline() || flaky()) ++probes_;
     const int silent = verdict == Verdict::silent ? 1 : 0;
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);
@@ -226,6 +228,10 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         if (group.silent_after >= whole) return short_wait(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
+    // Who stopped inside a reply is alive, and may still be held up: the two attempts together wait
+    // as long as one.
+    if (group.cut_after > Duration::zero() && !health_.offline())
+        return std::max(short_wait(line), whole - group.cut_after);
     constexpr int kDear = 16;
     if (health_.offline() && slowest() && turnaround_.known() && probes_ % kDear != kDear - 1) {
         // What a network did to a few replies must not make probes dear: now and then one waits as

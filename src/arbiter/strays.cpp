@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
@@ -43,23 +44,34 @@ Part part_of(Stray stray) {
 void Strays::hear(ByteView bytes) { idle_.insert(idle_.end(), bytes.begin(), bytes.end()); }
 
 std::vector<Unused> Strays::take(std::uint8_t asked) {
-    return modbus::classify_heard(std::exchange(idle_, {}), asked);
+    return modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
 }
 
-Part Strays::judge(const Unused& part, const Stations& stations) const {
+/// A reply to the broadcast of a moment ago: a panel that does not know that it should be silent.
+bool Strays::answers_broadcast(ByteView adu) const {
+    constexpr unsigned kRecent = 4;  // requests sent since
+    return !broadcast_.empty() && sent_since_ <= kRecent &&
+           modbus::answers(pdu_of(broadcast_), pdu_of(adu));
+}
+
+Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) const {
     if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
-    if (begins_with_request(part.bytes, last_frame_) &&
+    if (begins_with_request(part.bytes, last_frame_, orders_) &&
         (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
         return Part::request;
     if (part.kind == Unused::Kind::damaged) return Part::damaged;
-    return stations.find(part.station) == nullptr ? Part::unknown : Part::unasked;
+    const Station* station = stations.find(part.station);
+    const bool owed =
+        station != nullptr && station->judge(now, pdu_of(part.bytes)) != Stray::unasked;
+    if (!owed && answers_broadcast(part.bytes)) return Part::broadcast_reply;
+    return station == nullptr ? Part::unknown : Part::unasked;
 }
 
 void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, Stations& stations,
                   Quiet& quiet, Ledger& ledger) const {
     const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
-        const Part what = judge(part, stations);
+        const Part what = judge(heard_at, part, stations);
         if (what != Part::unasked) {
             ledger.on_stray(now, part, what, quiet.station());
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
@@ -94,7 +106,8 @@ void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& sta
 }
 
 bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const {
-    if (std::ranges::equal(adu, last_frame_) || is_request(adu)) return false;
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu))
+        return false;
     const Station* station = stations.find(adu[0]);
     return station != nullptr && station->judge(now, pdu_of(adu)) == Stray::unasked;
 }

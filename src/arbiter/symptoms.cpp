@@ -22,21 +22,15 @@ std::size_t pause_class(Duration pause) {
     return i;
 }
 
-/// A good frame, but for the order of the CRC's bytes.
-bool has_swapped_crc(ByteView heard) {
-    if (heard.size() < 4) return false;
-    Bytes swapped(heard.begin(), heard.end());
-    std::swap(swapped[swapped.size() - 1], swapped[swapped.size() - 2]);
-    return modbus::crc_ok(swapped);
-}
-
 }  // namespace
 
 void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
-    actions_.push_back(
-        Note{now, FrameKind::reply, modbus::encode_adu(station, attempt.reply()), {}});
+    actions_.push_back(Note{now,
+                            FrameKind::reply,
+                            modbus::encode_adu(station, attempt.reply(), orders_.of(station)),
+                            {}});
     StationCounters& counters = of(station);
     Symptoms& symptoms = counters.symptoms;
     counters.turnaround.observe(think);
@@ -65,6 +59,7 @@ void Ledger::on_failed(const Attempt& attempt, Verdict verdict) {
         symptoms.mute_in_a_row = 0;
     } else if (verdict == Verdict::wrong) {
         ++symptoms.wrong;
+        if (attempt.refused_other()) ++symptoms.wrong_exceptions;
     } else if (!attempt.damaged_bytes().empty()) {
         count_damaged(attempt);
         symptoms.mute_in_a_row = 0;
@@ -91,7 +86,8 @@ void Ledger::count_damaged(const Attempt& attempt) {
     } else {
         ++symptoms.damaged_long;
     }
-    if (has_swapped_crc(bytes)) ++symptoms.crc_swapped;
+    // A good frame, but for the order of the CRC's bytes.
+    if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
     if (head) ++symptoms.damaged_heads;
     if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;
     symptoms.damaged_bytes += bytes.size();
@@ -122,6 +118,9 @@ void Ledger::count_stray(const modbus::Unused& part, Part what, std::uint8_t ask
             return;
         case Part::copy:
             ++symptoms.doubled;
+            return;
+        case Part::broadcast_reply:
+            ++symptoms.broadcast_replies;
             return;
         case Part::unasked:
         case Part::unknown:

@@ -56,7 +56,9 @@ void Arbiter::settle(TimePoint now) {
     if (station.may_be_copy(now, *active_))
         return active_->hold_reply(station.needed(), active_->group().may_doubt(active_->reply()));
     pace_.on_reply(early);
-    if (active_->hasty()) pace_.on_hasty();
+    pace_.on_rate(active_->hasty());
+    surprised_ = active_->overslept() ? Station::kOdd : std::max(surprised_ - 1, 0);
+    if (const auto& look = active_->end_look()) notice_.on_look(look->whole);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
@@ -64,8 +66,7 @@ void Arbiter::settle(TimePoint now) {
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
-    const bool tells = group.silent_after == Duration::zero();
-    stations_.on_reply(now, tells ? std::optional(needed) : std::nullopt);
+    stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
     proved_ = std::max(proved_, attempt.timing().started);
@@ -91,7 +92,7 @@ void Arbiter::ask_again(TimePoint now) {
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.owe(now, group.request.pdu(), attempt.timing().sent);
-    group.silent_after = {};
+    group.silent_after = group.cut_after = {};
     if (in_time(now, group) && !group.abandoned())
         return schedule_.retry(std::move(group), station.usual());
     for (const Job& job : group.jobs)
@@ -121,6 +122,8 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     group.silent_after = verdict == Verdict::silent
                              ? std::min(now - sent, attempt.timing().patience) - latency_
                              : Duration::zero();
+    const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
+    group.cut_after = cut_off ? now - sent : Duration::zero();
     if (in_time(now, group) && affordable && station.may_retry(group)) {
         station.on_retry(verdict == Verdict::silent);
         schedule_.retry(std::move(group), stations_.patience(now, group));

@@ -47,7 +47,7 @@ struct Synonym {
     std::string_view meant;
 };
 /// What other programs and other trades call it.
-constexpr std::array<Synonym, 100> kSynonyms{{{"baudrate", "baud"},
+constexpr std::array<Synonym, 107> kSynonyms{{{"baudrate", "baud"},
                                               {"speed", "baud"},
                                               {"bitrate", "baud"},
                                               {"bps", "baud"},
@@ -146,12 +146,26 @@ constexpr std::array<Synonym, 100> kSynonyms{{{"baudrate", "baud"},
                                               {"littleendian", "DCBA"},
                                               {"16bit", "u16"},
                                               {"32bit", "u32"},
+                                              {"uint8", "u16"},
+                                              {"u8", "u16"},
+                                              {"byte", "u16"},
+                                              {"int8", "i16"},
+                                              {"i8", "i16"},
+                                              {"s8", "i16"},
+                                              {"0", "none"},
                                               {"writable", "access"}}};
+
+/// float32be, uint16le: types with the order of their bytes.
+std::string_view without_order(std::string_view typed) {
+    const bool ordered = typed.ends_with("be") || typed.ends_with("le");
+    return typed.substr(0, typed.size() - (ordered ? 2 : 0));
+}
 
 std::string synonym(std::string_view typed, std::span<const std::string_view> candidates) {
     for (const Synonym& synonym : kSynonyms) {
+        if (synonym.word != typed) continue;
         const bool known = std::ranges::find(candidates, synonym.meant) != candidates.end();
-        if (synonym.word == typed && known) return std::string(synonym.meant);
+        if (known) return std::string(synonym.meant);
     }
     return "";
 }
@@ -164,6 +178,8 @@ std::string nearest(std::string_view typed, std::span<const std::string_view> ca
         if (!letters.empty() && plain(candidate) == letters) return std::string(candidate);
     }
     if (std::string meant = synonym(letters, candidates); !meant.empty()) return meant;
+    if (std::string meant = synonym(without_order(letters), candidates); !meant.empty())
+        return meant;
     std::string_view best;
     std::size_t least = 3;
     for (const std::string_view candidate : candidates) {

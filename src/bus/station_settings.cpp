@@ -15,10 +15,19 @@ std::string_view label(Rule rule) {
             return "quantity";
         case Rule::range:
             return "range";
+        case Rule::listening:
+            return "listen";
         case Rule::write_protected:
             return "read-only";
     }
     std::abort();
+}
+
+std::optional<modbus::Request> translated(const Stations& stations, std::uint8_t id,
+                                          const modbus::Request& request) {
+    const auto listed = stations.find(id);
+    if (id == 0 || listed == stations.end() || !listed->second.translate) return std::nullopt;
+    return listed->second.translate(request);
 }
 
 std::string name_of(const Stations& stations, std::uint8_t id) {

@@ -6,6 +6,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {
@@ -20,21 +21,24 @@ std::string hex_of(ByteView pdu) {
     return pdu.size() > kShown ? hex + "..." : hex;
 }
 
+std::string place_of(const modbus::Request& request) {
+    const auto written = request.access().write;
+    if (!written) return "";
+    return std::string(modbus::label(written->table)) + '/' + std::to_string(written->first);
+}
+
 }  // namespace
 
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
     if (request.poll || request.request.is_read()) return std::nullopt;
-    Deed deed{names.of(request.client), {}, {}};
-    if (const auto written = request.request.access().write)
-        deed.place =
-            std::string(modbus::label(written->table)) + '/' + std::to_string(written->first);
-    deed.pdu = hex_of(request.request.pdu());
-    return deed;
+    return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu())};
 }
 
 std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
     if (modbus::is_pure_read(pdu)) return std::nullopt;
-    return Deed{names.of(client), {}, hex_of(pdu)};
+    const auto request =
+        modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
+    return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu)};
 }
 
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {
@@ -42,13 +46,22 @@ void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, 
         station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
     // A client's next connection has another port.
     const std::string who = deed.client.substr(0, deed.client.rfind(':'));
-    rt::log_deed("write", settings.name + '/' + name + ' ' + deed.place + ' ' + who,
+    const std::string subject = settings.name + '/' + name + ' ' + deed.place + ' ' + who;
+    const std::string ended(label(outcome));
+    if (deed.place.empty())
+        return rt::log_deed("write", subject,
+                            {{"line", settings.name},
+                             {"station", name},
+                             {"client", deed.client},
+                             {"pdu", deed.pdu},
+                             {"outcome", ended}});
+    rt::log_deed("write", subject,
                  {{"line", settings.name},
                   {"station", name},
                   {"client", deed.client},
                   {"at", deed.place},
                   {"pdu", deed.pdu},
-                  {"outcome", std::string(label(outcome))}});
+                  {"outcome", ended}});
 }
 
 }  // namespace panelgate::bus

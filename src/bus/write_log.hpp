@@ -19,7 +19,7 @@ struct Deed {
 
 /// Nothing for what changes nothing and for what no client wants (polls, relays).
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names);
-/// The same of a PDU that is no request: its place is not told.
+/// The same of a PDU that nobody was asked; its place is not told when it is no request.
 std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names);
 /// One line at info.
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);

@@ -57,6 +57,13 @@ std::optional<int> prefix_of_mask(const std::string& mask) {
     return prefix;
 }
 
+/// 127.0.0.1 10.0.0.0/8
+bool is_several(std::string_view text) {
+    const std::size_t blank = text.find(' ');
+    if (blank == text.npos) return parse_cidr(std::string(text)).has_value();
+    return parse_cidr(std::string(text.substr(0, blank))) && is_several(text.substr(blank + 1));
+}
+
 /// 10.0.* and 10.0.0
 std::string open_ended(std::string text) {
     while (text.ends_with(".*")) text.resize(text.size() - 2);
@@ -70,6 +77,19 @@ std::string open_ended(std::string text) {
 }
 
 }  // namespace
+
+std::string missing_commas(std::string_view typed) {
+    std::string list;
+    std::size_t parts = 0;
+    for (std::size_t at = 0; at < typed.size(); ++parts) {
+        const std::size_t end = std::min(typed.find(' ', at), typed.size());
+        if (end == at) return "";
+        list += (at > 0 ? ", " : "") + std::string(typed.substr(at, end - at));
+        at = end + 1;
+    }
+    constexpr std::size_t kMost = 10;
+    return parts > 1 && parts <= kMost ? "; a ',' is missing: write [" + list + ']' : "";
+}
 
 std::string listen_hint(std::string_view typed) {
     const std::string_view text = bare(typed);
@@ -94,6 +114,7 @@ std::string listen_hint(std::string_view typed) {
 
 std::string network_hint(std::string_view typed) {
     std::string text(typed);
+    if (text.find(' ') != text.npos && is_several(text)) return missing_commas(text);
     std::erase(text, ' ');
     if (text == "*" || text == "all" || text == "any")
         return "; to let everybody in, leave allow out";

@@ -12,5 +12,7 @@ namespace panelgate::config {
 std::string listen_hint(std::string_view typed);
 /// Of an item of `allow`.
 std::string network_hint(std::string_view typed);
+/// Of an item of a list whose words hold no blanks: "; a ',' is missing: write [a, b]".
+std::string missing_commas(std::string_view typed);
 
 }  // namespace panelgate::config

@@ -9,9 +9,8 @@
 #include <utility>
 
 #include "load_stations.hpp"
+#include "longest_read.hpp"
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -66,64 +65,6 @@ Wait longest_wait(const Node& node, const Line& line) {
     return longest;
 }
 
-/// A read and its reply, but for the values.
-constexpr std::size_t kReadOverhead = modbus::kReadRequestAdu + modbus::kReadReplyOverhead;
-
-/// One read of a station, and how many bytes of values answer it.
-struct Read {
-    std::string what;
-    std::size_t count = 0;
-    bool bits = false;
-    Duration response_timeout{};
-
-    std::size_t bytes() const { return bits ? (count + 7) / 8 : 2 * count; }
-    /// Nothing but the two frames: no read is quicker.
-    Duration on_wire(const SerialFormat& serial) const {
-        return wire_time(serial, kReadOverhead + bytes());
-    }
-};
-
-void keep_longer(std::optional<Read>& longest, Read read) {
-    if (!longest || read.bytes() > longest->bytes()) longest = std::move(read);
-}
-
-std::optional<Read> longest_poll(const Line& line) {
-    std::optional<Read> longest;
-    for (std::size_t i = 0; i < line.stations.size(); ++i) {
-        const Station& station = line.stations[i];
-        for (const points::Poll& poll : station.polls) {
-            keep_longer(
-                longest,
-                {"the poll of " + poll.read + " of station '" + station.name + '\'', poll.count,
-                 modbus::is_bit_table(poll.table), line.arbiter.stations[i].response_timeout});
-        }
-    }
-    return longest;
-}
-
-/// What a client may ask of any station.
-std::optional<Read> longest_read(const Line& line) {
-    std::optional<Read> longest;
-    const auto add = [&](const std::string& who, const arbiter::StationSettings& settings) {
-        const std::string what = "the longest read of " + who;
-        keep_longer(longest, {what, settings.max_registers, false, settings.response_timeout});
-        keep_longer(longest, {what, settings.max_bits, true, settings.response_timeout});
-    };
-    for (std::size_t i = 0; i < line.stations.size(); ++i)
-        add("station '" + line.stations[i].name + '\'', line.arbiter.stations[i]);
-    if (!line.refuse_unlisted) add("an unlisted station", line.arbiter.unlisted);
-    return longest;
-}
-
-/// How many items a read may have that can end before the deadline; 0 = none can.
-std::size_t most_items(const Line& line, bool bits) {
-    const Duration deadline = line.arbiter.queue.deadline - 1ns;
-    const auto characters = static_cast<std::size_t>(deadline / character_time(line.device.serial));
-    if (characters <= kReadOverhead) return 0;
-    const std::size_t bytes = characters - kReadOverhead;
-    return bits ? bytes * 8 : bytes / 2;
-}
-
 bool fits(const std::optional<Read>& read, const Line& line) {
     return !read || read->on_wire(line.device.serial) < line.arbiter.queue.deadline;
 }
@@ -133,7 +74,7 @@ void warn_of_read(Loading& loading, const Node& node, const Line& line, const Re
     const Duration wire = read.on_wire(serial);
     const Duration enough = std::chrono::ceil<std::chrono::seconds>(wire + read.response_timeout);
     const std::string noun = read.bits ? " bits" : " registers";
-    const std::size_t most = most_items(line, read.bits);
+    const std::size_t most = most_items(serial, read.bits, line.arbiter.queue.deadline);
     loading.warn(deadline_mark(node),
                  read.what + " (" + std::to_string(read.count) + noun + ") takes " + text(wire) +
                      " on the wire at " + to_string(serial) +

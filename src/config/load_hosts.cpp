@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "address_hints.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/settings.hpp"
 
@@ -34,7 +35,7 @@ void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) 
                 "and without a port, not '" +
                     item.scalar + '\'' +
                     (line::is_broken_address(item.scalar) ? "; its numbers are no IP address"
-                                                          : ""));
+                                                          : missing_commas(item.scalar)));
         }
     }
     if (list->items.empty())

@@ -159,6 +159,25 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
+/// Who asks on this line: the gateway, or somebody else.
+void load_mode(MapReader& in, Line& line) {
+    const Node* given = in.child("mode");
+    if (given != nullptr && (given->scalar == "kernel" || given->scalar == "rts")) {
+        in.problem("mode", "mode " + given->scalar +
+                               " is of rs485; write rs485: {mode: " + given->scalar + '}');
+        in.has("mode");
+        return;
+    }
+    constexpr std::array<std::string_view, 2> kModes{"master", "listen"};
+    line.listens = in.choice_index("mode", kModes) == std::size_t{1};
+    line.device.listen_only = line.listens;
+    if (line.listens && line.kind == Line::Kind::simulated) {
+        in.problem("mode",
+                   "mode listen needs a line with a master; nobody asks on a simulated one: name "
+                   "the device of an adapter that hears the line");
+    }
+}
+
 EchoMode load_echo(MapReader& in) {
     constexpr std::array<std::string_view, 3> kWords{"auto", "on", "off"};
     constexpr std::array kModes{EchoMode::automatic, EchoMode::on, EchoMode::off};
@@ -178,27 +197,30 @@ constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}"
 constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
 /// Keys that people write beside `device`.
-constexpr std::array<yaml::Elsewhere, 21> kElsewhere{{{"baud", "serial", {}},
-                                                      {"data_bits", "serial", {}},
-                                                      {"parity", "serial", {}},
-                                                      {"stop_bits", "serial", {}},
-                                                      {"response_timeout", "timing", {}},
-                                                      {"frame_gap", "timing", {}},
-                                                      {"reply_hole", "timing", {}},
-                                                      {"broadcast_turnaround", "timing", {}},
-                                                      {"late_window", "timing", {}},
-                                                      {"think_time", "timing", {}},
-                                                      {"limit", "queue", {}},
-                                                      {"per_client", "queue", {}},
-                                                      {"deadline", "queue", {}},
-                                                      {"after", "offline", {}},
-                                                      {"probe_min", "offline", {}},
-                                                      {"probe_max", "offline", {}},
-                                                      {"mode", "rs485", {}},
-                                                      {"points", {}, "a station"},
-                                                      {"poll", {}, "a station"},
-                                                      {"profile", {}, "a station"},
-                                                      {"listen", {}, "modbus_tcp or http"}}};
+constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
+constexpr std::array<yaml::Elsewhere, 22> kElsewhere{
+    {{"baud", "serial", {}},
+     {"data_bits", "serial", {}},
+     {"parity", "serial", {}, {}, kParities},
+     {"stop_bits", "serial", {}},
+     {"response_timeout", "timing", {}},
+     {"frame_gap", "timing", {}},
+     {"reply_hole", "timing", {}},
+     {"broadcast_turnaround", "timing", {}},
+     {"late_window", "timing", {}},
+     {"think_time", "timing", {}},
+     {"limit", "queue", {}},
+     {"per_client", "queue", {}},
+     {"deadline", "queue", {}},
+     {"after", "offline", {}},
+     {"probe_min", "offline", {}},
+     {"probe_max", "offline", {}},
+     {"points", {}, "a station"},
+     {"poll", {}, "a station"},
+     {"profile", {}, "a station"},
+     {"listen", {}, "modbus_tcp or http"},
+     {"type", {}, {}, "remove it: 'device' says what the line is"},
+     {"method", {}, {}, "remove it: every line is RTU"}}};
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
@@ -208,6 +230,7 @@ Line load_line(Loading& loading, const Node& node) {
     if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
         in.problem("name", "there are two lines '" + line.name + '\'');
     load_device(loading, in, line);
+    load_mode(in, line);
     const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in, line, line.device.rs485);
@@ -224,7 +247,7 @@ Line load_line(Loading& loading, const Node& node) {
     }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
-    if (serial_known) warn_of_deadline(loading, node, line);
+    if (serial_known && !line.listens) warn_of_deadline(loading, node, line);
     return line;
 }
 

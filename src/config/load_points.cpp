@@ -2,7 +2,10 @@
 #include <array>
 #include <cstdint>
 
+#include "check_points.hpp"
 #include "load_stations.hpp"
+#include "panelgate/base/decimal.hpp"
+#include "panelgate/base/number_text.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/yaml/quote.hpp"
@@ -24,6 +27,13 @@ std::vector<std::string_view> type_words() {
     return words;
 }
 
+/// float32be, uint32_le
+std::string order_hint(std::string_view typed) {
+    const bool ordered = typed.ends_with("be") || typed.ends_with("le");
+    const bool number = typed.find_first_of("0123456789") != typed.npos;
+    return ordered && number ? " The order of its bytes is word_order" : "";
+}
+
 void load_type(MapReader& in, Point& point) {
     const bool bits = modbus::is_bit_table(point.table);
     const auto bit = in.integer("bit", 0, 15);
@@ -31,7 +41,7 @@ void load_type(MapReader& in, Point& point) {
     if (bit && !bits) point.bit = static_cast<unsigned>(*bit);
     point.type = bits || point.bit ? Type::boolean : Type::u16;
     const auto words = type_words();
-    if (const auto chosen = in.choice_index("type", words)) {
+    if (const auto chosen = in.choice_index("type", words, order_hint)) {
         const Type type = points::kTypes[*chosen];
         if (point.type == Type::boolean && type != Type::boolean) {
             in.problem("type", point.at + (bits ? " is a bit" : " with bit: is one bit") +
@@ -54,9 +64,21 @@ void load_type(MapReader& in, Point& point) {
         in.problem("word_order", "word_order is for values of registers, not for type bool");
 }
 
+/// All the digits that were typed are reckoned with, or it is a problem.
+double exact_number(MapReader& in, std::string_view key, double otherwise) {
+    const auto number = in.number(key);
+    const Node* written = in.child(key);
+    if (!number || written == nullptr) return number.value_or(otherwise);
+    const auto exact = Decimal::parse(written->scalar);
+    if (exact && *exact != Decimal(*number))
+        in.problem(key, std::string(key) + " has more digits than are reckoned with, " +
+                            yaml::quote(written->scalar) + "; write " + number_text(*number));
+    return *number;
+}
+
 void load_scale(MapReader& in, Point& point) {
-    point.scale = in.number("scale").value_or(1);
-    point.offset = in.number("offset").value_or(0);
+    point.scale = exact_number(in, "scale", 1);
+    point.offset = exact_number(in, "offset", 0);
     const bool number = point.type != Type::boolean && point.type != Type::string;
     for (const std::string_view key : {"scale", "offset", "min", "max"}) {
         if (in.has(key) && !number)
@@ -74,11 +96,13 @@ constexpr std::string_view kPollExample = "{read: UW100, count: 8, every: 1s}";
 
 void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     const auto raw = yaml::parse_integer(entry.key);
-    if (!raw || entry.value.kind != Node::Kind::scalar || entry.value.scalar.empty()) {
+    const bool is_text = entry.value.kind == Node::Kind::scalar && !entry.value.comma;
+    if (!raw || !is_text || entry.value.scalar.empty()) {
         const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
         in.problems().add(entry.mark,
                           "labels are RAW-NUMBER: text, such as 1: running" +
-                              (turned ? "; write " + entry.value.scalar + ": " + entry.key : ""));
+                              (turned ? "; write " + entry.value.scalar + ": " + entry.key
+                                      : yaml::number_blank_hint(entry.key)));
         return;
     }
     if (const RawRange range = label_range(point.type); !range.contains(*raw)) {
@@ -183,6 +207,9 @@ bool is_point_name(std::string_view text) {
     return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
 }
 
+constexpr const char* kListens =
+    "the line is only listened to (mode: listen): nothing can be written there; leave writable out";
+
 void load_point(Loading& loading, const Node& node, Station& station) {
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
@@ -206,10 +233,12 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     point.writable = in.boolean("writable").value_or(false);
     if (point.writable && station.read_only)
         in.problem("writable", "station '" + station.name + "' is read_only");
+    if (point.writable && station.listens) in.problem("writable", kListens);
     load_labels(in, point);
     load_no_value(in, point);
     point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
     if (item) check_area(in, point, *item->area, *station.profile);
+    warn_of_idle_keys(loading, in, point);
     in.finish();
     if (item) station.points.push_back(std::move(point));
 }
@@ -273,6 +302,11 @@ void check_read_count(MapReader& in, std::string_view key, const profile::PanelP
 }
 
 void load_points(Loading& loading, MapReader& in, Station& station) {
+    if (station.listens && in.child("poll") != nullptr) {
+        in.problem("poll",
+                   "the line is only listened to (mode: listen): nothing is asked there; write "
+                   "points, which what passes by fills");
+    }
     load_list(loading, in, "poll", "[{read: UW100, count: 8, every: 1s}]", points::kMaxPolls,
               [&](Loading& l, const Node& node) { load_poll(l, node, station); });
     load_list(loading, in, "points", "[{name: temperature, at: UW100}]", points::kMaxPoints,

@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <functional>
-#include <set>
 #include <vector>
 
 #include "load_stations.hpp"
@@ -8,6 +6,7 @@
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
 #include "panelgate/yaml/quote.hpp"
+#include "relay_circle.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -21,16 +20,6 @@ struct End {
     RelayEnd end;
     const Station* station = nullptr;
     const profile::Area* area = nullptr;
-};
-
-/// Where items really are, in bits: a panel may show the same memory as words and as bits.
-struct Memory {
-    const Station* station = nullptr;
-    modbus::Span bits;
-
-    bool overlaps(const Memory& other) const {
-        return station == other.station && bits.overlaps(other.bits);
-    }
 };
 
 struct Route {
@@ -67,6 +56,12 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
                                             loading.station_names.end());
         in.problem(key, "there is no station " + yaml::quote(end.end.station) +
                             did_you_mean(end.end.station, names, "stations"));
+        return std::nullopt;
+    }
+    if (end.station->listens) {
+        in.problem(key, "station '" + end.end.station +
+                            "' is on a line that is only listened to (mode: listen): a relay can "
+                            "neither read nor write there");
         return std::nullopt;
     }
     const auto item = profile::parse_notation(*end.station->profile, end.end.at);
@@ -120,32 +115,36 @@ Memory memory_of(const End& end, std::uint32_t count) {
 }
 
 /// Two relays that write the same items: nobody could say which value they hold.
-void check_overlap(MapReader& in, const Route& route, const std::vector<Route>& others) {
+/// False, and a problem, then.
+bool check_overlap(MapReader& in, const Route& route, const std::vector<Route>& others) {
     for (const Route& other : others) {
         if (!route.to.overlaps(other.to)) continue;
         in.problem("to", "overlaps what the relay " + other.relay.name() + " writes");
-        return;
+        return false;
     }
+    return true;
 }
 
-/// A chain of relays that ends where it began.
-void check_loop(MapReader& in, const Route& route, const std::vector<Route>& others) {
-    std::vector<const Route*> chain{&route};
-    std::set<const Route*> seen;
-    const std::function<bool(const Route&)> leads_back = [&](const Route& last) {
-        if (last.to.overlaps(route.from)) return true;
-        for (const Route& next : others) {
-            if (!last.to.overlaps(next.from) || !seen.insert(&next).second) continue;
-            chain.push_back(&next);
-            if (leads_back(next)) return true;
-            chain.pop_back();
-        }
+/// False, and a problem, when it closes a circle.
+bool check_loop(MapReader& in, const Route& route, const std::vector<Route>& others) {
+    if (route.from.overlaps(route.to)) {
+        in.problem("to", route.relay.to.at + " overlaps what the relay itself reads, " +
+                             route.relay.from.at + ": its values would wander");
         return false;
-    };
-    if (!leads_back(route)) return;
+    }
+    std::vector<Copy> copies;
+    copies.reserve(others.size() + 1);
+    for (const Route& other : others) copies.push_back({other.from, other.to});
+    copies.push_back({route.from, route.to});
+    const std::vector<std::size_t> circle = find_circle(copies);
+    if (circle.empty()) return true;
     std::string text;
-    for (const Route* step : chain) text += (text.empty() ? "" : ", then ") + step->relay.name();
+    for (const std::size_t step : circle) {
+        const Relay& relay = step < others.size() ? others[step].relay : route.relay;
+        text += (text.empty() ? "" : ", then ") + relay.name();
+    }
     in.problem("to", "relays in a circle: " + text);
+    return false;
 }
 
 void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) {
@@ -173,9 +172,7 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
     check_source(in, *from, relay.count);
     check_target(in, *to, relay.count);
     const Route route{relay, memory_of(*from, relay.count), memory_of(*to, relay.count)};
-    check_overlap(in, route, routes);
-    check_loop(in, route, routes);
-    routes.push_back(route);
+    if (check_overlap(in, route, routes) && check_loop(in, route, routes)) routes.push_back(route);
     loading.config.relays.push_back(std::move(relay));
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "load_access.hpp"
 #include "load_port.hpp"
@@ -124,10 +125,11 @@ void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
     bool reaches_any = !settings.access.units.empty();
     each_station(loading.config, settings, [&](const auto&...) { reaches_any = true; });
     if (reaches_any) return;
+    const std::vector<std::string>& lines = settings.access.lines;
     loading.warn(in.mark(), "serial master '" + settings.name +
                                 "' reaches nobody: it is answered for listed stations and units "
                                 "only; add stations to the line, or units: {31: " +
-                                settings.access.lines.front() + "/31}");
+                                (lines.empty() ? "LINE" : lines.front()) + "/31}");
 }
 
 Settings load_master(Loading& loading, const Node& node) {

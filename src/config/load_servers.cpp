@@ -47,15 +47,18 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     std::vector<std::string_view> names;
     names.reserve(loading.config.lines.size());
     for (const Line& line : loading.config.lines) names.push_back(line.name);
-    loading.problems.add(
-        mark, "there is no line " + yaml::quote(name) + did_you_mean(name, names, "lines"));
+    const std::string commas = missing_commas(name);
+    loading.problems.add(mark, "there is no line " + yaml::quote(name) +
+                                   (commas.empty() ? did_you_mean(name, names, "lines") : commas));
     return nullptr;
 }
 
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
     if (list == nullptr) {
-        for (const Line& line : loading.config.lines) settings.lines.push_back(line.name);
+        for (const Line& line : loading.config.lines) {
+            if (!line.listens) settings.lines.push_back(line.name);
+        }
         return;
     }
     for (const Node& item : list->items) {
@@ -128,7 +131,8 @@ void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings)
             const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
             loading.problems.add(
                 entry.mark, "a unit id is a number from 0 to 255, not " + yaml::quote(entry.key) +
-                                (turned ? "; write " + entry.value.scalar + ": " + entry.key : ""));
+                                (turned ? "; write " + entry.value.scalar + ": " + entry.key
+                                        : yaml::number_blank_hint(entry.key)));
             continue;
         }
         if (const auto target = unit_target(loading, entry.value)) {
@@ -216,13 +220,20 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
 constexpr std::string_view kNoNetwork = "name at least one network, or leave it out for all";
 
 void refuse_tls(MapReader& in) {
-    if (in.has("tls"))
-        in.problem("tls",
-                   "tls is not in this version; remove it and listen on a trusted network only");
+    in.refuse("tls", "is not in this version; remove it and listen on a trusted network only");
 }
+
+/// Keys that people write where other programs have their serial lines.
+constexpr std::array<yaml::Elsewhere, 5> kElsewhere{
+    {{"type", {}, {}, "remove it: serial lines stand in 'lines'"},
+     {"method", {}, {}, "remove it: serial lines stand in 'lines'"},
+     {"device", {}, "a line, one of 'lines'"},
+     {"serial", {}, "a line, one of 'lines'"},
+     {"stations", {}, "a line, one of 'lines'"}}};
 
 tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a modbus_tcp listener", "{listen: 127.0.0.1:502}");
+    in.elsewhere(kElsewhere);
     tcp_server::Settings settings;
     load_listen(in, settings);
     load_access(loading, in, settings);

@@ -146,11 +146,14 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
 StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& work,
                           Station& station) {
     station.read_only = load_read_only(in).value_or(false);
+    station.listens = work.line.listens;
 
     StationSettings settings = load_station_timing(loading, in, work, station);
     settings.id = station.id;
     settings.retries = static_cast<int>(in.integer("retries", 0, 10).value_or(settings.retries));
     settings.retry_writes = in.boolean("retry_writes").value_or(false);
+    settings.crc_order = in.choice<modbus::CrcOrder>("crc_order", modbus::kCrcOrders)
+                             .value_or(station.profile->crc_order);
     using namespace modbus;
     settings.max_registers =
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
@@ -158,6 +161,8 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     settings.vouched = station.profile->name != "generic";  // which says what anybody could
     settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
     station.guard = in.boolean("guard").value_or(false);
+    constexpr std::array<std::string_view, 2> kTranslate{"auto", "off"};
+    station.translate = in.choice_index("translate", kTranslate) != std::size_t{1};
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
@@ -226,6 +231,20 @@ void warn_of_character(Loading& loading, MapReader& in, const LineInWork& work) 
                                         (common ? " but common" : ""));
 }
 
+/// One frame cannot have both orders (arbiter::crc_orders()).
+void warn_of_broadcasts(Loading& loading, MapReader& in, const Line& line) {
+    const auto is_old = [](const StationSettings& station) {
+        return station.crc_order == modbus::CrcOrder::high_first;
+    };
+    const auto old = std::ranges::find_if(line.arbiter.stations, is_old);
+    if (old == line.arbiter.stations.end() || std::ranges::all_of(line.arbiter.stations, is_old))
+        return;
+    loading.warn(in.mark("stations"),
+                 "broadcasts go out with the CRC's low byte first: those with crc_order "
+                 "high_first, such as station " +
+                     std::to_string(old->id) + ", do not hear them");
+}
+
 }  // namespace
 
 void judge_template(Loading& loading, const Node& body) {
@@ -249,6 +268,7 @@ void load_stations(Loading& loading, MapReader& in, LineInWork work) {
             work.line.stations.push_back(load_station(loading, node, work));
     }
     warn_of_character(loading, in, work);
+    warn_of_broadcasts(loading, in, work.line);
 }
 
 }  // namespace panelgate::config

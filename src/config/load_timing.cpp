@@ -123,19 +123,24 @@ void load_reply_hole(MapReader& in, Duration& hole) {
     hole = in.duration("reply_hole", 1ms, 10s).value_or(hole);
 }
 
-void load_late_window(MapReader& in, StationSettings& settings) {
+void load_late_window(Loading& loading, MapReader& in, StationSettings& settings) {
     if (is_word(in, "late_window", "auto")) {
         settings.late_window.reset();
     } else if (const auto window = in.duration("late_window", 0ms, 10min)) {
         settings.late_window = window;
+        if (*window == Duration::zero())
+            loading.warn(in.mark("late_window"),
+                         "late_window: 0ms expects no late reply: one that comes all the same may "
+                         "pass for the answer to the next request; write auto, or how late replies "
+                         "come, such as 500ms");
     }
 }
 
 /// The keys that a line and a station have.
-void load_common(MapReader& in, const LineInWork& work, Timing& timing) {
+void load_common(Loading& loading, MapReader& in, const LineInWork& work, Timing& timing) {
     load_response_timeout(in, timing.settings);
     load_frame_gap(in, work, timing);
-    load_late_window(in, timing.settings);
+    load_late_window(loading, in, timing.settings);
     in.duration("think_time", 0ms, 10s);  // what the plan assumes of a panel; nothing waits for it
 }
 
@@ -146,7 +151,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
     work.line.arbiter.reply_hole = automatic_hole(work.line);
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader timing(*node, loading.problems, "timing");
-        load_common(timing, work, work.timing);
+        load_common(loading, timing, work, work.timing);
         load_reply_hole(timing, work.line.arbiter.reply_hole);
         Duration& turnaround = work.line.arbiter.broadcast_turnaround;
         turnaround = timing.duration("broadcast_turnaround", 1ms, 1min).value_or(turnaround);
@@ -166,7 +171,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineI
     std::optional<yaml::Mark> own_gap;
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
         MapReader own(*node, loading.problems, "a station's timing");
-        load_common(own, work, timing);
+        load_common(loading, own, work, timing);
         if (own.has("frame_gap")) own_gap = own.mark("frame_gap");
         const auto refuse = [&](std::string_view key, const std::string& why) {
             if (own.has(key))

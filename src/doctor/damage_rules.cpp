@@ -87,10 +87,17 @@ Cause cause_of_damage(const Case& c, const Symptoms& s) {
 void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_crc_order, named(station)};
     if (s.crc_swapped < bar.enough(3) || s.crc_swapped * 2 <= s.damaged()) return;
+    const bool set = c.facts.crc_high_first.contains(station);
+    const std::string advice =
+        set ? "Leave its `crc_order` out, or set it to `low_first`, the standard's; of the profile "
+              "autonics-gp-2005-old the newer one is autonics-gp-2005."
+            : std::string(station == 0 ? "List it, and set" : "Set") +
+                  " its `crc_order: high_first`; Autonics GP panels with firmware of before June "
+                  "2005 have the profile autonics-gp-2005-old, which sets it.";
     c.add(Cause::wrong_crc_order, named(station),
-          "The replies of " + station_text(station) + " carry the CRC's high byte first.",
-          "This version reads the standard's order only, low byte first: the panel needs firmware "
-          "that sends it, as Autonics GP panels do since June 2005.",
+          "The replies of " + station_text(station) + " carry the CRC's " + (set ? "low" : "high") +
+              " byte first.",
+          advice,
           share_text(s.crc_swapped, s.damaged(), "damaged replies") +
               " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
               " replies were right");

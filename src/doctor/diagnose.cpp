@@ -19,7 +19,9 @@ std::vector<Finding> diagnose(const LineFacts& facts, const Sample& window,
     find_all_damaged(c);
     find_trailing_bytes(c);
     for (const auto& [id, symptoms] : window.stations) {
+        find_wrong_exception(c, id, symptoms);
         find_wrong_reply(c, id, symptoms);
+        find_broadcast_replies(c, id, symptoms);
         find_duplicate_address(c, id, symptoms);
         find_short_timeout(c, id, symptoms);
         find_short_gap(c, id, symptoms);

@@ -1,47 +1,26 @@
 #include "panelgate/doctor/finding.hpp"
 
-#include <cstdlib>
+#include <array>
+#include <cstddef>
 
 namespace panelgate::doctor {
+namespace {
 
-std::string_view code(Cause cause) {
-    switch (cause) {
-        case Cause::echo:
-            return "echo";
-        case Cause::no_answer_at_all:
-            return "no-answer-at-all";
-        case Cause::wrong_baud:
-            return "wrong-baud";
-        case Cause::wrong_parity:
-            return "wrong-parity";
-        case Cause::other_master:
-            return "other-master";
-        case Cause::collision:
-            return "collision";
-        case Cause::overrun:
-            return "overrun";
-        case Cause::noise:
-            return "noise";
-        case Cause::tcp_framing:
-            return "tcp-framing";
-        case Cause::trailing_bytes:
-            return "trailing-bytes";
-        case Cause::wrong_crc_order:
-            return "wrong-crc-order";
-        case Cause::wrong_reply:
-            return "wrong-reply";
-        case Cause::duplicate_address:
-            return "duplicate-address";
-        case Cause::timeout_too_short:
-            return "timeout-too-short";
-        case Cause::gap_too_short:
-            return "gap-too-short";
-        case Cause::unasked_frames:
-            return "unasked-frames";
-        case Cause::station_silent:
-            return "station-silent";
-    }
-    std::abort();
-}
+/// In the order of Cause.
+constexpr std::array<std::string_view, 19> kCodes{
+    "echo",          "no-answer-at-all",   "wrong-baud",        "wrong-parity",
+    "other-master",  "collision",          "overrun",           "noise",
+    "tcp-framing",   "trailing-bytes",     "wrong-crc-order",   "wrong-exception",
+    "wrong-reply",   "answers-broadcasts", "duplicate-address", "timeout-too-short",
+    "gap-too-short", "unasked-frames",     "station-silent",
+};
+constexpr std::size_t place(Cause cause) { return static_cast<std::size_t>(cause); }
+static_assert(place(Cause::station_silent) + 1 == kCodes.size());
+static_assert(kCodes[place(Cause::wrong_crc_order)] == "wrong-crc-order");
+static_assert(kCodes[place(Cause::duplicate_address)] == "duplicate-address");
+
+}  // namespace
+
+std::string_view code(Cause cause) { return kCodes[place(cause)]; }
 
 }  // namespace panelgate::doctor

@@ -72,6 +72,8 @@ void find_crc_order(Case& c, std::uint8_t station, const arbiter::Symptoms& symp
 void find_all_damaged(Case& c);
 void find_noise(Case& c);
 void find_tcp_framing(Case& c);
+void find_wrong_exception(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_broadcast_replies(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_wrong_reply(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_duplicate_address(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_short_timeout(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);

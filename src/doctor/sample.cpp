@@ -9,14 +9,14 @@ namespace {
 using arbiter::Symptoms;
 
 constexpr std::array kCounts = {
-    &Symptoms::answered,      &Symptoms::silent,        &Symptoms::disturbed,
-    &Symptoms::collided,      &Symptoms::damaged_exact, &Symptoms::damaged_short,
-    &Symptoms::damaged_long,  &Symptoms::damaged_heads, &Symptoms::damaged_bytes,
-    &Symptoms::damaged_zeros, &Symptoms::damaged_odd,   &Symptoms::long_answered,
-    &Symptoms::long_damaged,  &Symptoms::strays,        &Symptoms::doubled,
-    &Symptoms::late,          &Symptoms::unasked,       &Symptoms::echoes,
-    &Symptoms::wrong,         &Symptoms::requests,      &Symptoms::crc_swapped,
-    &Symptoms::trailed,
+    &Symptoms::answered,      &Symptoms::silent,           &Symptoms::disturbed,
+    &Symptoms::collided,      &Symptoms::damaged_exact,    &Symptoms::damaged_short,
+    &Symptoms::damaged_long,  &Symptoms::damaged_heads,    &Symptoms::damaged_bytes,
+    &Symptoms::damaged_zeros, &Symptoms::damaged_odd,      &Symptoms::long_answered,
+    &Symptoms::long_damaged,  &Symptoms::strays,           &Symptoms::doubled,
+    &Symptoms::late,          &Symptoms::unasked,          &Symptoms::echoes,
+    &Symptoms::wrong,         &Symptoms::requests,         &Symptoms::crc_swapped,
+    &Symptoms::trailed,       &Symptoms::wrong_exceptions, &Symptoms::broadcast_replies,
 };
 constexpr std::size_t kOthers = 2;  // mute_in_a_row, worst_lateness
 static_assert(sizeof(Symptoms) ==

@@ -167,11 +167,42 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
                          "requests"));
 }
 
+/// What it refuses is told by its own function only (AP 7): a stray frame may say anything.
+void find_wrong_exception(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::wrong_exception, named(station)};
+    if (s.wrong_exceptions < bar.enough(3) || s.wrong_exceptions * 2 < s.wrong) return;
+    c.add(Cause::wrong_exception, named(station),
+          "What " + station_text(station) +
+              " refuses, it refuses with the number of another function.",
+          "No such exception can be told from a stray frame, so clients are answered 0B. Ask it "
+          "only for what it has; with its profile, `guard: true` refuses the rest here, with the "
+          "right code. Newer firmware may answer as the standard says.",
+          share_text(s.wrong_exceptions, s.attempts(), "requests") +
+              " were answered with an exception that names another function; " +
+              std::to_string(s.answered) + " replies were right");
+}
+
+void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::answers_broadcasts, named(station)};
+    if (s.broadcast_replies < bar.enough(3) || s.broadcast_replies * 4 < c.window.broadcasts)
+        return;
+    const std::string who = station == 0 ? "A station that the configuration does not list"
+                                         : "Station " + std::to_string(station);
+    c.add(Cause::answers_broadcasts, named(station),
+          who + " answers broadcasts, which nobody may (serial line V1.02, 2.1).",
+          "Its replies run into those of other panels that do the same, and into the next request "
+          "where they take longer than `timing.broadcast_turnaround`: make that long enough, or "
+          "write to each station by itself.",
+          std::to_string(s.broadcast_replies) + " replies to " +
+              std::to_string(c.window.broadcasts) + " broadcasts");
+}
+
 /// A frame that is good, of the station that was asked, and not what was asked: the wire is fine.
 void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_reply, named(station)};
     const bool masters = c.has(Cause::other_master) && s.wrong <= c.all.requests;
     if (s.wrong < bar.enough(3) || s.wrong * 20 < s.answered || masters) return;
+    if (c.has(Cause::wrong_exception, station)) return;
     const std::string who = station == 0 ? "A station that the configuration does not list"
                                          : "Station " + std::to_string(station);
     c.add(Cause::wrong_reply, named(station),
@@ -203,7 +234,7 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
 void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0 || c.has(Cause::no_answer_at_all) || s.attempts() == 0) return;
     const Bar bar{c, Cause::station_silent, station};
-    if (c.has(Cause::wrong_reply, station)) return;
+    if (c.has(Cause::wrong_reply, station) || c.has(Cause::wrong_exception, station)) return;
     if (c.has(Cause::timeout_too_short, station) || s.mute_in_a_row < bar.enough(5)) return;
     bool other_answers = false;
     for (const auto& [id, other] : c.window.stations) {
@@ -211,9 +242,13 @@ void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
         other_answers = other_answers || (id != station && other.answered > 0 && lately);
     }
     if (!other_answers) return;
+    const bool by_crc = s.answered == 0 && !c.facts.crc_high_first.contains(station);
     c.add(Cause::station_silent, station,
           "Station " + std::to_string(station) + " does not answer; others do.",
-          "The line is fine: check this panel's power, its address and its plug.",
+          std::string("The line is fine: check this panel's power, its address and its plug.") +
+              (by_crc ? " An Autonics GP with firmware of before June 2005 is silent until its "
+                        "`crc_order: high_first` is set."
+                      : ""),
           "the last " + std::to_string(s.mute_in_a_row) + " requests to it without a reply");
 }
 

@@ -76,6 +76,21 @@ void add_requests(Families& out, const Snapshot& snapshot) {
     out.push_back(requests.take());
 }
 
+void add_translated(Families& out, const Snapshot& snapshot) {
+    Family family = make_counter(
+        "panelgate_translated_requests_total",
+        "Requests that went out with a function that the panel has instead of the one asked.");
+    each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
+        for (const auto& [functions, count] : station.translated) {
+            family.counter(
+                with(with(of_station(line, station), "function", std::to_string(functions.first)),
+                     "sent_as", std::to_string(functions.second)),
+                count);
+        }
+    });
+    out.push_back(family.take());
+}
+
 void add_times(Families& out, const Snapshot& snapshot, const char* name, const char* help,
                const Histogram& (*of)(const StationReport&)) {
     if (out.ended()) return;
@@ -287,9 +302,10 @@ void add_process(Families& out, const Snapshot& snapshot) {
 
 using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
-    add_requests,      add_station_times,  add_wire_counters, add_exceptions, add_line_counters,
-    add_uart_counters, add_line_state,     add_station_state, add_points,     add_relays,
-    add_listeners,     add_serial_masters, add_http,          add_loop,       add_process,
+    add_requests,       add_translated,    add_station_times, add_wire_counters,
+    add_exceptions,     add_line_counters, add_uart_counters, add_line_state,
+    add_station_state,  add_points,        add_relays,        add_listeners,
+    add_serial_masters, add_http,          add_loop,          add_process,
 };
 
 }  // namespace

@@ -40,9 +40,22 @@ bool speaks_rtu(Framing expected, ByteView first) {
     return expected != Framing::tcp || taken == first.size() || !begins_with_mbap(first);
 }
 
+/// Nothing but whole requests that somebody would send.
+bool is_mbap(ByteView first) {
+    MbapFramer framer;
+    framer.feed(first);
+    bool any = false;
+    while (const auto event = framer.next()) {
+        const Adu* adu = std::get_if<Adu>(&*event);
+        any = adu != nullptr && is_known(adu->pdu[0]) && check_request(adu->pdu);
+        if (!any) return false;
+    }
+    return any && !framer.partial();
+}
+
 /// Bytes that may still become a request in RTU are left alone.
 bool speaks_tcp(Framing expected, ByteView first) {
-    if (!begins_with_mbap(first)) return false;
+    if (!is_mbap(first)) return false;
     if (expected != Framing::rtu) return true;
     const RequestLength length = request_length(first);
     return length.length <= first.size() && rtu_request(first) == 0 && !crc_ok(first);

@@ -11,17 +11,19 @@
 namespace panelgate::modbus {
 namespace {
 
+constexpr std::size_t kHeader = 3;  // of a reply: address, function, byte count or exception
+
 ReplyLength known(std::size_t length) { return {ReplyLength::Kind::known, length}; }
 ReplyLength need_more() { return {ReplyLength::Kind::need_more, 0}; }
 ReplyLength by_silence() { return {ReplyLength::Kind::by_silence, 0}; }
 
 /// 2B/0E: address, 2B, 0E, code, conformity, more, next id, n, then n objects of id, length, value.
 ReplyLength device_identification_length(ByteView b) {
-    constexpr std::size_t kHeader = 8;
+    constexpr std::size_t kFront = 8;
     if (b.size() < 3) return need_more();
     if (b[2] != kMeiDeviceIdentification) return by_silence();
-    if (b.size() < kHeader) return need_more();
-    std::size_t at = kHeader;
+    if (b.size() < kFront) return need_more();
+    std::size_t at = kFront;
     for (unsigned object = 0; object < b[7]; ++object) {
         if (b.size() < at + 2) return need_more();
         at += 2u + b[at + 1];
@@ -82,9 +84,10 @@ std::size_t known_reply_length(ByteView heard) {
 
 }  // namespace
 
-ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu)
+ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders)
     : station_(station),
       request_(std::move(request_pdu)),
+      orders_(orders),
       expected_(reply_length_from_request(request_)) {}
 
 std::optional<Bytes> ReplyFramer::feed(ByteView bytes) {
@@ -140,7 +143,7 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
         if (other[0] == 0 || other[0] > kMaxStation) continue;
         for (const std::size_t size : {known_reply_length(other), request_adu_length(other)}) {
             if (size < kMinAdu || size > kMaxRtuAdu) continue;
-            const bool whole = size <= other.size() && crc_ok(other.first(size));
+            const bool whole = size <= other.size() && crc_ok(other.first(size), orders_);
             if (i + size > end && whole) return Inside::yes;
             if (i + size > end && size > other.size()) result = Inside::perhaps;
             if (i + size <= start && whole) {
@@ -153,7 +156,6 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
 }
 
 std::size_t ReplyFramer::missing() const {
-    constexpr std::size_t kHeader = 3;  // address, function, byte count or exception
     if (!has_start()) return ends_with_address() ? kHeader - 1 : 0;
     const ByteView rest = ByteView(heard_).subspan(starts_[judged_]);
     if (rest.size() < kHeader) return kHeader - rest.size();
@@ -164,9 +166,17 @@ std::size_t ReplyFramer::missing() const {
     return whole > rest.size() ? whole - rest.size() : 0;
 }
 
+std::size_t ReplyFramer::missing_as_asked() const {
+    if (!expected_ || !has_candidate()) return missing();
+    const std::size_t start = has_start() ? starts_[judged_] : heard_.size() - 1;
+    const std::size_t here = heard_.size() - start;
+    const bool refused = here > 1 && (heard_[start + 1] & kExceptionBit) != 0;
+    return refused || here >= std::min(kHeader, *expected_) ? missing() : *expected_ - here;
+}
+
 bool ReplyFramer::ends_with_other_frame() const {
     if (has_start() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
-    return known_reply_length(heard_) == heard_.size() && crc_ok(heard_);
+    return known_reply_length(heard_) == heard_.size() && crc_ok(heard_, orders_);
 }
 
 bool ReplyFramer::is_start(std::uint8_t address, std::uint8_t function) const {
@@ -219,10 +229,10 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
         open = !silence;
         return std::nullopt;
     }
-    if (!crc_ok(rest.first(size)) && rest[1] == kEncapsulatedInterface) {
+    if (!crc_ok(rest.first(size), orders_) && rest[1] == kEncapsulatedInterface) {
         // An object count that is too low: only silence tells the end (FRM-10).
         open = !silence;
-        if (!silence || !crc_ok(rest)) return std::nullopt;
+        if (!silence || !crc_ok(rest, orders_)) return std::nullopt;
         return answering(rest);
     }
     return answering(rest.first(size));
@@ -230,7 +240,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
 
 /// The PDU of this frame, when it is good and answers.
 std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
-    if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame)) return std::nullopt;
+    if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame, orders_)) return std::nullopt;
     const ByteView pdu = frame.subspan(1, frame.size() - kAduOverhead);
     if (!answers(request_, pdu)) return std::nullopt;
     return Bytes(pdu.begin(), pdu.end());
@@ -266,7 +276,7 @@ bool ReplyFramer::is_own_reply(ByteView damaged) const {
 }
 
 void ReplyFramer::classify(ByteView bytes) {
-    for (Unused& part : classify_heard(bytes, station_)) {
+    for (Unused& part : classify_heard(bytes, station_, orders_)) {
         if (part.kind == Unused::Kind::damaged && holds_start(part.bytes)) {
             damaged_ = true;
             damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
@@ -282,14 +292,15 @@ void ReplyFramer::classify(ByteView bytes) {
     }
 }
 
-std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station) {
+std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,
+                                   const CrcOrders& orders) {
     std::vector<Unused> parts;
     while (!bytes.empty()) {
         const std::size_t length = known_reply_length(bytes);
         const bool whole =
-            length >= kMinAdu && length <= bytes.size() && crc_ok(bytes.first(length));
-        const bool rest_is_frame =
-            !whole && bytes.size() >= kMinAdu && bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes);
+            length >= kMinAdu && length <= bytes.size() && crc_ok(bytes.first(length), orders);
+        const bool rest_is_frame = !whole && bytes.size() >= kMinAdu &&
+                                   bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes, orders);
         const std::size_t size = whole ? length : bytes.size();
         Unused part;
         part.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));

@@ -162,7 +162,9 @@ std::string describe(const PanelProfile& profile) {
         "stations: " + count(profile.first_station) + " to " + count(profile.last_station) + '\n';
     text += "serial: baud " + listed(profile.serial.baud, count) + "; parity " +
             listed(profile.serial.parity, parity) + "; stop bits " +
-            listed(profile.serial.stop_bits, count) + cited(profile.serial.source) + '\n';
+            listed(profile.serial.stop_bits, count) +
+            (profile.crc_order == modbus::CrcOrder::high_first ? "; CRC high byte first" : "") +
+            cited(profile.serial.source) + '\n';
     char gap[16] = {};
     std::snprintf(gap, sizeof gap, "%.1f", profile.timing.frame_gap_characters);
     text += std::string("frame gap: ") + gap + " characters";

@@ -290,6 +290,8 @@ std::optional<PanelProfile> load_profile(std::string_view text, std::string name
     profile.manual = in.required_text("manual").value_or("");
     if (const Node* stations = in.map("stations")) load_stations(*stations, profile, problems);
     if (const Node* serial = in.map("serial")) load_serial(*serial, profile.serial, problems);
+    profile.crc_order = in.choice<modbus::CrcOrder>("crc_order", modbus::kCrcOrders)
+                            .value_or(modbus::CrcOrder::low_first);
     load_functions(in, profile);
     load_areas(in, profile);
     if (const Node* timing = in.map("timing")) load_timing(*timing, profile.timing, problems);

@@ -24,11 +24,6 @@ unsigned standard_limit(std::uint8_t function) {
     }
 }
 
-bool reaches(const Area& area, modbus::Table table) {
-    return area.table == table ||
-           std::find(area.also.begin(), area.also.end(), table) != area.also.end();
-}
-
 }  // namespace
 
 const FunctionRule* PanelProfile::find_function(std::uint8_t code) const {
@@ -45,7 +40,7 @@ const Area* PanelProfile::find_area(std::string_view wanted) const {
 
 const Area* PanelProfile::find_area(modbus::Table table, std::uint32_t address) const {
     const auto found = std::find_if(areas.begin(), areas.end(), [&](const Area& area) {
-        return reaches(area, table) && area.readable.contains(address);
+        return area.reaches(table) && area.readable.contains(address);
     });
     return found == areas.end() ? nullptr : &*found;
 }

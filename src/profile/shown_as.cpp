@@ -12,8 +12,7 @@ constexpr std::uint32_t kBitsPerWord = 16;
 
 /// What of the items lies in the area, by whichever of its tables.
 std::optional<modbus::Span> part_in(const Area& area, const modbus::Span& items) {
-    if (items.table != area.table && std::ranges::count(area.also, items.table) == 0)
-        return std::nullopt;
+    if (!area.reaches(items.table)) return std::nullopt;
     const std::uint32_t first = std::max(items.first, area.readable.first);
     const std::uint32_t end = std::min(items.end(), area.readable.last + 1);
     if (first >= end) return std::nullopt;

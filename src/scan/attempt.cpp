@@ -59,8 +59,9 @@ Outcome Attempt::finish() const {
     Outcome outcome;
     Heard heard = take_apart(without_echo());
     for (Frame& frame : heard.frames) {
-        const bool ours =
-            frame.station == request_.station() && modbus::answers(request_.pdu(), frame.pdu);
+        const bool ours = frame.station == request_.station() &&
+                          frame.crc_order == request_.crc_order() &&
+                          modbus::answers(request_.pdu(), frame.pdu);
         if (!ours) {
             outcome.strays.push_back(std::move(frame));
         } else if (outcome.kind == Outcome::Kind::replied) {

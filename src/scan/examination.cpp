@@ -17,9 +17,11 @@ constexpr unsigned kSilentProbes = 2;
 Bytes first_question() { return modbus::encode_read(modbus::Table::holding_registers, 0, 1); }
 
 Examination::Examination(const profile::Catalogue& profiles, const Settings& settings,
-                         std::uint8_t station, const std::optional<SerialFormat>& format)
-    : settings_(settings), recogniser_(profiles, station, format) {
+                         std::uint8_t station, const std::optional<SerialFormat>& format,
+                         modbus::CrcOrder order)
+    : settings_(settings), recogniser_(profiles, station, format, order) {
     finding_.station = station;
+    finding_.crc_order = order;
 }
 
 /// Damage can be noise, or two panels that always speak together: more of the same tells.
@@ -50,7 +52,7 @@ std::optional<Ask> Examination::next() {
 
 /// Nothing when it is no read.
 std::optional<Ask> Examination::make_ask(const Bytes& pdu, Duration settle) const {
-    const auto request = ReadRequest::make(station(), pdu);
+    const auto request = ReadRequest::make(station(), pdu, finding_.crc_order);
     if (!request) return std::nullopt;
     return Ask{*request, {settings_.second_timeout, settle}};
 }
@@ -108,6 +110,7 @@ void Examination::on_outcome(const Outcome& outcome) {
 }
 
 bool Examination::on_stray(const Frame& frame) {
+    if (frame.crc_order != finding_.crc_order) return false;
     const bool late = owed_ > 0;
     if (!late && !modbus::answers(last_, frame.pdu) && !modbus::answers(before_last_, frame.pdu))
         return false;

@@ -5,6 +5,7 @@
 
 #include "attempt.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/scan/read_request.hpp"
 #include "panelgate/scan/result.hpp"
@@ -27,7 +28,7 @@ class Examination {
   public:
     /// `profiles` and `settings` outlive it. No `format`: a remote line.
     Examination(const profile::Catalogue& profiles, const Settings& settings, std::uint8_t station,
-                const std::optional<SerialFormat>& format);
+                const std::optional<SerialFormat>& format, modbus::CrcOrder order);
 
     std::uint8_t station() const { return finding_.station; }
     /// Nothing when all is known.

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::scan {
 
@@ -13,6 +14,7 @@ inline constexpr std::size_t kMaxHeard = 4096;
 struct Frame {
     std::uint8_t station = 0;
     Bytes pdu;
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
 };
 
 struct Heard {
@@ -20,8 +22,8 @@ struct Heard {
     std::size_t damaged = 0;  ///< bytes in no frame
 };
 
-/// Good frames, requests as well as replies, wherever they begin. Only functions of the standard:
-/// chance makes a frame of noise in less than one of 100 000 places.
+/// Good frames, requests as well as replies, wherever they begin, in either order of the CRC. Only
+/// functions of the standard: chance makes a frame of noise in less than one of 50 000 places.
 Heard take_apart(ByteView bytes);
 
 }  // namespace panelgate::scan

@@ -25,15 +25,22 @@ std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
 
 }  // namespace
 
-/// First pass, second pass of who will be silent, examination of who has answered.
+/// First pass, second pass and the other order of the CRC of who will be silent, examination of
+/// who has answered.
 Duration Scanner::State::asking_cost() const {
     const Duration wire = wire_time(format, modbus::kReadRequestAdu);
     const auto first = static_cast<std::int64_t>(first_pass.size());
     const auto second = static_cast<std::int64_t>(second_pass.size()) + first;
+    std::int64_t high_first = static_cast<std::int64_t>(high_first_pass.size());
+    for (const auto* pass : {&first_pass, &second_pass}) {
+        high_first += std::ranges::count_if(*pass, [this](std::uint8_t station) {
+            return may_be_high_first(profiles, station, known_format());
+        });
+    }
     const Duration examining = settings.repeats * (settings.settle + kProbe) + kProbes * kProbe;
     const auto open = static_cast<std::int64_t>(to_examine.size()) + (examination ? 1 : 0);
     return first * (settings.first_timeout + wire) + second * (settings.second_timeout + wire) +
-           open * examining;
+           high_first * (settings.first_timeout + wire) + open * examining;
 }
 
 std::string Scanner::State::activity() const {

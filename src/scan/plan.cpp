@@ -78,6 +78,15 @@ bool offers(const profile::PanelProfile& panel, const SerialFormat& format) {
            allows(panel.serial.stop_bits, format.stop_bits);
 }
 
+bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
+                       const std::optional<SerialFormat>& format) {
+    return std::ranges::any_of(profiles.all(), [&](const auto& entry) {
+        const profile::PanelProfile& panel = entry.second;
+        return panel.crc_order == modbus::CrcOrder::high_first && station >= panel.first_station &&
+               station <= panel.last_station && (!format || offers(panel, *format));
+    });
+}
+
 std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
                                           const std::vector<const profile::PanelProfile*>& panels) {
     for (const SerialFormat& format : likely_formats(profiles, {})) {
@@ -96,9 +105,21 @@ SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
             round < std::size(kRounds) ? std::min(kRounds[round], left) : left;
         for (const SerialFormat& format : formats) {
             for (std::size_t i = from; i < from + count; ++i)
-                cells_.push_back({format, stations[i]});
+                cells_.push_back({.format = format, .station = stations[i]});
         }
         from += count;
+    }
+}
+
+void SearchPlan::add_high_first(const profile::Catalogue& profiles, const Settings& settings,
+                                const std::vector<SerialFormat>& formats,
+                                const std::vector<std::uint8_t>& stations) {
+    for (const SerialFormat& format : formats) {
+        const auto known = settings.remote ? std::nullopt : std::optional(format);
+        for (const std::uint8_t station : stations) {
+            if (may_be_high_first(profiles, station, known))
+                cells_.push_back({format, station, modbus::CrcOrder::high_first});
+        }
     }
 }
 

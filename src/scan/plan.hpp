@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/scan/settings.hpp"
 
@@ -25,10 +26,16 @@ bool offers(const profile::PanelProfile& panel, const SerialFormat& format);
 std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
                                           const std::vector<const profile::PanelProfile*>& panels);
 
+/// A panel that sends and expects the CRC's high byte first could be here: a profile says so. No
+/// `format`: a remote line.
+bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
+                       const std::optional<SerialFormat>& format);
+
 /// One question while the format is unknown.
 struct Cell {
     SerialFormat format;
     std::uint8_t station = 0;
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
     friend bool operator==(const Cell&, const Cell&) = default;
 };
 
@@ -37,6 +44,10 @@ struct Cell {
 class SearchPlan {
   public:
     SearchPlan(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
+    /// When nobody has answered at all: where a panel may be that has the CRC's high byte first.
+    void add_high_first(const profile::Catalogue& profiles, const Settings& settings,
+                        const std::vector<SerialFormat>& formats,
+                        const std::vector<std::uint8_t>& stations);
 
     std::optional<Cell> next();
     /// The next one is in another format, or there is none.

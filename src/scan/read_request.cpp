@@ -5,12 +5,13 @@
 
 namespace panelgate::scan {
 
-std::optional<ReadRequest> ReadRequest::make(std::uint8_t station, ByteView pdu) {
+std::optional<ReadRequest> ReadRequest::make(std::uint8_t station, ByteView pdu,
+                                             modbus::CrcOrder order) {
     if (station == 0 || station > modbus::kMaxStation) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
     if (!request || !request->is_read()) return std::nullopt;
-    return ReadRequest(modbus::encode_adu(station, pdu));
+    return ReadRequest(modbus::encode_adu(station, pdu, order), order);
 }
 
 }  // namespace panelgate::scan

@@ -21,7 +21,8 @@ constexpr std::size_t kMostAsked = 24;
 constexpr std::uint32_t kLastAddress = 0xFFFF;
 
 bool may_be(const PanelProfile& profile, std::uint8_t station,
-            const std::optional<SerialFormat>& format) {
+            const std::optional<SerialFormat>& format, modbus::CrcOrder order) {
+    if (profile.crc_order != order) return false;
     if (station < profile.first_station || station > profile.last_station) return false;
     return !format || offers(profile, *format);
 }
@@ -79,11 +80,11 @@ bool is_data(const Bytes& reply) {
 }  // namespace
 
 Recogniser::Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
-                       const std::optional<SerialFormat>& format) {
+                       const std::optional<SerialFormat>& format, modbus::CrcOrder order) {
     for (const auto& [name, profile] : profiles.all()) {
         if (name == kGeneric) {
             generic_ = true;
-        } else if (may_be(profile, station, format)) {
+        } else if (may_be(profile, station, format, order)) {
             suspects_.push_back({&profile});
         }
     }

@@ -6,6 +6,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/scan/result.hpp"
 
@@ -16,10 +17,11 @@ namespace panelgate::scan {
 /// what tells most of those that are still possible apart, then confirms what is left.
 class Recogniser {
   public:
-    /// `profiles` outlive it. No `format`: a remote line. Profiles that do not have this address or
-    /// this format are not considered.
+    /// `profiles` outlive it. No `format`: a remote line. Profiles that do not have this address,
+    /// this format or this order of the CRC are not considered.
     Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
-               const std::optional<SerialFormat>& format);
+               const std::optional<SerialFormat>& format,
+               modbus::CrcOrder order = modbus::CrcOrder::low_first);
 
     /// The PDU to ask next; nothing when there is nothing more to learn. May be asked repeatedly.
     /// Only pure reads.

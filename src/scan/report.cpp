@@ -59,7 +59,9 @@ std::string profile_of(const StationFinding& finding) {
 }
 
 std::string evidence_of(const StationFinding& finding) {
-    const std::string odd = oddities(finding);
+    std::string odd = oddities(finding);
+    if (finding.crc_order == modbus::CrcOrder::high_first)
+        odd += std::string(odd.empty() ? "" : "; ") + "the CRC's high byte comes first";
     if (finding.candidates.empty()) return odd.empty() ? "answers, not looked at closer" : odd;
     const std::string& why = finding.candidates.front().why;
     return odd.empty() ? why : odd + "; " + why;
@@ -123,7 +125,10 @@ std::string yaml_station(const StationFinding& finding) {
         finding.candidates.empty() ? kUnknown : finding.candidates.front().profile;
     text += was_read(finding) ? "      - " : "      # - ";
     text += "{id: " + address(finding) + ", name: station-" + address(finding) +
-            ", profile: " + profile + '}';
+            ", profile: " + profile;
+    if (finding.crc_order == modbus::CrcOrder::high_first)
+        text += ", crc_order: " + std::string(label(finding.crc_order));
+    text += '}';
     if (finding.candidates.size() > 1) text += "  # or";
     for (std::size_t i = 1; i < finding.candidates.size(); ++i)
         text += ' ' + finding.candidates[i].profile;

@@ -24,6 +24,7 @@ Scanner::State::State(const profile::Catalogue& catalogue, Settings s, TimePoint
       started(now),
       format(formats.front()),
       not_before(now) {
+    plan.add_high_first(profiles, settings, formats, stations);
     if (!settings.remote) actions.emplace_back(SetFormat{format});
     result.remote = settings.remote;
     listen(now, settings.listen);
@@ -69,6 +70,7 @@ void Scanner::State::start_search(TimePoint now) {
     if (cell->format != format) return set_format(now, cell->format);  // asked when that is done
     const Duration patience =
         plan.is_last_of_format() ? settings.leave_timeout : settings.search_timeout;
+    orders.set(cell->station, cell->crc_order);
     ask(now, cell->station, patience, Purpose::search);
     cell.reset();
 }
@@ -92,18 +94,21 @@ void Scanner::State::start_asking(TimePoint now) {
     if (!first_pass.empty())
         return ask(now, take(first_pass), settings.first_timeout, Purpose::first_pass);
     if (!to_examine.empty()) {
-        examination =
-            std::make_unique<Examination>(profiles, settings, take(to_examine), known_format());
+        const std::uint8_t station = take(to_examine);
+        examination = std::make_unique<Examination>(profiles, settings, station, known_format(),
+                                                    orders.of(station));
         return;
     }
     if (!second_pass.empty())
         return ask(now, take(second_pass), settings.second_timeout, Purpose::second_pass);
+    if (!high_first_pass.empty())
+        return ask(now, take(high_first_pass), settings.first_timeout, Purpose::high_first_pass);
     result.ending = Result::Ending::finished;
     phase = Phase::done;
 }
 
 void Scanner::State::ask(TimePoint now, std::uint8_t station, Duration timeout, Purpose why) {
-    const auto request = ReadRequest::make(station, first_question());
+    const auto request = ReadRequest::make(station, first_question(), orders.of(station));
     if (request) transmit(now, {*request, {timeout, settings.quiet}}, why);
 }
 
@@ -147,9 +152,19 @@ void Scanner::State::on_outcome(std::uint8_t station, const Outcome& outcome) {
 
 /// Once more with patience, when everybody else was asked.
 void Scanner::State::ask_again_later(std::uint8_t station) {
-    if (phase != Phase::asking || answered.contains(station) || waited_for[station]) return;
+    if (phase != Phase::asking || answered.contains(station)) return;
+    if (waited_for[station]) return try_high_first(station);
     waited_for.set(station);
     second_pass.push_back(station);
+}
+
+/// It is silent to what all others understand.
+void Scanner::State::try_high_first(std::uint8_t station) {
+    if (orders.of(station) == modbus::CrcOrder::high_first ||
+        !may_be_high_first(profiles, station, known_format()))
+        return;
+    orders.set(station, modbus::CrcOrder::high_first);
+    high_first_pass.push_back(station);
 }
 
 /// Something answers. Two at one address are understood now and then; a wrong parity never.
@@ -162,7 +177,7 @@ void Scanner::State::on_damaged(std::uint8_t station, bool begun) {
         if (next.begun || next.late) found(station);
         ask_again_later(station);
     } else {
-        plan.hint({format, station});
+        plan.hint({.format = format, .station = station});
         append_new(result.damaged_formats, format);
     }
 }
@@ -183,6 +198,7 @@ void Scanner::State::on_stray(const Frame& frame) {
         return;
     }
     ++seen.late;
+    orders.set(frame.station, frame.crc_order);
     const auto waits = [&](const Again& other) { return other.station == frame.station; };
     if (std::ranges::none_of(again, waits)) again.push_front({frame.station, 0, true, false});
     if (phase == Phase::searching) settle();
@@ -193,8 +209,9 @@ void Scanner::State::settle() {
     phase = Phase::asking;
     for (const std::uint8_t station : stations) {
         const auto waits = [&](const Again& other) { return other.station == station; };
-        if (!answered.contains(station) && std::ranges::none_of(again, waits))
-            first_pass.push_back(station);
+        if (answered.contains(station) || std::ranges::any_of(again, waits)) continue;
+        orders.set(station, modbus::CrcOrder::low_first);
+        first_pass.push_back(station);
     }
 }
 
@@ -202,6 +219,7 @@ void Scanner::State::found(std::uint8_t station) {
     if (!answered.insert(station).second) return;
     to_examine.push_back(station);
     std::erase(second_pass, station);
+    std::erase(high_first_pass, station);
     if (phase == Phase::searching) settle();
 }
 

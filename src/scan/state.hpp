@@ -21,7 +21,14 @@ void note(Talk& talk, const Frame& frame);
 struct Scanner::State {
     enum class Phase : std::uint8_t { listening, searching, asking, done };
     /// Why the request on the wire was sent.
-    enum class Purpose : std::uint8_t { search, first_pass, second_pass, again, examine };
+    enum class Purpose : std::uint8_t {
+        search,
+        first_pass,
+        second_pass,
+        high_first_pass,
+        again,
+        examine,
+    };
     struct Again {
         std::uint8_t station = 0;
         unsigned tries = 0;
@@ -48,6 +55,7 @@ struct Scanner::State {
     void finish_attempt();
     void on_outcome(std::uint8_t station, const Outcome& outcome);
     void ask_again_later(std::uint8_t station);
+    void try_high_first(std::uint8_t station);
     void on_damaged(std::uint8_t station, bool begun);
     void on_stray(const Frame& frame);
     void settle();
@@ -85,6 +93,8 @@ struct Scanner::State {
     std::deque<Again> again;
     std::deque<std::uint8_t> first_pass;
     std::deque<std::uint8_t> second_pass;
+    std::deque<std::uint8_t> high_first_pass;  ///< silent otherwise, and a profile says how
+    modbus::CrcOrders orders;                  ///< in which each station is asked next
     std::deque<std::uint8_t> to_examine;
     std::unique_ptr<Examination> examination;
     Result result;

@@ -125,7 +125,7 @@ TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
 
 /// Empty when nobody answers: damage, a broadcast, an address that nobody has.
 Bytes SimulatedBus::State::reply_to(ByteView adu) {
-    if (!modbus::crc_ok(adu)) return {};
+    if (adu.size() < modbus::kMinAdu) return {};
     const ByteView pdu = adu.subspan(1, adu.size() - modbus::kAduOverhead);
     const TimePoint now = clock.now();
     const std::int64_t wall = rt::local_wall_seconds();
@@ -133,10 +133,13 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
     for (Station& station : stations) {
         const auto faults = settings.faults.find(station.id());
         const bool dead = faults != settings.faults.end() && faults->second.dead;
-        if (dead || station.minds_pause(longest_pause, settings.serial)) continue;
+        const modbus::CrcOrder order = settings.crc_orders.of(station.id());
+        if (dead || station.minds_pause(longest_pause, settings.serial) ||
+            !modbus::crc_ok(adu, order))
+            continue;
         if (adu[0] == 0) station.broadcast(now, wall, pdu);
         if (adu[0] == station.id())
-            answer = modbus::encode_adu(station.id(), station.handle(now, wall, pdu));
+            answer = modbus::encode_adu(station.id(), station.handle(now, wall, pdu), order);
     }
     return answer;
 }

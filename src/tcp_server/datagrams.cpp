@@ -1,7 +1,6 @@
 #include "datagrams.hpp"
 
 #include <algorithm>
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <iterator>
@@ -52,10 +51,11 @@ error_code Datagrams::open(const std::string& address, std::uint16_t port, bool 
         socket_.set_option(asio::ip::v6_only(ipv6_only), error);
     if (!error) socket_.non_blocking(true, error);
     if (!error) socket_.bind(endpoint, error);
-    error_code ignored;
     if (error) {
+        error_code ignored;
         socket_.close(ignored);
     } else {
+        ask_for_own_address(socket_);
         receive();
     }
     return error;
@@ -70,27 +70,27 @@ void Datagrams::receive() {
 
 void Datagrams::on_readable() {
     for (int i = 0; i < kDatagramsAtOnce && socket_.is_open(); ++i) {
-        Endpoint from;
-        error_code error;
-        const std::size_t size = socket_.receive_from(asio::buffer(input_), from, 0, error);
-        if (error == asio::error::would_block) break;
-        // Others are what the network says of earlier answers: their receiver is gone.
-        if (!error && !finishing_) take(from, ByteView(input_.data(), size));
+        bool failed = false;
+        const auto received = receive_datagram(socket_, input_, failed);
+        if (!received && !failed) break;
+        if (received && !finishing_) take(*received);
     }
     if (socket_.is_open()) receive();
 }
 
-void Datagrams::take(const Endpoint& from, ByteView datagram) {
+void Datagrams::take(const Received& received) {
+    const Endpoint& from = received.from;
     if (!allowed_.allows(from.address())) {
         return shared_->log(rt::LogLevel::info, "datagram refused",
                             {{"client", endpoint_text(from.address().to_string(), from.port())},
                              {"reason", "not in the allow list"}});
     }
-    auto adu = adu_of(datagram);
+    auto adu = adu_of(ByteView(input_).first(received.size));
     if (!adu) return drop();
     Peer* sender = peer(from);
     if (sender == nullptr || !sender->pipeline->has_room()) return drop();
     sender->heard = shared_->clock.now();
+    sender->asked = received.to;
     sender->pipeline->take(std::move(*adu));
     answer(from);
 }
@@ -145,14 +145,13 @@ bool Datagrams::forget_longest_idle(const asio::ip::address* address) {
     return true;
 }
 
-/// What the system does not take now is lost, as datagrams are.
 void Datagrams::answer(const Endpoint& to) {
     const auto found = peers_.find(to);
     if (found == peers_.end() || !socket_.is_open()) return;
     const std::shared_ptr<Pipeline> pipeline = found->second.pipeline;
+    const OwnAddress asked = found->second.asked;
     while (const Bytes* adu = pipeline->front()) {
-        error_code ignored;
-        socket_.send_to(asio::buffer(*adu), to, 0, ignored);
+        send_datagram(socket_, *adu, to, asked);
         pipeline->pop();
     }
     if (finishing_ && idle()) on_idle_();

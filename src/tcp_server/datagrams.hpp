@@ -10,7 +10,7 @@
 #include <map>
 #include <memory>
 
-#include "panelgate/base/bytes.hpp"
+#include "datagram_io.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/mbap.hpp"
 #include "panelgate/rt/access_list.hpp"
@@ -44,12 +44,13 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     struct Peer {
         std::shared_ptr<Pipeline> pipeline;
         TimePoint heard{};
+        OwnAddress asked{};  ///< which answers then
     };
     using Peers = std::map<Endpoint, Peer>;
 
     void receive();
     void on_readable();
-    void take(const Endpoint& from, ByteView datagram);
+    void take(const Received& received);
     Peer* peer(const Endpoint& from);
     bool make_room(const Endpoint& from);
     void forget_idle(TimePoint now);

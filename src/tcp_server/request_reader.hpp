@@ -37,6 +37,8 @@ class RequestReader {
     /// When time alone changes something: on_due() then, and next() may give more.
     virtual std::optional<TimePoint> due() const = 0;
     virtual void on_due(TimePoint now) = 0;
+    /// The client has said all: next() may give what only a silence would have ended.
+    virtual void on_end() {}
     /// Nobody reads what the client sends: how long it takes is not its fault. Until next().
     virtual void pause() = 0;
 };

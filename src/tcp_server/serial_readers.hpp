@@ -42,6 +42,7 @@ class RtuReader : public SerialReader {
     bool partial() const override { return framer_.partial(); }
     std::optional<TimePoint> due() const override;
     void on_due(TimePoint now) override;
+    void on_end() override { framer_.on_silence(); }
     void pause() override { begun_.reset(); }
 
   private:

@@ -141,6 +141,11 @@ void Session::forget_due() {
 /// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
 /// has left looks the same until it answers the first reply with a reset (P2).
 void Session::on_end_of_input() {
+    if (input_state_ == Input::served) {
+        reader_->on_end();
+        take_requests();
+        if (closed_) return;
+    }
     const bool cut_off = input_state_ == Input::served && reader_->partial();
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;

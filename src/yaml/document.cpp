@@ -56,6 +56,7 @@ class Builder final : public YAML::EventHandler {
         charge(mark_of(mark), {});
         Node node;
         node.mark = mark_of(mark);
+        node.comma = source_.byte(mark.line, mark.column) == ',';
         put(std::move(node), anchor);
     }
     void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -75,6 +76,9 @@ class Builder final : public YAML::EventHandler {
     void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   const std::string& value) override {
         check_tag(mark, tag);
+        if (tag == "!" && source_.byte(mark.line, mark.column) == '!')
+            problems_.add(mark_of(mark),
+                          "a '!' alone is no value; write one, or \"!\" for the text");
         charge(mark_of(mark), {1, value.size(), 0});
         Node node;
         node.kind = Node::Kind::scalar;
@@ -155,17 +159,24 @@ class Builder final : public YAML::EventHandler {
         }
         Open& level = stack_.back();
         if (level.node.kind == Node::Kind::sequence) {
-            level.node.items.push_back(std::move(node));
+            if (!is_comma(node)) level.node.items.push_back(std::move(node));
         } else if (!level.has_key) {
             put_key(level, node);
         } else {
             put_value(level, std::move(node));
         }
     }
+    /// Nothing, between two commas of [a,, b] and {a: 1,, b: 2}: a problem, and nothing else.
+    bool is_comma(const Node& node) {
+        if (node.kind != Node::Kind::null || !node.comma) return false;
+        problems_.add(node.mark, "a ',' too many; remove it");
+        return true;
+    }
     void put_key(Open& level, const Node& node) {
         level.pending = Entry{node.scalar, node.mark, {}};
         level.has_key = true;
         level.refused = true;
+        if (is_comma(node)) return;
         if (node.kind != Node::Kind::scalar) {
             const bool is_map = node.kind == Node::Kind::map;  // {{ NAME }}, most likely
             problems_.add(node.mark,
@@ -188,36 +199,32 @@ class Builder final : public YAML::EventHandler {
         return is_item && !level.node.entries.empty() && level.node.entries.front().key == key;
     }
     /// `scale: 0,1` inside brackets is a key with a value, and a key.
-    bool is_decimal_comma(const Open& level, const Node& value) const {
+    static bool is_decimal_comma(const Open& level, const Node& value) {
         if (value.kind != Node::Kind::null || level.node.entries.empty()) return false;
+        constexpr std::string_view kNumber = "-0123456789,";
         const Node& before = level.node.entries.back().value;
-        const Mark key = level.pending.mark;
-        const auto is_number = [](const std::string& text, std::string_view letters) {
-            return !text.empty() && text.find_first_not_of(letters) == std::string::npos;
-        };
-        return is_number(before.scalar, "-0123456789") &&
-               is_number(level.pending.key, "0123456789") && before.mark.line == key.line &&
-               before.mark.column + static_cast<int>(before.scalar.size()) + 1 == key.column;
+        const Entry& key = level.pending;
+        const bool number =
+            !before.scalar.empty() && before.scalar.find_first_not_of(kNumber) == std::string::npos;
+        return number && !key.key.empty() && key.key[0] >= '0' && key.key[0] <= '9' &&
+               before.mark.line == key.mark.line &&
+               before.mark.column + static_cast<int>(before.scalar.size()) + 1 == key.mark.column;
     }
     void put_value(Open& level, Node node) {
         level.has_key = false;
         if (level.refused) return;
         if (is_decimal_comma(level, node)) {
             Node& number = level.node.entries.back().value;
-            const std::string comma = number.scalar + ',' + level.pending.key;
-            const bool thousands = level.pending.key.size() == 3;
-            const std::string fraction = number.scalar + '.' + level.pending.key;
-            const std::string whole = number.scalar + level.pending.key;
-            problems_.add(number.mark,
-                          quote(comma) + " is two values here; write " +
-                              (thousands ? whole + ", or " + fraction : fraction) +
-                              (thousands ? " for a fraction" : ", with a decimal point"));
-            number.scalar = thousands ? whole : fraction;
+            number.scalar += ',' + level.pending.key;
+            number.comma = true;
             return;
         }
         Entry entry = std::move(level.pending);
         // An empty value is marked at the next token, maybe lines below.
-        if (node.kind == Node::Kind::null) node.mark = entry.mark;
+        if (node.kind == Node::Kind::null) {
+            node.mark = entry.mark;
+            node.comma = false;
+        }
         entry.value = std::move(node);
         level.node.entries.push_back(std::move(entry));
     }
@@ -268,9 +275,10 @@ const Token* too_deep(const Scanned& scanned) {
 }
 
 /// False when yaml-cpp refused the text: why is added to `problems`, what else is wrong to `found`.
-bool build(const Source& source, Builder& builder, Problems& problems, Problems& found) {
+bool build(const Scanned& scanned, Builder& builder, Problems& problems, Problems& found) {
+    const Source& source = scanned.source;
     try {
-        std::istringstream in{mask_variables(source.text())};
+        std::istringstream in{without_idle_tabs(scanned, mask_variables(source.text()))};
         YAML::Parser parser(in);
         return !parser.HandleNextDocument(builder) || refuse_second_document(parser, source, found);
     } catch (const TooLarge& reason) {
@@ -303,7 +311,7 @@ Node parse(std::string_view text, Problems& problems) {
     Problems found(problems.file());
     Builder builder(source, found);
     Problems refusal(problems.file());
-    const bool built = build(source, builder, refusal, found);
+    const bool built = build(scanned, builder, refusal, found);
     const Findings traps = built ? find_traps(scanned) : Findings();
     add(source, traps, problems);
     if (!traps.empty()) return {};  // what could be read is not what was meant

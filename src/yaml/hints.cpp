@@ -152,6 +152,23 @@ std::optional<std::string> calculated(std::string_view text) {
 
 std::string write(std::string_view text) { return "; write " + std::string(text); }
 
+/// 20,21 where one is wanted, and 1,234, which may be a fraction.
+std::string comma_hint(std::string_view text, bool whole) {
+    const std::size_t comma = text.find(',');
+    if (comma == text.npos || comma == 0 || text.find_first_not_of("-0123456789,") != text.npos)
+        return "";
+    const std::string first(text.substr(0, comma));
+    const std::string second(text.substr(comma + 1));
+    if (second.empty()) return "";
+    if (second.find(',') != second.npos) return whole ? "; one number is wanted, not a list" : "";
+    if (!whole) {
+        const std::string fraction = first + '.' + second;
+        return is_group(second) ? write(first + second + ", or " + fraction + " for a fraction")
+                                : "";
+    }
+    return is_group(second) ? "" : "; one number is wanted: write " + first + " or " + second;
+}
+
 /// Shares are numbers from 0 to 1.
 std::string percent_hint(std::string_view text) {
     double value = 0;
@@ -184,6 +201,7 @@ std::string number_hint(std::string_view text, bool whole) {
     if (text.ends_with('%')) return whole ? "" : percent_hint(text);
     for (const std::string_view minus : {"\u2212", "\u2013"})
         if (text.starts_with(minus)) return write('-' + std::string(text.substr(minus.size())));
+    if (std::string hint = comma_hint(text, whole); !hint.empty()) return hint;
     auto meant = hexadecimal(text);
     if (!meant && !whole) meant = calculated(text);
     if (!meant && whole) meant = kilo(text);
@@ -228,6 +246,14 @@ std::string none_hint(std::string_view key, std::string_view example, const Node
     const bool says_none = std::ranges::find(kNone, node.scalar) != kNone.end();
     if (!says_none || example.find("off") != example.npos) return "";
     return "; leave " + std::string(key) + " out for none";
+}
+
+std::string number_blank_hint(std::string_view key) {
+    const std::size_t colon = std::min(key.find(':'), key.size());
+    if (!parse_integer(key.substr(0, colon)) || colon + 1 >= key.size()) return "";
+    const std::string number(key.substr(0, colon + 1));
+    return "; a blank is missing after '" + number + "'" +
+           write(number + ' ' + std::string(key.substr(colon + 1)));
 }
 
 std::string blank_hint(std::string_view text) {

@@ -25,7 +25,8 @@ std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
     const Token& line = text.tokens[token];
     const std::string_view word = text.text(line);
     if (line.kind != Kind::plain) return std::nullopt;
-    if (word.starts_with("//") || word.starts_with("/*") || word.starts_with(';'))
+    if (word.starts_with("//") || word.starts_with("/*") || word.starts_with(';') ||
+        word.starts_with("-- "))
         return Finding{line.begin, "a comment begins with '#'"};
     const std::size_t end = std::min(word.find_first_of(":= \t\xEF"), word.size());
     const std::string_view key = word.substr(0, end);

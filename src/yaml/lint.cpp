@@ -31,6 +31,9 @@ Findings run(const Scanned& text, std::span<const Find> finds) {
     return all;
 }
 
+/// The signs of a patch disturb all that stands around them: they are told alone.
+constexpr std::array<Find, 1> kPatches{find_patches};
+
 }  // namespace
 
 std::string_view Scanned::rest(std::size_t token) const {
@@ -40,14 +43,16 @@ std::string_view Scanned::rest(std::size_t token) const {
 }
 
 Findings find_traps(const Scanned& text) {
-    static constexpr std::array<Find, 4> kFinds{find_odd_blanks, find_odd_dashes, find_open_quotes,
-                                                find_typeset_quotes};
+    if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
+    static constexpr std::array<Find, 5> kFinds{find_odd_blanks, find_odd_dashes, find_open_quotes,
+                                                find_typeset_quotes, find_directives};
     return run(text, kFinds);
 }
 
 Findings find_causes(const Scanned& text) {
-    static constexpr std::array<Find, 8> kFinds{
-        find_odd_blanks, find_odd_dashes, find_open_quotes, find_typeset_quotes,
+    if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
+    static constexpr std::array<Find, 9> kFinds{
+        find_odd_blanks, find_odd_dashes, find_open_quotes, find_typeset_quotes, find_directives,
         find_quote_ends, find_brackets,   find_odd_starts,  find_columns};
     return run(text, kFinds);
 }

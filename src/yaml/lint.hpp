@@ -49,13 +49,19 @@ bool is_oddly_indented(const Scanned& text, const Token& first);
 /// Empty when it is no address.
 std::string address_hint(std::string_view word, std::string_view all);
 
+/// `bytes`, which differ from the text in no offset, with blanks for the tabs of lines that hold
+/// nothing, or a comment alone: those indent nothing.
+std::string without_idle_tabs(const Scanned& text, std::string bytes);
+
 // One kind of mistake each, in the order of the text.
+void find_patches(const Scanned& text, Findings& findings);
 void find_open_quotes(const Scanned& text, Findings& findings);
 void find_odd_blanks(const Scanned& text, Findings& findings);
 void find_odd_dashes(const Scanned& text, Findings& findings);
 void find_typeset_quotes(const Scanned& text, Findings& findings);
 void find_quote_ends(const Scanned& text, Findings& findings);
 void find_brackets(const Scanned& text, Findings& findings);
+void find_directives(const Scanned& text, Findings& findings);
 void find_odd_starts(const Scanned& text, Findings& findings);
 void find_columns(const Scanned& text, Findings& findings);
 

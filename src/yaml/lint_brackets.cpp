@@ -46,8 +46,35 @@ std::size_t open_variable(const Scanned& text, const Token& bracket) {
     return closed ? line.npos : bracket.begin + dollar;
 }
 
+/// A '#' on a line of the bracket that hides what would close it: its offset.
+std::size_t hiding_comment(const Scanned& text, std::size_t open) {
+    const char end = text.text(text.tokens[open]) == "[" ? ']' : '}';
+    constexpr std::size_t kFar = 200;  // tokens
+    const std::size_t last = std::min(open + kFar, text.tokens.size());
+    for (std::size_t i = open; i < last; ++i) {
+        if (i > open && text.tokens[i].depth <= text.tokens[open].depth) break;
+        if (text.follows(i + 1)) continue;
+        const std::size_t from = text.tokens[i].end;
+        std::string_view rest = text.source.text().substr(from);
+        rest = rest.substr(0, rest.find('\n'));
+        const std::size_t sign = rest.find('#');
+        if (sign != rest.npos && rest.find(end, sign) != rest.npos) return from + sign;
+    }
+    return std::string_view::npos;
+}
+
 void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
     const Token& token = text.tokens[i];
+    const std::size_t comment =
+        token.state == State::unclosed ? hiding_comment(text, i) : std::string_view::npos;
+    if (comment != std::string_view::npos) {
+        const std::string end = text.text(token) == "[" ? "']'" : "'}'";
+        findings.push_back({comment, "this '#' begins a comment, which hides the " + end +
+                                         " behind it; put a text that begins with '#' in quotes, "
+                                         "or a comment behind the " +
+                                         end});
+        return;
+    }
     const std::size_t dollar =
         token.state == State::unclosed ? open_variable(text, token) : std::string_view::npos;
     if (dollar != std::string_view::npos) {
@@ -74,8 +101,22 @@ struct Pair {
     bool colon = false;    ///< since the last comma
 };
 
+/// The key stands on a line of its own: nothing ends the value before it.
+bool find_comma_of_line(const Scanned& text, const Token& key, const Token& value,
+                        Findings& findings) {
+    const bool ends =
+        value.kind == Kind::plain || value.kind == Kind::quoted || value.kind == Kind::close;
+    if (!key.first || !ends) return false;
+    findings.push_back(
+        {value.end, "a ',' is missing behind " + (value.kind == Kind::close
+                                                      ? '\'' + std::string(text.text(value)) + '\''
+                                                      : quote(text.text(value)))});
+    return true;
+}
+
 void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
     const Token& before = text.tokens[colon - 1];
+    if (colon > 1 && find_comma_of_line(text, before, text.tokens[colon - 2], findings)) return;
     const std::string_view word = text.text(before);
     const std::size_t blank = word.find_last_of(" \t");
     if (before.kind == Kind::plain && blank == word.npos) {

@@ -55,7 +55,7 @@ bool find_copied(const Token& token, std::string_view word, Findings& findings) 
         findings.push_back({token.begin, "'&nbsp;' is a blank of a web page; type blanks"});
     } else if (!token.first) {
         return false;
-    } else if (begins("//") || begins("/*")) {
+    } else if (begins("//") || begins("/*") || begins("-- ")) {
         findings.push_back({token.begin, "a comment begins with '#'"});
     } else if (begins("```") || begins("$ ") || begins("cat >") || begins("cat <") ||
                begins("sudo ") || word == "EOF") {
@@ -106,6 +106,15 @@ void find_odd_dashes(const Scanned& text, Findings& findings) {
             {token.begin, sign_of(text.text(token)) +
                               " begins no item; type a '-' of the keyboard in its place"});
     }
+}
+
+void find_directives(const Scanned& text, Findings& findings) {
+    if (text.tokens.empty() || text.tokens.front().kind == Kind::document) return;
+    const std::string_view head = text.source.text().substr(0, text.tokens.front().begin);
+    const std::size_t sign = head.starts_with('%') ? 0 : head.find("\n%");
+    if (sign == head.npos) return;
+    findings.push_back({sign + (sign == 0 ? 0 : 1),
+                        "a '---' is missing below this directive; write it, or remove this line"});
 }
 
 void find_odd_starts(const Scanned& text, Findings& findings) {

@@ -8,6 +8,7 @@
 #include "hints.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/yaml/quote.hpp"
+#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
 namespace {
@@ -43,6 +44,10 @@ std::string list_hint(const Node& node, std::string_view example) {
     if (node.kind == Node::Kind::map) return "; begin each item with '- '";
     if (std::string text = text_hint(node, '['); !text.empty() || !example.empty()) return text;
     return "; write [" + std::string(clip(node.scalar, 40)) + "], or '- ' before each item";
+}
+
+std::string two_values(const Node& node) {
+    return quote(node.scalar) + " is two values in { }; put a text that holds a ',' in quotes";
 }
 
 /// Nobody counts 1440 minutes.
@@ -111,8 +116,8 @@ const Node* MapReader::scalar(std::string_view key, std::string_view wanted) {
 std::optional<std::string> MapReader::text(std::string_view key) {
     const Node* node = scalar(key, "a text");
     if (node == nullptr) return std::nullopt;
-    if (node->scalar.empty()) {
-        problem(key, std::string(key) + " must not be empty");
+    if (node->scalar.empty() || node->comma) {
+        problem(key, node->comma ? two_values(*node) : std::string(key) + " must not be empty");
         return std::nullopt;
     }
     return node->scalar;
@@ -188,7 +193,8 @@ std::optional<Duration> MapReader::duration(std::string_view key, Duration min, 
 }
 
 std::optional<std::size_t> MapReader::choice_index(std::string_view key,
-                                                   std::span<const std::string_view> words) {
+                                                   std::span<const std::string_view> words,
+                                                   const Hint& hint) {
     const Node* node = scalar(key, join(words));
     if (node == nullptr) return std::nullopt;
     for (std::size_t i = 0; i < words.size(); ++i) {
@@ -196,7 +202,8 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
     }
     const std::string near = nearest(node->scalar, words);
     problem(key, wrong(key, join(words), *node) +
-                     (near.empty() ? "" : "; did you mean '" + near + "'?"));
+                     (near.empty() ? "" : "; did you mean '" + near + "'?") +
+                     (hint ? hint(node->scalar) : ""));
     return std::nullopt;
 }
 
@@ -249,10 +256,14 @@ const Entry* MapReader::shallow_parent(std::size_t entry) const {
     return nullptr;
 }
 
+std::string MapReader::is_unknown(std::string_view key) const {
+    return "unknown key " + quote(key) + " in " + what_;
+}
+
 std::string MapReader::unknown(std::size_t entry) const {
     const std::string& key = node_->entries[entry].key;
     const std::vector<std::string_view> known(known_.begin(), known_.end());
-    const std::string message = "unknown key " + quote(key) + " in " + what_;
+    const std::string message = is_unknown(key);
     const std::string blank = blank_hint(key);
     if (!blank.empty()) return message + blank;
     if (const Entry* parent = shallow_parent(entry))
@@ -275,22 +286,34 @@ std::string MapReader::place_of(const Entry& entry, bool exactly) const {
         const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
         if (entry.key != place.key && !near) continue;
         const std::string key(place.key);
+        if (!place.instead.empty()) return "; " + std::string(place.instead);
         if (place.map.empty())
             return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
                    std::string(place.owner) + (near ? "?" : "");
         const Node& value = entry.value;
-        const std::string shown =
-            value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
+        std::string shown = nearest(value.scalar, place.words);
+        if (shown.empty())
+            shown = value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
         return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
     }
     return "";
 }
 
+void MapReader::refuse(std::string_view key, const std::string& why) {
+    for (const Entry& entry : node_->entries) {
+        if (entry.key == key) problems_->add(entry.value.mark, std::string(key) + ' ' + why);
+    }
+    refused_.push_back(key);
+}
+
 void MapReader::finish() {
+    std::size_t told = 0;
     for (std::size_t i = 0; i < node_->entries.size(); ++i) {
         const Entry& entry = node_->entries[i];
-        if (std::ranges::find(known_, entry.key) == known_.end())
-            problems_->add(entry.mark, unknown(i));
+        if (std::ranges::find(refused_, entry.key) != refused_.end()) continue;
+        if (std::ranges::find(known_, entry.key) != known_.end()) continue;
+        // Nobody reads more of them, and what was meant takes a while to find.
+        problems_->add(entry.mark, ++told > kMaxTold ? is_unknown(entry.key) : unknown(i));
     }
 }
 

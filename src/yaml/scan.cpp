@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <string>
 #include <utility>
 
 #include "panelgate/yaml/settings.hpp"
@@ -74,6 +75,7 @@ class Scanner {
         const bool marker = at_ == line_ && blank(3) &&
                             (text_.substr(at_, 3) == "---" || text_.substr(at_, 3) == "...");
         if (marker) return add(Kind::document, at_ + 3);
+        if (is_conflict()) return add(Kind::plain, content_end());
         if (c == '-' && blank(1)) return add_parent(Kind::dash, 1);
         if (const std::size_t dash = odd_dash()) return add_parent(Kind::dash, dash);
         if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || behind_quote()))))
@@ -84,6 +86,20 @@ class Scanner {
         if (c == '"' || c == '\'') return quoted(c);
         if ((c == '|' || c == '>') && !inside) return block();
         word(c);
+    }
+
+    /// <<<<<<<, |||||||, ======= or >>>>>>> of a merge.
+    bool is_conflict() const {
+        constexpr std::size_t kLength = 7;
+        const char c = peek();
+        return at_ == line_ && std::string_view("<|=>").find(c) != std::string_view::npos &&
+               text_.substr(at_, kLength) == std::string(kLength, c) && blank(kLength);
+    }
+    /// Of the line, without the blanks at its end.
+    std::size_t content_end() const {
+        std::size_t end = line_end(at_);
+        while (end > at_ && is_space(text_[end - 1])) --end;
+        return end;
     }
 
     void word(char c) {
@@ -166,7 +182,7 @@ class Scanner {
     /// A line that can only go on where the brackets should have ended: an item, or a key no deeper
     /// than the line that opened them.
     bool ends_brackets() const {
-        if (peek() == '-' && blank(1)) return true;
+        if ((peek() == '-' && blank(1)) || is_conflict()) return true;
         const std::size_t indent = at_ - line_;
         if (indent > outermost_) return false;
         const std::size_t end = text_.find_first_of(":\n,[]{}\"'", at_);

@@ -81,6 +81,13 @@ std::string_view Source::line(int number) const {
     return line;
 }
 
+char Source::byte(int line, int column) const {
+    if (line < 0 || static_cast<std::size_t>(line) >= lines_.size()) return '\n';
+    const std::size_t at =
+        lines_[static_cast<std::size_t>(line)] + static_cast<std::size_t>(column);
+    return at < text_.size() ? text_[at] : '\n';
+}
+
 std::string Source::excerpt(Mark mark) const {
     constexpr std::size_t kBefore = 70;
     constexpr std::size_t kShown = 100;

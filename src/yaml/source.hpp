@@ -21,6 +21,8 @@ class Source {
     Mark mark(int line, int column) const;
     /// Without its end; empty when there is none of that number (from 1).
     std::string_view line(int number) const;
+    /// At a place as yaml-cpp tells it; '\n' behind the end.
+    char byte(int line, int column) const;
     /// The line and a `^` below the column, each ended by '\n'; a long line is cut around it.
     std::string excerpt(Mark mark) const;
 

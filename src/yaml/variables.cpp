@@ -58,10 +58,25 @@ class Expansion {
                 to += value_of(node, rest.substr(0, end == rest.npos ? end : end + 1));
                 at = end == rest.npos ? from.size() : at + end + 1;
             } else {
+                if (rest[0] == '$' && (at == 0 || !is_variable_name(from.substr(at - 1, 1))))
+                    refuse_unbraced(node, rest.substr(1));
                 to += from[at++];
             }
         }
         return to;
+    }
+
+    /// $NAME and $(NAME), as shells and makefiles have them; a letter alone is a currency.
+    void refuse_unbraced(const Node& node, std::string_view behind) {
+        const bool bracket = behind.starts_with('(');
+        if (bracket) behind.remove_prefix(1);
+        std::size_t end = 0;
+        while (end < behind.size() && is_variable_name(behind.substr(0, end + 1))) ++end;
+        if (end < 2 || (bracket && !behind.substr(end).starts_with(')'))) return;
+        const std::string name(behind.substr(0, end));
+        const std::string typed = bracket ? "$(" + name + ')' : '$' + name;
+        problems_.add(node.mark, '\'' + typed + "' is no variable here; write ${" + name +
+                                     "}, or $" + typed + " for the text itself");
     }
 
     /// `typed`: with dollar and braces. What it cannot be stays as it is.

@@ -8,11 +8,15 @@ using namespace panelgate;
 using namespace panelgate::modbus;
 
 /// Whatever is heard, in whatever pieces: what is accepted answers the request, and no byte is
-/// accounted for twice. The first byte chooses the size of the pieces, 0 among them is a silence.
+/// accounted for twice. The first byte chooses the size of the pieces and who has which order of
+/// the CRC, 0 among them is a silence.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     const Bytes request{0x03, 0x00, 0x6B, 0x00, 0x03};
-    ReplyFramer framer(0x11, request);
     if (size == 0) return 0;
+    CrcOrders orders;
+    if ((data[0] & 0x80) != 0) orders.set(0x11, CrcOrder::high_first);
+    if ((data[0] & 0x40) != 0) orders.set(0x12, CrcOrder::high_first);
+    ReplyFramer framer(0x11, request, orders);
     const std::size_t piece = data[0] % 16u + 1;
     ByteView heard(data + 1, size - 1);
     std::size_t accepted = 0;

@@ -50,7 +50,7 @@ void Panel::reboot() {
 void Panel::hear(ByteView adu, std::uint64_t connection) {
     constexpr std::size_t kRing = 4;
     const ByteView pdu = adu.subspan(1, adu.size() - 3);
-    if (is_dead()) return;
+    if (is_dead() || !modbus::crc_ok(adu, plan_.crc_order)) return;
     if (adu[0] == 0) {
         write(pdu);
         if (plan_.answers_broadcasts) answer_broadcast(pdu, connection);
@@ -64,7 +64,7 @@ void Panel::hear(ByteView adu, std::uint64_t connection) {
 
 void Panel::answer_broadcast(ByteView pdu, std::uint64_t connection) {
     Said said;
-    said.bytes = modbus::encode_adu(plan_.id, pdu.first(5));
+    said.bytes = modbus::encode_adu(plan_.id, pdu.first(5), plan_.crc_order);
     said.rate = plan_.own_rate;
     said.connection = connection;
     agenda_.at(agenda_.now() + random_.between(500us, Duration(8ms)),

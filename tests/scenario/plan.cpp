@@ -188,6 +188,17 @@ bool is_of_sound_panels(Kind kind) {
            kind == Kind::flood || kind == Kind::mass || kind == Kind::writers;
 }
 
+/// Every other panel has old firmware.
+void mix_crc_orders(Plan& plan) {
+    for (std::size_t i = 0; i < plan.panels.size(); i += 2) {
+        PanelPlan& panel = plan.panels[i];
+        const auto listed =
+            std::ranges::find(plan.settings.stations, panel.id, &arbiter::StationSettings::id);
+        if (listed == plan.settings.stations.end()) continue;
+        panel.crc_order = listed->crc_order = modbus::CrcOrder::high_first;
+    }
+}
+
 }  // namespace
 
 Plan draw(Kind kind, std::uint64_t seed) {
@@ -200,6 +211,7 @@ Plan draw(Kind kind, std::uint64_t seed) {
     } else {
         draw_faulty(random, plan, kind);
     }
+    if (seed % 4 == 3) mix_crc_orders(plan);
     return plan;
 }
 

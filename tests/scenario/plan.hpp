@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::scenario {
 
@@ -12,6 +13,8 @@ namespace panelgate::scenario {
 struct PanelPlan {
     std::uint8_t id = 1;
     bool listed = true;  ///< the settings know it
+    /// Of what it says and of what it takes for a good frame.
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
     // When it answers
     Duration think = 1ms;
     Duration slow_think{};  ///< what it needs in every other `swing`; 0 = always `think`

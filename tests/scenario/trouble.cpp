@@ -55,7 +55,7 @@ void Trouble::babble() {
     const auto coils = static_cast<std::uint8_t>(random_.between(1, 8));
     Bytes pdu{1, coils};
     pdu.resize(2u + coils, 0x55);
-    said.bytes = modbus::encode_adu(id, pdu);
+    said.bytes = modbus::encode_adu(id, pdu, plan_.panels.back().crc_order);
     said.connection = wire_.connection();
     wire_.say(std::move(said));
     agenda_.at(agenda_.now() + plan_.line.babble, [this] { babble(); });

@@ -27,7 +27,7 @@ std::uint8_t Voice::glitch() { return random_.chance(0.5) ? 0x00 : 0xFF; }
 
 std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
     std::vector<Utterance> all;
-    const Bytes good = modbus::encode_adu(plan_.id, reply_pdu);
+    const Bytes good = modbus::encode_adu(plan_.id, reply_pdu, plan_.crc_order);
     add_preface(all, reply_pdu, spare);
     // Behind a piece that could be this reply, the reply is a frame of its own.
     const bool first = all.empty() || all.back().said.answer_to == 0;
@@ -38,7 +38,7 @@ std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
 
 /// What goes before the reply. It has to end in time: see `spare`.
 void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duration spare) {
-    const Bytes good = modbus::encode_adu(plan_.id, reply);
+    const Bytes good = modbus::encode_adu(plan_.id, reply, plan_.crc_order);
     const Duration frame = time_of(good.size());
     if (random_.chance(plan_.fragment)) {
         const Duration pause = random_.between(1ms, 30ms);
@@ -78,7 +78,7 @@ Said Voice::main_part(const Bytes& reply, const Bytes& good) {
         longer.insert(longer.end(), {0, 0});
         if (random_.chance(0.5) && reply[0] < 5)
             longer[1] = static_cast<std::uint8_t>(longer[1] + 2);
-        frame = modbus::encode_adu(plan_.id, longer);
+        frame = modbus::encode_adu(plan_.id, longer, plan_.crc_order);
         whole = damaged = false;
     }
     Said s = said({});

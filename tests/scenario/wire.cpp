@@ -140,8 +140,10 @@ void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
     const std::size_t begin = answer ? frame.answer_from : 0;
     const std::size_t end = answer ? frame.answer_to : frame.bytes.size();
     const bool last = end > from && end <= to && end - begin > 3;
-    if (last && modbus::crc_ok(ByteView(frame.bytes).subspan(begin, end - begin)))
-        frame.bytes[end - 1] ^= 1;
+    const ByteView said = ByteView(frame.bytes).subspan(begin, last ? end - begin : 0);
+    for (const auto& [word, order] : modbus::kCrcOrders) {
+        if (modbus::crc_ok(said, order)) frame.bytes[end - 1] ^= 1;
+    }
 }
 
 void Wire::arrive(Held held) {

@@ -90,7 +90,7 @@ class BusScript {
     /// request has left then.
     void hear_reply(std::uint8_t station, ByteView pdu) {
         if (!settings_.paced) sent_until_ = std::min(sent_until_, now_);
-        hear(modbus::encode_adu(station, pdu));
+        hear(modbus::encode_adu(station, pdu, arbiter::crc_orders(settings_).of(station)));
     }
     /// Bytes arrive one by one from now on, at the line's pace.
     void hear_paced(ByteView bytes) {

@@ -56,6 +56,31 @@ class CommandLine(unittest.TestCase):
                       self.expect(USAGE, "check", "x.yaml").stderr)
         self.assertIn("a command is missing before '-c'", self.expect(USAGE, "-c", "x").stderr)
 
+    def test_what_a_command_lacks_is_told_by_name(self):
+        for typed, told in (("check --format xml", "--format must be text or json, not 'xml'"),
+                            ("check --format", "--format needs a value behind it"),
+                            ("check -c a -c b", "--config may be given once"),
+                            ("scan", "DEVICE is missing"),
+                            ("address autonics-gplp-s", "NOTATION is missing"),
+                            ("run --simulate=x", "an option that takes no value was given one"),
+                            ("run -- x", "nothing is to stand behind '--'")):
+            command = typed.split()[0]
+            self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
+                             f"panelgate: {command}: {told}; `panelgate help {command}` says what "
+                             "it takes\n")
+
+    def test_a_service_whose_stdout_is_closed_runs_and_ends_like_any_other(self):
+        start = 'exec "$0" demo --http 127.0.0.1:0 --modbus 127.0.0.1:0 >&-'
+        with subprocess.Popen(["sh", "-c", start, harness.PANELGATE], stderr=subprocess.PIPE,
+                              text=True) as program:
+            for text in program.stderr:
+                if "listening http=" in text:
+                    break
+            program.terminate()
+            told = program.stderr.read()
+        self.assertEqual(program.returncode, 0, told)
+        self.assertNotIn("stdout", told)
+
     def test_version_and_help_are_commands_too(self):
         version = self.expect(0, "--version").stdout
         for asked in (["version"], ["-V"]):
@@ -157,7 +182,8 @@ class Files(unittest.TestCase):
               points: [{name: level, at: UW100, writable: true, min: 1, max: 2.5, unit: m}]},
               {id: 20, name: oven, profile: panasonic-gt, access: read_only}""",
                         unlisted_stations="refuse"),
-            modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, allow: [10.0.0.0/8]",
+            modbus="listen: 127.0.0.1:502, units: {101: floor1/press}, broadcast: deny, "
+                   "allow: [10.0.0.0/8]",
             http="listen: 127.0.0.1:8080, anonymous: none, hosts: [a.example], allow: ['::1']",
             relays="[{from: oven/GDT0, to: press/UW200, every: 3s, on_change: true}]"))
         text = run("check", "-c", str(self.file)).stdout
@@ -165,19 +191,27 @@ class Files(unittest.TestCase):
                       "station 20 oven, panasonic-gt, read only",
                       "point level: UW100, u16, every 1s, in m, writable from 1 to 2.5",
                       "poll UW0, count 32, every 5s", "other stations: refused",
+                      "clients: every request is answered within 2s, so their timeout has to be "
+                      "longer; for 500ms set queue: {deadline: 450ms}",
                       "relay oven/GDT0 to press/UW200: count 1, every 3s, on change",
                       "modbus_tcp 127.0.0.1:502: floor1, read and write, for 10.0.0.0/8",
-                      "unit 101 is floor1/31",
+                      "unit 101 is floor1/31", "unit 255 is the gateway itself",
+                      "broadcasts are refused",
                       "http 127.0.0.1:8080: without a token nothing, for ::1/128, as a.example"):
             self.assertIn(shown, text)
         plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
         [line] = plan["lines"]
         self.assertEqual(line["polls"], [{"station": "press", "read": "UW0", "count": 32,
                                           "every_ms": 5000}])
+        clients = line["clients"]
+        self.assertEqual((clients["answered_within_ms"], clients["within_500_ms"]["deadline_ms"]),
+                         (2000, 450))
         self.assertEqual([s["access"] for s in line["stations"]], ["read_write", "read_only"])
         self.assertEqual(line["stations"][0]["points"][0]["name"], "level")
         self.assertEqual(plan["relays"][0]["to"], "press/UW200")
         self.assertEqual(plan["modbus_tcp"][0]["units"], {"101": "floor1/31"})
+        self.assertEqual(plan["modbus_tcp"][0]["diagnostics_unit"], 255)
+        self.assertEqual(plan["modbus_tcp"][0]["broadcast"], "deny")
         self.assertEqual(plan["http"]["anonymous"], "none")
         self.assertEqual((plan["valid"], plan["errors"]), (True, []))
 

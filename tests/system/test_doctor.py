@@ -186,6 +186,28 @@ class Doctor(unittest.TestCase):
                 running.ask_both()
             self.expect(running, "other-master", drive=between)
 
+    def test_a_panel_whose_crc_comes_the_other_way_round(self):
+        def old(frame):
+            good = reply_of(frame)
+            return Raw(good[:-2] + good[:-3:-1])
+        with line({1: echo_address, 2: old}) as running:
+            found = self.expect(running, "wrong-crc-order", 2, "oven")
+            self.assertIn("Set its `crc_order: high_first`", found["advice"])
+
+    def test_a_panel_that_refuses_with_another_functions_number(self):
+        with line({1: echo_address, 2: lambda _: b"\x84\x02"}) as running:
+            found = self.expect(running, "wrong-exception", 2, "oven")
+            self.assertIn("another function", found["text"])
+
+    def test_a_panel_that_answers_broadcasts(self):
+        def broadcasts():
+            running.client.ask(0, struct.pack(">BHH", 6, 9, 1))
+            running.ask_both()
+        with line({0: lambda frame: Raw(harness.rtu(2, frame[1:6])),
+                   1: echo_address, 2: echo_address}) as running:
+            found = self.expect(running, "answers-broadcasts", 2, "oven", drive=broadcasts)
+            self.assertIn("`timing.broadcast_turnaround`", found["advice"])
+
     def test_an_echo_that_the_configuration_denies(self):
         panels = {1: echo_address, 2: echo_address}
         with line(panels, "off", echo=lambda frame: frame) as running:

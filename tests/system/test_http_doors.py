@@ -4,6 +4,7 @@ import json
 import socket
 import struct
 import tempfile
+import threading
 import time
 import unittest
 
@@ -270,7 +271,7 @@ class Logins(unittest.TestCase):
         start = time.monotonic()
         with Connection(self.port, address) as client:
             answer = client.ask("GET", "/api/v1/lines", f"Authorization: Bearer {token}")
-        self.assertEqual(answer.status, status)
+        self.assertEqual(answer and answer.status, status)
         return time.monotonic() - start
 
     def metric(self, name):
@@ -291,6 +292,41 @@ class Logins(unittest.TestCase):
         self.assertEqual(self.metric('panelgate_http_requests_total{code="200"}'), 4)
         self.program.log.wait_for(r"warn(ing)? login failed .*client=127\.0\.0\.1")
         self.assertNotIn("wrong", self.program.log.text())
+
+    def guess_until(self, stop, times):
+        """Wrong tokens without a pause; a refused connection is tried again at once."""
+        while not stop.is_set():
+            start = time.monotonic()
+            with contextlib.suppress(OSError), Connection(self.port) as client:
+                client.send("GET", "/api/v1/lines", "Authorization: Bearer wrong-and-long-enough")
+                answer = client.receive()
+                if answer and answer.status == 401:
+                    times.append(time.monotonic() - start)
+
+    def test_among_forty_who_guess_without_pause_what_is_right_is_answered(self):
+        stop, times, right = threading.Event(), [], []
+        guessers = [threading.Thread(target=self.guess_until, args=(stop, times))
+                    for _ in range(40)]
+        start = time.monotonic()
+        for guesser in guessers:
+            guesser.start()
+        try:
+            while len(times) < 60 and time.monotonic() < start + harness.PATIENCE:
+                time.sleep(0.01)  # until the first wave has been told
+            for _ in range(40):
+                with contextlib.suppress(OSError, AssertionError):
+                    right.append(self.seconds("right-and-long-enough", 200))
+        finally:
+            stop.set()
+            for guesser in guessers:
+                guesser.join()
+        pace = self.metric("panelgate_login_failures_total") / (time.monotonic() - start)
+        held = sorted(times)[len(times) // 2]
+        soon = [seconds for seconds in right if seconds < held / 2]
+        print(f"\n  {len(soon)} of 40 right ones soon, at most {max(right, default=0):.3f} s; wrong "
+              f"ones {held:.3f} s, {pace:.1f} a second", end="")
+        self.assertGreaterEqual(len(soon), 36)
+        self.assertLess(pace, 33)
 
 
 if __name__ == "__main__":

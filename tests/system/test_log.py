@@ -108,6 +108,15 @@ class Log(unittest.TestCase):
                                ("/api/v1/stations/press/holding-registers/1002", {"values": ["x"]})):
                 self.assertEqual(program.rest("PUT", path, body)[0], 403, path)
             program.log.wait_for(r"info write .*client=\"http .*/1001 .*outcome=refused")
+            everybody = {"table": "holding-registers", "address": 1003}
+            for values, status in ((["x"], 400), ([7], 403)):
+                self.assertEqual(program.rest("POST", "/api/v1/lines/floor1/broadcast",
+                                              {**everybody, "values": values})[0], status)
+            program.rest("POST", "/api/v1/lines/floor1/raw", {"station": 0, "pdu": "0603EC0007"})
+            for place in (1003, 1004):
+                program.log.wait_for(r"info write .*station=broadcast .*at=holding-registers/%d "
+                                     r".*outcome=refused" % place)
+            self.assertNotIn('at=""', program.log.text())
             self.assertEqual(program.rest("POST", "/api/v1/lines/floor1/raw",
                                           {"station": 31, "pdu": "0603EA0009"})[0], 403)
             program.log.wait_for(r"info write .*/1002 .*outcome=refused")

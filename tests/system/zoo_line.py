@@ -82,7 +82,8 @@ class Zoo:
 @contextlib.contextmanager
 def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=None, **keys):
     """Panels and a gateway; `habits`: {unit or "all": names}; `zoo`: more options of zoo_bus;
-    `wire_baud`: where it is not what the gateway thinks, 0: unpaced; `keys`: of the line."""
+    `wire_baud`: where it is not what the gateway thinks, 0: unpaced; `keys`: of the line, also
+    `stations` where more than their ids is to be said."""
     with tempfile.TemporaryDirectory() as folder:
         numbers = ",".join(map(str, units))
         far_end = "tcp:0" if tcp else f"{folder}/tty"
@@ -92,7 +93,8 @@ def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=
             options += ["--set", f"{unit}={names}"]
         with Zoo(*options) as panels:
             device = f"tcp://{panels.names[0]}" if tcp else panels.names[0]
-            listed = config.line("zoo", device, config.station_ids(units), baud=baud, **keys)
+            keys = {"stations": config.station_ids(units), **keys}
+            listed = config.line("zoo", device, baud=baud, **keys)
             with harness.configured(config.gateway(listed)) as program:
                 program.log.wait_for("line up")
                 yield Line(panels, program)

@@ -22,7 +22,8 @@ bool is_long_read(const Bytes& pdu, double most) {
 }  // namespace
 
 void Bus::on_frame(const Bytes& frame, const Character& last, bool is_ours) {
-    const bool is_good = has_good_crc(frame) && !(is_ours && is_lost_);
+    const bool is_old = habits_[frame[0] % habits_.size()].always(Kind::crc_old) != nullptr;
+    const bool is_good = has_good_crc(frame, is_old) && !(is_ours && is_lost_);
     if (is_ours) note(frame_start_, last.end, is_good ? "REQ" : "BAD", frame);
     if (!is_good) {
         ++counters_.bad;

@@ -46,7 +46,8 @@ std::optional<Bytes> RequestFinder::hear(const Character& c) {
     data_.push_back(c.value);
     const std::size_t length = request_length(data_);
     if (length == 0 || data_.size() != length) return std::nullopt;
-    if (!has_good_crc(data_)) return data_;  // and what follows without a pause belongs to it
+    const bool is_good = has_good_crc(data_) || has_good_crc(data_, true);
+    if (!is_good) return data_;  // and what follows without a pause belongs to it
     return std::exchange(data_, {});
 }
 

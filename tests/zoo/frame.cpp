@@ -32,8 +32,10 @@ Bytes sealed(int unit, const Bytes& pdu, bool swapped) {
     return frame;
 }
 
-bool has_good_crc(const Bytes& frame) {
-    return frame.size() >= 4 && crc16(frame.data(), frame.size()) == 0;
+bool has_good_crc(const Bytes& frame, bool swapped) {
+    if (frame.size() < 4) return false;
+    const Bytes pdu(frame.begin() + 1, frame.end() - 2);
+    return frame == sealed(frame[0], pdu, swapped);
 }
 
 std::size_t request_length(const Bytes& data) {

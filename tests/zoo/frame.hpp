@@ -25,7 +25,7 @@ std::uint16_t crc16(const std::uint8_t* data, std::size_t size);
 // Address + PDU + checksum; `swapped`: high byte first, as some panels have it.
 Bytes sealed(int unit, const Bytes& pdu, bool swapped = false);
 
-bool has_good_crc(const Bytes& frame);
+bool has_good_crc(const Bytes& frame, bool swapped = false);
 
 // Bytes of the request that starts here; 0 while nothing can be said, and for unknown functions.
 std::size_t request_length(const Bytes& data);

@@ -39,6 +39,7 @@ constexpr std::array kNames{
     Name{"echo-partial", Kind::echo_partial, 3, 0, 0},
     Name{"crcswap", Kind::crc_swapped, 0, 0, 0},
     Name{"crcbad", Kind::crc_bad, 0, 0, 0},
+    Name{"crcold", Kind::crc_old, 0, 0, 0},
     Name{"padin", Kind::pad_inside, 2, 0, 0},
     Name{"pad", Kind::pad_behind, 2, 0, 0},
     Name{"excfn", Kind::wrong_function, 0x84, 0, 0, true},

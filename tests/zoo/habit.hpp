@@ -33,6 +33,7 @@ enum class Kind {
     echo_partial,    // the first A bytes
     crc_swapped,
     crc_bad,
+    crc_old,
     pad_behind,       // A bytes behind the checksum
     pad_inside,       // A bytes in front of it
     wrong_function,   // everything is refused, and with function A

@@ -17,7 +17,9 @@ Bytes frame_of(const Habits& habits, int unit, Bytes reply) {
     if (const Habit* h = habits.find(Kind::pad_inside)) {
         reply.insert(reply.end(), static_cast<std::size_t>(h->a), 0x20);
     }
-    Bytes frame = sealed(unit, reply, habits.find(Kind::crc_swapped) != nullptr);
+    const bool swapped =
+        habits.find(Kind::crc_swapped) != nullptr || habits.always(Kind::crc_old) != nullptr;
+    Bytes frame = sealed(unit, reply, swapped);
     if (habits.find(Kind::crc_bad) != nullptr) frame.back() ^= 0x5A;
     if (const Habit* h = habits.find(Kind::pad_behind)) {
         frame.insert(frame.end(), static_cast<std::size_t>(h->a), 0x20);

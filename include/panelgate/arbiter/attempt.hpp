@@ -7,10 +7,13 @@
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
@@ -43,6 +46,9 @@ class Attempt {
         std::optional<Duration> tolerance;
         SerialFormat serial;
         bool steady = false;       ///< bytes come one by one, at the line's rate
+        Duration notice{};         ///< the line's Notice
+        Drift drift;               ///< what looks at the station's replies have told
+        bool as_asked = false;     ///< what begins is the reply that was asked for, as a rule
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
@@ -53,7 +59,8 @@ class Attempt {
     /// long it is waited for is added.
     static Timing timing_of(const Settings& line, TimePoint now, std::size_t size, Duration lead);
 
-    Attempt(Group group, const Timing& timing, EchoFilter echo);
+    Attempt(Group group, const Timing& timing, EchoFilter echo,
+            const modbus::CrcOrders& orders = {});
 
     Verdict on_rx(TimePoint now, ByteView bytes, const Ends& ends);
     /// Harmless when nothing is due.
@@ -64,8 +71,18 @@ class Attempt {
 
     /// Bytes that come before then tell nothing: what may be the reply (or our echo) has begun, and
     /// the rest of its header, or of all of it, takes as long at the line's rate. Who waits needs
-    /// not look at each. Nothing: every byte may tell something.
+    /// not look at each. An exception where none was foreseen (Timing::as_asked) is noticed when
+    /// the reply would have been there. Nothing: every byte may tell something.
     std::optional<TimePoint> busy_until() const;
+    /// What the first look at the end of a reply that was slept through has told: how long the
+    /// reply is at the line's rate, and whether it was all there.
+    struct EndLook {
+        Duration reply{};
+        bool whole = false;
+    };
+    const std::optional<EndLook>& end_look() const { return end_look_; }
+    /// It was an exception that nobody had foreseen.
+    bool overslept() const { return overslept_; }
     /// More has come than the line's rate allows since the reply began.
     bool hasty() const { return hasty_; }
 
@@ -122,6 +139,10 @@ class Attempt {
     void teach(EchoMemory& memory) const;
     /// Its own reply has come, but damaged: what tells it from anything else is whole.
     bool came_damaged() const { return framer_.had_own_header(); }
+    /// What may have been its own reply began, and never became as long as that would be.
+    bool was_cut_off() const { return framer_.was_damaged() && !framer_.was_damaged_whole(); }
+    /// The station refused with the number of a function that it was not asked.
+    bool refused_other() const { return refused_other_; }
     /// Something of the station was heard, good or not.
     bool heard() const { return heard_; }
     /// Bytes were heard that came before a reply could.
@@ -141,12 +162,24 @@ class Attempt {
   private:
     void drop_what_ended(TimePoint now, std::size_t size);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
+    /// Bytes, until what has begun tells more. 0: each may tell.
+    std::size_t missing() const;
+    struct NextLook {
+        TimePoint at;
+        Duration reply{};  ///< at the line's rate, from its beginning until then
+        bool end = false;  ///< at all of it
+    };
+    std::optional<NextLook> next_look() const;
     Duration character() const { return character_time(timing_.serial); }
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
     bool may_be_echo(ByteView reply) const;
     Verdict judge_pending(const Ends& ends);
     void stray_frame(const Bytes& pdu);
+    /// What the station has said when this is its reply.
+    Bytes adu_of(ByteView reply) const {
+        return modbus::encode_adu(group_.station, reply, orders_.of(group_.station));
+    }
     void judge_strays(std::size_t from, const Ends& ends);
     void collect();
     bool is_stale(TimePoint now, std::size_t size) const;
@@ -156,6 +189,7 @@ class Attempt {
 
     Group group_;
     Timing timing_;
+    modbus::CrcOrders orders_;
     EchoFilter echo_;
     modbus::ReplyFramer framer_;
     /// As framer_, for the case that the echo's last byte was lost and the reply's first was taken
@@ -171,12 +205,15 @@ class Attempt {
     Bytes stale_;
     TimePoint computed_end_;
     TimePoint first_byte_;
+    std::optional<TimePoint> held_since_;  ///< the first byte that the echo filter held back
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
     std::size_t since_ = 0;  ///< bytes since then
     TimePoint looked_{};     ///< when bytes came last
+    std::optional<EndLook> end_look_;
+    bool overslept_ = false;  ///< its reply is shorter than foreseen: an exception
     bool hasty_ = false;
     bool heard_ = false;
     bool disturbed_ = false;
@@ -186,6 +223,7 @@ class Attempt {
     std::size_t noise_in_front_ = 0;  ///< bytes
     bool borrowed_ = false;
     bool wrong_ = false;
+    bool refused_other_ = false;
     bool strange_ = false;  ///< the station said something that has nothing to do with the request
     bool end_confirmed_ = true;
 };

@@ -55,10 +55,11 @@ class CopyGuard {
         if (std::ranges::count_if(slots_, &Slot::second) >= 2) learn(now, now - last().at);
     }
     /// A recent reply that stands once more, as a good frame, amid bytes that are none; or nullptr.
-    const Bytes* copy_in(TimePoint now, std::uint8_t station, ByteView bytes) const {
+    const Bytes* copy_in(TimePoint now, std::uint8_t station, ByteView bytes,
+                         modbus::CrcOrder order = modbus::CrcOrder::low_first) const {
         for (const Slot& slot : slots_) {
             if (!slot.is_recent(now)) continue;
-            const Bytes said = modbus::encode_adu(station, slot.reply);
+            const Bytes said = modbus::encode_adu(station, slot.reply, order);
             if (!std::ranges::search(bytes, said).empty()) return &slot.reply;
         }
         return nullptr;

@@ -19,7 +19,8 @@ struct Symptoms {
     std::uint64_t disturbed = 0;  ///< no reply, but good frames of others, or bytes that were stale
     std::uint64_t collided = 0;   ///< the echo was not what was sent
     std::uint64_t wrong = 0;      ///< a good frame of the station that does not answer the request
-    std::uint64_t damaged_exact = 0;  ///< as long as the reply has to be, and yet no good frame
+    std::uint64_t wrong_exceptions = 0;  ///< ... an exception with another function's number
+    std::uint64_t damaged_exact = 0;     ///< as long as the reply has to be, and yet no good frame
     std::uint64_t damaged_short = 0;
     std::uint64_t damaged_long = 0;   ///< longer, or nothing tells how long it has to be
     std::uint64_t damaged_heads = 0;  ///< of all damaged: began with the right address and function
@@ -29,14 +30,15 @@ struct Symptoms {
     std::uint64_t damaged_odd = 0;    ///< bytes with an odd number of ones
     std::uint64_t long_answered = 0;  ///< replies of kLongReply bytes or more
     std::uint64_t long_damaged = 0;
-    std::uint64_t strays = 0;       ///< damaged bytes around good replies or unasked, each time
-    std::uint64_t doubled = 0;      ///< the reply taken before, or one of its shape, once more
-    std::uint64_t late = 0;         ///< replies behind the whole response timeout
-    std::uint64_t unasked = 0;      ///< good frames that nobody here asked for
-    std::uint64_t echoes = 0;       ///< the request came back as it was sent
-    std::uint64_t requests = 0;     ///< another master's: good requests that are not ours
-    std::uint64_t crc_swapped = 0;  ///< damaged only in that the CRC's high byte came first
-    std::uint64_t trailed = 0;      ///< replies with something behind them: bytes, or a copy
+    std::uint64_t strays = 0;   ///< damaged bytes around good replies or unasked, each time
+    std::uint64_t doubled = 0;  ///< the reply taken before, or one of its shape, once more
+    std::uint64_t late = 0;     ///< replies behind the whole response timeout
+    std::uint64_t unasked = 0;  ///< good frames that nobody here asked for
+    std::uint64_t broadcast_replies = 0;  ///< good frames that answer a broadcast: nobody should
+    std::uint64_t echoes = 0;             ///< the request came back as it was sent
+    std::uint64_t requests = 0;           ///< another master's: good requests that are not ours
+    std::uint64_t crc_swapped = 0;        ///< damaged only in that the CRC's high byte came first
+    std::uint64_t trailed = 0;            ///< replies with something behind them: bytes, or a copy
 
     /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.
     static constexpr std::size_t kPauses = 9;

@@ -22,6 +22,8 @@ struct Group {
     int attempts = 0;
     TimePoint started{};      ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
+    Duration
+        cut_after{};  ///< the attempt before, whose reply broke off, took so long; 0: it did not
     Bytes doubted{};  ///< the attempt before was answered so, and it may be a copy; or nothing
     TimePoint doubted_at{};  ///< when that came
     bool probe = false;
@@ -58,6 +60,8 @@ struct Group {
     bool is_values(ByteView reply) const {
         return request.is_read() && reply[0] == request.function();
     }
+    /// What answers a retry behind a wait may be the reply to the attempt before: it tells nothing.
+    bool tells_pace() const { return silent_after + cut_after == Duration::zero(); }
     /// Nobody waits for it any more.
     bool abandoned() const { return std::ranges::all_of(jobs, &Job::gone); }
 };

@@ -24,6 +24,8 @@ struct Job {
     Client client = 0;
     Host host = 0;  ///< 0: the client is its own
     PriorityClass priority = PriorityClass::read;
+    /// The function that was asked for, where the request has another one instead; 0: its own.
+    std::uint8_t asked_function = 0;
     TimePoint arrived{};
     TimePoint deadline{};
     TimePoint start_by{};  ///< the last moment at which starting it makes sense

@@ -49,7 +49,16 @@ class Ledger {
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
 
     /// What a good frame is that nobody waits for, or that some bytes are damaged.
-    enum class Part : std::uint8_t { damaged, echo, request, late, copy, unasked, unknown };
+    enum class Part : std::uint8_t {
+        damaged,
+        echo,
+        request,
+        late,
+        copy,
+        broadcast_reply,
+        unasked,
+        unknown,
+    };
     /// Traces and counts it; `asked` is who was asked last. Damage inside an attempt is its own.
     void on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
                   Duration lateness = {});
@@ -66,6 +75,7 @@ class Ledger {
     void count_stray(const modbus::Unused& part, Part what, std::uint8_t asked, Duration lateness);
 
     bool explain_;
+    modbus::CrcOrders orders_;
     bool inside_attempt_ = false;
     std::optional<TimePoint> told_collision_;
     PoolDeque<Action> actions_;

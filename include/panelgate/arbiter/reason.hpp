@@ -22,7 +22,8 @@ struct Reason {
     Kind kind = Kind::none;
     PriorityClass priority = PriorityClass::read;
     std::uint8_t station = 0;
-    bool passed_over = false;  ///< ahead of a higher class, which had had its turns
+    std::uint8_t asked_function = 0;  ///< what it stands for; 0: its own
+    bool passed_over = false;         ///< ahead of a higher class, which had had its turns
     int attempt = 1;
     Duration waited{};
     std::size_t waiting = 0;  ///< behind it, on the whole line

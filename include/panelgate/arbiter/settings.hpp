@@ -9,6 +9,7 @@
 #include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::arbiter {
 
@@ -25,6 +26,7 @@ struct StationSettings {
     std::optional<Duration> frame_gap;
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;  ///< as it sends and expects it
     /// How long after a timeout a reply may still come; nothing = auto: the response timeout at
     /// first, then what lateness was seen.
     std::optional<Duration> late_window;
@@ -77,5 +79,9 @@ struct Settings {
     /// Say why each request goes now and why one is refused.
     bool explain = false;
 };
+
+/// Those of the stations. A broadcast has the standard's, but where all listed stations have the
+/// other one: no frame can be right for both.
+modbus::CrcOrders crc_orders(const Settings& settings);
 
 }  // namespace panelgate::arbiter

@@ -9,6 +9,7 @@
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {
@@ -17,12 +18,17 @@ namespace panelgate::arbiter {
 /// handed to whom it concerns. Pure.
 class Strays {
   public:
-    explicit Strays(const SerialFormat& serial) : serial_(serial) {}
+    explicit Strays(const SerialFormat& serial, const modbus::CrcOrders& orders = {})
+        : serial_(serial), orders_(orders) {}
 
     /// The frame sent last: its echo may come late.
     void on_sent(ByteView adu) {
         last_frame_.assign(adu.begin(), adu.end());
         replied_before_ = std::exchange(replied_, std::uint8_t{0});
+        ++sent_since_;
+        if (adu[0] != 0) return;
+        broadcast_ = last_frame_;
+        sent_since_ = 0;
     }
     /// What stands behind this answer is its station's trail.
     void on_replied(std::uint8_t station) { replied_ = station; }
@@ -43,17 +49,21 @@ class Strays {
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
               Stations& stations, Quiet& quiet, Ledger& ledger) const;
     /// It is the reply that its station gives instead of the right one: not the echo, nor a copy,
-    /// nor what was owed.
+    /// nor what was owed, nor its answer to a broadcast.
     bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const;
 
   private:
-    Ledger::Part judge(const modbus::Unused& part, const Stations& stations) const;
+    Ledger::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
+    bool answers_broadcast(ByteView adu) const;
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 
     SerialFormat serial_;
+    modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
+    Bytes broadcast_;           ///< the last one
+    unsigned sent_since_ = 0;   ///< frames behind it
     std::uint8_t replied_ = 0;  ///< what was sent last; 0: nobody, or not yet
     std::uint8_t replied_before_ = 0;
 };

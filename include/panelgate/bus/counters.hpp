@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "panelgate/arbiter/counters.hpp"
@@ -20,6 +21,8 @@ struct StationReport {
     /// By function code; kOtherFunctions: all that modbus::is_known() does not know. Those that
     /// were used, and those that the settings expect.
     std::map<std::uint8_t, OutcomeCounts> requests;
+    /// Of these, those that went out with another function: by function asked and function sent.
+    std::map<std::pair<std::uint8_t, std::uint8_t>, std::uint64_t> translated;
     Histogram request_duration;
     arbiter::StationCounters wire;
     bool configured = false;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/modbus/request.hpp"
@@ -19,9 +20,10 @@ enum class Rule : std::uint8_t {
     function,                  ///< the panel does not have it
     quantity,                  ///< more items than it takes, or a request that contradicts itself
     range,                     ///< not all of it is memory of the panel
+    listening,                 ///< its line is only listened to, whatever is asked
     write_protected,           ///< memory that it does not let be written
 };
-/// "access", "function", "quantity", "range" or "read-only": stable words.
+/// "access", "function", "quantity", "range", "listen" or "read-only": stable words.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
     return rule == Rule::read_only || rule == Rule::broadcast_over_read_only;
@@ -35,19 +37,31 @@ struct Objection {
 /// Of what is to be refused instead of being transmitted.
 using Guard = std::function<std::optional<Objection>(const modbus::Request&)>;
 
+/// The request that goes out instead of the one that was asked; nothing: that one itself. It must
+/// do the same, of no more items, and modbus::translated_back() must know what its reply means.
+using Translate = std::function<std::optional<modbus::Request>(const modbus::Request&)>;
+
 enum class Access : std::uint8_t { read_write, read_only };
 
 /// What the configuration says of a station to its bus.
 struct StationSettings {
     std::string name;
     Access access = Access::read_write;
-    Guard guard{};  ///< empty: whatever is asked goes out
+    Guard guard{};          ///< empty: whatever is asked goes out
+    Translate translate{};  ///< empty: whatever is asked goes out as it came
     /// What its panel is likely to be asked: counted from the start, with 0.
     std::vector<std::uint8_t> functions{};
+    /// The same of what `translate` does: by function asked and function sent.
+    std::vector<std::pair<std::uint8_t, std::uint8_t>> translations{};
 };
 
 /// Those that the configuration lists, by their ids.
 using Stations = std::map<std::uint8_t, StationSettings>;
+
+/// What goes out instead of this request; nothing: itself. A broadcast stays as it came, because
+/// it is for many.
+std::optional<modbus::Request> translated(const Stations& stations, std::uint8_t id,
+                                          const modbus::Request& request);
 
 /// Its name, or its id when it is not listed.
 std::string name_of(const Stations& stations, std::uint8_t id);

@@ -25,7 +25,9 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
+    bool listens = false;      ///< its line is only listened to
     bool guard = false;        ///< what the profile rules out is refused without using the bus
+    bool translate = true;     ///< what its panel lacks goes out as what does the same
     sim::Misbehaviour faults;  ///< of the simulated panel
     std::vector<points::Point> points;
     std::vector<points::Poll> polls;
@@ -37,6 +39,7 @@ struct Line {
     Kind kind = Kind::serial;
     line::Settings device;
     arbiter::Settings arbiter;  ///< every station's timing resolved
+    bool listens = false;       ///< its master is somebody else: nothing is ever sent
     bool refuse_unlisted = false;
     bool simulated_echo = false;  ///< the simulated adapter hears itself
     std::vector<Station> stations;

@@ -9,23 +9,25 @@ namespace panelgate::doctor {
 
 /// What is probably wrong, what concerns the whole line first.
 enum class Cause : std::uint8_t {
-    echo,               ///< the adapter's echo is not what the configuration says
-    no_answer_at_all,   ///< wiring, power, baud, parity or addresses
-    wrong_baud,         ///< bytes come, at another pace
-    wrong_parity,       ///< bytes come at the right pace and are taken for wrong
-    other_master,       ///< somebody else asks on this line
-    collision,          ///< somebody speaks while the gateway does
-    overrun,            ///< bytes came faster than they were fetched
-    noise,              ///< some replies of everybody are damaged
-    tcp_framing,        ///< the same over TCP, where no wire of ours can be the reason
-    trailing_bytes,     ///< something follows the replies
-    wrong_crc_order,    ///< a panel sends the CRC's high byte first
-    wrong_reply,        ///< a panel's good frames do not answer what was asked
-    duplicate_address,  ///< two panels answer to one address
-    timeout_too_short,  ///< a panel answers after its response timeout
-    gap_too_short,      ///< a panel does not hear what follows another frame closely
-    unasked_frames,     ///< a panel speaks when nobody has asked it
-    station_silent,     ///< one panel is off or has another address: not a fault of the line
+    echo,                ///< the adapter's echo is not what the configuration says
+    no_answer_at_all,    ///< wiring, power, baud, parity or addresses
+    wrong_baud,          ///< bytes come, at another pace
+    wrong_parity,        ///< bytes come at the right pace and are taken for wrong
+    other_master,        ///< somebody else asks on this line
+    collision,           ///< somebody speaks while the gateway does
+    overrun,             ///< bytes came faster than they were fetched
+    noise,               ///< some replies of everybody are damaged
+    tcp_framing,         ///< the same over TCP, where no wire of ours can be the reason
+    trailing_bytes,      ///< something follows the replies
+    wrong_crc_order,     ///< a panel sends the CRC's bytes in the other order than configured
+    wrong_exception,     ///< a panel refuses with the number of a function that was not asked
+    wrong_reply,         ///< a panel's good frames do not answer what was asked
+    answers_broadcasts,  ///< a panel answers what nobody may answer
+    duplicate_address,   ///< two panels answer to one address
+    timeout_too_short,   ///< a panel answers after its response timeout
+    gap_too_short,       ///< a panel does not hear what follows another frame closely
+    unasked_frames,      ///< a panel speaks when nobody has asked it
+    station_silent,      ///< one panel is off or has another address: not a fault of the line
 };
 /// "wrong-baud": the word in REST and in the log. It never changes.
 std::string_view code(Cause cause);

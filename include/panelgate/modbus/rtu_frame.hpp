@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::modbus {
 
@@ -15,11 +16,13 @@ inline constexpr std::size_t kExceptionAdu = kMinAdu + 1;    ///< ... and code: 
 inline constexpr std::size_t kReadRequestAdu = kMinAdu + 4;  ///< 01 to 06: ... and two words
 inline constexpr std::size_t kReadReplyOverhead = kMinAdu + 1;  ///< 01 to 04: ... and byte count
 
-/// Address, PDU, CRC low byte first: what goes out in one write (TIM-02).
-Bytes encode_adu(std::uint8_t station, ByteView pdu);
+/// Address, PDU, CRC: what goes out in one write (TIM-02).
+Bytes encode_adu(std::uint8_t station, ByteView pdu, CrcOrder order = CrcOrder::low_first);
 
 /// At least address, function and CRC (4 bytes), and the CRC is right. Knows no upper limit.
-bool crc_ok(ByteView adu);
+bool crc_ok(ByteView adu, CrcOrder order = CrcOrder::low_first);
+/// ... in the order of the frame's own address.
+bool crc_ok(ByteView adu, const CrcOrders& orders);
 
 /// A good frame taken apart. `pdu` looks into the bytes it was made from.
 struct RtuFrame {

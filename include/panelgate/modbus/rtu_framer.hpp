@@ -7,6 +7,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::modbus {
 
@@ -47,7 +48,8 @@ class ReplyFramer {
     /// Heard bytes that are kept at most; older ones become Unused.
     static constexpr std::size_t kMaxHeard = 1024;
 
-    ReplyFramer(std::uint8_t station, Bytes request_pdu);
+    /// `orders`: of all that may speak. A frame counts only in the order of its own address.
+    ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders = {});
 
     /// Takes bytes; gives the reply PDU as soon as its last byte is there.
     std::optional<Bytes> feed(ByteView bytes);
@@ -65,6 +67,8 @@ class ReplyFramer {
     /// How many bytes have to come at least until what may be the reply tells more: its header, or
     /// all of it. 0: every byte may tell.
     std::size_t missing() const;
+    /// The same, if what has begun is no exception: the request tells then how long it is.
+    std::size_t missing_as_asked() const;
     /// The reply is there, but it may be a part of another frame that is not whole yet: a silence
     /// of its length tells.
     bool is_inside() const { return inside_; }
@@ -105,6 +109,7 @@ class ReplyFramer {
 
     std::uint8_t station_;
     Bytes request_;
+    CrcOrders orders_;
     std::optional<std::size_t> expected_;  ///< from the request (FRM-04)
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
@@ -120,6 +125,7 @@ class ReplyFramer {
 };
 
 /// Cuts bytes into good frames (any station) and the rest, for counters: linear time.
-std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station);
+std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,
+                                   const CrcOrders& orders = {});
 
 }  // namespace panelgate::modbus

@@ -9,6 +9,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/modbus/function.hpp"
 
 namespace panelgate::profile {
@@ -55,6 +56,11 @@ struct Area {
     /// Name of the word area whose bits these are (UB: "UW"): bit n is bit n%16 of word n/16.
     std::string view_of;
     std::string source;  ///< manual and page
+
+    /// The functions of this table reach it.
+    bool reaches(modbus::Table other) const {
+        return table == other || std::ranges::find(also, other) != also.end();
+    }
 };
 
 struct FunctionRule {
@@ -135,6 +141,7 @@ struct PanelProfile {
     std::uint8_t first_station = 1;
     std::uint8_t last_station = modbus::kMaxStation;
     Serial serial;
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
     std::vector<FunctionRule> functions;
     std::vector<Area> areas;
     Timing timing;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scan {
@@ -13,15 +14,18 @@ namespace panelgate::scan {
 class ReadRequest {
   public:
     /// Nothing unless the station is 1 to 247 and the PDU is well-formed and a pure read.
-    static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu);
+    static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu,
+                                           modbus::CrcOrder order = modbus::CrcOrder::low_first);
 
     std::uint8_t station() const { return adu_.front(); }
     ByteView pdu() const { return ByteView(adu_).subspan(1, adu_.size() - modbus::kAduOverhead); }
     const Bytes& adu() const { return adu_; }
+    modbus::CrcOrder crc_order() const { return order_; }
 
   private:
-    explicit ReadRequest(Bytes adu) : adu_(std::move(adu)) {}
+    ReadRequest(Bytes adu, modbus::CrcOrder order) : adu_(std::move(adu)), order_(order) {}
     Bytes adu_;
+    modbus::CrcOrder order_;
 };
 
 }  // namespace panelgate::scan

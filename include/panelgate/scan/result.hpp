@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::scan {
 
@@ -32,6 +33,7 @@ struct StationFinding {
     std::vector<Candidate> candidates;  ///< the best first; empty when no reply could be read
     Evidence evidence;
     bool duplicate = false;  ///< two stations seem to have this address
+    modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
 };
 
 /// Frames that answer nothing this scan has asked: function codes by station.

@@ -5,6 +5,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::sim {
 
@@ -24,8 +25,9 @@ struct Misbehaviour {
 
 struct Settings {
     SerialFormat serial;
-    Duration think_time = 1ms;  ///< of a panel, after the silence that ends the request
-    bool echo = false;          ///< the adapter hears what the gateway sends
+    Duration think_time = 1ms;     ///< of a panel, after the silence that ends the request
+    modbus::CrcOrders crc_orders;  ///< by station
+    bool echo = false;             ///< the adapter hears what the gateway sends
     std::map<std::uint8_t, Misbehaviour> faults;  ///< by station
     std::uint32_t seed = 1;                       ///< of the faults' chance
 };

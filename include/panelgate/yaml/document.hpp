@@ -60,6 +60,7 @@ struct Node {
     Mark mark;                   ///< of a null in a map: its key's mark
     std::string scalar;          ///< Kind::scalar
     bool quoted = false;         ///< the scalar stood in quotes: it is text, never a number
+    bool comma = false;          ///< typed with a ',' in { }, where that ends a value: no text
     std::vector<Node> items;     ///< Kind::sequence
     std::vector<Entry> entries;  ///< Kind::map
 };

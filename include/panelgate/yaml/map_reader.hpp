@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -16,8 +17,10 @@ namespace panelgate::yaml {
 /// Where a key stands that people write elsewhere.
 struct Elsewhere {
     std::string_view key;
-    std::string_view map;    ///< key of the map that has it, beside where it was written; or
-    std::string_view owner;  ///< who has it: "a station"
+    std::string_view map;           ///< key of the map that has it, beside where it was written; or
+    std::string_view owner;         ///< who has it: "a station"
+    std::string_view instead = {};  ///< nobody has it: what to do, "remove it: ..."
+    std::span<const std::string_view> words = {};  ///< if its values are such
 };
 
 /// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key
@@ -63,8 +66,11 @@ class MapReader {
         if (!i) return std::nullopt;
         return words[*i].second;
     }
+    /// What else is to be said of a wrong value, as the end of the message.
+    using Hint = std::function<std::string(std::string_view typed)>;
     std::optional<std::size_t> choice_index(std::string_view key,
-                                            std::span<const std::string_view> words);
+                                            std::span<const std::string_view> words,
+                                            const Hint& hint = {});
 
     /// The value itself, of any kind but null; nullptr when absent or null.
     const Node* child(std::string_view key);
@@ -81,6 +87,10 @@ class MapReader {
     void problem(std::string_view key, std::string message);
     Problems& problems() { return *problems_; }
 
+    /// A key of other versions: a problem, "KEY why", where it stands, and never proposed. `key`
+    /// must outlive this.
+    void refuse(std::string_view key, const std::string& why);
+
     /// Reports unknown keys. Call once, last.
     void finish();
 
@@ -89,6 +99,7 @@ class MapReader {
     const Node* scalar(std::string_view key, std::string_view wanted);
     bool require(std::string_view key);
     const Entry* shallow_parent(std::size_t entry) const;
+    std::string is_unknown(std::string_view key) const;
     std::string unknown(std::size_t entry) const;
     std::string place_of(const Entry& entry, bool exactly) const;
 
@@ -96,6 +107,7 @@ class MapReader {
     Problems* problems_;
     std::string what_;
     std::vector<std::string> known_;
+    std::vector<std::string_view> refused_;
     std::vector<std::string> parents_;  ///< of these, those with a map or a list
     std::span<const Elsewhere> elsewhere_;
 };
@@ -104,6 +116,9 @@ class MapReader {
 /// Units: us, ms, s, min.
 std::optional<Duration> parse_duration(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
+/// "; a blank is missing after '101:'; write 101: floor1/31" for a key that is a number, a colon
+/// and its value; else "".
+std::string number_blank_hint(std::string_view key);
 /// In the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
 std::string format_duration(Duration duration);
 

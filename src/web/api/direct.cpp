@@ -132,8 +132,8 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
     if (!line) co_return to_response(line.error());
     const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
     if (!body) co_return to_response(body.error());
-    auto planned = unless_refused(broadcast_request(*api->directory, **line, *body), *(*line)->bus,
-                                  std::uint8_t{0});
+    // What is no request says so first; one is the bus's to refuse, which counts and tells it.
+    auto planned = broadcast_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));

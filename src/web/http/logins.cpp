@@ -13,11 +13,12 @@ Duration Logins::turn(TimePoint now, const std::string& address) {
     const auto known = known_.find(address);
     if (known == known_.end() || !guesses(now, known->second)) return Duration::zero();
     Failures& failures = known->second;
-    // So many may be connected that this is their pace when each is held; nobody waits longer.
-    const TimePoint mine = std::clamp(failures.free, now, now + settings_.hold);
-    failures.free = mine + settings_.hold / settings_.at_once;
+    const TimePoint mine = std::clamp(failures.free, now, now + settings_.longest_turn);
+    failures.free = mine + pause();
     return mine - now;
 }
+
+Duration Logins::pause() const { return Duration(1s) / settings_.a_second; }
 
 bool Logins::guesses(TimePoint now, const Failures& failures) const {
     return count_at(now, failures) > settings_.free;
@@ -38,7 +39,7 @@ void Logins::failed(TimePoint now, const std::string& address) {
 void Logins::succeeded(const std::string& address) {
     const auto known = known_.find(address);
     if (known == known_.end()) return;
-    known->second.free -= settings_.hold / settings_.at_once;  // it was no guess
+    known->second.free -= pause();  // it was no guess
     if (known->second.count <= 1) {
         known_.erase(known);
     } else {

@@ -10,8 +10,9 @@ namespace panelgate::web {
 
 /// Who guesses tokens is slowed down, by address. A wrong one is answered late. What is right is
 /// not, and that tells it apart before the answer of a wrong one comes; so an address that guesses
-/// is looked at one request at a time, no faster than if each were held: hanging up early wins
-/// nothing. Each right one makes up for a wrong one: behind one address there may be many. Pure.
+/// is looked at one request at a time, at a fixed pace: hanging up early wins nothing. The hold is
+/// so much longer than the pace that a few dozen who wait for their answers leave turns for what is
+/// right. Each right one makes up for a wrong one: behind one address there may be many. Pure.
 class Logins {
   public:
     explicit Logins(const LoginSettings& settings) : settings_(settings) {}
@@ -30,6 +31,7 @@ class Logins {
         TimePoint last;
         TimePoint free{};  ///< when the next request with a token may be looked at
     };
+    Duration pause() const;  ///< between two turns of an address
     bool guesses(TimePoint now, const Failures& failures) const;
     unsigned count_at(TimePoint now, const Failures& failures) const;
 

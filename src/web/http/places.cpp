@@ -7,19 +7,28 @@ namespace panelgate::web {
 Places::Places(const Settings& settings)
     : limit_(settings.max_connections),
       limit_of_address_(settings.max_per_address),
+      limit_of_held_(settings.max_held),
       limit_of_probes_(settings.probe_places) {}
 
-Places::Arrival Places::arrive(Id id, const std::string& address) {
+Places::Arrival Places::admit(const std::string& address) const {
     Arrival arrival;
-    if (count(false, &address) >= limit_of_address_) {
-        arrival.leaves = first_to_leave(&address);
+    if (placed(address) >= limit_of_address_) {
+        arrival.leaves = longest(State::idle, false, &address);
         arrival.probes_only = !arrival.leaves;
-    } else if (count(false) >= limit_) {
-        arrival.leaves = first_to_leave();
+    } else if (held(address) >= limit_of_held_) {
+        arrival.leaves = longest(State::wrong, false, &address);
+    } else if (guests() >= limit_) {
+        arrival.leaves = longest(State::wrong, false);
+        if (!arrival.leaves) arrival.leaves = longest(State::idle, false);
         if (!arrival.leaves) arrival.leaves = suspect_of_another(address);
         arrival.probes_only = !arrival.leaves;
     }
-    if (arrival.probes_only && count(true) >= limit_of_probes_)
+    return arrival;
+}
+
+Places::Arrival Places::arrive(Id id, const std::string& address) {
+    Arrival arrival = admit(address);
+    if (arrival.probes_only && probes() >= limit_of_probes_)
         arrival.leaves = longest(State::idle, true);
     if (arrival.leaves) leave(*arrival.leaves);
     guests_[id] = {address, arrival.probes_only, State::idle, ++turn_};
@@ -46,16 +55,29 @@ void Places::idle(Id id) {
 
 void Places::leave(Id id) { guests_.erase(id); }
 
-std::size_t Places::count(bool probes_only, const std::string* address) const {
+bool Places::is_held(Id id) const {
+    const auto guest = guests_.find(id);
+    return guest != guests_.end() && guest->second.state == State::wrong;
+}
+
+std::size_t Places::probes() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(guests_, [](const auto& entry) { return entry.second.probes_only; }));
+}
+
+std::size_t Places::guests() const { return guests_.size() - probes(); }
+
+std::size_t Places::placed(const std::string& address) const {
     return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
         const Guest& guest = entry.second;
-        return guest.probes_only == probes_only && (!address || guest.address == *address);
+        return !guest.probes_only && guest.state != State::wrong && guest.address == address;
     }));
 }
 
-std::optional<Places::Id> Places::first_to_leave(const std::string* address) const {
-    const auto wrong = longest(State::wrong, false, address);
-    return wrong ? wrong : longest(State::idle, false, address);
+std::size_t Places::held(const std::string& address) const {
+    return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
+        return entry.second.state == State::wrong && entry.second.address == address;
+    }));
 }
 
 std::optional<Places::Id> Places::longest(State state, bool probes_only,

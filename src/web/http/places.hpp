@@ -10,10 +10,14 @@
 
 namespace panelgate::web {
 
-/// Who may stay when many want to: so many connections, so many of them an address. To a full house
-/// whoever is held for a wrong token gives its place, then whoever has had no request for longest;
-/// where all have one, there are a few places more that answer probes, and the newest of these
-/// displaces the oldest. Pure.
+/// Who may stay when many want to: so many connections, so many of them an address. Whoever is held
+/// for a wrong token takes no place of its address, which may have so many held besides: to be
+/// closed would tell it to try again. Who comes to a full house displaces, in this order: of an
+/// address without a place, whoever of it has had no request for longest; of one with too many
+/// held, the one that is held for longest; of a full house, the one held for longest, then the one
+/// without a request for longest, then one that waits to be looked at and is of another address
+/// that guesses. Where nobody gives way there are a few places more that answer probes, and the
+/// newest of these displaces the oldest. Pure.
 class Places {
   public:
     using Id = std::uint64_t;
@@ -31,8 +35,9 @@ class Places {
     /// Its address guesses tokens and its own has not been looked at: another address may take its
     /// place. Not the same one, or a guess could displace what is right.
     void suspect(Id id);
-    /// It waits for no more than to be told that its token is wrong.
+    /// It waits for no more than to be told that its token is wrong, and is closed then.
     void wrong(Id id);
+    bool is_held(Id id) const;
     void idle(Id id);
     void leave(Id id);
 
@@ -45,15 +50,19 @@ class Places {
         std::uint64_t since = 0;  ///< turn at which it became idle, or came
     };
     void set(Id id, State state);
-    std::size_t count(bool probes_only, const std::string* address = nullptr) const;
+    std::size_t probes() const;
+    std::size_t guests() const;                            ///< other than probes
+    std::size_t placed(const std::string& address) const;  ///< of these, neither held
+    std::size_t held(const std::string& address) const;
+    Arrival admit(const std::string& address) const;
     /// Of all, or of one address.
-    std::optional<Id> first_to_leave(const std::string* address = nullptr) const;
     std::optional<Id> longest(State state, bool probes_only,
                               const std::string* address = nullptr) const;
     std::optional<Id> suspect_of_another(const std::string& address) const;
 
     std::size_t limit_;
     std::size_t limit_of_address_;
+    std::size_t limit_of_held_;
     std::size_t limit_of_probes_;
     std::map<Id, Guest> guests_;
     std::uint64_t turn_ = 0;

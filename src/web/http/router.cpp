@@ -124,7 +124,7 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     const bool failed = refused && refused->status == 401;
     const Duration hold = shared->logins.hold(shared->site->now(), address);
     judge_login(*request, failed, *shared);
-    if (failed) {
+    if (failed && hold > Duration::zero()) {
         shared->places.wrong(request->caller->id());
         asio::awaitable<void> waiting = hold_up(hold);
         co_await std::move(waiting);
@@ -138,7 +138,15 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     const std::shared_ptr<const Site> site = shared->site;
     Found found = find_route(request, site->routes);
     const bool free = found.route != nullptr && found.route->needed == Role::none;
-    if (barred && !free) co_return to_response(*barred);
+    if (barred && !free) {
+        // At once, it would come again at once: that is no slower than to guess.
+        Duration hold = Duration::zero();
+        if (barred->status == 503 && request.caller)
+            hold = shared->logins.hold(site->now(), request.caller->address());
+        asio::awaitable<void> waiting = hold_up(hold);
+        co_await std::move(waiting);
+        co_return to_response(*barred);
+    }
     if (request.method == "OPTIONS") co_return options(found, request, *site);
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = co_await admit(&request, found.route->needed, shared);

@@ -82,7 +82,8 @@ asio::awaitable<bool> HttpSession::serve_one() {
         asio::awaitable<void> sending = send_events(std::move(response.events));
         co_await std::move(sending);
     } else if (!caller_->has_left()) {
-        asio::awaitable<bool> sending = send(std::move(response), head, keep_alive && !stopping_);
+        const bool stays = keep_alive && !stopping_ && !shared_->places.is_held(caller_->id());
+        asio::awaitable<bool> sending = send(std::move(response), head, stays);
         more = co_await std::move(sending);
     }
     if (probes_only_ && !caller_->has_left()) co_await drain();

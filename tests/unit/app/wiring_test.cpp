@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <cstdint>
+
 #include <utility>
+#include <vector>
 
 #include "panelgate/profile/load_profile.hpp"
 #include "support/fake_bus.hpp"
@@ -62,6 +65,21 @@ TEST_F(WiringTest, AGuardRefusesAsThePanelWould) {
     EXPECT_EQ(function->why, "generic has no function 65");
     EXPECT_EQ(guard(test::request_of("05 0000 1234"_hex)).value().rule, bus::Rule::quantity)
         << "no value of a coil";
+}
+
+TEST_F(WiringTest, WhatAPanelLacksIsTranslatedUnlessTurnedOffOrGuarded) {
+    const modbus::Request write = test::request_of("06 0064 0007"_hex);
+    for (config::Station& station : floor.stations) {
+        station.profile = shipped.find("autonics-gplp-s");
+    }
+    EXPECT_FALSE(bus_settings(floor).stations.at(31).translate) << "the guard refuses it";
+    const bus::Translate translate = bus_settings(floor).stations.at(5).translate;
+    ASSERT_TRUE(translate);
+    EXPECT_EQ(translate(write).value().pdu(), "10 0064 0001 02 0007"_hex);
+    const std::vector<std::pair<std::uint8_t, std::uint8_t>> both{{5, 15}, {6, 16}};
+    EXPECT_EQ(bus_settings(floor).stations.at(5).translations, both) << "counted from the start";
+    floor.stations[1].translate = false;
+    EXPECT_FALSE(bus_settings(floor).stations.at(5).translate);
 }
 
 TEST_F(WiringTest, OnlyStationsWithPointsOrPollBlocksArePolled) {

@@ -90,6 +90,37 @@ TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
 }
 
+/// A panel stops inside a reply for 400 ms, beside one that is well. It has no time of the line to
+/// spend, so the other one is served meanwhile; and still what it says when it goes on is waited
+/// for.
+TEST_F(ArbiterTest, P4AReplyThatBrokeOffIsWaitedForOnceMoreForTheRestOfATimeout) {
+    const Bytes reply = modbus::encode_adu(17, kReply);
+    const auto ask = [&](std::uint8_t station) {
+        const Ticket ticket = bus.submit(station, kRead, station);
+        EXPECT_TRUE(bus.next_sent(1s));
+        bus.run_to_end_of_request();
+        bus.run_for(2ms);
+        return ticket;
+    };
+    for (unsigned i = 0; i < 40; ++i) {
+        const auto station = static_cast<std::uint8_t>(17 + i % 2);
+        ask(station);
+        bus.hear_paced(modbus::encode_adu(station, kReply));
+    }
+    const Ticket held_up = ask(17);
+    bus.hear_paced(ByteView(reply).first(4));
+    const TimePoint goes_on = bus.now() + 400ms;
+    const Ticket other = ask(18);
+    bus.hear_paced(modbus::encode_adu(18, kReply));
+    EXPECT_TRUE(bus.answer(other).pdu.has_value());
+    bus.run_until(goes_on);
+    EXPECT_EQ(bus.sent.back().adu[0], 17);
+    bus.hear_paced(ByteView(reply).subspan(4));
+    bus.hear_paced(reply);
+    ASSERT_TRUE(bus.answered(held_up));
+    EXPECT_TRUE(bus.answer(held_up).pdu.has_value());
+}
+
 TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {
     for (int i = 0; i < 5; ++i) {
         bus.submit(17, kRead);

@@ -165,5 +165,55 @@ TEST_F(SymptomsTest, ACollisionIsOne) {
     EXPECT_EQ(of(17).attempts(), 1u);
 }
 
+TEST_F(SymptomsTest, AnExceptionWithAnotherFunctionsNumberIsCountedBesides) {
+    ask(17, kRead, modbus::encode_adu(17, "84 02"_hex));
+    ask(17, kRead, modbus::encode_adu(17, "90 01"_hex));
+    ask(17, kRead, modbus::encode_adu(17, "04 02 00 07"_hex));  // no exception
+    EXPECT_EQ(of(17).wrong, 3u);
+    EXPECT_EQ(of(17).wrong_exceptions, 2u);
+}
+
+TEST_F(SymptomsTest, WhoAnswersABroadcastIsNobodyWhoSpeaksUnasked) {
+    const Bytes write = "10 00 64 00 01 02 12 34"_hex;
+    ask(18, kRead, modbus::encode_adu(18, kReply));
+    for (const Bytes& said : {"10 00 64 00 01"_hex, "90 02"_hex}) {
+        bus().submit(0, write);
+        bus().run_to_end_of_request();
+        bus().run_for(3ms);
+        bus().hear(modbus::encode_adu(18, said));
+        bus().run_for(400ms);
+    }
+    EXPECT_EQ(of(18).broadcast_replies, 2u);
+    EXPECT_EQ(of(18).unasked, 0u);
+    bus().submit(0, write);
+    bus().run_for(400ms);
+    bus().hear(modbus::encode_adu(18, "10 00 64 00 02"_hex));  // of another quantity
+    bus().run_for(400ms);
+    EXPECT_EQ(of(18).unasked, 1u);
+}
+
+TEST_F(SymptomsTest, AnAnswerToABroadcastIsNotWhatTheNextRequestIsAnswered) {
+    bus().submit(0, "10 00 64 00 01 02 12 34"_hex);
+    bus().run_for(200ms);
+    const auto ticket = bus().submit(18, kRead);
+    bus().run_to_end_of_request();
+    bus().hear(modbus::encode_adu(18, "90 02"_hex));
+    bus().run_for(10ms);
+    bus().hear(modbus::encode_adu(18, kReply));
+    ASSERT_TRUE(bus().answered(ticket));
+    EXPECT_EQ(bus().answer(ticket).pdu.value(), kReply);
+    EXPECT_EQ(of(18).broadcast_replies, 1u);
+    EXPECT_EQ(of(18).wrong, 0u);
+}
+
+TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
+    bus().submit(0, "06 00 01 00 03"_hex);
+    bus().run_for(400ms);
+    for (int i = 0; i < 5; ++i) ask(17, kRead, modbus::encode_adu(17, kReply));
+    bus().hear(modbus::encode_adu(18, "06 00 01 00 03"_hex));
+    bus().run_for(400ms);
+    EXPECT_EQ(of(18).broadcast_replies, 0u);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter

@@ -86,9 +86,10 @@ TEST_F(BusTellsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     bus->tell_refused(17, "03 00"_hex, 1);
     ASSERT_EQ(log.lines().size(), 2u) << "nobody asks who has read what";
     EXPECT_EQ(log.lines()[0],
-              "info write line=floor1 station=press client=\"modbus_tcp 10.0.0.5:1\" at=\"\" "
-              "pdu=0600 outcome=refused");
-    EXPECT_EQ(log.count("station=broadcast"), 1u);
+              "info write line=floor1 station=press client=\"modbus_tcp 10.0.0.5:1\" "
+              "pdu=0600 outcome=refused")
+        << "no address could be told";
+    EXPECT_EQ(log.count("station=broadcast client=\"modbus_tcp 10.0.0.5:1\" at=coils/1 "), 1u);
     const LineReport report = bus->report();
     const auto& press = report.stations.back();
     EXPECT_EQ(press.requests.at(6)[Outcome::refused], 1u);

@@ -97,6 +97,17 @@ TEST_F(RequestCountersTest, EachFunctionAndEachOutcomeCountsByItself) {
     EXPECT_TRUE(of("other").requests.empty());
 }
 
+TEST_F(RequestCountersTest, OutcomesAreThoseOfAllFunctionsOfAListedStation) {
+    ask(17, 3);
+    ask(17, 6);
+    counters.count(17, 4, outcome_of(answer(Fault::timeout)), 500ms);
+    ask(18, 3);
+    EXPECT_EQ(counters.outcomes(17)[Outcome::ok], 2u);
+    EXPECT_EQ(counters.outcomes(17)[Outcome::timeout], 1u);
+    EXPECT_EQ(counters.outcomes(18)[Outcome::ok], 0u) << "it is among others";
+    EXPECT_EQ(counters.outcomes(0)[Outcome::ok], 0u);
+}
+
 TEST_F(RequestCountersTest, P10NoClientCanAddASeries) {
     for (unsigned station = 0; station <= 255; ++station) {
         if (station == 17) continue;

@@ -63,6 +63,62 @@ TEST_F(Diagnose, ACrcWithItsHighByteFirstIsNeitherNoiseNorASecondPanel) {
                 ElementsAre("noise", "wrong-crc-order 2"));
 }
 
+TEST_F(Diagnose, AdviceOnTheCrcOrderFollowsWhatIsSet) {
+    EXPECT_THAT(findings({{2, swapped(9)}}).at(0).text, HasSubstr("high byte first"));
+    EXPECT_THAT(findings({{2, swapped(9)}}).at(0).advice,
+                HasSubstr("Set its `crc_order: high_first`"));
+    EXPECT_THAT(findings({{0, swapped(9)}}).at(0).advice, HasSubstr("List it"));
+    facts.crc_high_first = {2};
+    EXPECT_THAT(findings({{2, swapped(9)}}).at(0).text, HasSubstr("low byte first"));
+    EXPECT_THAT(findings({{2, swapped(9)}}).at(0).advice, HasSubstr("Leave its `crc_order` out"));
+}
+
+TEST_F(Diagnose, AnExceptionOfAnotherFunctionIsNeitherAMasterNorSilence) {
+    const Symptoms fine = Mix().answered(50);
+    const Symptoms odd = Mix()
+                             .with(&Symptoms::wrong, 9)
+                             .with(&Symptoms::wrong_exceptions, 9)
+                             .with(&Symptoms::unasked, 9)
+                             .with(&Symptoms::mute_in_a_row, 9);
+    const auto found = findings({{1, fine}, {2, odd}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].cause, Cause::wrong_exception);
+    EXPECT_EQ(found[0].station, 2);
+    EXPECT_THAT(found[0].evidence, HasSubstr("9 of 9 requests (100 %)"));
+    EXPECT_THAT(
+        causes(
+            {{1, fine},
+             {2,
+              Mix().answered(50).with(&Symptoms::wrong, 9).with(&Symptoms::wrong_exceptions, 3)}}),
+        ElementsAre("wrong-reply 2"))
+        << "most of it is something else";
+}
+
+TEST_F(Diagnose, SilenceFromTheStartMayBeTheOrderOfTheCrc) {
+    const Symptoms fine = Mix().answered(50);
+    const auto advice = [&](const Symptoms& s) {
+        return findings({{1, fine}, {2, s}}).at(0).advice;
+    };
+    EXPECT_THAT(advice(Mix().silent(9)), HasSubstr("`crc_order: high_first`"));
+    EXPECT_THAT(advice(Mix().answered(9).silent(9)), Not(HasSubstr("crc_order")));
+    facts.crc_high_first = {2};
+    EXPECT_THAT(advice(Mix().silent(9)), Not(HasSubstr("crc_order")));
+}
+
+TEST_F(Diagnose, APanelThatAnswersBroadcastsIsToldByName) {
+    broadcasts = 8;
+    const Symptoms fine = Mix().answered(50);
+    const auto answers = [](std::uint64_t n) {
+        return Mix().answered(50).with(&Symptoms::broadcast_replies, n);
+    };
+    EXPECT_THAT(causes({{1, fine}, {2, answers(8)}}), ElementsAre("answers-broadcasts 2"));
+    EXPECT_THAT(causes({{1, answers(4)}, {2, answers(8)}}),
+                ElementsAre("answers-broadcasts 1", "answers-broadcasts 2"));
+    EXPECT_THAT(causes({{1, fine}, {2, answers(2)}}), IsEmpty()) << "may be chance";
+    broadcasts = 100;
+    EXPECT_THAT(causes({{1, fine}, {2, answers(20)}}), IsEmpty()) << "it is silent as a rule";
+}
+
 TEST_F(Diagnose, GoodFramesThatDoNotAnswerAreAWrongReply) {
     const Symptoms fine = Mix().answered(50);
     const Symptoms odd = Mix().with(&Symptoms::wrong, 9).with(&Symptoms::unasked, 9);

@@ -76,6 +76,20 @@ TEST(OtherFraming, OneThatSpeaksModbusTcpIsRecognised) {
     EXPECT_EQ(other_framing(Framing::tcp, read), std::nullopt);
 }
 
+TEST(OtherFraming, ADamagedRequestInRtuThatIsRepeatedIsNoModbusTcp) {
+    Bytes damaged = encode_adu(1, "03 0000 0006"_hex);
+    damaged[6] ^= 0x10;
+    const Bytes both = damaged + encode_adu(1, "03 0000 0006"_hex);
+    for (std::size_t size = 0; size <= both.size(); ++size)
+        EXPECT_EQ(other_framing(Framing::rtu, ByteView(both).first(size)), std::nullopt) << size;
+}
+
+TEST(OtherFraming, PipelinedRequestsOfModbusTcpAreRecognised) {
+    const Bytes two = encode_mbap(1, 1, "03 0000 000A"_hex) + encode_mbap(2, 1, "06 0001 0002"_hex);
+    EXPECT_EQ(other_framing(Framing::rtu, two), Framing::tcp);
+    EXPECT_EQ(other_framing(Framing::ascii, two), Framing::tcp);
+}
+
 TEST(OtherFraming, AWriteInRtuThatIsHalfThereIsNoModbusTcp) {
     const Bytes write = encode_adu(1, "10 0000 0002 04 0001 0002"_hex);
     for (std::size_t size = 0; size <= write.size(); ++size)

@@ -41,9 +41,23 @@ TEST(ShippedProfiles, AreTheFilesOfTheFolder) {
         yaml::Problems problems(entry.path().filename());
         EXPECT_TRUE(load_profile(text, "x", problems)) << problems.text();
     }
-    EXPECT_EQ(files, 7u);
-    EXPECT_EQ(catalogue().all().size(), 7u);
+    EXPECT_EQ(files, 8u);
+    EXPECT_EQ(catalogue().all().size(), 8u);
     EXPECT_EQ(catalogue().find("autonics"), nullptr);
+}
+
+TEST(ShippedProfiles, OldFirmwareDiffersInTheOrderOfTheCrcOnly) {
+    const PanelProfile& old = *catalogue().find("autonics-gp-2005-old");
+    const PanelProfile& panel = *catalogue().find("autonics-gp-2005");
+    EXPECT_EQ(old.crc_order, modbus::CrcOrder::high_first);
+    EXPECT_EQ(functions_of(old.name), functions_of(panel.name));
+    EXPECT_EQ(broadcasts_of(old.name), broadcasts_of(panel.name));
+    ASSERT_EQ(old.areas.size(), panel.areas.size());
+    EXPECT_EQ(old.areas[0].readable.last, panel.areas[0].readable.last);
+    EXPECT_EQ(old.areas[0].writable->first, panel.areas[0].writable->first);
+    EXPECT_EQ(old.serial.default_format, panel.serial.default_format);
+    for (const auto& [name, profile] : catalogue().all())
+        EXPECT_TRUE(profile.crc_order == modbus::CrcOrder::low_first || name == old.name) << name;
 }
 
 TEST(ShippedProfiles, CiteASourceForEveryFigure) {
@@ -136,7 +150,7 @@ TEST(Catalogue, LetsAUserReplaceAndAdd) {
     own.add(panel);
     panel.name = "another";
     own.add(panel);
-    EXPECT_EQ(own.all().size(), 8u);
+    EXPECT_EQ(own.all().size(), 9u);
     EXPECT_EQ(own.find("generic")->description, "mine");
     EXPECT_NE(own.find("another"), nullptr);
 }

@@ -17,7 +17,7 @@ const SerialFormat k38400{38400, 8, Parity::none, 1};
 std::vector<Candidate> recognise(const profile::PanelProfile& panel, std::uint8_t station,
                                  const std::optional<SerialFormat>& format, int& asked) {
     sim::Station simulated(panel, station);
-    Recogniser recogniser(shipped(), station, format);
+    Recogniser recogniser(shipped(), station, format, panel.crc_order);
     asked = 0;
     while (const auto probe = recogniser.next_probe()) {
         EXPECT_TRUE(modbus::is_pure_read(*probe));

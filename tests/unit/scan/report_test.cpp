@@ -56,6 +56,16 @@ TEST(ScanReport, IsATable) {
                 StartsWith("x: 38400 8N1, 4 stations, 1 address shared by two (interrupted)\n"));
 }
 
+TEST(ScanReport, SaysWhichPanelHasTheOtherOrderOfTheCrc) {
+    Result result = five();
+    result.stations.resize(1);
+    result.stations[0].crc_order = modbus::CrcOrder::high_first;
+    EXPECT_THAT(report_text("x", result),
+                HasSubstr("the CRC's high byte comes first; function 04"));
+    EXPECT_THAT(report_yaml("/dev/ttyUSB0", result),
+                HasSubstr("profile: autonics-gp-2005, crc_order: high_first}"));
+}
+
 TEST(ScanReport, SaysWhenThereIsNoTable) {
     Result result;
     result.ending = Result::Ending::finished;

@@ -119,6 +119,37 @@ TEST(Scanner, TriesTheOtherParitiesWhenRepliesAreDamaged) {
     EXPECT_THAT(texts(result), ElementsAre("1 panasonic-gt"));
 }
 
+TEST(Scanner, TellsAPanelOfTheOtherCrcOrderBesideOthers) {
+    VirtualLine line;
+    line.add("autonics-gplp-s", 31);
+    line.add("autonics-gp-2005-old", 5);
+    line.add("autonics-gp-2005", 6);
+    const Result result = line.scan({});
+    EXPECT_THAT(texts(result),
+                ElementsAre("5 autonics-gp-2005-old", "6 autonics-gp-2005", "31 autonics-gplp-s"));
+    EXPECT_EQ(result.stations[0].crc_order, modbus::CrcOrder::high_first);
+    EXPECT_EQ(result.stations[1].crc_order, modbus::CrcOrder::low_first);
+    EXPECT_TRUE(result.talk.empty());
+    EXPECT_LT(line.now - line.start, 30s);
+}
+
+TEST(Scanner, FindsAPanelOfTheOtherCrcOrderThatIsAlone) {
+    for (const bool remote : {false, true}) {
+        VirtualLine line(remote ? SerialFormat{} : SerialFormat{38400, 8, Parity::none, 1});
+        line.add("autonics-gp-2005-old", 9);
+        Settings settings;
+        settings.remote = remote;
+        EXPECT_THAT(texts(line.scan(settings)), ElementsAre("9 autonics-gp-2005-old")) << remote;
+    }
+}
+
+TEST(Scanner, TriesTheOtherCrcOrderOnlyWhereAProfileHasIt) {
+    VirtualLine line({9600, 8, Parity::none, 1});
+    line.add("autonics-arm", 17);
+    line.scan({});
+    for (const Bytes& adu : line.sent) EXPECT_TRUE(modbus::crc_ok(adu));
+}
+
 TEST(Scanner, KeepsToTheStationsAndFormatsItWasGiven) {
     VirtualLine line;
     add_demo(line);
@@ -226,7 +257,7 @@ TEST(Scanner, EndsWhenNothingAnswers) {
     const Result result = line.scan({});
     EXPECT_EQ(result.ending, Result::Ending::finished);
     EXPECT_TRUE(result.stations.empty());
-    EXPECT_EQ(line.sent.size(), 21u * 31u);
+    EXPECT_EQ(line.sent.size(), 21u * 31u + 31u) << "and once in the other order of the CRC";
     EXPECT_LT(line.now - line.start, 80s);
 }
 

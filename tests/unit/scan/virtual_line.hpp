@@ -32,6 +32,7 @@ class VirtualLine {
     }
     sim::Misbehaviour& add(const profile::PanelProfile& profile, std::uint8_t station) {
         stations_.emplace_back(profile, station);
+        orders_.set(station, profile.crc_order);
         return faults_[station];
     }
     /// Bytes that somebody else puts on the line, readable in its own format only.
@@ -112,8 +113,9 @@ class VirtualLine {
         if (answer_) return answer_(adu);
         const ByteView pdu = ByteView(adu).subspan(1, adu.size() - 3);
         for (sim::Station& station : stations_) {
-            if (station.id() == adu[0])
-                return modbus::encode_adu(adu[0], station.handle(now, 0, pdu));
+            const modbus::CrcOrder order = orders_.of(station.id());
+            if (station.id() == adu[0] && modbus::crc_ok(adu, order))
+                return modbus::encode_adu(adu[0], station.handle(now, 0, pdu), order);
         }
         return {};
     }
@@ -131,6 +133,7 @@ class VirtualLine {
     bool echo_ = false;
     std::function<Bytes(const Bytes&)> answer_;
     std::vector<sim::Station> stations_;
+    modbus::CrcOrders orders_;
     std::map<std::uint8_t, sim::Misbehaviour> faults_;
     std::multimap<TimePoint, std::uint8_t> coming_;
     std::multimap<TimePoint, std::uint8_t> others_;

@@ -13,10 +13,11 @@ using asio::ip::udp;
 /// Somebody who sends datagrams.
 class Sender {
   public:
-    Sender(asio::io_context& context, std::uint16_t port, const char* own_address = "127.0.0.1")
+    Sender(asio::io_context& context, std::uint16_t port, const char* own_address = "127.0.0.1",
+           const char* server = "127.0.0.1")
         : context_(context),
           socket_(context, udp::endpoint(asio::ip::make_address(own_address), 0)) {
-        socket_.connect(udp::endpoint(asio::ip::address_v4::loopback(), port));
+        socket_.connect(udp::endpoint(asio::ip::make_address(server), port));
         socket_.non_blocking(true);
     }
     void send(const Bytes& datagram) { socket_.send(asio::buffer(datagram)); }
@@ -185,6 +186,17 @@ TEST_F(DatagramsTest, WhoHasBeenIdleIsForgotten) {
     second.request(1, 1, read_pdu(1));
     EXPECT_TRUE(second.receive());
     EXPECT_EQ(bus1.cancelled.size(), 1U);
+}
+
+TEST_F(DatagramsTest, TheAddressThatWasAskedAnswers) {
+    bus1.instant = reply_to_read(1);
+    for (const char* all : {"0.0.0.0", "::"}) {
+        settings.address = all;
+        start();
+        Sender client(context, listener->port(), "127.0.0.1", "127.0.0.9");
+        client.request(1, 1, read_pdu(1));
+        EXPECT_EQ(client.receive(), adu(1, 1, reply_to_read(1))) << all;
+    }
 }
 
 TEST_F(DatagramsTest, WhoIsNotInTheListIsNotAnswered) {

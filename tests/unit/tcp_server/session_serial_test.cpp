@@ -196,6 +196,18 @@ TEST_F(SessionRtu, AVendorsFunctionEndsByASilence) {
     EXPECT_EQ(bus1.seen.at(0).request.pdu(), "41 01 02"_hex);
 }
 
+TEST_F(SessionRtu, P3TheEndOfWhatAClientSaysIsASilence) {
+    bus1.instant = "41 07"_hex;
+    start();
+    Client client = connect();
+    client.send(modbus::encode_adu(1, "41 01 02"_hex));
+    client.socket().shutdown(tcp::socket::shutdown_send);
+    const Bytes reply = modbus::encode_adu(1, "41 07"_hex);
+    EXPECT_EQ(client.receive_bytes(reply.size()), reply);
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+}
+
 TEST_F(SessionRtu, HalfARequestIsGivenUpAndTheConnectionLivesOn) {
     bus1.instant = reply_to_read(7);
     start();

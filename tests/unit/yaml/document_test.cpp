@@ -157,12 +157,14 @@ TEST(Document, AnItemWithoutItsDashIsToldOnce) {
               "f.yaml:3:3: duplicate key 'id', already on line 1; is a '- ' missing before it?\n");
 }
 
-TEST(Document, ADecimalCommaInsideBracketsIsOneNumber) {
-    const Parsed parsed = read("{scale: 0,1, b: 2}\n");
-    EXPECT_EQ(parsed.problems,
-              "f.yaml:1:9: '0,1' is two values here; write 0.1, with a decimal point\n");
-    EXPECT_EQ(value(parsed.root, "scale").scalar, "0.1");
-    EXPECT_EQ(parsed.root.entries.size(), 2U);
+TEST(Document, ADecimalCommaInsideBracketsIsKeptForWhoReadsTheValue) {
+    const Parsed parsed = read("{scale: 0,1, every: 1,5s, b: 2}\n");
+    EXPECT_THAT(parsed.problems, IsEmpty());
+    EXPECT_EQ(value(parsed.root, "scale").scalar, "0,1");
+    EXPECT_TRUE(value(parsed.root, "scale").comma);
+    EXPECT_EQ(value(parsed.root, "every").scalar, "1,5s");
+    EXPECT_EQ(parsed.root.entries.size(), 3U);
+    EXPECT_FALSE(value(parsed.root, "b").comma);
 }
 
 TEST(Document, LongTextsInMessagesAreCut) {

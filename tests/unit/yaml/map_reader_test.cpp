@@ -171,6 +171,20 @@ TEST(MapReader, PointsAtValuesAndAtTheMapForAbsentKeys) {
     EXPECT_EQ(s.problems(), "f:2:2: absent\nf:2:5: odd\n");
 }
 
+TEST(MapReader, LooksForWhatWasMeantByAsManyKeysAsAreShown) {
+    std::string text;
+    for (int i = 0; i < 200; ++i) text += "baudd" + std::to_string(i) + ": 1\n";
+    Problems problems("f");
+    const Node node = parse(text, problems);
+    MapReader in(node, problems, "thing");
+    in.integer("baudd", 0, 1);
+    in.finish();
+    ASSERT_EQ(problems.list().size(), 200U);
+    EXPECT_EQ(problems.list().front().message,
+              "unknown key 'baudd0' in thing; did you mean 'baudd'?");
+    EXPECT_EQ(problems.list().back().message, "unknown key 'baudd199' in thing");
+}
+
 TEST(MapReader, ReportsUnknownKeysWithTheNearestKnownOne) {
     Subject s("bauds: 1\nparity: none\n");
     s.read().integer("baud", 1, 9);

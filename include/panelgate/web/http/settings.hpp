@@ -22,8 +22,9 @@ struct Token {
 /// How guesses at tokens are slowed down, by address.
 struct LoginSettings {
     unsigned free = 5;              ///< wrong tokens that cost nothing
-    Duration hold = 1s;             ///< for each wrong one beyond these
-    unsigned at_once = 32;          ///< requests of an address that are looked at in this time
+    Duration hold = 2s;             ///< for each wrong one beyond these, and each without a place
+    unsigned a_second = 32;         ///< requests of an address that are looked at
+    Duration longest_turn = 1s;     ///< nobody waits longer to be looked at
     Duration forgiven_after = 10s;  ///< each
     unsigned remembered = 20;       ///< at most, of an address
     std::size_t addresses = 256;    ///< at most
@@ -40,6 +41,7 @@ struct Settings {
     std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;
     std::size_t max_per_address = 32;      ///< of these
+    std::size_t max_held = 64;             ///< and of an address that are told late of wrong tokens
     std::size_t probe_places = 16;         ///< beyond these: only what is free is answered there
     std::size_t max_body = 64 * 1024;      ///< bytes
     Duration first_request_timeout = 10s;  ///< of a connection that has not asked anything yet

@@ -17,7 +17,9 @@ TEST_F(ApiLines, ListsTheLines) {
     bus.line.load_percent = 50;
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
-    EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
+    EXPECT_EQ(
+        lines[0],
+        json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","mode":"master","up":true,
         "load_percent":50,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);
@@ -203,6 +205,18 @@ TEST_F(ApiLines, DoesNotBroadcastOverAReadOnlyStation) {
     EXPECT_EQ(
         ask("POST", "/api/v1/lines/floor1/raw", R"({"station":0,"pdu":"0500010000"})").status(),
         403u);
+}
+
+TEST_F(ApiLines, TellsWhatIsWrongWithABroadcastBeforeWhomItWouldReach) {
+    add_meter();
+    const auto status = [&](const char* body) {
+        return ask("POST", "/api/v1/lines/floor1/broadcast", body).status();
+    };
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":["x"]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"coils","values":[1]})"), 400u);
+    EXPECT_EQ(status(R"({"table":"input-registers","address":1,"values":[1]})"), 422u);
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":[1]})"), 403u);
+    EXPECT_TRUE(bus.requests.empty());
 }
 
 TEST_F(ApiLines, P2WhatMayBeAMistakeInABodyIsNotExecuted) {

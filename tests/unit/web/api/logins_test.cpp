@@ -69,7 +69,38 @@ TEST_F(LoginAttempts, ThatAreHeldTakeNoPlaceFromThoseThatAreRight) {
         now += 1h;  // another turn
     }
     EXPECT_EQ(status("right"), 200u);
-    EXPECT_TRUE(guessing.front().receive().error);
+    EXPECT_EQ(server->connections(), settings.max_per_address + 1) << "they go on waiting";
+    server.reset();
+}
+
+TEST_F(LoginAttempts, ThatWereHeldEndTheirConnection) {
+    Client guessing = connect();
+    for (int i = 0; i < 3; ++i) {
+        EXPECT_EQ(
+            guessing.ask("GET", "/api/v1/lines", "", "Authorization: Bearer wrong\r\n").status(),
+            401u);
+    }
+    const Reply last = guessing.ask("GET", "/api/v1/lines", "", "Authorization: Bearer wrong\r\n");
+    EXPECT_EQ(last.status(), 401u);
+    EXPECT_EQ(last.header("Connection"), "close");
+}
+
+TEST_F(LoginAttempts, OfAnAddressThatGuessesAreHeldAlsoWhereAllPlacesAreTaken) {
+    settings.logins.hold = 1h;
+    settings.max_per_address = 1;
+    settings.anonymous = Role::viewer;
+    start();
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
+    Client asking = connect();
+    bus.script = [](const bus::Request&) { return std::nullopt; };
+    asking.send("GET /api/v1/stations/press/holding-registers/1 HTTP/1.1\r\nHost: x\r\n\r\n");
+    while (bus.open() == 0) io.run_one();
+    Client refused = connect();
+    refused.send("GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
+    while (server->connections() < 2) io.run_one();
+    io.poll();
+    EXPECT_FALSE(server->counters().requests.contains(503)) << "it would come again at once";
+    EXPECT_EQ(get("/healthz").status(), 200u);
     server.reset();
 }
 

@@ -35,13 +35,19 @@ TEST_F(LoginsTest, LookAtAnAddressThatGuessesNoFasterThanItsGuessesAreAnswered) 
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
     fail(settings.free + 1);
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero()) << "the first is looked at at once";
-    const Duration pause = settings.hold / settings.at_once;
+    const Duration pause = Duration(1s) / settings.a_second;
     EXPECT_EQ(logins.turn(now, "a"), pause);
     EXPECT_EQ(logins.turn(now, "a"), 2 * pause) << "whether the one before has hung up or not";
-    for (int i = 0; i < 1000; ++i) EXPECT_LE(logins.turn(now, "a"), settings.hold);
+    for (int i = 0; i < 1000; ++i) EXPECT_LE(logins.turn(now, "a"), settings.longest_turn);
     EXPECT_EQ(logins.turn(now, "b"), Duration::zero());
-    now += settings.hold + pause;
+    now += settings.longest_turn + pause;
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
+}
+
+TEST_F(LoginsTest, LeaveTurnsForWhatIsRightAmongFortyWhoGuessWithoutPause) {
+    fail(settings.remembered);
+    const auto held = settings.hold / (Duration(1s) / settings.a_second);
+    EXPECT_GT(held, 40 + 10) << "so many turns pass while each of them waits for its answer";
 }
 
 TEST_F(LoginsTest, ARightTokenTakesNobodysTurn) {

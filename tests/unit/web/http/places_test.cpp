@@ -16,6 +16,7 @@ class PlacesTest : public ::testing::Test {
         Settings settings;
         settings.max_connections = 3;
         settings.max_per_address = 2;
+        settings.max_held = 2;
         settings.probe_places = 2;
         places.emplace(settings);
     }
@@ -66,17 +67,38 @@ TEST_F(PlacesTest, DisplacesNobodyWhoHasARequest) {
     EXPECT_EQ(come(6, "c").leaves, 3u);
 }
 
-TEST_F(PlacesTest, TakesThePlaceOfAWrongTokenBeforeAllOthers) {
+TEST_F(PlacesTest, GivesThePlaceOfAWrongTokenAndLeavesItItsConnection) {
+    come(1, "a");
+    come(2, "a");
+    for (const Id id : {1u, 2u}) places->busy(id);
+    places->wrong(2);
+    EXPECT_TRUE(places->is_held(2));
+    const auto arrival = come(3, "a");
+    EXPECT_FALSE(arrival.leaves);
+    EXPECT_FALSE(arrival.probes_only);
+    places->busy(3);
+    EXPECT_TRUE(come(4, "a").probes_only) << "the place is taken once";
+}
+
+TEST_F(PlacesTest, HoldsSoManyWrongTokensOfAnAddressAndThenLetsTheFirstOfThemGo) {
+    for (const Id id : {1u, 2u}) {
+        come(id, "a");
+        places->wrong(id);
+    }
+    EXPECT_EQ(come(3, "a").leaves, 1u);
+    EXPECT_FALSE(places->is_held(1));
+    places->wrong(3);
+    EXPECT_FALSE(come(4, "b").leaves);
+}
+
+TEST_F(PlacesTest, OfAFullHouseTakesThePlaceOfAWrongTokenBeforeAllOthers) {
     come(1, "b");
     come(2, "a");
     come(3, "a");
     for (const Id id : {2u, 3u}) places->busy(id);
-    places->wrong(3);
-    EXPECT_EQ(come(4, "a").leaves, 3u);
-    places->busy(4);
-    EXPECT_TRUE(come(5, "a").probes_only) << "the place is taken once";
     places->wrong(2);
-    EXPECT_EQ(come(6, "c").leaves, 2u) << "though the first has been idle for longer";
+    EXPECT_EQ(come(4, "c").leaves, 2u) << "though the first has been idle for longer";
+    EXPECT_EQ(come(5, "d").leaves, 1u);
 }
 
 TEST_F(PlacesTest, TakesThePlaceOfAGuessingAddressForAnotherOnly) {

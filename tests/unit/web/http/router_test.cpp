@@ -24,6 +24,9 @@ Handling echo(std::string name, HttpRequest request) {
 
 class Router : public ::testing::Test {
   protected:
+    Router() {
+        site.now = [] { return TimePoint{}; };
+    }
     void add(const char* verb, const char* pattern, Role needed = Role::none) {
         const std::string name = std::string(verb) + " " + pattern;
         site.routes.push_back({verb, pattern, needed, [name](HttpRequest request) {
