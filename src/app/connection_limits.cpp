@@ -31,7 +31,9 @@ std::string words(const config::Config& config, const std::vector<std::size_t>& 
 }  // namespace
 
 std::string fit_connections(config::Config& config, std::size_t limit) {
-    const std::size_t reserve = kOwnDescriptors + kDescriptorsPerLine * config.lines.size();
+    const std::size_t reserve =
+        kOwnDescriptors +
+        kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size());
     std::vector<std::size_t> asked;
     for (const std::size_t* most : maxima(config)) asked.push_back(*most);
     const auto granted = rt::share_descriptors(limit > reserve ? limit - reserve : 0, asked);

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "address_families.hpp"
+#include "panelgate/bus/listening_bus.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
@@ -35,6 +36,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, b
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
     for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
+    for (const serial_server::Settings& settings : config_.serial_masters)
+        add_serial_master(settings);
     if (config_.http) add_http(*config_.http);
 }
 
@@ -57,14 +60,20 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
     settings.arbiter.may_stall = remote;
     auto wire = remote ? line::make_tcp_line(executor_, clock_, std::move(device))
                        : line::make_tty_line(executor_, clock_, std::move(device));
-    buses_.push_back(
-        std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
+    if (line.listens) {
+        buses_.push_back(std::make_unique<bus::ListeningBus>(executor_, clock_, std::move(settings),
+                                                             std::move(wire)));
+    } else {
+        buses_.push_back(
+            std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
+    }
     plant_.add(line, *buses_.back(), simulated);
-    add_poller(line, *buses_.back());
+    add_points(line, *buses_.back());
 }
 
 void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, plant_, line, event);
+    if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write == nullptr) return;
     const auto listener = write_listeners_.find(line);
@@ -72,10 +81,36 @@ void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) 
     if (relay_listener_) relay_listener_(line, *write);
 }
 
+void Gateway::add_points(const config::Line& line, bus::LineBus& bus) {
+    auto wanted = polled_stations(line);
+    if (wanted.empty()) return;
+    if (line.listens) return add_heard(line, wanted);
+    add_poller(line, std::move(wanted), bus);
+}
+
+void Gateway::add_heard(const config::Line& line,
+                        const std::vector<points::PolledStation>& wanted) {
+    for (const points::PolledStation& one : wanted) {
+        const auto [heard, added] = heard_.try_emplace({line.name, one.id}, one.wants, one.memory);
+        Station& station = plant_.at(line.name, one.id);
+        const config::Station& configured = *station.configured;
+        station.points.emplace(configured.points, configured.polls, heard->second.readings());
+    }
+}
+
+/// A broadcast is to all of them.
+void Gateway::hear(const std::string& line, const tap::Transaction& heard) {
+    for (auto& [place, values] : heard_) {
+        if (place.first != line || (heard.station != 0 && heard.station != place.second)) continue;
+        const auto wants = values.on_heard(heard);
+        if (!wants.empty())
+            publish_points(events_, plant_.at(line, place.second), wants, clock_.now());
+    }
+}
+
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
-void Gateway::add_poller(const config::Line& line, bus::Bus& bus) {
-    auto polled = polled_stations(line);
-    if (polled.empty()) return;
+void Gateway::add_poller(const config::Line& line, std::vector<points::PolledStation> polled,
+                         bus::LineBus& bus) {
     pollers_.push_back(std::make_unique<points::Poller>(clock_, bus, std::move(polled)));
     points::Poller& poller = *pollers_.back();
     for (const config::Station& station : line.stations) {
@@ -109,6 +144,15 @@ void Gateway::add_listener(tcp_server::Settings settings) {
     plant_.add_units(units);
     listeners_.push_back(std::make_unique<tcp_server::Listener>(
         executor_, clock_, std::move(settings), std::move(units), PANELGATE_VERSION));
+}
+
+/// Who else answers on the master's line is not ours to speak for: only what is listed is served.
+void Gateway::add_serial_master(const serial_server::Settings& settings) {
+    auto lines = plant_.listener_lines();
+    for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
+    serial_masters_.push_back(std::make_unique<serial_server::SerialMaster>(
+        clock_, settings, tcp_server::UnitMap(settings.access, lines),
+        line::make_tty_line(executor_, clock_, settings.device)));
 }
 
 void Gateway::add_http(const web::Settings& settings) {
@@ -150,6 +194,7 @@ void Gateway::start() {
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
+    for (const auto& master : serial_masters_) master->start();
     add_doors();
     openings_.start();
     ready_ = true;
@@ -170,22 +215,27 @@ void Gateway::stop_accepting() {
     for (const auto& listener : listeners_) {
         listener->stop([this] { --open_listeners_; });
     }
+    for (const auto& master : serial_masters_) master->finish();
     if (http_) http_->stop(longest_answer());
 }
 
 bool Gateway::drained() const {
-    return open_listeners_ == 0 && (!http_ || http_->connections() == 0);
+    const auto idle = [](const auto& master) { return master->idle(); };
+    return open_listeners_ == 0 && std::ranges::all_of(serial_masters_, idle) &&
+           (!http_ || http_->connections() == 0);
 }
 
 std::size_t Gateway::owing() const {
     std::size_t count = http_ ? http_->connections() : 0;
     for (const auto& listener : listeners_) count += listener->counters().connections;
+    for (const auto& master : serial_masters_) count += master->idle() ? 0 : 1;
     return count;
 }
 
 void Gateway::stop() {
     lag_.stop();
     for (const auto& listener : listeners_) listener->close_now();
+    for (const auto& master : serial_masters_) master->stop();
     http_.reset();
     relays_->stop();
     for (const auto& poller : pollers_) poller->stop();
@@ -202,6 +252,8 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const
     }
     if (points.next(snapshot.points, clock_.now())) return true;
     for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
+    for (const auto& master : serial_masters_)
+        snapshot.serial_masters.push_back(master->counters());
     snapshot.relays = relay_samples(relays_->status());
     if (http_) snapshot.http = http_->counters();
     snapshot.version = PANELGATE_VERSION;

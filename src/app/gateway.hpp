@@ -7,18 +7,23 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/line_bus.hpp"
 #include "panelgate/bus/write_event.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/points/heard_values.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/loop_lag.hpp"
+#include "panelgate/serial_server/serial_master.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
+#include "panelgate/tap/heard.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
@@ -58,9 +63,14 @@ class Gateway {
   private:
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void add_line(const config::Line& line, bool simulate);
-    void add_poller(const config::Line& line, bus::Bus& bus);
+    void add_points(const config::Line& line, bus::LineBus& bus);
+    void add_poller(const config::Line& line, std::vector<points::PolledStation> polled,
+                    bus::LineBus& bus);
+    void add_heard(const config::Line& line, const std::vector<points::PolledStation>& polled);
+    void hear(const std::string& line, const tap::Transaction& heard);
     void add_relays();
     void add_listener(tcp_server::Settings settings);
+    void add_serial_master(const serial_server::Settings& settings);
     void add_http(const web::Settings& settings);
     void add_doors();
     bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;
@@ -75,10 +85,13 @@ class Gateway {
     std::map<std::string, std::function<void(const bus::WriteEvent&)>> write_listeners_;
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
-    std::vector<std::unique_ptr<bus::Bus>> buses_;  ///< by the order of config_.lines
+    std::vector<std::unique_ptr<bus::LineBus>> buses_;  ///< by the order of config_.lines
     std::vector<std::unique_ptr<points::Poller>> pollers_;
+    /// Of lines that are only listened to, by their name and the station's id.
+    std::map<std::pair<std::string, std::uint8_t>, points::HeardValues> heard_;
     std::unique_ptr<points::Relays> relays_;
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
+    std::vector<std::unique_ptr<serial_server::SerialMaster>> serial_masters_;
     std::unique_ptr<Scrapes> scrapes_;
     web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
     std::unique_ptr<web::Server> http_;

@@ -90,6 +90,7 @@ json::object line_json(const config::Line& line) {
     }
     return {{"name", line.name},
             {"device", line.device.device},
+            {"mode", line.listens ? "listen" : "master"},
             {"serial", to_string(line.device.serial)},
             {"clients", clients_json(line)},
             {"unlisted_stations", line.refuse_unlisted ? "refuse" : "pass"},
@@ -128,15 +129,31 @@ const char* word(tcp_server::BroadcastMode mode) {
     std::abort();
 }
 
-json::object listener_json(const tcp_server::Settings& listener) {
+json::object units_json(const tcp_server::Settings& access) {
     json::object units;
-    for (const auto& [unit, target] : listener.units)
+    for (const auto& [unit, target] : access.units)
         units[std::to_string(unit)] = target.line + '/' + std::to_string(target.station);
+    return units;
+}
+
+json::object master_json(const serial_server::Settings& master) {
+    const bool silent = master.on_failure == serial_server::OnFailure::silence;
+    return {{"name", master.name},
+            {"device", master.device.device},
+            {"serial", to_string(master.device.serial)},
+            {"framing", modbus::label(master.access.framing)},
+            {"lines", each(master.access.lines, text_json)},
+            {"units", units_json(master.access)},
+            {"access", access(master.access.read_only)},
+            {"on_failure", silent ? "silence" : "exception"}};
+}
+
+json::object listener_json(const tcp_server::Settings& listener) {
     return {{"listen", listener.name()},
             {"framing", modbus::label(listener.framing)},
             {"udp", listener.udp},
             {"lines", each(listener.lines, text_json)},
-            {"units", std::move(units)},
+            {"units", units_json(listener)},
             {"diagnostics_unit", unit_json(listener.diagnostics_unit)},
             {"broadcast", word(listener.broadcast)},
             {"access", access(listener.read_only)},
@@ -160,6 +177,8 @@ json::object inventory_json(const config::Config& config) {
     json::object made{{"lines", each(config.lines, line_json)},
                       {"relays", each(config.relays, relay_json)},
                       {"modbus_tcp", each(config.modbus_tcp, listener_json)}};
+    if (!config.serial_masters.empty())
+        made["serial_masters"] = each(config.serial_masters, master_json);
     if (config.http) made["http"] = http_json(*config.http);
     return made;
 }

@@ -1,5 +1,7 @@
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -78,9 +80,11 @@ std::string clients_of(const config::Line& line) {
 std::string text_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
     if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
+    if (line.listens) text += ", only listened to";
     text += '\n';
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         text += text_of(line.stations[i], line.arbiter.stations[i]);
+    if (line.listens) return text;
     return text +
            "  other stations: " + (line.refuse_unlisted ? "refused" : "passed on, read and write") +
            '\n' + clients_of(line);
@@ -101,6 +105,15 @@ std::string text_of(const std::vector<Network>& allow) {
     return text.empty() ? "everybody" : text;
 }
 
+std::string text_of(const std::map<std::uint8_t, tcp_server::UnitTarget>& units) {
+    std::string text;
+    for (const auto& [unit, target] : units) {
+        text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
+                std::to_string(target.station) + '\n';
+    }
+    return text;
+}
+
 std::string broadcasts_of(const tcp_server::Settings& listener) {
     using Mode = tcp_server::BroadcastMode;
     if (listener.read_only || listener.broadcast == Mode::deny) return "refused";
@@ -114,13 +127,21 @@ std::string text_of(const tcp_server::Settings& listener) {
         text += ", framing " + std::string(modbus::label(listener.framing));
     if (listener.udp) text += ", udp too";
     text += ", " + rights(listener.read_only) + ", for " + text_of(listener.allow) + '\n';
-    for (const auto& [unit, target] : listener.units) {
-        text += "  unit " + std::to_string(unit) + " is " + target.line + '/' +
-                std::to_string(target.station) + '\n';
-    }
+    text += text_of(listener.units);
     if (listener.diagnostics_unit)
         text += "  unit " + std::to_string(*listener.diagnostics_unit) + " is the gateway itself\n";
     return text + "  broadcasts are " + broadcasts_of(listener) + '\n';
+}
+
+std::string text_of(const serial_server::Settings& master) {
+    std::string text = "serial master " + master.name + ": " + master.device.device + ", " +
+                       to_string(master.device.serial) + ", " +
+                       std::string(modbus::label(master.access.framing)) + ':';
+    for (const std::string& line : master.access.lines) text += ' ' + line;
+    const bool silent = master.on_failure == serial_server::OnFailure::silence;
+    text += ", " + rights(master.access.read_only) + ", told of failures by " +
+            (silent ? "silence" : "exceptions") + '\n';
+    return text + text_of(master.access.units);
 }
 
 std::string text_of(web::Role role) {
@@ -153,6 +174,7 @@ std::string inventory_text(const config::Config& config) {
     for (const config::Line& line : config.lines) text += text_of(line);
     for (const points::Relay& relay : config.relays) text += text_of(relay);
     for (const tcp_server::Settings& listener : config.modbus_tcp) text += text_of(listener);
+    for (const serial_server::Settings& master : config.serial_masters) text += text_of(master);
     if (config.http) text += text_of(*config.http);
     return text;
 }

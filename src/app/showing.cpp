@@ -49,7 +49,8 @@ struct Publisher {
         hub.publish("transaction", web::transaction_event(line, station, event.function,
                                                           label(event.outcome), event.took));
     }
-    void operator()(const bus::WriteEvent&) const {}  // the points it touches are told
+    void operator()(const bus::WriteEvent&) const {}   // the points it touches are told
+    void operator()(const tap::Transaction&) const {}  // as are these
 };
 
 }  // namespace

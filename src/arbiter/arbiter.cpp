@@ -208,6 +208,9 @@ void Arbiter::start(TimePoint now, Group group) {
                 !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual() + latency_, timing.patience);
+        timing.notice = notice_.early();
+        timing.drift = station.clock_drift();
+        timing.as_asked = surprised_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
     ledger_.written(group, false);

@@ -52,38 +52,70 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     // Who looks late, or is told late, is no slower line.
     const Duration slack = std::max<Duration>(2 * character(), 1ms);
+    const auto planned = next_look();
     since_ += bytes.size();
     looked_ = now;
     const TimePoint latest = now - since_ * character();
     hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
+    if (planned && planned->end && now >= planned->at && !end_look_) {
+        const bool whole = since_ * character() >= planned->reply;
+        overslept_ = verdict == Verdict::replied && !whole;
+        if (!overslept_) end_look_ = {planned->reply, whole};
+    }
     // More should have come by now: a hole, or a slower clock, as the next byte will tell.
     const auto busy = busy_until();
     if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
     return verdict;
 }
 
+std::optional<Attempt::NextLook> Attempt::next_look() const {
+    if (!timing_.steady || hasty_ || !began_) return std::nullopt;
+    const std::size_t rest = missing();
+    if (rest == 0) return std::nullopt;
+    NextLook next;
+    next.reply = (since_ + rest) * character();
+    next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
+    next.at = *began_ + next.reply;
+    const Duration early = timing_.notice + timing_.drift.early(next.reply);
+    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one tells nothing
+    return next;
+}
+
 /// A reply that was cut short is noticed before twice the time that it has taken.
 std::optional<TimePoint> Attempt::busy_until() const {
     constexpr Duration kLongest = 30ms;
-    const std::size_t missing = echo_.pending() ? echo_.missing() : framer_.missing();
-    if (!timing_.steady || hasty_ || missing == 0 || !began_) return std::nullopt;
-    return std::min<TimePoint>(*began_ + (since_ + missing) * character(),
-                               looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+    const auto next = next_look();
+    if (!next) return std::nullopt;
+    return std::min(next->at, looked_ + std::max<Duration>(kLongest, looked_ - *began_));
+}
+
+std::size_t Attempt::missing() const {
+    const std::size_t echo = echo_.missing();
+    if (!timing_.as_asked) return echo > 0 ? echo : framer_.missing();
+    if (!echo_.pending()) return echo > 0 ? echo : framer_.missing_as_asked();
+    return std::max(group_.request.reply_length().value_or(0), echo_.held() + echo) - echo_.held();
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     const bool was_complete = echo_.complete();
     const ByteView rest = echo_.feed(bytes);
-    if (echo_.complete() && !was_complete) began_ = now - (since_ = rest.size()) * character();
+    if (echo_.complete() && !was_complete) {
+        since_ = rest.size();
+        began_.reset();
+        if (since_ > 0) began_ = now - since_ * character();
+    }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
     if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
         lender_.emplace(group_.station, group_.request.pdu(), orders_);
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
-    if (rest.empty()) return Verdict::open;
+    if (rest.empty()) {
+        if (echo_.pending() && !held_since_) held_since_ = now;
+        return Verdict::open;
+    }
     if (now < timing_.sent) early_ = now;
     if (is_stale(now, rest.size())) {
         disturbed_ = true;
@@ -92,6 +124,9 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     }
     drop_what_ended(now, rest.size());
     if (!heard_) first_byte_ = now;
+    // What was held back as an echo was the beginning, where nothing but us delays the rest.
+    if (!heard_ && timing_.steady && held_since_ && !echo_.complete())
+        first_byte_ = std::min(now, std::max(*held_since_, timing_.sent));
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
@@ -235,6 +270,7 @@ void Attempt::teach(EchoMemory& memory) const {
 }
 
 Duration Attempt::waited(TimePoint now) const {
+    if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = wire_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }

@@ -46,8 +46,9 @@ ByteView EchoFilter::feed(ByteView bytes) {
 
 std::size_t EchoFilter::missing() const {
     constexpr std::size_t kHeader = 3;  // a reply begins like the request, up to its byte count
-    if (!pending()) return 0;
-    return matched_ < kHeader ? kHeader - matched_ : frame_.size() - matched_;
+    if (expect_ == Expect::nothing || matched_ == 0) return 0;
+    const bool open = expect_ == Expect::perhaps && matched_ < kHeader;
+    return (open ? kHeader : frame_.size()) - matched_;
 }
 
 Bytes EchoFilter::release() {

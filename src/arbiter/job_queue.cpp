@@ -169,14 +169,15 @@ Jobs JobQueue::remove_if(const Test& match) {
     return removed;
 }
 
-void JobQueue::each_first(const Show& show) const {
+bool JobQueue::any_first(const Test& match) const {
     for (const auto& [host, origin] : hosts_) {
         for (const auto& [client, source] : origin.sources) {
             for (const auto& [station, lane] : source.lanes) {
-                if (in_order(source, station)) show(lane.jobs.front().job);
+                if (in_order(source, station) && match(lane.jobs.front().job)) return true;
             }
         }
     }
+    return false;
 }
 
 bool JobQueue::has(Client client, std::uint8_t station) const {

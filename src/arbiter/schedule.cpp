@@ -88,7 +88,10 @@ void Schedule::let_others_go_first() {
     turns_ = 0;
     dear_ = dear_ && backlog_.has_retries();
     if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
-    backlog_.queue().each_first([&](const Job& job) { others_.insert(job.station); });
+    backlog_.queue().any_first([&](const Job& job) {
+        others_.insert(job.station);
+        return false;
+    });
     // Who has many clients does not have all of these turns.
     turns_ = dear_ ? 2 * others_.size() : 1;
 }
@@ -158,12 +161,15 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
         next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
     };
     backlog_.each_retry([&](const Group& group) { earlier(repeat_from(group, stations)); });
-    backlog_.queue().each_first([&](const Job& job) {
-        if (backlog_.has_retry(job.station)) return;
+    // As a rule the first of them may start at once: however many wait, nothing starts sooner.
+    const bool at_once = backlog_.queue().any_first([&](const Job& job) {
+        if (backlog_.has_retry(job.station)) return false;
         const Station* station = stations.find(job.station);
         const TimePoint rested = station != nullptr ? station->rested() : free;
         earlier(std::max(quiet.quarantined_until(), rested));
+        return *next <= free;
     });
+    if (at_once) return next;
     if (const auto probe = stations.next_probe())
         earlier(std::max(quiet.quarantined_until(), *probe));
     return next;

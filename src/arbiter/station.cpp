@@ -163,6 +163,8 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
     const bool exception = modbus::exception_of(attempt.reply()).has_value();
+    if (const auto& look = attempt.end_look()) clock_drift_.on_look(look->reply, look->whole);
+    odd_ = exception ? kOdd : std::max(odd_ - 1, 0);
     damaged_pdu_.clear();
     settle_debt(now, attempt);
     if (!group.span || exception) return result;
@@ -184,6 +186,7 @@ void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) 
 void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     if (verdict == Verdict::silent) adaptive_.on_timeout();
     failed_ = now;
+    if (verdict != Verdict::silent) odd_ = kOdd;
     if (health_.offline() || flaky()) ++probes_;
     const int silent = verdict == Verdict::silent ? 1 : 0;
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);

@@ -56,7 +56,9 @@ void Arbiter::settle(TimePoint now) {
     if (station.may_be_copy(now, *active_))
         return active_->hold_reply(station.needed(), active_->group().may_doubt(active_->reply()));
     pace_.on_reply(early);
-    if (active_->hasty()) pace_.on_hasty();
+    pace_.on_rate(active_->hasty());
+    surprised_ = active_->overslept() ? Station::kOdd : std::max(surprised_ - 1, 0);
+    if (const auto& look = active_->end_look()) notice_.on_look(look->whole);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();

@@ -13,6 +13,7 @@ FrameDirection direction_of(FrameKind kind) {
         case FrameKind::broadcast:
             return FrameDirection::sent;
         case FrameKind::reply:
+        case FrameKind::heard_request:
             return FrameDirection::received;
         case FrameKind::damaged:
         case FrameKind::echo:
@@ -39,6 +40,8 @@ std::string_view label(FrameKind kind) {
             return "broadcast";
         case FrameKind::reply:
             return "reply";
+        case FrameKind::heard_request:
+            return "heard request";
         case FrameKind::damaged:
             return "damaged";
         case FrameKind::echo:

@@ -12,6 +12,8 @@ std::string_view label(Health health) {
             return "online";
         case Health::suspect:
             return "suspect";
+        case Health::heard:
+            return "heard";
         case Health::offline:
             return "offline";
     }

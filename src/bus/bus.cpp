@@ -6,9 +6,7 @@
 #include "client_shares.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/arbiter/reason.hpp"
 #include "panelgate/base/pool.hpp"
-#include "panelgate/bus/flight_recorder.hpp"
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"
 #include "panelgate/modbus/exception.hpp"
@@ -17,6 +15,7 @@
 #include "refusals.hpp"
 #include "request_counters.hpp"
 #include "station_events.hpp"
+#include "trace_book.hpp"
 #include "wall.hpp"
 #include "write_log.hpp"
 
@@ -53,12 +52,11 @@ struct Bus::State final : public line::Line::Events {
           arbiter(settings.arbiter),
           rights(settings.stations),
           counters(settings.stations),
-          recorder(settings.trace_frames),
-          decisions(settings.trace_decisions),
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
           wall(clock),
+          book(settings, wall),
           answers(executor),
           drive(clock, *line, arbiter, *this) {}
 
@@ -74,8 +72,10 @@ struct Bus::State final : public line::Line::Events {
         arbiter.set_latency(line->latency());
     }
     void act(arbiter::Finish& finish);
-    void act(arbiter::Note& note);
-    void act(arbiter::Decision& decision);
+    void act(arbiter::Note& note) {
+        book.note(note.at, note.kind, std::move(note.bytes), std::move(note.why));
+    }
+    void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
     void act(arbiter::StationEvent& event);
     void act(const arbiter::Written& written) {
         observe(WriteEvent{written.station, written.items, written.ended, written.client});
@@ -88,7 +88,7 @@ struct Bus::State final : public line::Line::Events {
     void on_deadline(TimePoint now);
     void settled(TimePoint now) {
         load.record(now, arbiter.counters().busy);
-        if (up) doctor.look(now, arbiter, *line);
+        if (up) doctor.look(now, counts());
         if (calls == 0) answers.hand_over();
     }
     /// Somebody calls: whatever it leads to, nobody is answered before it ends.
@@ -101,6 +101,9 @@ struct Bus::State final : public line::Line::Events {
     void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
                  Outcome outcome, Duration took);
     void answer(Pending pending, Answer answer);
+    LineCounts counts() const {
+        return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
+    }
     void observe(const BusEvent& event) const {
         if (settings.observe) settings.observe(event);
     }
@@ -112,13 +115,11 @@ struct Bus::State final : public line::Line::Events {
     arbiter::Arbiter arbiter;
     Rights rights;
     RequestCounters counters;
-    std::uint64_t happened = 0;  ///< the last sequence number of a frame or decision
-    FlightRecorder recorder;
-    DecisionRecorder decisions;
     LineDoctor doctor;
     LoadMeter load;
     Refusals refusals;
     Wall wall;
+    TraceBook book;
     Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
@@ -137,7 +138,7 @@ void Bus::State::on_up() {
     arbiter.confirm_ends(line->unsent().has_value());
     drive.hear([this](TimePoint now) {
         arbiter.on_line_up(now);
-        doctor.begin(now, arbiter, *line);
+        doctor.begin(now, counts());
     });
 }
 
@@ -218,31 +219,6 @@ void Bus::State::act(arbiter::Finish& finish) {
         result.age = *finish.age;
     }
     answer(std::move(entry), std::move(result));
-}
-
-void Bus::State::act(arbiter::Note& note) {
-    if (rt::log_enabled(rt::LogLevel::trace)) {
-        rt::log(rt::LogLevel::trace, "frame",
-                {{"line", settings.name},
-                 {"what", std::string(label(note.kind))},
-                 {"bytes", to_hex(note.bytes)},
-                 {"why", text_of(note.why)}});
-    }
-    RecordedFrame frame;
-    frame.sequence = ++happened;
-    frame.at = note.at;
-    frame.kind = note.kind;
-    frame.bytes = std::move(note.bytes);
-    frame.why = std::move(note.why);
-    frame.time = wall.at(note.at);
-    recorder.add(std::move(frame));
-}
-
-void Bus::State::act(arbiter::Decision& decision) {
-    if (rt::log_enabled(rt::LogLevel::trace)) {
-        rt::log(rt::LogLevel::trace, "decision", {{"line", settings.name}, {"why", decision.text}});
-    }
-    decisions.add({++happened, decision.at, std::move(decision.text), wall.at(decision.at)});
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
@@ -344,7 +320,7 @@ LineStatus Bus::status() const {
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
-    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->arbiter, *state_->line);
+    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->counts());
     status.findings = state_->doctor.findings();
     return status;
 }
@@ -370,20 +346,18 @@ std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 
-std::vector<TraceFrame> Bus::trace(std::size_t last) const {
-    return in_words(state_->recorder.last(last));
-}
+std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->book.frames(last); }
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
-    return state_->decisions.last(last);
+    return state_->book.decisions().last(last);
 }
 
 std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return in_words(state_->recorder.since(sequence, most));
+    return state_->book.frames_since(sequence, most);
 }
 
 std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->decisions.since(sequence, most);
+    return state_->book.decisions().since(sequence, most);
 }
 
 bool Bus::idle() const { return state_->arbiter.idle(); }

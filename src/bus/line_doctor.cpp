@@ -22,13 +22,13 @@ doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     return facts;
 }
 
-doctor::Sample sample_of(const arbiter::Arbiter& arbiter, line::Line& line) {
+doctor::Sample sample_of(const LineCounts& counts) {
     doctor::Sample sample;
-    for (const auto& [id, counters] : arbiter.station_counters()) {
+    for (const auto& [id, counters] : counts.stations) {
         sample.stations.emplace_hint(sample.stations.end(), id, counters.symptoms);
     }
-    sample.broadcasts = arbiter.counters().broadcasts;
-    sample.uart = line.counters().uart;
+    sample.broadcasts = counts.broadcasts;
+    sample.uart = counts.line.counters().uart;
     return sample;
 }
 
@@ -37,20 +37,20 @@ doctor::Sample sample_of(const arbiter::Arbiter& arbiter, line::Line& line) {
 LineDoctor::LineDoctor(const Settings& settings)
     : settings_(settings), doctor_(settings.doctor, facts_of(settings.arbiter)) {}
 
-void LineDoctor::begin(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
-    doctor_.begin(now, sample_of(arbiter, line));
+void LineDoctor::begin(TimePoint now, const LineCounts& counts) {
+    doctor_.begin(now, sample_of(counts));
 }
 
-void LineDoctor::look(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
-    if (doctor_.due(now)) judge(now, arbiter, line);
+void LineDoctor::look(TimePoint now, const LineCounts& counts) {
+    if (doctor_.due(now)) judge(now, counts);
 }
 
-void LineDoctor::glance(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
-    if (doctor_.rested(now)) judge(now, arbiter, line);
+void LineDoctor::glance(TimePoint now, const LineCounts& counts) {
+    if (doctor_.rested(now)) judge(now, counts);
 }
 
-void LineDoctor::judge(TimePoint now, const arbiter::Arbiter& arbiter, line::Line& line) {
-    const doctor::Doctor::Change change = doctor_.look(now, sample_of(arbiter, line));
+void LineDoctor::judge(TimePoint now, const LineCounts& counts) {
+    const doctor::Doctor::Change change = doctor_.look(now, sample_of(counts));
     for (const doctor::Finding& finding : change.gone) say(finding, false);
     for (const doctor::Finding& finding : change.appeared) say(finding, true);
 }

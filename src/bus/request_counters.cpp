@@ -5,6 +5,14 @@
 
 namespace panelgate::bus {
 
+namespace {
+
+bool is_there(Health state) {
+    return state == Health::online || state == Health::heard || state == Health::suspect;
+}
+
+}  // namespace
+
 Outcome outcome_of(const Answer& answer) {
     if (!answer.pdu) return outcome_of(answer.pdu.error());
     if (modbus::exception_of(*answer.pdu))
@@ -50,13 +58,19 @@ OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
 }
 
 std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
+    return report(arbiter.station_counters(),
+                  [&](std::uint8_t id) { return arbiter.health(id).state(); });
+}
+
+std::vector<StationReport> RequestCounters::report(
+    const std::map<std::uint8_t, arbiter::StationCounters>& counted_there,
+    const std::function<Health(std::uint8_t)>& health) const {
     std::vector<StationReport> reports;
     for (const auto& [id, counted] : stations_) {
         StationReport report = counted;
-        const auto wire = arbiter.station_counters().find(id);
-        if (wire != arbiter.station_counters().end()) report.wire = wire->second;
-        const auto state = arbiter.health(id).state();
-        report.up = state == Health::online || state == Health::suspect;
+        const auto wire = counted_there.find(id);
+        if (wire != counted_there.end()) report.wire = wire->second;
+        report.up = is_there(health(id));
         reports.push_back(std::move(report));
     }
     return reports;

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/arbiter/counters.hpp"
+#include "panelgate/base/health.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/station_settings.hpp"
@@ -29,6 +33,9 @@ class RequestCounters {
     OutcomeCounts outcomes(std::uint8_t station) const;
     /// Joined with what the arbiter counted on the wire.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
+    /// ... or with what was heard there.
+    std::vector<StationReport> report(const std::map<std::uint8_t, arbiter::StationCounters>& wire,
+                                      const std::function<Health(std::uint8_t)>& health) const;
 
   private:
     StationReport& of(std::uint8_t station);

@@ -13,6 +13,8 @@ modbus::ExceptionCode code_of(Rule rule) {
             return modbus::ExceptionCode::illegal_function;
         case Rule::quantity:
             return modbus::ExceptionCode::illegal_data_value;
+        case Rule::listening:
+            return modbus::ExceptionCode::gateway_path_unavailable;
         case Rule::range:
         case Rule::write_protected:  // the manuals disagree about the code
             return modbus::ExceptionCode::illegal_data_address;

@@ -15,6 +15,8 @@ std::string_view label(Rule rule) {
             return "quantity";
         case Rule::range:
             return "range";
+        case Rule::listening:
+            return "listen";
         case Rule::write_protected:
             return "read-only";
     }

@@ -108,6 +108,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_lines(loading, root);
     for (const yaml::Node& body : unused) judge_template(loading, body);
     load_modbus_tcp(loading, root);
+    load_serial_masters(loading, root);
     load_http(loading, root);
     load_log(loading, root);
     load_realtime(loading, root);
@@ -119,7 +120,8 @@ void load_tree(Loading& loading, yaml::Node& tree) {
                           std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
                               return is_http(entry.key);
                           });
-    if (is_empty && root.child("http") == nullptr && !mistyped)
+    const bool has_other = root.child("http") != nullptr || root.child("serial_masters") != nullptr;
+    if (is_empty && !has_other && !mistyped)
         loading.problems.add({1, 1},
                              "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
                              "[{listen: 127.0.0.1:502}]");

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "line_hints.hpp"
+#include "load_port.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -187,6 +188,25 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
+/// Who asks on this line: the gateway, or somebody else.
+void load_mode(MapReader& in, Line& line) {
+    const Node* given = in.child("mode");
+    if (given != nullptr && (given->scalar == "kernel" || given->scalar == "rts")) {
+        in.problem("mode", "mode " + given->scalar +
+                               " is of rs485; write rs485: {mode: " + given->scalar + '}');
+        in.has("mode");
+        return;
+    }
+    constexpr std::array<std::string_view, 2> kModes{"master", "listen"};
+    line.listens = in.choice_index("mode", kModes) == std::size_t{1};
+    line.device.listen_only = line.listens;
+    if (line.listens && line.kind == Line::Kind::simulated) {
+        in.problem("mode",
+                   "mode listen needs a line with a master; nobody asks on a simulated one: name "
+                   "the device of an adapter that hears the line");
+    }
+}
+
 EchoMode load_echo(MapReader& in) {
     constexpr std::array<std::string_view, 3> kWords{"auto", "on", "off"};
     constexpr std::array kModes{EchoMode::automatic, EchoMode::on, EchoMode::off};
@@ -227,7 +247,6 @@ constexpr std::array<yaml::Elsewhere, 29> kElsewhere{
      {"after", "offline", {}},
      {"probe_min", "offline", {}},
      {"probe_max", "offline", {}},
-     {"mode", "rs485", {}},
      {"points", {}, "a station"},
      {"poll", {}, "a station"},
      {"profile", {}, "a station"},
@@ -235,6 +254,7 @@ constexpr std::array<yaml::Elsewhere, 29> kElsewhere{
      {"relays", {}, {}, kAtTheTop},
      {"templates", {}, {}, kAtTheTop},
      {"modbus_tcp", {}, {}, kAtTheTop},
+     {"serial_masters", {}, {}, kAtTheTop},
      {"http", {}, {}, kAtTheTop},
      {"log", {}, {}, kAtTheTop},
      {"realtime", {}, {}, kAtTheTop},
@@ -249,6 +269,7 @@ Line load_line(Loading& loading, const Node& node) {
     if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
         in.problem("name", "there are two lines '" + line.name + '\'');
     load_device(loading, in, line);
+    load_mode(in, line);
     const bool serial_known = load_serial(loading, in, line.device.serial);
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in, line, line.device.rs485);
@@ -265,11 +286,28 @@ Line load_line(Loading& loading, const Node& node) {
     }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
-    if (serial_known) warn_of_deadline(loading, node, line);
+    if (serial_known && !line.listens) warn_of_deadline(loading, node, line);
     return line;
 }
 
 }  // namespace
+
+bool load_port(Loading& loading, MapReader& in, line::Settings& port) {
+    Line line;  // what a port has is a part of it
+    line.device.device = port.device = in.required_text("device").value_or("");
+    if (!port.device.empty() && port.device[0] != '/') {
+        const bool remote = port.device.starts_with("tcp://");
+        in.problem("device", "device must be a serial device such as /dev/ttyUSB1, not " +
+                                 yaml::quote(port.device) +
+                                 (remote ? "; a master's silences do not come through a network"
+                                         : device_hint(port.device)));
+    } else {
+        check_path(in, port.device);
+    }
+    const bool serial_known = load_serial(loading, in, port.serial);
+    load_rs485(loading, in, line, port.rs485);
+    return serial_known;
+}
 
 void load_lines(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("lines", kListExample);

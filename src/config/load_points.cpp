@@ -237,6 +237,9 @@ bool refuse_short_form(Loading& loading, const Node& node) {
     return true;
 }
 
+constexpr const char* kListens =
+    "the line is only listened to (mode: listen): nothing can be written there; leave writable out";
+
 void load_point(Loading& loading, const Node& node, Station& station) {
     if (refuse_short_form(loading, node)) return;
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
@@ -261,6 +264,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     point.writable = in.boolean("writable").value_or(false);
     if (point.writable && station.read_only)
         in.problem("writable", "station '" + station.name + "' is read_only");
+    if (point.writable && station.listens) in.problem("writable", kListens);
     load_labels(in, point);
     load_no_value(in, point);
     point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
@@ -329,6 +333,11 @@ void check_read_count(MapReader& in, std::string_view key, const profile::PanelP
 }
 
 void load_points(Loading& loading, MapReader& in, Station& station) {
+    if (station.listens && in.child("poll") != nullptr) {
+        in.problem("poll",
+                   "the line is only listened to (mode: listen): nothing is asked there; write "
+                   "points, which what passes by fills");
+    }
     load_list(loading, in, "poll", "[{read: UW100, count: 8, every: 1s}]", points::kMaxPolls,
               [&](Loading& l, const Node& node) { load_poll(l, node, station); });
     load_list(loading, in, "points", "[{name: temperature, at: UW100}]", points::kMaxPoints,

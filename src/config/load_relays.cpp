@@ -58,6 +58,12 @@ std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view ke
                             did_you_mean(end.end.station, names, "stations"));
         return std::nullopt;
     }
+    if (end.station->listens) {
+        in.problem(key, "station '" + end.end.station +
+                            "' is on a line that is only listened to (mode: listen): a relay can "
+                            "neither read nor write there");
+        return std::nullopt;
+    }
     const auto item = profile::parse_notation(*end.station->profile, end.end.at);
     if (!item) {
         in.problem(key, item.error().message);

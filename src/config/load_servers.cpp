@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "address_hints.hpp"
+#include "load_access.hpp"
 #include "load_framing.hpp"
 #include "load_hosts.hpp"
 #include "load_tokens.hpp"
@@ -55,7 +56,9 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
     if (list == nullptr) {
-        for (const Line& line : loading.config.lines) settings.lines.push_back(line.name);
+        for (const Line& line : loading.config.lines) {
+            if (!line.listens) settings.lines.push_back(line.name);
+        }
         return;
     }
     for (const Node& item : list->items) {
@@ -239,24 +242,32 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     in.elsewhere(kElsewhere);
     tcp_server::Settings settings;
     load_listen(in, settings);
-    load_listener_lines(loading, in, settings);
-    load_units(loading, in, settings);
-    check_overlap(loading, in, settings);
+    load_access(loading, in, settings);
     load_framing(in, settings);
     load_diagnostics(loading, in, settings);
-    settings.read_only = load_read_only(in).value_or(false);
     load_allow(loading, in, settings.allow);
     settings.max_connections =
         static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
     refuse_tls(in);
-    refuse_empty(in, "lines", "name at least one line, or leave it out for all");
-    refuse_empty(in, "units", "write such as {101: floor1/31}, or leave it out");
+    refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);
     in.finish();
     return settings;
 }
 
 }  // namespace
+
+void load_access(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+    load_listener_lines(loading, in, settings);
+    load_units(loading, in, settings);
+    check_overlap(loading, in, settings);
+    settings.read_only = load_read_only(in).value_or(false);
+}
+
+void refuse_empty_access(MapReader& in) {
+    refuse_empty(in, "lines", "name at least one line, or leave it out for all");
+    refuse_empty(in, "units", "write such as {101: floor1/31}, or leave it out");
+}
 
 void load_modbus_tcp(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("modbus_tcp", "[{listen: 127.0.0.1:502}]");

@@ -146,6 +146,7 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
 StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& work,
                           Station& station) {
     station.read_only = load_read_only(in).value_or(false);
+    station.listens = work.line.listens;
 
     StationSettings settings = load_station_timing(loading, in, work, station);
     settings.id = station.id;

@@ -47,6 +47,7 @@ void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view in
 void load_lines(Loading& loading, yaml::MapReader& root);
 void load_relays(Loading& loading, yaml::MapReader& root);
 void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
+void load_serial_masters(Loading& loading, yaml::MapReader& root);
 void load_http(Loading& loading, yaml::MapReader& root);
 
 }  // namespace panelgate::config

@@ -165,7 +165,7 @@ Duration TcpLine::latency() {
 }
 
 void TcpLine::write(ByteView bytes) {
-    if (!is_open()) return;
+    if (!is_open() || settings().listen_only) return;
     if (undelivered()) return reset(takes_nothing());  // what follows makes this frame the last one
     const TimePoint now = clock().now();
     older_ = unacknowledged_since().value_or(now);

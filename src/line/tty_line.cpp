@@ -85,7 +85,8 @@ void TtyLine::begin_open() {
 /// Empty when the device is ready.
 std::string TtyLine::try_open() {
     const std::string& device = settings().device;
-    const int opened = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+    const int access = settings().listen_only ? O_RDONLY : O_RDWR;
+    const int opened = ::open(device.c_str(), access | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (opened < 0) return explain_open_error(device, errno);
     if (std::string error = adopt(opened); !error.empty()) return error;
     if (flock(fd(), LOCK_EX | LOCK_NB) != 0) return holder_of_lock(fd()) + " holds it";
@@ -142,7 +143,7 @@ void TtyLine::close_device(bool discard) {
 }
 
 void TtyLine::write(ByteView bytes) {
-    if (!is_open()) return;
+    if (!is_open() || settings().listen_only) return;
     if (holds_nothing()) {
         gone_by_ =
             clock().now() + lead() + wire_time(settings().serial, bytes.size()) + kTransferTime;

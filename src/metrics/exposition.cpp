@@ -11,6 +11,7 @@
 #include "panelgate/base/priority.hpp"
 #include "panelgate/line/counters.hpp"
 #include "point_families.hpp"
+#include "serial_families.hpp"
 
 namespace panelgate::metrics {
 namespace {
@@ -301,9 +302,10 @@ void add_process(Families& out, const Snapshot& snapshot) {
 
 using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
-    add_requests,      add_translated,    add_station_times, add_wire_counters, add_exceptions,
-    add_line_counters, add_uart_counters, add_line_state,    add_station_state, add_points,
-    add_relays,        add_listeners,     add_http,          add_loop,          add_process,
+    add_requests,       add_translated,    add_station_times, add_wire_counters,
+    add_exceptions,     add_line_counters, add_uart_counters, add_line_state,
+    add_station_state,  add_points,        add_relays,        add_listeners,
+    add_serial_masters, add_http,          add_loop,          add_process,
 };
 
 }  // namespace

@@ -25,8 +25,10 @@ static_assert(kTable[1] == 0xC0C1);
 
 }  // namespace
 
-std::uint16_t crc16(ByteView bytes) {
-    unsigned crc = 0xFFFF;
+std::uint16_t crc16(ByteView bytes) { return crc16(0xFFFF, bytes); }
+
+std::uint16_t crc16(std::uint16_t before, ByteView bytes) {
+    unsigned crc = before;
     for (const std::uint8_t byte : bytes) crc = crc >> 8 ^ kTable[(crc ^ byte) & 0xFF];
     return static_cast<std::uint16_t>(crc);
 }

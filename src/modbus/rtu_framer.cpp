@@ -11,17 +11,19 @@
 namespace panelgate::modbus {
 namespace {
 
+constexpr std::size_t kHeader = 3;  // of a reply: address, function, byte count or exception
+
 ReplyLength known(std::size_t length) { return {ReplyLength::Kind::known, length}; }
 ReplyLength need_more() { return {ReplyLength::Kind::need_more, 0}; }
 ReplyLength by_silence() { return {ReplyLength::Kind::by_silence, 0}; }
 
 /// 2B/0E: address, 2B, 0E, code, conformity, more, next id, n, then n objects of id, length, value.
 ReplyLength device_identification_length(ByteView b) {
-    constexpr std::size_t kHeader = 8;
+    constexpr std::size_t kFront = 8;
     if (b.size() < 3) return need_more();
     if (b[2] != kMeiDeviceIdentification) return by_silence();
-    if (b.size() < kHeader) return need_more();
-    std::size_t at = kHeader;
+    if (b.size() < kFront) return need_more();
+    std::size_t at = kFront;
     for (unsigned object = 0; object < b[7]; ++object) {
         if (b.size() < at + 2) return need_more();
         at += 2u + b[at + 1];
@@ -154,7 +156,6 @@ ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end
 }
 
 std::size_t ReplyFramer::missing() const {
-    constexpr std::size_t kHeader = 3;  // address, function, byte count or exception
     if (!has_start()) return ends_with_address() ? kHeader - 1 : 0;
     const ByteView rest = ByteView(heard_).subspan(starts_[judged_]);
     if (rest.size() < kHeader) return kHeader - rest.size();
@@ -163,6 +164,14 @@ std::size_t ReplyFramer::missing() const {
     const bool asked = length.kind == ReplyLength::Kind::by_silence && expected_;
     const std::size_t whole = known ? length.length : asked ? *expected_ : 0;
     return whole > rest.size() ? whole - rest.size() : 0;
+}
+
+std::size_t ReplyFramer::missing_as_asked() const {
+    if (!expected_ || !has_candidate()) return missing();
+    const std::size_t start = has_start() ? starts_[judged_] : heard_.size() - 1;
+    const std::size_t here = heard_.size() - start;
+    const bool refused = here > 1 && (heard_[start + 1] & kExceptionBit) != 0;
+    return refused || here >= std::min(kHeader, *expected_) ? missing() : *expected_ - here;
 }
 
 bool ReplyFramer::ends_with_other_frame() const {

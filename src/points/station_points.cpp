@@ -24,12 +24,12 @@ const Point* StationPoints::point_of(std::size_t want) const {
 
 const Reading& StationPoints::reading(const Poll& block) const {
     const auto index = static_cast<std::size_t>(&block - blocks_->data());
-    return polls_->reading(points_->size() + index);
+    return (*readings_)[points_->size() + index];
 }
 
 PointReading StationPoints::read(const Point& point, TimePoint now) const {
     const auto index = static_cast<std::size_t>(&point - points_->data());
-    const Reading& reading = polls_->reading(index);
+    const Reading& reading = (*readings_)[index];
     PointReading made;
     made.quality = quality_of(reading, point.every, now);
     if (reading.sampled) made.age = now - *reading.sampled;

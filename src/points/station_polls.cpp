@@ -110,7 +110,7 @@ std::vector<std::size_t> StationPolls::on_write(TimePoint now,
     std::vector<std::size_t> outdated;
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         Reading& reading = readings_[i];
-        if (!changes(items, wants_[i].span)) continue;
+        if (!may_change(memory_, items, wants_[i].span)) continue;
         const bool was_old = reading.outdated();
         reading.written = now;
         if (!was_old && reading.outdated()) outdated.push_back(i);
@@ -124,20 +124,22 @@ void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& 
             const modbus::Span& span = plan_[i].span;
             const bool direct = items && items->overlaps(span);
             if (direct != themselves || spares(items, span)) continue;
-            if (is_outdated(plan_[i]) || !changes(items, span)) schedule_.hasten(i, now);
+            if (is_outdated(plan_[i]) || !may_change(memory_, items, span))
+                schedule_.hasten(i, now);
         }
     }
 }
 
-bool StationPolls::changes(const std::optional<modbus::Span>& written,
-                           const modbus::Span& items) const {
-    const auto known = written ? memory_.changes(*written, items) : std::nullopt;
+bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+                const modbus::Span& items) {
+    const auto known = written ? memory.changes(*written, items) : std::nullopt;
     return known ? *known : modbus::may_change(written, items);
 }
 
 bool StationPolls::spares(const std::optional<modbus::Span>& written,
                           const modbus::Span& items) const {
-    return memory_.known ? !changes(written, items) : !modbus::may_change(written, items);
+    return memory_.known ? !may_change(memory_, written, items)
+                         : !modbus::may_change(written, items);
 }
 
 bool StationPolls::is_outdated(const PlannedRead& read) const {

@@ -1,78 +1,162 @@
 #include "panelgate/rt/asio_clock.hpp"
 
-#include <boost/asio/steady_timer.hpp>
+#include <sys/timerfd.h>
+
+#include <algorithm>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <cerrno>
+#include <cstdint>
 #include <memory>
+#include <system_error>
 #include <utility>
 
-namespace panelgate::rt {
-namespace {
+#include "panelgate/base/pool.hpp"
+#include "panelgate/rt/lead_time.hpp"
 
-/// The system's timer is moved only when it must ring earlier: one that rings too early is set
-/// again, which most of them never are, because what they wait for comes first.
-class AsioAlarm final : public Alarm {
+namespace panelgate::rt {
+
+namespace asio = boost::asio;
+
+/// All armed alarms of a clock, in their order, and the one timer of the system that wakes for the
+/// first of them. It is moved only when it must ring earlier: most alarms never ring, because what
+/// they wait for comes first, and who wakes in vain sets it again.
+class AsioClock::Alarms {
   public:
-    AsioAlarm(const boost::asio::any_io_executor& executor, LeadTime& lead)
-        : timer_(executor), lead_(lead) {}
-    ~AsioAlarm() override { *alive_ = false; }
+    class One;
+    using Key = std::pair<TimePoint, std::uint64_t>;
+
+    explicit Alarms(const asio::any_io_executor& executor) : timer_(executor) {
+        const int timer = ::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+        if (timer < 0) throw std::system_error(errno, std::generic_category(), "timerfd_create");
+        timer_.assign(timer);
+    }
+    ~Alarms() { *alive_ = false; }
+    Alarms(const Alarms&) = delete;
+    Alarms& operator=(const Alarms&) = delete;
+
+    LeadTime& lead() { return lead_; }
+    Key add(TimePoint wake_at, One& alarm) {
+        const Key key{wake_at, ++added_};
+        armed_.emplace(key, &alarm);
+        set();
+        return key;
+    }
+    void remove(const Key& key) {
+        armed_.erase(key);
+        if (armed_.empty() && !ringing_) rest();
+    }
+
+  private:
+    void set();
+    void wait();
+    void on_time();
+    /// A loop that has nothing else to do ends.
+    void rest() {
+        if (!std::exchange(waiting_, false)) return;
+        ++waits_;
+        timer_.cancel();
+    }
+
+    asio::posix::stream_descriptor timer_;
+    LeadTime lead_;  ///< of all of them: they ring from one loop
+    PoolMap<Key, One*> armed_;
+    std::uint64_t added_ = 0;
+    TimePoint set_for_{};
+    unsigned waits_ = 0;    ///< what was due when it was cancelled completes nevertheless
+    bool waiting_ = false;  ///< the system's timer is set
+    bool ringing_ = false;
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
+
+class AsioClock::Alarms::One final : public Alarm {
+  public:
+    explicit One(std::shared_ptr<Alarms> alarms) : alarms_(std::move(alarms)) {}
+    ~One() override { One::cancel(); }
 
     void arm(TimePoint when, Handler ring) override { arm(when, std::move(ring), false); }
     void arm_sharp(TimePoint when, Handler ring) override { arm(when, std::move(ring), true); }
     void cancel() override {
-        ring_ = nullptr;
-        if (!std::exchange(waiting_, false)) return;
-        ++waits_;
-        timer_.cancel();  // a loop that has nothing else to do ends
+        const Handler gone = std::exchange(ring_, nullptr);
+        if (std::exchange(armed_, false)) alarms_->remove(key_);
+    }
+    /// It is time, and it was taken off the list.
+    void ring() {
+        armed_ = false;
+        if (sharp_) watch_clock();
+        const Handler handler = std::exchange(ring_, nullptr);
+        handler();
     }
 
   private:
     void arm(TimePoint when, Handler ring, bool sharp) {
+        cancel();
         ring_ = std::move(ring);
         when_ = when;
         sharp_ = sharp;
-        if (!waiting_ || wake_at() < timer_.expiry()) wait();
-    }
-    TimePoint wake_at() const { return sharp_ ? when_ - lead_.lead() : when_; }
-    void wait() {
-        waiting_ = true;
-        const unsigned number = ++waits_;
-        timer_.expires_at(wake_at());
-        timer_.async_wait([this, number, alive = alive_](boost::system::error_code) {
-            if (*alive && number == waits_) on_time();
-        });
-    }
-    void on_time() {
-        waiting_ = false;
-        if (!ring_) return;
-        if (std::chrono::steady_clock::now() < wake_at()) return wait();
-        if (sharp_) watch_clock();
-        const Handler ring = std::exchange(ring_, nullptr);
-        ring();
+        armed_ = true;
+        key_ = alarms_->add(sharp ? when - alarms_->lead().lead() : when, *this);
     }
     void watch_clock() {
         const TimePoint woken = std::chrono::steady_clock::now();
         TimePoint now = woken;
         while (now < when_) now = std::chrono::steady_clock::now();
-        lead_.on_rung(now, woken - timer_.expiry(), now - woken);
+        alarms_->lead().on_rung(now, woken - key_.first, now - woken);
     }
 
-    boost::asio::steady_timer timer_;
-    LeadTime& lead_;
+    std::shared_ptr<Alarms> alarms_;  ///< what a loop still holds when it ends may be the last
+    Key key_{};
     TimePoint when_{};
-    bool sharp_ = false;
     Handler ring_;
-    unsigned waits_ = 0;    ///< a timer that was due when it was moved completes nevertheless
-    bool waiting_ = false;  ///< the system's timer is set
-    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+    bool sharp_ = false;
+    bool armed_ = false;
 };
 
-}  // namespace
+void AsioClock::Alarms::set() {
+    if (ringing_) return;  // afterwards
+    if (armed_.empty()) return rest();
+    const TimePoint first = armed_.begin()->first.first;
+    if (waiting_ && set_for_ <= first) return;
+    set_for_ = first;
+    // In the past, it rings at once; nothing at all would stop it.
+    const auto since = std::max<Duration>(first.time_since_epoch(), 1ns);
+    itimerspec at{};
+    at.it_value.tv_sec = static_cast<std::time_t>(since / 1s);
+    at.it_value.tv_nsec = static_cast<long>((since % 1s).count());
+    ::timerfd_settime(timer_.native_handle(), TFD_TIMER_ABSTIME, &at, nullptr);
+    if (!waiting_) wait();
+}
 
-AsioClock::AsioClock(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
+/// Setting the timer takes back that it has rung, so nobody reads that from it.
+void AsioClock::Alarms::wait() {
+    waiting_ = true;
+    timer_.async_wait(asio::posix::stream_descriptor::wait_read,
+                      [this, number = ++waits_, alive = alive_](boost::system::error_code) {
+                          if (*alive && number == waits_) on_time();
+                      });
+}
+
+/// What is armed meanwhile waits for the next turn, so that the others in the loop have theirs.
+void AsioClock::Alarms::on_time() {
+    waiting_ = false;
+    ringing_ = true;
+    const std::uint64_t last = added_;
+    while (!armed_.empty()) {
+        const auto first = armed_.begin();
+        if (first->first.second > last) break;
+        if (first->first.first > std::chrono::steady_clock::now()) break;
+        One& alarm = *first->second;
+        armed_.erase(first);
+        alarm.ring();
+    }
+    ringing_ = false;
+    set();
+}
+
+AsioClock::AsioClock(const asio::any_io_executor& executor)
+    : alarms_(std::make_shared<Alarms>(executor)) {}
 
 TimePoint AsioClock::now() const { return std::chrono::steady_clock::now(); }
 
-std::unique_ptr<Alarm> AsioClock::make_alarm() {
-    return std::make_unique<AsioAlarm>(executor_, lead_);
-}
+std::unique_ptr<Alarm> AsioClock::make_alarm() { return std::make_unique<Alarms::One>(alarms_); }
 
 }  // namespace panelgate::rt

@@ -1,10 +1,11 @@
-#include "caller.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 
 #include <utility>
 
 namespace panelgate::tcp_server {
 
-Caller::Caller(std::string name, bus::Host host) : name_(std::move(name)), host_(host) {}
+Caller::Caller(std::string name, bus::Host host, std::string protocol)
+    : name_(std::move(name)), protocol_(std::move(protocol)), host_(host) {}
 
 void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
@@ -21,11 +22,12 @@ void Caller::tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pd
 
 /// It has a name there before it does anything.
 void Caller::use(bus::BusClient* bus) {
-    if (used_.insert(bus).second) bus->name_client(client_, "modbus_tcp " + name_);
+    if (used_.insert(bus).second) bus->name_client(client_, protocol_ + ' ' + name_);
 }
 
 void Caller::withdraw() {
-    const std::set<bus::BusClient*> buses = used_;  // an answer may end the connection meanwhile
+    // An answer may end the connection meanwhile.
+    const std::set<bus::BusClient*> buses = std::exchange(used_, {});
     for (bus::BusClient* bus : buses) bus->cancel(client_);
 }
 

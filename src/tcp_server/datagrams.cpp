@@ -9,9 +9,9 @@
 #include <utility>
 #include <variant>
 
-#include "caller.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 
 namespace panelgate::tcp_server {
 namespace {

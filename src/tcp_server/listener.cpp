@@ -11,13 +11,13 @@
 #include <system_error>
 #include <utility>
 
-#include "caller.hpp"
 #include "datagrams.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/access_list.hpp"
 #include "panelgate/rt/keep_alive.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 

@@ -6,12 +6,12 @@
 #include <variant>
 
 #include "diagnostics.hpp"
-#include "dispatch.hpp"
 #include "own_state.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 namespace panelgate::tcp_server {
 namespace {

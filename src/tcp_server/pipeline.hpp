@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "caller.hpp"
-#include "dispatch.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/modbus/mbap.hpp"
+#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
 #include "reply_queue.hpp"
 #include "shared.hpp"

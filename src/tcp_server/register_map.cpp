@@ -54,6 +54,8 @@ std::uint16_t word_of(Health state) {
             return 3;
         case Health::offline:
             return 4;
+        case Health::heard:
+            return 5;
     }
     std::abort();
 }
@@ -92,7 +94,7 @@ what nothing stands at is 0. Two registers: the high word first.
   106, 107    exceptions it has answered, the panels' included
   108, 109    what it took for no request
   1000 + 16u  unit u (from 0 to 247): 0 no listed station, 1 not asked yet, 2 online,
-              3 its last transaction failed, 4 offline
+              3 its last transaction failed, 4 offline, 5 answers another master
   1001 + 16u  its line, from 1; 0: an alias of another listener's line
   1002 + 16u  its station address on that line
   1004 + 16u  (2) milliseconds since its last answer; 4294967295: it has never answered

@@ -8,11 +8,11 @@
 #include <optional>
 #include <string_view>
 
-#include "caller.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/settings.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "pipeline.hpp"
 #include "request_reader.hpp"
 #include "shared.hpp"

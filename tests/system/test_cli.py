@@ -82,7 +82,7 @@ class CommandLine(unittest.TestCase):
         self.assertNotIn("stdout", told)
 
     def test_a_configuration_comes_from_standard_input_too(self):
-        for text, code in ((good(), 0), ("lines\n", BAD_CONFIG)):
+        for text, code in ((good(), 0), ("lines\n  - name: x\n", BAD_CONFIG)):
             ended = subprocess.run([harness.PANELGATE, "check", "-c", "-"], input=text,
                                    capture_output=True, text=True, timeout=harness.PATIENCE,
                                    check=False)

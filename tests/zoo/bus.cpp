@@ -43,6 +43,8 @@ Bus::Bus(BusSettings settings, std::unique_ptr<FarEnd> far_end)
       theirs_(end_of_frame(settings_)),
       gap_(silent_interval(settings_)),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (!settings_.tap.empty()) tap_ = make_pty(settings_.tap);
+    tap_ear_.set_latency(settings_.tap_latency);
     for (const int unit : settings_.units) stations_.try_emplace(unit, unit);
     thread_ = std::thread([this] { run(); });
 }
@@ -88,6 +90,7 @@ Time Bus::next_wake(Time at) const {
     };
     sooner(wire_.next(last_step_ + std::max(kGrain, wire_.character())));
     if (far_end_->descriptor() >= 0) sooner(ear_.next());
+    if (tap_) sooner(tap_ear_.next());
     for (const Source& s : sources_) sooner(s.next);
     if (other_asks_ != 0) sooner(wire_.busy_until() + kIdle);
     if (stopped_until_ > at) sooner(stopped_until_);
@@ -109,6 +112,14 @@ void Bus::step(Time at) {
         const Bytes heard = ear_.due(at);
         if (!heard.empty()) far_end_->write(heard);
     }
+    if (tap_) serve_tap(at);
+}
+
+// What comes from it is counted, and nobody hears it.
+void Bus::serve_tap(Time at) {
+    const Bytes heard = tap_ear_.due(at);
+    if (!heard.empty()) tap_->write(heard);
+    counters_.tap_bytes += tap_->read().size();
 }
 
 void Bus::hear_master(Time at) {
@@ -128,6 +139,7 @@ void Bus::hear_master(Time at) {
 }
 
 void Bus::on_character(const Character& c) {
+    if (tap_) tap_ear_.hear(c.end, c.value);
     if (c.speaker == kMaster) {
         on_master_character(c);
     } else {

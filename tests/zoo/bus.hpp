@@ -33,6 +33,8 @@ struct BusSettings {
     int bits = 10;  // of a character
     Time think = 500 * kMicrosecond;
     bool is_strict = false;    // a request behind too short a silence is lost
+    std::string tap;           // a link that hears all that is on the wire, and is not heard
+    Time tap_latency = 0;      // of its adapter
     std::FILE* log = nullptr;  // a line for each frame: START END BUS KIND hex..., seconds
 };
 
@@ -63,7 +65,7 @@ class Bus {
     };
     struct Counters {
         std::uint64_t requests = 0, bad = 0, broadcasts = 0, unknown = 0, gap_violations = 0,
-                      connections = 0;
+                      connections = 0, tap_bytes = 0;
     };
     struct Write {
         Time at;
@@ -75,6 +77,7 @@ class Bus {
     void wait();
     void step(Time at);
     void hear_master(Time at);
+    void serve_tap(Time at);
     void on_character(const Character& c);
     void on_master_character(const Character& c);
     void on_frame(const Bytes& frame, const Character& last, bool is_ours);
@@ -95,10 +98,12 @@ class Bus {
 
     BusSettings settings_;
     std::unique_ptr<FarEnd> far_end_;
+    std::unique_ptr<FarEnd> tap_;
     std::mutex mutex_;
     Wire wire_;
     Dice dice_;
     Ear ear_;
+    Ear tap_ear_;
     RequestFinder ours_;
     RequestFinder theirs_;
     std::map<int, Station> stations_;

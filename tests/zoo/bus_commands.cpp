@@ -99,7 +99,7 @@ std::string Bus::stats() const {
            field("broadcasts", c.broadcasts) + ", " + field("unknown", c.unknown) + ", " +
            field("gap_violations", c.gap_violations) + ", " +
            field("collisions", wire_.collisions()) + ", " + field("connections", c.connections) +
-           "}";
+           ", " + field("tap_bytes", c.tap_bytes) + "}";
 }
 
 // [[nanoseconds, unit, "PDU in hex"], ...], the oldest first.

@@ -6,6 +6,8 @@
 //     10: 8N1)
 //     --think MS       of an ordinary panel (default 0.5)      --strict  too early a request is
 //     lost
+//     --tap LINK[,MS]  another link, which hears the whole wire (through an adapter's latency
+//     timer)
 //     --log FILE       START END BUS KIND hex... of each frame, in seconds of CLOCK_MONOTONIC;
 //     KIND:
 //                      REQ, BAD (what our master said), RSP, ODD (what it should not hear)
@@ -22,6 +24,7 @@
 //   in front of it `@I ` for bus I instead of 0.
 // A holding register holds unit * 257 + address * 31 + 7, an input register unit * 263 +
 // address * 37 + 11; 0xE000 and 0xE001 count, 0xF000 and above are refused.
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -89,6 +92,11 @@ Plan parse(const std::vector<std::string>& arguments) {
             plan.settings.bits = std::stoi(value);
         } else if (option == "--think") {
             plan.settings.think = zoo::milliseconds(std::stod(value));
+        } else if (option == "--tap") {
+            const std::size_t comma = std::min(value.find(','), value.size());
+            plan.settings.tap = value.substr(0, comma);
+            if (comma < value.size())
+                plan.settings.tap_latency = zoo::milliseconds(std::stod(value.substr(comma + 1)));
         } else if (option == "--log") {
             plan.settings.log = std::fopen(value.c_str(), "w");
         } else {

@@ -17,6 +17,7 @@
 #include "panelgate/arbiter/pace.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/reception.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/schedule.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
@@ -145,6 +146,8 @@ class Arbiter {
     Quiet quiet_;
     Strays strays_;
     Pace pace_;
+    Notice notice_;
+    int surprised_ = 0;  ///< replies: where one station refuses something, others may do so, too
     Reception reception_;
     EchoMemory echo_memory_;
     Ledger ledger_;

@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -45,6 +46,9 @@ class Attempt {
         std::optional<Duration> tolerance;
         SerialFormat serial;
         bool steady = false;       ///< bytes come one by one, at the line's rate
+        Duration notice{};         ///< the line's Notice
+        Drift drift;               ///< what looks at the station's replies have told
+        bool as_asked = false;     ///< what begins is the reply that was asked for, as a rule
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
@@ -67,8 +71,18 @@ class Attempt {
 
     /// Bytes that come before then tell nothing: what may be the reply (or our echo) has begun, and
     /// the rest of its header, or of all of it, takes as long at the line's rate. Who waits needs
-    /// not look at each. Nothing: every byte may tell something.
+    /// not look at each. An exception where none was foreseen (Timing::as_asked) is noticed when
+    /// the reply would have been there. Nothing: every byte may tell something.
     std::optional<TimePoint> busy_until() const;
+    /// What the first look at the end of a reply that was slept through has told: how long the
+    /// reply is at the line's rate, and whether it was all there.
+    struct EndLook {
+        Duration reply{};
+        bool whole = false;
+    };
+    const std::optional<EndLook>& end_look() const { return end_look_; }
+    /// It was an exception that nobody had foreseen.
+    bool overslept() const { return overslept_; }
     /// More has come than the line's rate allows since the reply began.
     bool hasty() const { return hasty_; }
 
@@ -148,6 +162,14 @@ class Attempt {
   private:
     void drop_what_ended(TimePoint now, std::size_t size);
     Verdict hear(TimePoint now, ByteView bytes, const Ends& ends);
+    /// Bytes, until what has begun tells more. 0: each may tell.
+    std::size_t missing() const;
+    struct NextLook {
+        TimePoint at;
+        Duration reply{};  ///< at the line's rate, from its beginning until then
+        bool end = false;  ///< at all of it
+    };
+    std::optional<NextLook> next_look() const;
     Duration character() const { return character_time(timing_.serial); }
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
@@ -183,12 +205,15 @@ class Attempt {
     Bytes stale_;
     TimePoint computed_end_;
     TimePoint first_byte_;
+    std::optional<TimePoint> held_since_;  ///< the first byte that the echo filter held back
     std::optional<TimePoint> early_;
     TimePoint last_byte_;
     /// What is heard, if the line has kept its rate since; nothing: the next byte tells.
     std::optional<TimePoint> began_;
     std::size_t since_ = 0;  ///< bytes since then
     TimePoint looked_{};     ///< when bytes came last
+    std::optional<EndLook> end_look_;
+    bool overslept_ = false;  ///< its reply is shorter than foreseen: an exception
     bool hasty_ = false;
     bool heard_ = false;
     bool disturbed_ = false;

@@ -29,7 +29,9 @@ class EchoFilter {
 
     /// Bytes are held back that may still turn out not to be the echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
-    /// ... and how many at least have to come until that shows. 0: none are held back.
+    std::size_t held() const { return pending() ? matched_ : 0; }
+    /// The echo has begun, and so many bytes at least have to come until it shows that it is none,
+    /// or until it is over. 0: nothing has begun.
     std::size_t missing() const;
     /// It watches for the echo, as long as nothing else has come.
     bool expected() const { return expect_ != Expect::nothing; }
@@ -62,6 +64,7 @@ class EchoMemory {
     explicit EchoMemory(EchoMode mode);
 
     EchoState state() const { return state_; }
+    bool known() const { return state_ == EchoState::present || state_ == EchoState::absent; }
     /// The device was opened again: it may be another one.
     void forget();
     EchoFilter::Expect expect(const modbus::Request& request) const;

@@ -39,7 +39,6 @@ namespace panelgate::arbiter {
 class JobQueue {
   public:
     using Test = InlineFunction<bool(const Job&), 48>;
-    using Show = InlineFunction<void(const Job&), 48>;
     static constexpr std::size_t kMost = 4096;
     static constexpr int kReadTurn = 5;   ///< a read gets at least every fifth turn
     static constexpr int kPollTurn = 10;  ///< a poll gets at least every tenth
@@ -67,8 +66,8 @@ class JobQueue {
     Jobs take_all(std::uint8_t station, const Test& wanted);
     /// In order of tickets.
     Jobs remove_if(const Test& match);
-    /// Each lane's first job that order allows to run.
-    void each_first(const Show& show) const;
+    /// Each lane's first job that order allows to run, until one matches. False when none does.
+    bool any_first(const Test& match) const;
 
     /// Something of this client waits for this station; a broadcast of it is for every station.
     bool has(Client client, std::uint8_t station) const;

@@ -11,6 +11,7 @@
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/late_window.hpp"
 #include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/arbiter/station_health.hpp"
@@ -155,6 +156,9 @@ class Station {
     /// ... and not more than that, but for what a receiver holds back.
     Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }
+    /// Its last replies were what was asked for, no exceptions, and not damaged.
+    bool answers_as_asked() const { return odd_ == 0; }
+    const Drift& clock_drift() const { return clock_drift_; }
     modbus::Request probe() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {
@@ -175,6 +179,7 @@ class Station {
 
     static constexpr int kFailing = 2;  ///< transactions in a row
     static constexpr int kFlaky = 4;    ///< silent ones of the last 8 attempts
+    static constexpr int kOdd = 16;     ///< replies after which an exception surprises again
     static constexpr int kCredit = 2;   ///< whole timeouts that need not be paid at once
     static constexpr int kDebt = 3;     ///< ... and that are remembered
     static constexpr Duration kForgetStranger = 60s;
@@ -220,7 +225,9 @@ class Station {
     std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
     Slowest slowest_;  ///< from request to first sign of the reply
     TimePoint failed_{};
+    Drift clock_drift_;
     int failed_in_a_row_ = 0;
+    int odd_ = 0;          ///< so many more replies until answers_as_asked()
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
     bool trail_told_ = false;
     int probes_ = 0;  ///< in vain, since it was heard last

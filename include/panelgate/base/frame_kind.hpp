@@ -15,6 +15,7 @@ enum class FrameKind : std::uint8_t {
     broadcast,
     // Received, and what was waited for
     reply,
+    heard_request,  ///< of the line's master, where the gateway only listens
     // Received and thrown away
     damaged,
     echo,             ///< of what was sent last

@@ -11,11 +11,13 @@
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/bus/line_bus.hpp"
 #include "panelgate/bus/station_settings.hpp"
 #include "panelgate/bus/write_event.hpp"
 #include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/rt/clock.hpp"
+#include "panelgate/tap/heard.hpp"
 
 namespace panelgate::bus {
 
@@ -32,7 +34,8 @@ struct TransactionEvent {
     Duration took{};  ///< arrival to answer
 };
 /// Something happened that others may want to know.
-using BusEvent = std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent>;
+using BusEvent =
+    std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent, tap::Transaction>;
 
 struct Settings {
     std::string name;    ///< of the line
@@ -46,7 +49,7 @@ struct Settings {
 };
 
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.
-class Bus final : public BusClient {
+class Bus final : public LineBus {
   public:
     /// Answers come from the executor's loop; it and the clock outlive the bus.
     Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
@@ -54,9 +57,9 @@ class Bus final : public BusClient {
     /// Answers what is still open with Fault::cancelled.
     ~Bus() override;
 
-    void start();
+    void start() override;
     /// Closes the line; what waits is answered at once (line_down, line_lost).
-    void stop();
+    void stop() override;
 
     void transact(Request request, AnswerHandler handler) override;
     void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
@@ -73,7 +76,7 @@ class Bus final : public BusClient {
                                                std::size_t most) const override;
     void name_client(ClientId client, std::string name) override;
 
-    LineReport report() const;
+    LineReport report() const override;
     /// Nothing waits, nothing is on the wire.
     bool idle() const;
 

@@ -99,6 +99,19 @@ struct LineStatus {
     double load_percent = 0;  ///< busy share of the last ten seconds, the same for all who ask
     EchoState echo = EchoState::unknown;
     std::vector<LineFinding> findings{};  ///< the likeliest first; none on a healthy line
+    bool listens = false;                 ///< its master is somebody else: nothing is ever sent
+};
+
+/// What passed by of one station on a line that is only listened to.
+struct HeardCounts {
+    std::uint64_t requests = 0;  ///< of the line's master
+    std::uint64_t replies = 0;   ///< normal ones
+    std::uint64_t exceptions = 0;
+    std::uint64_t timeouts = 0;  ///< its master went on without a reply
+    std::uint64_t damaged = 0;
+    std::uint64_t doubtful = 0;  ///< whose reply or echo it was, nobody can tell
+    Duration think{};            ///< from the last request to its reply
+    Duration longest_think{};
 };
 
 struct StationStatus {
@@ -106,6 +119,7 @@ struct StationStatus {
     std::optional<Duration> last_success;  ///< how long ago
     /// How often it, or its line, was gone and came back: each may have been a restart.
     std::uint64_t returns = 0;
+    std::optional<HeardCounts> heard{};  ///< on a line that is only listened to
 };
 
 /// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long

@@ -18,7 +18,7 @@ struct Refusal {
     Rule rule = Rule::read_only;
     std::string station;  ///< the name of the one that the rule protects
     modbus::ExceptionCode code = modbus::ExceptionCode::illegal_function;  ///< for Modbus clients
-    std::string why{};                                                     ///< a guard's own words
+    std::string why{};  ///< a guard's own words; the name of a line that is only listened to
 
     friend bool operator==(const Refusal&, const Refusal&) = default;
 };

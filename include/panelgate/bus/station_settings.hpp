@@ -20,9 +20,10 @@ enum class Rule : std::uint8_t {
     function,                  ///< the panel does not have it
     quantity,                  ///< more items than it takes, or a request that contradicts itself
     range,                     ///< not all of it is memory of the panel
+    listening,                 ///< its line is only listened to, whatever is asked
     write_protected,           ///< memory that it does not let be written
 };
-/// "access", "function", "quantity", "range" or "read-only": stable words.
+/// "access", "function", "quantity", "range", "listen" or "read-only": stable words.
 std::string_view label(Rule rule);
 inline bool is_access(Rule rule) {
     return rule == Rule::read_only || rule == Rule::broadcast_over_read_only;

@@ -11,6 +11,7 @@
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/rt/settings.hpp"
+#include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 #include "panelgate/web/http/settings.hpp"
@@ -24,6 +25,7 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
+    bool listens = false;      ///< its line is only listened to
     bool guard = false;        ///< what the profile rules out is refused without using the bus
     bool translate = true;     ///< what its panel lacks goes out as what does the same
     sim::Misbehaviour faults;  ///< of the simulated panel
@@ -37,6 +39,7 @@ struct Line {
     Kind kind = Kind::serial;
     line::Settings device;
     arbiter::Settings arbiter;  ///< every station's timing resolved
+    bool listens = false;       ///< its master is somebody else: nothing is ever sent
     bool refuse_unlisted = false;
     bool simulated_echo = false;  ///< the simulated adapter hears itself
     std::vector<Station> stations;
@@ -48,6 +51,7 @@ struct Config {
     std::vector<Line> lines;
     std::vector<points::Relay> relays;
     std::vector<tcp_server::Settings> modbus_tcp;
+    std::vector<serial_server::Settings> serial_masters;
     std::optional<web::Settings> http;
     rt::LogSettings log;
     rt::RealtimeSettings realtime;

@@ -18,7 +18,7 @@ namespace panelgate::line {
 ///
 /// Machine: `poll_action()` gives an optional variant, `next_deadline()` an optional TimePoint.
 /// `busy_until()`, where it has one, too: input that comes before then changes nothing and wakes
-/// nobody.
+/// nobody. It is looked at then, or as late as the machine wakes up.
 /// Host acts for it: `act(action)` for each alternative, `on_deadline(now)` when the machine's
 /// deadline has come, `settled(now)` when it wants nothing more for now.
 ///
@@ -66,19 +66,24 @@ class Drive {
     }
     void arm(TimePoint now) {
         std::optional<TimePoint> next = machine_.next_deadline();
+        bool sharp = true;
         if constexpr (requires { machine_.busy_until(); }) {
             const std::optional<TimePoint> busy = machine_.busy_until();
             const bool hold = busy && *busy > now;
-            if (hold) next = next ? std::min(*next, *busy) : *busy;
+            if (hold && (!next || *busy < *next)) {
+                next = busy;
+                sharp = false;
+            }
             line_.hold_input(hold);
         }
         if (next == armed_) return;
         if (!next) return silence();
         armed_ = next;
-        alarm_->arm_sharp(*next, [this] {
+        auto ring = [this] {
             armed_.reset();
             tell([this](TimePoint now) { host_.on_deadline(now); });
-        });
+        };
+        sharp ? alarm_->arm_sharp(*next, ring) : alarm_->arm(*next, ring);
     }
 
     rt::Clock& clock_;

@@ -32,6 +32,9 @@ struct Settings {
     Rs485 rs485;                  ///< of a serial device
     Duration reopen_min = 100ms;  ///< back-off between attempts to open, doubled each time
     Duration reopen_max = 1s;
+    /// The line's master is somebody else: the device is opened for reading only, and write() does
+    /// nothing. A connection is only read.
+    bool listen_only = false;
     bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
 };
 

@@ -11,6 +11,7 @@
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
+#include "panelgate/serial_server/counters.hpp"
 #include "panelgate/tcp_server/counters.hpp"
 #include "panelgate/web/http/counters.hpp"
 
@@ -20,6 +21,7 @@ namespace panelgate::metrics {
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<tcp_server::Counters> listeners;
+    std::vector<serial_server::Counters> serial_masters;
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;

@@ -67,6 +67,8 @@ class ReplyFramer {
     /// How many bytes have to come at least until what may be the reply tells more: its header, or
     /// all of it. 0: every byte may tell.
     std::size_t missing() const;
+    /// The same, if what has begun is no exception: the request tells then how long it is.
+    std::size_t missing_as_asked() const;
     /// The reply is there, but it may be a part of another frame that is not whole yet: a silence
     /// of its length tells.
     bool is_inside() const { return inside_; }

@@ -23,13 +23,17 @@ struct PointReading {
 /// What has to be polled for a station: its points first, in their order, then its poll blocks.
 std::vector<Want> wants_of(const std::vector<Point>& points, const std::vector<Poll>& polls);
 
-/// The points of one station over what its polls have brought. Pure; what it refers to outlives it.
+/// The points of one station over what its polls have brought, or what was heard. Pure; what it
+/// refers to outlives it.
 class StationPoints {
   public:
-    /// `polls` are those of wants_of(points, blocks).
+    /// `readings` are those of wants_of(points, blocks).
+    StationPoints(const std::vector<Point>& points, const std::vector<Poll>& blocks,
+                  const std::vector<Reading>& readings)
+        : points_(&points), blocks_(&blocks), readings_(&readings) {}
     StationPoints(const std::vector<Point>& points, const std::vector<Poll>& blocks,
                   const StationPolls& polls)
-        : points_(&points), blocks_(&blocks), polls_(&polls) {}
+        : StationPoints(points, blocks, polls.readings()) {}
 
     const std::vector<Point>& points() const { return *points_; }
     const Point* find(std::string_view name) const;
@@ -43,7 +47,7 @@ class StationPoints {
   private:
     const std::vector<Point>* points_;
     const std::vector<Poll>* blocks_;
-    const StationPolls* polls_;
+    const std::vector<Reading>* readings_;
 };
 
 }  // namespace panelgate::points

@@ -50,6 +50,10 @@ struct SharedMemory {
     std::optional<bool> changes(const modbus::Span& written, const modbus::Span& items) const;
 };
 
+/// Could writing `written` (nothing: anything) change what a read of `items` gives?
+bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+                const modbus::Span& items);
+
 /// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.
 class StationPolls {
   public:
@@ -79,6 +83,8 @@ class StationPolls {
 
     const std::vector<Want>& wants() const { return wants_; }
     const Reading& reading(std::size_t want) const { return readings_[want]; }
+    /// Of all wants, in their order.
+    const std::vector<Reading>& readings() const { return readings_; }
     const std::vector<PlannedRead>& plan() const { return plan_; }
     const ScheduleCounters& counters() const { return schedule_.counters(); }
 
@@ -89,7 +95,6 @@ class StationPolls {
     bool is_outdated(const PlannedRead& read) const;
     /// Surely nothing of these items is written.
     bool spares(const std::optional<modbus::Span>& written, const modbus::Span& items) const;
-    bool changes(const std::optional<modbus::Span>& written, const modbus::Span& items) const;
 
     std::vector<Want> wants_;
     std::vector<Reading> readings_;

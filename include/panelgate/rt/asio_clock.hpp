@@ -5,7 +5,6 @@
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/rt/lead_time.hpp"
 
 namespace panelgate::rt {
 
@@ -13,14 +12,16 @@ namespace panelgate::rt {
 /// only place that asks the machine for the time.
 class AsioClock final : public Clock {
   public:
-    explicit AsioClock(boost::asio::any_io_executor executor);
+    /// Throws std::system_error when the system has no timer left.
+    explicit AsioClock(const boost::asio::any_io_executor& executor);
 
     TimePoint now() const override;
     std::unique_ptr<Alarm> make_alarm() override;
 
   private:
-    boost::asio::any_io_executor executor_;
-    LeadTime lead_;  ///< of all alarms: they ring from one loop
+    class Alarms;
+
+    std::shared_ptr<Alarms> alarms_;
 };
 
 }  // namespace panelgate::rt

@@ -25,6 +25,7 @@ json::object describe(const LineEntry& line, const bus::LineStatus& status) {
     object["name"] = line.name;
     object["device"] = line.device;
     object["state"] = status.state;
+    object["mode"] = status.listens ? "listen" : "master";
     object["up"] = status.up;
     object["load_percent"] = std::round(status.load_percent * 10) / 10;
     object["queue_depth"] = status.queue_depth;

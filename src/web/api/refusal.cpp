@@ -14,6 +14,10 @@ std::string detail_of(const bus::Refusal& refusal) {
             return station + " is read-only";
         case bus::Rule::broadcast_over_read_only:
             return "a broadcast would write to " + station + ", which is read-only";
+        case bus::Rule::listening:
+            return "line '" + refusal.why +
+                   "' has another master: it is only listened to (mode: listen); its points tell "
+                   "what passed by";
         case bus::Rule::function:
         case bus::Rule::quantity:
         case bus::Rule::range:
@@ -32,10 +36,15 @@ Problem refused(unsigned status, bus::Rule rule, std::string detail) {
     return made;
 }
 
+unsigned status_of(bus::Rule rule) {
+    if (rule == bus::Rule::listening) return 409;
+    return bus::is_access(rule) ? 403 : 422;
+}
+
 }  // namespace
 
 Problem problem_of(const bus::Refusal& refusal) {
-    Problem made = refused(bus::is_access(refusal.rule) ? 403 : 422, refusal.rule,
+    Problem made = refused(status_of(refusal.rule), refusal.rule,
                            "refused here, nothing was sent: " + detail_of(refusal));
     made.extensions["modbus_exception"] = static_cast<std::uint8_t>(refusal.code);
     return made;

@@ -10,6 +10,19 @@ namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
+json::object describe(const bus::HeardCounts& heard) {
+    json::object object;
+    object["requests"] = heard.requests;
+    object["replies"] = heard.replies;
+    object["exceptions"] = heard.exceptions;
+    object["timeouts"] = heard.timeouts;
+    object["damaged"] = heard.damaged;
+    object["doubtful"] = heard.doubtful;
+    object["think_ms"] = to_milliseconds(heard.think);
+    object["longest_think_ms"] = to_milliseconds(heard.longest_think);
+    return object;
+}
+
 json::object describe(const StationEntry& station) {
     const bus::StationStatus status = station.bus->station_status(station.id);
     json::object object;
@@ -26,6 +39,7 @@ json::object describe(const StationEntry& station) {
     if (status.last_success) {
         object["last_success_ms"] = whole_ms(*status.last_success);
     }
+    if (status.heard) object["heard"] = describe(*status.heard);
     return object;
 }
 

@@ -17,10 +17,11 @@ const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
 /// What has to be looked at and what need not, while a reply of 11 bytes comes.
 class AttemptPaceTest : public testing::Test {
   protected:
-    static Attempt attempt_of(bool may_stall, EchoFilter echo = {}) {
+    static Attempt attempt_of(bool may_stall, EchoFilter echo = {}, bool as_asked = false) {
         Settings line;
         line.may_stall = may_stall;
         Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+        timing.as_asked = as_asked;
         timing.patience = timing.usual = 500ms;
         return {group_of(kStation, "03 00 6B 00 03"_hex), timing, std::move(echo)};
     }
@@ -53,6 +54,75 @@ TEST_F(AttemptPaceTest, ThreeLooksAtAReplyAreEnough) {
     hear(1, 3);
     EXPECT_EQ(busy(), 11 * kCharacter) << "all of it";
     EXPECT_EQ(hear(3, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, TwoLooksAreEnoughWhereTheReplyIsWhatWasAskedFor) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter) << "all of it";
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
+}
+
+TEST_F(AttemptPaceTest, TellsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
+    for (const std::size_t there : {std::size_t{10}, std::size_t{11}}) {
+        attempt_ = attempt_of(false, {}, true);
+        hear(0, 1);
+        EXPECT_FALSE(attempt_.end_look());
+        hear(1, there, kCharacter);
+        ASSERT_TRUE(attempt_.end_look());
+        EXPECT_EQ(attempt_.end_look()->reply, 11 * kCharacter);
+        EXPECT_EQ(attempt_.end_look()->whole, there == 11);
+        EXPECT_EQ(busy(), std::nullopt) << "the last byte is wanted when it comes";
+    }
+}
+
+TEST_F(AttemptPaceTest, AnExceptionThatNobodyForesawTellsNothingOfTheEndAndWhenItBeganIsKnown) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    now_ = start_ + 11 * kCharacter;
+    const Bytes rest = "83 02 C1 34"_hex;
+    EXPECT_EQ(attempt_.on_rx(now_, rest, [](ByteView) { return true; }), Verdict::replied);
+    EXPECT_TRUE(attempt_.overslept());
+    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter);
+}
+
+TEST_F(AttemptPaceTest, ALookBeforeItsTimeTellsNothingOfTheEnd) {
+    attempt_ = attempt_of(false, {}, true);
+    hear(0, 1);
+    hear(1, 5);
+    EXPECT_FALSE(attempt_.end_look());
+    EXPECT_EQ(busy(), 11 * kCharacter);
+}
+
+TEST_F(AttemptPaceTest, WhoseRepliesAreOverSoonerIsLookedAtSooner) {
+    Drift drift;
+    for (int i = 0; i < 50; ++i) drift.on_look(11 * kCharacter, true);
+    Settings line;
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = timing.usual = 500ms;
+    timing.notice = 40us;
+    timing.drift = drift;
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
+    hear(0, 1);
+    EXPECT_EQ(busy(), 3 * kCharacter) << "the header has come when it has come";
+    hear(1, 3);
+    EXPECT_EQ(busy(), 11 * kCharacter - 40us - drift.early(11 * kCharacter));
+}
+
+TEST_F(AttemptPaceTest, AShortReplyIsSleptThroughAllTheSame) {
+    Settings line;
+    line.serial.baud = 921600;
+    Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
+    timing.patience = timing.usual = 500ms;
+    timing.notice = Notice::kMost;
+    timing.as_asked = true;
+    attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
+    const Duration character = character_time(line.serial);
+    const Duration reply = 11 * character;
+    now_ = start_;
+    attempt_.on_rx(now_, ByteView(kReply).first(1), [](ByteView) { return true; });
+    EXPECT_EQ(attempt_.busy_until(), now_ - character + reply - reply / 4);
 }
 
 TEST_F(AttemptPaceTest, AnExceptionIsNotWaitedForLongerThanItIs) {
@@ -125,6 +195,31 @@ TEST_F(AttemptPaceTest, OverTcpNothingComesAtTheRateOfTheLine) {
     attempt_ = attempt_of(true);
     hear(0, 1);
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
+}
+
+TEST_F(AttemptPaceTest, WhatBeginsLikeAnEchoThatNobodyExpectsIsLookedAtWhenTheReplyIsThere) {
+    attempt_ =
+        attempt_of(false, {"11 03 00 6B 00 03 76 87"_hex, EchoFilter::Expect::perhaps}, true);
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
+    EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter) << "it began with the first byte";
+}
+
+TEST_F(AttemptPaceTest, AnEchoThatIsCertainIsLookedAtWhenAllOfItIsThere) {
+    const Bytes frame = "11 03 00 6B 00 03 76 87"_hex;
+    attempt_ = attempt_of(false, {frame, EchoFilter::Expect::certainly}, true);
+    start_ = attempt_.timing().started;
+    now_ = start_ + kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).first(1), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), 8 * kCharacter);
+    now_ = start_ + 8 * kCharacter;
+    attempt_.on_rx(now_, ByteView(frame).subspan(1), [](ByteView) { return true; });
+    EXPECT_EQ(busy(), std::nullopt);
+    start_ = attempt_.timing().sent + 5ms;
+    hear(0, 1);
+    EXPECT_EQ(busy(), 11 * kCharacter);
+    EXPECT_EQ(hear(1, 11), Verdict::replied);
 }
 
 TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {

@@ -28,6 +28,28 @@ TEST(Pace, P1OneReplyThatCameTooEarlySettlesIt) {
     }
 }
 
+TEST(Pace, HasteNowAndThenIsASenderThatWasHeldUp) {
+    Pace pace;
+    for (int i = 0; i < 50; ++i) {
+        pace.on_rate(true);
+        EXPECT_TRUE(pace.kept());
+        for (int j = 0; j < 8; ++j) pace.on_rate(false);
+    }
+}
+
+TEST(Pace, HasteAgainAndAgainIsNoPaceUntilItHasCeased) {
+    Pace pace;
+    for (int i = 0; i < 3; ++i) pace.on_rate(true);
+    EXPECT_FALSE(pace.kept());
+    for (int i = 0; i < 50; ++i) {
+        for (int j = 0; j < 4; ++j) pace.on_rate(false);
+        pace.on_rate(true);
+        EXPECT_FALSE(pace.kept());
+    }
+    for (int i = 0; i < 16; ++i) pace.on_rate(false);
+    EXPECT_TRUE(pace.kept());
+}
+
 TEST(Pace, IsNoPaceAtAllAfterSomeEarlyRepliesInARow) {
     Pace pace;
     pace.on_reply(kEarly);

@@ -33,14 +33,14 @@ TEST(Words, OfPriorityClassesAreThoseOfTheMetric) {
 }
 
 TEST(Words, OfStationsAndEchoesAreThoseOfRest) {
-    EXPECT_EQ(words<Health>(4), "unknown,online,suspect,offline");
+    EXPECT_EQ(words<Health>(5), "unknown,online,suspect,heard,offline");
     EXPECT_EQ(words<EchoState>(4), "unknown,absent,present,unclear");
 }
 
 TEST(Words, OfFramesAreThoseOfTheTrace) {
-    EXPECT_EQ(words<FrameKind>(12),
-              "request,retry,probe,learn echo,broadcast,reply,damaged,echo,foreign request,late,"
-              "copy,foreign");
+    EXPECT_EQ(words<FrameKind>(13),
+              "request,retry,probe,learn echo,broadcast,reply,heard request,damaged,echo,"
+              "foreign request,late,copy,foreign");
     EXPECT_EQ(words<FrameDirection>(3), "sent,received,discarded");
 }
 

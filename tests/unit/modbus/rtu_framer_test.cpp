@@ -33,6 +33,23 @@ TEST(RtuFramer, GivesTheReplyAtItsLastByteHoweverItIsCut) {
     }
 }
 
+TEST(RtuFramer, TellsHowManyBytesAreMissingIfItIsNoException) {
+    ReplyFramer framer(0x11, kRequest);
+    EXPECT_EQ(framer.missing_as_asked(), 0);
+    framer.feed("11"_hex);
+    EXPECT_EQ(framer.missing_as_asked(), 10);
+    framer.feed("03"_hex);
+    EXPECT_EQ(framer.missing_as_asked(), 9);
+    framer.feed("04"_hex);
+    EXPECT_EQ(framer.missing_as_asked(), framer.missing()) << "it says so itself";
+    ReplyFramer refused(0x11, kRequest);
+    refused.feed("11 83"_hex);
+    EXPECT_EQ(refused.missing_as_asked(), 1);
+    ReplyFramer foreign(0x11, kRequest);
+    foreign.feed("12"_hex);
+    EXPECT_EQ(foreign.missing_as_asked(), 0);
+}
+
 TEST(RtuFramer, TellsHowManyBytesMustComeAtLeast) {
     ReplyFramer framer(0x11, kRequest);
     EXPECT_EQ(framer.missing(), 0);

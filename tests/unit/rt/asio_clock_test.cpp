@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 #include <memory>
 #include <string>
 
@@ -86,6 +87,38 @@ TEST_F(AsioClockTest, AnAlarmThatIsGoneDoesNotRing) {
     alarm->arm(clock.now() - 2s, [&] { other.reset(); });
     io.run();
     EXPECT_EQ(rung, "");
+}
+
+TEST_F(AsioClockTest, AlarmsRingInTheOrderOfTheirTimesWhateverTheyWereArmedFor) {
+    const TimePoint now = clock.now();
+    const auto second = clock.make_alarm();
+    const auto third = clock.make_alarm();
+    third->arm_sharp(now + 3ms, ring("c"));
+    alarm->arm(now + 1ms, ring("a"));
+    second->arm(now + 9ms, ring("-"));
+    second->arm(now + 2ms, ring("b"));
+    io.run();
+    EXPECT_EQ(rung, "abc");
+}
+
+TEST_F(AsioClockTest, ALoopWithoutAnArmedAlarmEnds) {
+    alarm->arm(clock.now() + 1h, ring("a"));
+    const auto other = clock.make_alarm();
+    other->arm(clock.now(), [&] { alarm->cancel(); });
+    io.run();
+    EXPECT_EQ(rung, "");
+    io.restart();
+    alarm->arm(clock.now() + 1ms, ring("b"));
+    io.run();
+    EXPECT_EQ(rung, "b") << "and it can be used again";
+}
+
+TEST(AsioClockEnd, AnAlarmMayOutliveItsClockInAHandlerThatTheLoopHolds) {
+    boost::asio::io_context io{1};
+    AsioClock clock{io.get_executor()};
+    std::shared_ptr<Alarm> alarm = clock.make_alarm();
+    alarm->arm(clock.now() + 1h, [] {});
+    boost::asio::post(io, [alarm] {});
 }
 
 TEST_F(AsioClockTest, AHandlerMayArmItsOwnAlarm) {

@@ -1,4 +1,4 @@
-#include "dispatch.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "caller.hpp"
 #include "held_bus.hpp"
+#include "panelgate/tcp_server/caller.hpp"
 #include "shared.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"

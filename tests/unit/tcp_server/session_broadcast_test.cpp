@@ -1,5 +1,5 @@
-#include "dispatch.hpp"
 #include "loopback.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 namespace panelgate::tcp_server {
 namespace {

@@ -17,7 +17,9 @@ TEST_F(ApiLines, ListsTheLines) {
     bus.line.load_percent = 50;
     const auto lines = get("/api/v1/lines").at("lines").as_array();
     ASSERT_EQ(lines.size(), 2u);
-    EXPECT_EQ(lines[0], json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","up":true,
+    EXPECT_EQ(
+        lines[0],
+        json_of(R"({"name":"floor1","device":"/dev/ttyUSB0","state":"up","mode":"master","up":true,
         "load_percent":50,"queue_depth":3,"echo":"absent","findings":[]})"));
     EXPECT_EQ(get("/api/v1/lines/floor2").at("device"), "/dev/ttyUSB1");
     EXPECT_EQ(get("/api/v1/lines/floor3").status(), 404u);

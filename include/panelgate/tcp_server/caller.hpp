@@ -10,11 +10,12 @@
 
 namespace panelgate::tcp_server {
 
-/// One connection as the buses see it: who asks, and which of them were asked.
+/// One client as the buses see it: who asks, and which of them were asked.
 class Caller {
   public:
-    /// `name` is its address with the port; connections from one address share a host.
-    Caller(std::string name, bus::Host host);
+    /// `name` is its address with the port, or that of a serial port; connections from one address
+    /// share a host. The buses call it PROTOCOL NAME.
+    Caller(std::string name, bus::Host host, std::string protocol = "modbus_tcp");
 
     const std::string& name() const { return name_; }
     /// Hands the request to a bus, for one of its stations; 0: all of them.
@@ -23,12 +24,14 @@ class Caller {
     /// Has the bus count what was refused before it was asked.
     void tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu);
     /// Takes back what still waits on the buses; it is answered Fault::cancelled.
+    /// May ask again.
     void withdraw();
 
   private:
     void use(bus::BusClient* bus);
 
     std::string name_;
+    std::string protocol_;
     bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();
     std::set<bus::BusClient*> used_;

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/line_bus.hpp"
+#include "panelgate/line/line.hpp"
+#include "panelgate/rt/clock.hpp"
+
+namespace panelgate::bus {
+
+/// A line whose master is somebody else (`mode: listen`): what passes by is matched, counted,
+/// recorded and told to the observer; nothing is ever sent. Every request is refused
+/// (Rule::listening). Everything happens on the executor's one thread.
+class ListeningBus final : public LineBus {
+  public:
+    /// Of `settings.arbiter` only the serial format, the hole and `offline.after` mean something
+    /// here. The executor's loop and the clock outlive the bus.
+    ListeningBus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
+                 std::unique_ptr<line::Line> line);
+    ~ListeningBus() override;
+
+    void start() override;
+    void stop() override;
+
+    void transact(Request request, AnswerHandler handler) override;
+    void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;
+    void cancel(ClientId client) override;
+    LineStatus status() const override;
+    StationStatus station_status(std::uint8_t station) const override;
+    std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
+    std::vector<TraceFrame> trace(std::size_t last) const override;
+    std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const override;
+    std::vector<TraceDecision> decisions(std::size_t last) const override;
+    std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
+                                               std::size_t most) const override;
+    void name_client(ClientId client, std::string name) override;
+    LineReport report() const override;
+
+  private:
+    struct State;
+    std::unique_ptr<State> state_;
+};
+
+}  // namespace panelgate::bus

@@ -1,0 +1,235 @@
+#include "panelgate/bus/listening_bus.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "heard_stations.hpp"
+#include "line_doctor.hpp"
+#include "panelgate/arbiter/client_names.hpp"
+#include "panelgate/bus/load_meter.hpp"
+#include "panelgate/line/drive.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/rt/log.hpp"
+#include "panelgate/tap/matcher.hpp"
+#include "refusals.hpp"
+#include "request_counters.hpp"
+#include "trace_book.hpp"
+#include "wall.hpp"
+#include "write_log.hpp"
+
+namespace panelgate::bus {
+
+namespace asio = boost::asio;
+
+namespace {
+
+tap::Settings tap_settings(const arbiter::Settings& line) {
+    tap::Settings settings;
+    settings.serial = line.serial;
+    settings.hole = std::max(settings.hole, line.reply_hole);
+    return settings;
+}
+
+std::string words_of_doubt(const tap::Transaction& made) {
+    const std::string function = std::to_string(made.request.front());
+    const std::string station = std::to_string(made.station);
+    if (made.end == tap::End::answered)
+        return "the reply to function " + function + " of station " + station +
+               " may be to another request: its values are not taken";
+    return "the request of function " + function + " to station " + station +
+           " may be a reply whose request was not heard: it is not counted";
+}
+
+}  // namespace
+
+/// Also the host of the matcher's drive.
+struct ListeningBus::State final : public line::Line::Events {
+    State(const asio::any_io_executor& executor, rt::Clock& c, Settings s,
+          std::unique_ptr<line::Line> l)
+        : clock(c),
+          settings(std::move(s)),
+          line(std::move(l)),
+          matcher(tap_settings(settings.arbiter)),
+          heard(settings.stations, settings.arbiter.offline.after),
+          counters(settings.stations),
+          doctor(settings),
+          load(c.now()),
+          refusals(executor, clock),
+          wall(clock),
+          book(settings, wall),
+          drive(clock, *line, matcher, *this) {}
+
+    void on_up() override;
+    void on_down(const std::string& why) override;
+    void on_bytes(ByteView bytes) override {
+        drive.hear([this, bytes](TimePoint now) { matcher.on_rx(now, bytes); });
+    }
+    void on_deadline(TimePoint now) { matcher.on_deadline(now); }
+    void settled(TimePoint now) {
+        load.record(now, heard.line().busy);
+        if (up) doctor.look(now, counts());
+    }
+    void act(tap::Frame& frame);
+    void act(const tap::Transaction& made);
+    void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed);
+    void refuse(Request request, AnswerHandler handler);
+    Refusal refusal(std::uint8_t station) const;
+    LineCounts counts() const { return {heard.wire(), heard.line().broadcasts, *line}; }
+    void observe(const BusEvent& event) const {
+        if (settings.observe) settings.observe(event);
+    }
+
+    rt::Clock& clock;
+    Settings settings;
+    std::unique_ptr<line::Line> line;
+    tap::Matcher matcher;
+    HeardStations heard;
+    RequestCounters counters;
+    arbiter::ClientNames names;
+    mutable LineDoctor doctor;
+    LoadMeter load;
+    Refusals refusals;
+    Wall wall;
+    TraceBook book;  ///< whose frames are whose is a decision here
+    line::Drive<tap::Matcher, State> drive;
+    bool up = false;
+    std::string why_down = "not opened yet";
+};
+
+void ListeningBus::State::on_up() {
+    up = true;
+    rt::log(rt::LogLevel::info, "line up",
+            {{"line", settings.name}, {"device", settings.device}, {"mode", "listen"}});
+    observe(LineEvent{true, {}});
+    drive.hear([this](TimePoint now) { doctor.begin(now, counts()); });
+}
+
+void ListeningBus::State::on_down(const std::string& why) {
+    up = false;
+    why_down = why;
+    rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
+    observe(LineEvent{false, why});
+    drive.hear([this](TimePoint now) { matcher.on_line_down(now); });
+}
+
+void ListeningBus::State::act(tap::Frame& frame) {
+    heard.count(frame);
+    book.note(frame.at, frame.kind, std::move(frame.bytes));
+}
+
+/// What is perhaps no request at all is no request of the line's.
+void ListeningBus::State::act(const tap::Transaction& made) {
+    heard.count(made);
+    if (made.doubtful) book.decide(made.ended, words_of_doubt(made));
+    if (made.end == tap::End::answered || !made.doubtful) {
+        const Outcome outcome = outcome_of(made);
+        const Duration took = made.ended - made.asked;
+        counters.count(made.station, made.request[0], outcome, took);
+        const bool success = outcome == Outcome::ok && made.station != 0;
+        if (success) counters.succeeded(made.station, wall_seconds_of(wall.at(made.ended)));
+        observe(TransactionEvent{made.station, made.request[0], outcome, took});
+    }
+    observe(made);
+}
+
+Refusal ListeningBus::State::refusal(std::uint8_t station) const {
+    return {Rule::listening, station == 0 ? std::string() : name_of(settings.stations, station),
+            modbus::ExceptionCode::gateway_path_unavailable, settings.name};
+}
+
+/// What nobody may ask here: for the metrics, the log and who watches.
+void ListeningBus::State::account(std::uint8_t station, std::uint8_t function,
+                                  const std::optional<Deed>& deed) {
+    counters.count(station, function, Outcome::refused, Duration::zero());
+    if (deed) log_deed(settings, station, *deed, Outcome::refused);
+    observe(TransactionEvent{station, function, Outcome::refused, Duration::zero()});
+}
+
+void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
+    const std::uint8_t function = request.request.function();
+    account(request.station, function, deed_of(request, names));
+    Answer answer;
+    answer.refusal = refusal(request.station);
+    answer.pdu = answer_to(*answer.refusal, function);
+    refusals.add({std::move(handler), std::move(answer)});
+}
+
+ListeningBus::ListeningBus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
+                           std::unique_ptr<line::Line> line)
+    : state_(std::make_unique<State>(executor, clock, std::move(settings), std::move(line))) {}
+
+ListeningBus::~ListeningBus() { stop(); }
+
+void ListeningBus::start() { state_->line->start(*state_); }
+
+void ListeningBus::stop() {
+    state_->line->stop();
+    state_->drive.rest();
+}
+
+void ListeningBus::transact(Request request, AnswerHandler handler) {
+    state_->refuse(std::move(request), std::move(handler));
+}
+
+void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
+    if (pdu.empty()) return;
+    state_->account(station, pdu[0], deed_of(pdu, client, state_->names));
+}
+
+void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
+
+std::vector<TraceDecision> ListeningBus::decisions(std::size_t last) const {
+    return state_->book.decisions().last(last);
+}
+
+std::vector<TraceDecision> ListeningBus::decisions_since(std::uint64_t sequence,
+                                                         std::size_t most) const {
+    return state_->book.decisions().since(sequence, most);
+}
+
+void ListeningBus::name_client(ClientId client, std::string name) {
+    state_->names.set(client, std::move(name));
+}
+
+LineStatus ListeningBus::status() const {
+    LineStatus status;
+    status.name = state_->settings.name;
+    status.device = state_->settings.device;
+    status.up = state_->up;
+    status.listens = true;
+    status.state = state_->up ? "up" : "down: " + state_->why_down;
+    status.load_percent = state_->load.percent(state_->clock.now());
+    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->counts());
+    status.findings = state_->doctor.findings();
+    return status;
+}
+
+StationStatus ListeningBus::station_status(std::uint8_t station) const {
+    return state_->heard.status(station, state_->clock.now());
+}
+
+std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) const {
+    return state_->refusal(station);
+}
+
+std::vector<TraceFrame> ListeningBus::trace(std::size_t last) const {
+    return state_->book.frames(last);
+}
+
+std::vector<TraceFrame> ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->book.frames_since(sequence, most);
+}
+
+LineReport ListeningBus::report() const {
+    LineReport report;
+    report.line = state_->settings.name;
+    report.up = state_->up;
+    report.wire = state_->heard.line();
+    report.device = state_->line->counters();
+    report.stations = state_->counters.report(state_->heard.wire(), [this](std::uint8_t station) {
+        return state_->heard.health(station);
+    });
+    return report;
+}
+
+}  // namespace panelgate::bus

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "loader.hpp"
+#include "panelgate/line/settings.hpp"
+
+namespace panelgate::config {
+
+/// `device`, `serial` and `rs485` of a serial port that is no line. False when its serial format
+/// had a fault: then nothing may be concluded from it.
+bool load_port(Loading& loading, yaml::MapReader& in, line::Settings& port);
+
+}  // namespace panelgate::config

@@ -1,0 +1,216 @@
+#include "conversation.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/framing.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+
+namespace panelgate::serial_server {
+namespace {
+
+/// An adapter hands over what came in a row (config's reply_hole counts alike).
+constexpr std::size_t kChunk = 32;
+
+EchoState first_state(EchoMode mode) {
+    if (mode == EchoMode::on) return EchoState::present;
+    return mode == EchoMode::off ? EchoState::absent : EchoState::unknown;
+}
+
+Duration lead(const line::Settings& device) {
+    const bool switches = device.rs485.mode != line::Rs485::Mode::off;
+    return switches ? device.rs485.delay_before_send : Duration::zero();
+}
+
+}  // namespace
+
+Conversation::Conversation(const Settings& settings, const Units& served)
+    : settings_(settings), served_(served), silence_(silent_interval(settings.device.serial)) {
+    reset();
+}
+
+void Conversation::reset() {
+    hearing_ = make_hearing(settings_, served_);
+    was_silent_ = true;
+    unexplained_ = 0;
+    echo_ = {};
+    echo_until_.reset();
+    echo_state_ = first_state(settings_.echo);
+}
+
+void Conversation::on_line_up() { counters_.up = true; }
+
+void Conversation::on_line_down() {
+    counters_.up = false;
+    supersede();
+    reset();
+}
+
+void Conversation::on_rx(TimePoint now, ByteView bytes) {
+    if (echo_until_ && now > *echo_until_) end_echo(now);
+    const ByteView rest = echo_.feed(bytes);
+    if (echo_until_ && echo_.complete()) {
+        if (echo_teaches_) echo_state_ = EchoState::present;
+        echo_until_.reset();
+    }
+    if (!rest.empty()) hear(now, rest);
+}
+
+void Conversation::hear(TimePoint now, ByteView bytes) {
+    look_at_silence(now);  // before these: nobody may have had the time
+    heard_at_ = now;
+    was_silent_ = false;
+    unexplained_ += bytes.size();
+    hearing_->feed(now, bytes);
+    take_frames();
+}
+
+void Conversation::take_frames() {
+    while (auto adu = hearing_->next()) on_frame(std::move(*adu));
+    counters_.damaged += hearing_->take_faults();
+}
+
+void Conversation::on_frame(modbus::SerialAdu adu) {
+    unexplained_ = hearing_->pending();
+    if (adu.station != 0 && served_[adu.station]) return ask(std::move(adu));
+    supersede();
+    if (adu.station != 0) {
+        ++counters_.foreign;
+    } else if (!finishing_) {
+        ++counters_.requests;
+        ++counters_.broadcasts;
+        actions_.emplace_back(Spread{std::move(adu)});
+    }
+}
+
+void Conversation::ask(modbus::SerialAdu adu) {
+    if (open_ && open_->request == adu) {
+        ++counters_.requests;
+        ++counters_.repeated;
+        open_->ended = heard_at_;
+        return;
+    }
+    supersede();
+    if (finishing_) return;
+    ++counters_.requests;
+    open_ = Open{next_ticket_++, adu, heard_at_};
+    actions_.emplace_back(Ask{open_->ticket, std::move(adu)});
+}
+
+void Conversation::supersede() {
+    if (!open_) return;
+    ++counters_.superseded;
+    open_.reset();
+    actions_.emplace_back(Withdraw{});
+}
+
+/// Behind it, what is pending gets nothing more.
+Duration Conversation::pause() const {
+    if (settings_.access.framing == modbus::Framing::ascii) return settings_.access.ascii_pause;
+    if (hearing_->pending() < modbus::kMinAdu) return settings_.glitch + silence_;
+    return settings_.hole + wire_time(settings_.device.serial, kChunk);
+}
+
+void Conversation::look_at_silence(TimePoint now) {
+    if (now - heard_at_ >= silence_ && !std::exchange(was_silent_, true)) {
+        hearing_->on_silence();
+        take_frames();
+        judge_noise();
+    }
+    if (hearing_->pending() == 0 || now - heard_at_ < pause()) return;
+    hearing_->drop_pending();
+    take_frames();
+    judge_noise();
+}
+
+/// Damage that is long enough may have been the next request, and a reply that comes then would be
+/// taken for its answer. What is shorter is a glitch.
+void Conversation::judge_noise() {
+    if (hearing_->pending() > 0) return;
+    if (std::exchange(unexplained_, 0) >= modbus::kMinAdu) supersede();
+}
+
+void Conversation::on_answer(TimePoint now, std::uint64_t ticket, const std::optional<Bytes>& pdu) {
+    look_at_silence(now);
+    if (!open_ || open_->ticket != ticket) return;
+    if (!pdu) {
+        ++counters_.silent;
+        open_.reset();
+        return;
+    }
+    open_->is_exception = modbus::exception_of(*pdu).has_value();
+    open_->reply = modbus::encode_reply(settings_.access.framing, 0, open_->request.station, *pdu);
+    try_send(now);
+}
+
+void Conversation::on_deadline(TimePoint now) {
+    if (echo_until_ && now >= *echo_until_) end_echo(now);
+    look_at_silence(now);
+    try_send(now);
+}
+
+/// What looked like the beginning of an echo was the master's.
+void Conversation::end_echo(TimePoint now) {
+    const Bytes held = echo_.release();
+    if (held.empty() && echo_teaches_ && settings_.echo == EchoMode::automatic)
+        echo_state_ = EchoState::absent;
+    echo_ = {};
+    echo_until_.reset();
+    if (!held.empty()) hear(now, held);
+}
+
+/// Where a reply is the request word by word, its echo is as good as a retry: only known absence
+/// tells them apart.
+void Conversation::watch_echo(TimePoint now, const Bytes& sent) {
+    const modbus::SerialAdu& request = open_->request;
+    const Bytes asked =
+        modbus::encode_reply(settings_.access.framing, 0, request.station, request.pdu);
+    echo_teaches_ = sent != asked;
+    const bool watch = echo_teaches_ || echo_state_ != EchoState::absent;
+    if (!watch) return;
+    echo_ = arbiter::EchoFilter(sent, arbiter::EchoFilter::Expect::perhaps);
+    echo_until_ = std::max(now, sent_by_) + settings_.hole;
+}
+
+/// Bytes that may become a frame are waited for.
+TimePoint Conversation::may_send_at() const {
+    const Duration quiet = hearing_->pending() == 0 ? silence_ : std::max(silence_, pause());
+    return std::max(heard_at_ + quiet, sent_by_ + silence_);
+}
+
+void Conversation::try_send(TimePoint now) {
+    if (!open_ || !open_->reply || !counters_.up || now < may_send_at()) return;
+    const auto limit = settings_.response_timeout;
+    if (limit && now - open_->ended >= *limit) {
+        ++counters_.late;
+        open_.reset();
+        return;
+    }
+    ++counters_.replies;
+    if (open_->is_exception) ++counters_.exceptions;
+    const Bytes bytes = *std::move(open_->reply);
+    sent_by_ = now + lead(settings_.device) + wire_time(settings_.device.serial, bytes.size());
+    watch_echo(now, bytes);
+    open_.reset();
+    actions_.emplace_back(Send{bytes});
+}
+
+std::optional<Action> Conversation::poll_action() {
+    if (actions_.empty()) return std::nullopt;
+    Action first = std::move(actions_.front());
+    actions_.pop_front();
+    return first;
+}
+
+std::optional<TimePoint> Conversation::next_deadline() const {
+    std::optional<TimePoint> next = echo_until_;
+    const auto add = [&](TimePoint when) { next = next ? std::min(*next, when) : when; };
+    if (!was_silent_) add(heard_at_ + silence_);
+    if (hearing_->pending() > 0) add(heard_at_ + pause());
+    if (open_ && open_->reply && counters_.up) add(may_send_at());
+    return next;
+}
+
+}  // namespace panelgate::serial_server

@@ -1,0 +1,119 @@
+#include "rtu_hearing.hpp"
+
+#include <utility>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_request_framer.hpp"
+
+namespace panelgate::serial_server {
+namespace {
+
+using Length = modbus::ReplyLength;
+
+/// 08/0000 with one word of data, as nearly all are.
+bool is_usual_loopback(ByteView b) {
+    constexpr std::size_t kSize = modbus::kReadRequestAdu;
+    return b.size() >= kSize && b[1] == modbus::kDiagnostics && modbus::crc_ok(b.first(kSize));
+}
+
+}  // namespace
+
+void RtuHearing::feed(TimePoint, ByteView bytes) {
+    silent_ = false;
+    heard_.feed(bytes);
+}
+
+std::optional<modbus::SerialAdu> RtuHearing::next() {
+    while (!heard_.empty()) {
+        const Judgement judgement = judge(heard_.view(), aligned_);
+        if (judgement.kind == Judgement::Kind::open) break;
+        if (judgement.kind == Judgement::Kind::frame) {
+            const bool is_last = judgement.size == heard_.size();
+            if (aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_))
+                return take(judgement.size);
+            if (is_last) break;
+        }
+        step_over(1);
+    }
+    return std::nullopt;
+}
+
+RtuHearing::Judgement RtuHearing::judge(ByteView start, bool aligned) const {
+    const Judgement request = weigh(modbus::request_length(start), start, aligned);
+    if (request.kind == Judgement::Kind::frame || concerns_us(start[0])) return request;
+    const Judgement reply = weigh(modbus::reply_length(start), start, aligned);
+    return reply.kind == Judgement::Kind::nothing ? request : reply;
+}
+
+RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool aligned) const {
+    using Kind = Judgement::Kind;
+    if (length.kind == Length::Kind::need_more)
+        return {silent_ && !aligned ? Kind::nothing : Kind::open};
+    if (length.kind == Length::Kind::by_silence) {
+        if (is_usual_loopback(start)) return {Kind::frame, modbus::kReadRequestAdu};
+        const bool may_be = aligned && start.size() <= modbus::kMaxRtuAdu;
+        if (may_be && silent_ && modbus::crc_ok(start)) return {Kind::frame, start.size()};
+        return {may_be ? Kind::open : Kind::nothing};
+    }
+    if (length.length > modbus::kMaxLongRtuAdu) return {};
+    if (length.length > start.size()) return {Kind::open};
+    if (!modbus::crc_ok(start.first(length.length))) return {};
+    return {Kind::frame, length.length};
+}
+
+void RtuHearing::on_silence() {
+    if (heard_.empty()) aligned_ = true;
+    if (std::exchange(silent_, true) || heard_.empty()) return;
+    if (!knows_rest()) step_to_last();
+}
+
+/// By its header, the front is a frame that goes on: a silence is only a hole in it.
+bool RtuHearing::knows_rest() const {
+    const ByteView all = heard_.view();
+    const auto goes_on = [&](const Length& length) {
+        return length.kind == Length::Kind::known && length.length > all.size() &&
+               length.length <= modbus::kMaxLongRtuAdu;
+    };
+    if (goes_on(modbus::request_length(all))) return true;
+    return !concerns_us(all[0]) && goes_on(modbus::reply_length(all));
+}
+
+/// What waits for more gives way to a good frame that ends with what was heard.
+bool RtuHearing::step_to_last() {
+    const ByteView all = heard_.view();
+    if (all.empty() || judge(all, aligned_).kind == Judgement::Kind::frame) return true;
+    for (std::size_t start = 1; start + modbus::kMinAdu <= all.size(); ++start) {
+        const Judgement later = judge(all.subspan(start), false);
+        if (later.kind != Judgement::Kind::frame || start + later.size != all.size()) continue;
+        step_over(start);
+        return true;
+    }
+    return false;
+}
+
+modbus::SerialAdu RtuHearing::take(std::size_t size) {
+    const modbus::RtuFrame frame = *modbus::decode_adu(heard_.view().first(size));
+    modbus::SerialAdu adu;
+    adu.station = frame.station;
+    adu.pdu.assign(frame.pdu.begin(), frame.pdu.end());
+    heard_.take(size);
+    aligned_ = true;
+    return adu;
+}
+
+void RtuHearing::step_over(std::size_t count) {
+    if (std::exchange(aligned_, false)) ++faults_;
+    heard_.take(count);
+}
+
+void RtuHearing::drop_pending() {
+    silent_ = true;
+    if (step_to_last()) return;
+    step_over(heard_.size());
+    aligned_ = true;
+}
+
+std::size_t RtuHearing::take_faults() { return std::exchange(faults_, 0); }
+
+}  // namespace panelgate::serial_server

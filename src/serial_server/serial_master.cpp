@@ -1,0 +1,193 @@
+#include "panelgate/serial_server/serial_master.hpp"
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "conversation.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/line/drive.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/rt/log.hpp"
+#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
+
+namespace panelgate::serial_server {
+namespace {
+
+constexpr const char* kProtocol = "serial";
+
+Units served_by(const tcp_server::UnitMap& map) {
+    Units units;
+    for (unsigned unit = 1; unit < units.size(); ++unit)
+        units[unit] = map.is_listed(static_cast<std::uint8_t>(unit));
+    return units;
+}
+
+/// The gateway has no answer of a panel: what a slave that is there would never say.
+bool is_failure(modbus::ExceptionCode code) {
+    using enum modbus::ExceptionCode;
+    return code == server_device_busy || code == gateway_path_unavailable ||
+           code == gateway_target_failed;
+}
+
+}  // namespace
+
+class SerialMaster::Core final : public line::Line::Events,
+                                 public std::enable_shared_from_this<Core> {
+  public:
+    Core(rt::Clock& clock, Settings settings, tcp_server::UnitMap units,
+         std::unique_ptr<line::Line> line)
+        : settings_(std::move(settings)),
+          map_(std::move(units)),
+          clock_(clock),
+          line_(std::move(line)),
+          asks_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
+          spreads_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
+          talk_(settings_, served_by(map_)),
+          drive_(clock, *line_, talk_, *this) {}
+
+    void start() { line_->start(*this); }
+    void finish() { talk_.finish(); }
+    bool idle() const { return !talk_.busy() && open_broadcasts_ == 0; }
+    void stop();
+    Counters counters() const;
+
+    void on_up() override;
+    void on_down(const std::string& why) override;
+    void on_bytes(ByteView bytes) override {
+        drive_.hear([&](TimePoint now) { talk_.on_rx(now, bytes); });
+    }
+
+    void act(const Ask& ask);
+    void act(const Spread& spread);
+    void act(const Withdraw&) { asks_.withdraw(); }
+    void act(const Send& send) { line_->write(send.bytes); }
+    void on_deadline(TimePoint now) { talk_.on_deadline(now); }
+    void settled(TimePoint) {}
+
+  private:
+    using Pdu = std::optional<Bytes>;
+    Pdu told(std::uint8_t function, modbus::ExceptionCode code) const;
+    Pdu told(std::uint8_t function, Result<Bytes> pdu) const;
+    void refuse(const Ask& ask, const tcp_server::Refuse& refusal);
+    void forward(const Ask& ask, tcp_server::Forward forwarding);
+    void broadcast(const tcp_server::Broadcast& all);
+
+    Settings settings_;
+    tcp_server::UnitMap map_;
+    rt::Clock& clock_;
+    std::unique_ptr<line::Line> line_;
+    tcp_server::Caller asks_;
+    tcp_server::Caller spreads_;  ///< broadcasts, which nobody withdraws
+    Conversation talk_;
+    line::Drive<Conversation, Core> drive_;
+    std::size_t open_broadcasts_ = 0;  ///< on all lines
+    bool stopped_ = false;
+};
+
+void SerialMaster::Core::stop() {
+    if (std::exchange(stopped_, true)) return;
+    drive_.rest();
+    line_->stop();
+    asks_.withdraw();
+    spreads_.withdraw();
+}
+
+Counters SerialMaster::Core::counters() const {
+    Counters counters = talk_.counters();
+    counters.master = settings_.name;
+    counters.reopens = line_->counters().reopens;
+    return counters;
+}
+
+void SerialMaster::Core::on_up() {
+    rt::log(rt::LogLevel::info, "serial master up",
+            {{"master", settings_.name}, {"device", settings_.device.device}});
+    drive_.hear([&](TimePoint) { talk_.on_line_up(); });
+}
+
+void SerialMaster::Core::on_down(const std::string& why) {
+    rt::log(rt::LogLevel::warn, "serial master down", {{"master", settings_.name}, {"why", why}});
+    drive_.hear([&](TimePoint) { talk_.on_line_down(); });
+}
+
+void SerialMaster::Core::act(const Ask& ask) {
+    auto decision = tcp_server::decide(ask.adu.station, ask.adu.pdu, settings_.access, map_);
+    if (auto* forwarding = std::get_if<tcp_server::Forward>(&decision))
+        return forward(ask, std::move(*forwarding));
+    if (const auto* refusal = std::get_if<tcp_server::Refuse>(&decision))
+        return refuse(ask, *refusal);
+    // A unit that stands for everybody on a line: as unit 0.
+    if (const auto* all = std::get_if<tcp_server::Broadcast>(&decision)) broadcast(*all);
+    talk_.on_answer(clock_.now(), ask.ticket, std::nullopt);
+}
+
+void SerialMaster::Core::act(const Spread& spread) {
+    const auto decision =
+        tcp_server::decide(spread.adu.station, spread.adu.pdu, settings_.access, map_);
+    if (const auto* all = std::get_if<tcp_server::Broadcast>(&decision)) return broadcast(*all);
+    const auto* refusal = std::get_if<tcp_server::Refuse>(&decision);
+    if (refusal == nullptr) return;
+    for (const tcp_server::Target& target : refusal->asked)
+        spreads_.tell_refused(target.bus, target.station, spread.adu.pdu);
+}
+
+void SerialMaster::Core::broadcast(const tcp_server::Broadcast& all) {
+    if (open_broadcasts_ + all.lines.size() > settings_.open_broadcasts) return;
+    for (bus::BusClient* line : all.lines) {
+        ++open_broadcasts_;
+        spreads_.transact(line, 0, all.request, [weak = weak_from_this()](const bus::Answer&) {
+            if (const auto self = weak.lock()) --self->open_broadcasts_;
+        });
+    }
+}
+
+void SerialMaster::Core::refuse(const Ask& ask, const tcp_server::Refuse& refusal) {
+    for (const tcp_server::Target& target : refusal.asked)
+        asks_.tell_refused(target.bus, target.station, ask.adu.pdu);
+    talk_.on_answer(clock_.now(), ask.ticket, told(ask.adu.pdu[0], refusal.code));
+}
+
+void SerialMaster::Core::forward(const Ask& ask, tcp_server::Forward forwarding) {
+    asks_.transact(forwarding.target.bus, forwarding.target.station, std::move(forwarding.request),
+                   [weak = weak_from_this(), ticket = ask.ticket,
+                    function = ask.adu.pdu[0]](bus::Answer answer) {
+                       const auto self = weak.lock();
+                       if (!self || self->stopped_) return;
+                       self->drive_.tell([&](TimePoint now) {
+                           self->talk_.on_answer(now, ticket,
+                                                 self->told(function, std::move(answer.pdu)));
+                       });
+                   });
+}
+
+auto SerialMaster::Core::told(std::uint8_t function, modbus::ExceptionCode code) const -> Pdu {
+    if (settings_.on_failure == OnFailure::silence && is_failure(code)) return std::nullopt;
+    return modbus::encode_exception(function, code);
+}
+
+/// What a panel says passes, its own exceptions too.
+auto SerialMaster::Core::told(std::uint8_t function, Result<Bytes> pdu) const -> Pdu {
+    if (!pdu) return told(function, modbus::to_exception(pdu.error()));
+    if (pdu->empty() || pdu->size() > modbus::kMaxPdu)
+        return told(function, modbus::to_exception(Fault::malformed));
+    return std::move(*pdu);
+}
+
+SerialMaster::SerialMaster(rt::Clock& clock, Settings settings, tcp_server::UnitMap units,
+                           std::unique_ptr<line::Line> line)
+    : core_(std::make_shared<Core>(clock, std::move(settings), std::move(units), std::move(line))) {
+}
+
+SerialMaster::~SerialMaster() { core_->stop(); }
+
+void SerialMaster::start() { core_->start(); }
+void SerialMaster::finish() { core_->finish(); }
+bool SerialMaster::idle() const { return core_->idle(); }
+void SerialMaster::stop() { core_->stop(); }
+Counters SerialMaster::counters() const { return core_->counters(); }
+
+}  // namespace panelgate::serial_server

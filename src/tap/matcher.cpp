@@ -1,0 +1,302 @@
+#include "panelgate/tap/matcher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
+
+namespace panelgate::tap {
+namespace {
+
+/// Sooner than any master gives up: an adapter's latency timer, and a panel that thinks.
+constexpr Duration kQuickest = 30ms;
+
+ByteView pdu_of(const Piece& piece) {
+    return ByteView(piece.bytes).subspan(1, piece.bytes.size() - modbus::kAduOverhead);
+}
+
+Bytes copy_of(ByteView bytes) { return Bytes(bytes.begin(), bytes.end()); }
+
+bool has_form_of_reply(ByteView frame) {
+    if (frame[0] == 0) return false;  // nobody answers a broadcast
+    const modbus::ReplyLength length = modbus::reply_length(frame);
+    return length.kind == modbus::ReplyLength::Kind::by_silence || length.length == frame.size();
+}
+
+}  // namespace
+
+Matcher::Matcher(const Settings& settings) : settings_(settings), cutter_(settings) {}
+
+void Matcher::on_rx(TimePoint now, ByteView bytes) {
+    cutter_.hear(now, bytes);
+    cut(false);
+}
+
+void Matcher::on_deadline(TimePoint now) {
+    if (!cutter_.empty() && now - cutter_.last() >= settings_.hole) cut(true);
+    if (const auto at = resolved_at(); at && now >= *at) {
+        answer(*std::exchange(held_, std::nullopt), true);
+    }
+    if (asked_ && !held_ && cutter_.empty() && now - asked_->end >= settings_.patience)
+        give_up(now);
+}
+
+void Matcher::on_line_down(TimePoint now) {
+    cut(true);
+    if (held_) answer(*std::exchange(held_, std::nullopt), true);
+    if (asked_) {
+        asked_->doubtful = true;
+        give_up(now);
+    }
+    for (auto& [id, habits] : habits_) habits.forget_owed();
+    noise_ = false;
+}
+
+std::optional<Event> Matcher::poll_action() {
+    if (events_.empty()) return std::nullopt;
+    Event event = std::move(events_.front());
+    events_.pop_front();
+    return event;
+}
+
+std::optional<TimePoint> Matcher::next_deadline() const {
+    if (!cutter_.empty()) return cutter_.last() + settings_.hole;
+    if (held_) return resolved_at();
+    if (asked_) return asked_->end + settings_.patience;
+    return std::nullopt;
+}
+
+void Matcher::cut(bool silence) {
+    while (auto piece = cutter_.next(question(), silence)) take(std::move(*piece));
+}
+
+void Matcher::take(Piece piece) {
+    if (held_ && resolve(piece)) return;
+    switch (piece.kind) {
+        case Piece::Kind::answer:
+            return on_answer(std::move(piece));
+        case Piece::Kind::request:
+            return on_request(std::move(piece));
+        case Piece::Kind::reply:
+            return on_reply(std::move(piece));
+        case Piece::Kind::damaged:
+            return on_damaged(std::move(piece));
+    }
+}
+
+/// What was held is known by what follows: the same again at once answers it, so it was the request
+/// once more; and a master that goes on sooner than it has waited before had its answer. True when
+/// `piece` is dealt with by that.
+bool Matcher::resolve(Piece& piece) {
+    const Duration waited = held_->begin - asked_->end;
+    const Duration behind = piece.begin - held_->end;
+    Piece held = *std::exchange(held_, std::nullopt);
+    const bool same = piece.kind != Piece::Kind::damaged && piece.bytes == held.bytes;
+    if (same && behind <= quick(of(asked_->question.station))) {
+        give_up(piece.begin);
+        ask(held, false);
+        answer(std::move(piece), true);
+        return true;
+    }
+    // Frames of functions without a length rule may be lost between, where an adapter joins them.
+    const bool known = modbus::is_known(asked_->question.pdu.front());
+    const bool goes_on =
+        known && piece.kind != Piece::Kind::damaged && behind < waited - waited / 4;
+    answer(std::move(held), !goes_on);
+    // It was read as an answer to what is answered now.
+    if (piece.kind == Piece::Kind::answer)
+        piece.kind = piece.twofold ? Piece::Kind::request : Piece::Kind::reply;
+    return false;
+}
+
+void Matcher::on_answer(Piece piece) {
+    if (!piece.twofold) return answer(std::move(piece), false);
+    switch (read(piece)) {
+        case Reading::answer:
+            return answer(std::move(piece), false);
+        case Reading::request:
+            return on_request(std::move(piece));
+        case Reading::open:
+            held_ = std::move(piece);
+            return;
+    }
+}
+
+/// An answer that may as well be the request again: soon behind it, it is the answer; as late as
+/// its master gives up, the request; between, nobody can tell yet.
+Matcher::Reading Matcher::read(const Piece& piece) const {
+    const Habits& habits = habits_.at(asked_->question.station);
+    const Duration waited = piece.begin - asked_->end;
+    const Duration late = patience(habits);
+    if (waited >= late) return Reading::request;
+    return waited <= quick(habits) ? Reading::answer : Reading::open;
+}
+
+/// A master waits longer than this.
+Duration Matcher::quick(const Habits& habits) const {
+    const Duration usual = habits.longest_think().value_or(Duration::zero());
+    return std::min(patience(habits), std::max<Duration>(2 * usual + 10ms, kQuickest));
+}
+
+/// A master waits no longer than this.
+Duration Matcher::patience(const Habits& habits) const {
+    auto least = habits.give_up.least();
+    if (!least) least = give_up_.least();
+    return least ? *least - *least / 16 : settings_.usual_give_up;
+}
+
+std::optional<TimePoint> Matcher::resolved_at() const {
+    if (!held_) return std::nullopt;
+    return held_->end + patience(habits_.at(asked_->question.station));
+}
+
+void Matcher::answer(Piece piece, bool in_doubt) {
+    const Asked asked = *std::exchange(asked_, std::nullopt);
+    Habits& habits = of(asked.question.station);
+    const Bytes& request = asked.question.pdu;
+    const ByteView reply = pdu_of(piece);
+    const Duration think = std::max<Duration>(piece.begin - asked.end, Duration::zero());
+    const bool late = habits.owes_other(piece.end, request, reply);
+    const bool repeats = habits.repeated && piece.end - *habits.repeated < settings_.late_window;
+    const bool copied =
+        repeats && piece.bytes == habits.last_reply && request != habits.last_request;
+    Transaction made;
+    made.station = asked.question.station;
+    made.request = request;
+    made.reply = copy_of(reply);
+    made.end = End::answered;
+    const bool unheard = asked.damaged_bytes >= modbus::kMinAdu;  // a request, perhaps
+    const bool overdue = piece.begin - asked.end >= patience(habits);
+    // Of a function without a length rule: frames between may be lost where an adapter joins them.
+    const bool unruled =
+        !modbus::is_known(request[0]) && (think > kQuickest || std::ranges::equal(reply, request));
+    made.doubtful = in_doubt || unruled || late || copied || unheard || overdue;
+    made.asked = asked.begin;
+    made.sent = asked.end;
+    made.replied = piece.begin;
+    made.ended = piece.end;
+    made.sampled = habits.owed_since(piece.end, request).value_or(asked.begin);
+    if (!made.doubtful) {
+        habits.answered(think);
+    } else {
+        habits.answered_perhaps(think);
+    }
+    habits.last_request = request;
+    habits.last_reply = piece.bytes;
+    note(FrameKind::reply, made.station, piece);
+    tell(std::move(made));
+    noise_ = false;
+    last_end_ = piece.end;
+}
+
+void Matcher::on_request(Piece piece) {
+    const Habits& habits = of(piece.bytes.front());
+    // A master that waits does not ask: it is an old reply that looks like a request.
+    if (asked_ && is_old_reply(habits, piece) &&
+        piece.begin - asked_->end < patience(of(asked_->question.station))) {
+        return on_reply(std::move(piece));
+    }
+    const bool again = asked_ && asked_->question.station == piece.bytes.front() &&
+                       std::ranges::equal(asked_->question.pdu, pdu_of(piece));
+    const bool noise = asked_ ? asked_->damaged : noise_;
+    const bool doubtful =
+        (noise && has_form_of_reply(piece.bytes)) || (!again && is_old_reply(habits, piece));
+    give_up_for(piece);
+    ask(piece, doubtful);
+}
+
+/// A late one, or a copy, by what was asked and answered before.
+bool Matcher::is_old_reply(const Habits& habits, const Piece& piece) const {
+    if (!has_form_of_reply(piece.bytes)) return false;
+    return piece.bytes == habits.last_reply || habits.is_owed(piece.end, pdu_of(piece));
+}
+
+/// The master goes on with another request.
+void Matcher::give_up_for(const Piece& request) {
+    if (!asked_) return;
+    Habits& habits = of(asked_->question.station);
+    const Duration waited = request.begin - asked_->end;
+    const Duration usual = habits.longest_think().value_or(Duration::zero());
+    if (!asked_->damaged && !asked_->wrong && !asked_->doubtful && waited >= 2 * usual + 10ms) {
+        habits.give_up.seen(waited);
+        give_up_.seen(waited);
+    }
+    give_up(request.begin);
+}
+
+void Matcher::give_up(TimePoint now) {
+    const Asked asked = *std::exchange(asked_, std::nullopt);
+    of(asked.question.station).owes(asked.begin, asked.question.pdu);
+    Transaction made;
+    made.station = asked.question.station;
+    made.request = asked.question.pdu;
+    made.end = asked.damaged || asked.wrong ? End::damaged : End::silent;
+    made.doubtful = asked.doubtful;
+    made.asked = asked.begin;
+    made.sent = asked.end;
+    made.ended = std::max(now, asked.end);
+    made.sampled = asked.begin;
+    tell(std::move(made));
+}
+
+void Matcher::ask(const Piece& piece, bool doubtful) {
+    const std::uint8_t station = piece.bytes.front();
+    note(FrameKind::heard_request, station, piece);
+    noise_ = false;
+    last_end_ = piece.end;
+    Asked asked;
+    asked.question = {station, copy_of(pdu_of(piece))};
+    asked.begin = piece.begin;
+    asked.end = piece.end;
+    asked.doubtful = doubtful;
+    asked_ = std::move(asked);
+    if (station != 0 && !modbus::is_never_answered(pdu_of(piece))) return;
+    Transaction made;
+    made.station = station;
+    made.request = asked_->question.pdu;
+    made.end = End::unasked;
+    made.doubtful = doubtful;
+    made.asked = made.sampled = piece.begin;
+    made.sent = made.ended = piece.end;
+    tell(std::move(made));
+    asked_.reset();
+}
+
+/// Not the answer to what is asked: a late one, a copy, or nobody knows.
+void Matcher::on_reply(Piece piece) {
+    const std::uint8_t station = piece.bytes.front();
+    Habits& habits = of(station);
+    const bool unheard = asked_ ? asked_->damaged : noise_;  // a request, perhaps
+    if (!unheard && piece.bytes == habits.last_reply) {
+        habits.repeated = piece.end;
+        return note(FrameKind::copy, station, piece);
+    }
+    const bool late = habits.settle(piece.end, pdu_of(piece));
+    if (late) habits.last_reply = piece.bytes;
+    if (!late && asked_ && asked_->question.station == station) asked_->wrong = true;
+    note(late ? FrameKind::late : FrameKind::foreign, station, piece);
+}
+
+void Matcher::on_damaged(Piece piece) {
+    if (asked_) {
+        asked_->damaged = true;
+        asked_->damaged_bytes += piece.bytes.size();
+    } else {
+        noise_ = true;
+    }
+    note(FrameKind::damaged, asked_ ? asked_->question.station : piece.bytes.front(), piece);
+}
+
+Habits& Matcher::of(std::uint8_t station) {
+    return habits_.try_emplace(station, settings_).first->second;
+}
+
+void Matcher::note(FrameKind kind, std::uint8_t station, const Piece& piece) {
+    events_.emplace_back(Frame{piece.end, kind, station, piece.bytes});
+}
+
+}  // namespace panelgate::tap

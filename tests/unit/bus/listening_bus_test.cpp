@@ -1,0 +1,148 @@
+#include "panelgate/bus/listening_bus.hpp"
+
+#include <gtest/gtest.h>
+
+#include <boost/asio/io_context.hpp>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/hex.hpp"
+#include "support/manual_clock.hpp"
+#include "support/memory_line.hpp"
+#include "support/request.hpp"
+
+namespace panelgate::bus {
+namespace {
+
+const Bytes kRead = "03 00 6B 00 03"_hex;
+const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
+
+class ListeningBusTest : public testing::Test {
+  protected:
+    ListeningBusTest() {
+        settings.name = "floor1";
+        settings.device = "memory";
+        settings.arbiter.serial = {38400, 8, Parity::none, 1};
+        settings.arbiter.offline.after = 3;
+        settings.stations[17].name = "press";
+        settings.doctor.rest = {};
+        settings.observe = [this](const BusEvent& event) {
+            if (const auto* made = std::get_if<tap::Transaction>(&event)) heard.push_back(*made);
+            if (const auto* made = std::get_if<TransactionEvent>(&event))
+                outcomes.push_back(made->outcome);
+        };
+        auto memory = std::make_unique<test::MemoryLine>(clock);
+        line = memory.get();
+        bus = std::make_unique<ListeningBus>(io.get_executor(), clock, settings, std::move(memory));
+        bus->start();
+    }
+    /// Somebody says it so long behind what was said before.
+    void say(Duration pause, std::uint8_t station, const Bytes& pdu) {
+        const Bytes adu = modbus::encode_adu(station, pdu);
+        clock.advance(pause + wire_time(settings.arbiter.serial, adu.size()));
+        line->come(adu);
+        line->poll_input();
+    }
+    StationReport report_of(const std::string& name) const {
+        for (const StationReport& station : bus->report().stations) {
+            if (station.station == name) return station;
+        }
+        return {};
+    }
+
+    boost::asio::io_context io{1};
+    test::ManualClock clock;
+    Settings settings;
+    test::MemoryLine* line = nullptr;
+    std::unique_ptr<ListeningBus> bus;
+    std::vector<tap::Transaction> heard;
+    std::vector<Outcome> outcomes;
+};
+
+TEST_F(ListeningBusTest, TellsWhatPassesBy) {
+    EXPECT_EQ(bus->station_status(17).state, Health::unknown);
+    say(10ms, 17, kRead);
+    say(4ms, 17, kReply);
+    ASSERT_EQ(heard.size(), 1u);
+    EXPECT_EQ(heard[0].reply, kReply);
+    EXPECT_EQ(outcomes, std::vector{Outcome::ok});
+    EXPECT_EQ(bus->station_status(17).state, Health::heard);
+    EXPECT_EQ(bus->station_status(17).last_success, 0ms);
+    const HeardCounts counts = bus->station_status(17).heard.value();
+    EXPECT_EQ(counts.requests, 1u);
+    EXPECT_EQ(counts.replies, 1u);
+    EXPECT_NEAR(to_milliseconds(counts.think), 4, 0.001);
+    const StationReport report = report_of("press");
+    EXPECT_EQ(report.requests.at(3)[Outcome::ok], 1u);
+    EXPECT_TRUE(report.up);
+    EXPECT_GT(report.last_success_unix, 0);
+    EXPECT_NEAR(report.wire.turnaround.sum, 0.004, 1e-6);
+    const auto trace = bus->trace(10);
+    ASSERT_EQ(trace.size(), 2u);
+    EXPECT_EQ(trace[0].kind, FrameKind::heard_request);
+    EXPECT_EQ(trace[1].kind, FrameKind::reply);
+    EXPECT_EQ(bus->trace_since(trace[0].sequence, 10).size(), 1u);
+    EXPECT_TRUE(bus->status().listens);
+}
+
+TEST_F(ListeningBusTest, SaysWhoDoesNotAnswerItsMaster) {
+    for (int i = 0; i < 4; ++i) say(300ms, 17, kRead);
+    EXPECT_EQ(bus->station_status(17).state, Health::offline);
+    EXPECT_FALSE(report_of("press").up);
+    EXPECT_EQ(report_of("press").requests.at(3)[Outcome::timeout], 3u);
+    say(4ms, 17, kReply);
+    EXPECT_EQ(bus->station_status(17).state, Health::heard);
+    say(10ms, 17, kRead);
+    say(4ms, 17, "83 02"_hex);
+    EXPECT_EQ(report_of("press").wire.exceptions.at(2), 1u);
+    const HeardCounts counts = bus->station_status(17).heard.value();
+    EXPECT_EQ(counts.timeouts, 3u);
+    EXPECT_EQ(counts.exceptions, 1u);
+}
+
+TEST_F(ListeningBusTest, CountsWhatNobodyListedTogether) {
+    say(10ms, 5, kRead);
+    say(4ms, 5, kReply);
+    say(10ms, 0, "06 00 64 00 07"_hex);
+    EXPECT_EQ(report_of("other").requests.at(3)[Outcome::ok], 1u);
+    EXPECT_EQ(bus->report().wire.broadcasts, 1u);
+    EXPECT_EQ(bus->report().stations.size(), 2u);
+}
+
+TEST_F(ListeningBusTest, RefusesEveryRequestAndSendsNothing) {
+    std::vector<Answer> answers;
+    const auto ask = [&](std::uint8_t station, const Bytes& pdu) {
+        bus->transact({.station = station, .request = test::request_of(pdu), .client = 1},
+                      [&](Answer answer) { answers.push_back(std::move(answer)); });
+    };
+    ask(17, kRead);
+    ask(17, "06 00 01 00 03"_hex);
+    ask(0, "06 00 01 00 03"_hex);
+    EXPECT_TRUE(answers.empty()) << "answered from inside transact()";
+    ASSERT_TRUE(test::run_until(io, clock, [&] { return answers.size() == 3; }));
+    EXPECT_EQ(answers[0].pdu.value(), "83 0A"_hex);
+    EXPECT_EQ(answers[1].pdu.value(), "86 0A"_hex);
+    for (const Answer& answer : answers) {
+        EXPECT_FALSE(answer.transmitted);
+        EXPECT_EQ(answer.refusal.value().rule, Rule::listening);
+    }
+    EXPECT_EQ(bus->refusal_of_write(17).value().rule, Rule::listening);
+    EXPECT_EQ(report_of("press").requests.at(6)[Outcome::refused], 1u);
+    EXPECT_TRUE(line->written.empty());
+}
+
+TEST_F(ListeningBusTest, SaysThatTheLineIsDown) {
+    say(10ms, 17, kRead);
+    line->events()->on_down("unplugged");
+    EXPECT_FALSE(bus->status().up);
+    EXPECT_EQ(bus->status().state, "down: unplugged");
+    ASSERT_EQ(heard.size(), 1u);
+    EXPECT_TRUE(heard[0].doubtful);
+    EXPECT_TRUE(outcomes.empty()) << "nobody here knows what came of it";
+}
+
+}  // namespace
+}  // namespace panelgate::bus

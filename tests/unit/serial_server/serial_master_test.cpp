@@ -1,0 +1,198 @@
+#include "panelgate/serial_server/serial_master.hpp"
+
+#include <gmock/gmock.h>
+
+#include <boost/asio/io_context.hpp>
+#include <memory>
+#include <utility>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "support/fake_bus.hpp"
+#include "support/manual_clock.hpp"
+#include "support/memory_line.hpp"
+#include "talk.hpp"
+
+namespace panelgate::serial_server::test {
+namespace {
+
+using modbus::encode_adu;
+using panelgate::test::FakeBus;
+using panelgate::test::ManualClock;
+using panelgate::test::MemoryLine;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+const Bytes kRequest = encode_adu(kOurs, kReadOne);
+const Bytes kWrite = modbus::encode_write_register(1, 2);
+
+Settings with_access(Settings settings) {
+    settings.access.lines = {"floor1"};
+    settings.access.units = {{kOurs, {"floor1", 3}}};
+    settings.access.broadcast = tcp_server::BroadcastMode::silent;
+    settings.access.diagnostics_unit.reset();
+    return settings;
+}
+
+/// A master's port before one bus.
+struct House {
+    explicit House(Settings given = Talk::rtu())
+        : settings(with_access(std::move(given))),
+          wire(new MemoryLine(clock)),
+          master(clock, settings,
+                 tcp_server::UnitMap(settings.access, {{"floor1", &bus, {5}, false}}),
+                 std::unique_ptr<line::Line>(wire)) {
+        bus.script = [](const bus::Request&) { return std::nullopt; };
+        master.start();
+    }
+
+    void hear(const Bytes& bytes) {
+        wire->come(bytes);
+        wire->poll_input();
+    }
+    void answer(const bus::Answer& answer) {
+        bus.release(answer);
+        run();
+    }
+    void run() {
+        io.restart();
+        io.poll();
+        clock.advance(100ms);
+    }
+    /// What the master hears of it.
+    std::vector<Bytes> told(Fault fault) {
+        hear(kRequest);
+        answer(FakeBus::fault(fault, true));
+        return std::exchange(wire->written, {});
+    }
+
+    boost::asio::io_context io;
+    ManualClock clock;
+    FakeBus bus{io.get_executor()};
+    Settings settings;
+    MemoryLine* wire;
+    SerialMaster master;
+};
+
+TEST(SerialMaster, AsksTheStationBehindTheUnitUnderItsName) {
+    House house;
+    house.hear(kRequest);
+    ASSERT_THAT(house.bus.requests, SizeIs(1));
+    EXPECT_EQ(house.bus.requests[0].station, 3);
+    EXPECT_EQ(house.bus.names.at(house.bus.requests[0].client), "serial plc");
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, kOneValue)));
+}
+
+TEST(SerialMaster, AsksNothingOfUnitsThatNobodyListed) {
+    House house;
+    house.hear(encode_adu(6, kReadOne));
+    EXPECT_THAT(house.bus.requests, IsEmpty());
+    house.hear(encode_adu(5, kReadOne));
+    EXPECT_THAT(house.bus.requests, SizeIs(1));
+}
+
+TEST(SerialMaster, HearsTheMasterBeforeItAnswersLate) {
+    House house;
+    house.hear(kRequest);
+    house.clock.advance(300ms);
+    house.wire->come(encode_adu(5, kReadOne));  // and nobody has been told
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_THAT(house.wire->written, IsEmpty());
+    EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[0].client));
+}
+
+TEST(SerialMaster, IsSilentWhereTheGatewayHasNoAnswer) {
+    House house;
+    for (const Fault fault : {Fault::busy, Fault::expired, Fault::not_routed, Fault::line_down,
+                              Fault::line_lost, Fault::timeout, Fault::damaged, Fault::offline})
+        EXPECT_THAT(house.told(fault), IsEmpty());
+    EXPECT_EQ(house.master.counters().silent, 8u);
+}
+
+TEST(SerialMaster, OrGivesTheExceptionThatTellsWhy) {
+    Settings settings = Talk::rtu();
+    settings.on_failure = OnFailure::exception;
+    House house(settings);
+    const auto exception = [](std::uint8_t code) { return encode_adu(kOurs, Bytes{0x83, code}); };
+    EXPECT_THAT(house.told(Fault::busy), ElementsAre(exception(0x06)));
+    EXPECT_THAT(house.told(Fault::line_down), ElementsAre(exception(0x0A)));
+    EXPECT_THAT(house.told(Fault::timeout), ElementsAre(exception(0x0B)));
+}
+
+TEST(SerialMaster, PassesWhatAPanelRefuses) {
+    House house;
+    house.hear(kRequest);
+    house.answer(FakeBus::reply({0x83, 0x06}));
+    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, Bytes{0x83, 0x06})));
+    EXPECT_EQ(house.master.counters().exceptions, 1u);
+}
+
+TEST(SerialMaster, RefusesWritesWhereOnlyReadsAreAllowed) {
+    Settings settings = Talk::rtu();
+    settings.access.read_only = true;
+    House house(settings);
+    house.hear(encode_adu(kOurs, kWrite));
+    house.run();
+    EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, Bytes{0x86, 0x01})));
+    EXPECT_EQ(house.bus.told_refused, 1);
+    house.hear(encode_adu(0, kWrite));
+    EXPECT_THAT(house.bus.requests, IsEmpty());
+}
+
+TEST(SerialMaster, SendsBroadcastsThatALaterRequestDoesNotTakeBack) {
+    House house;
+    house.hear(encode_adu(0, kWrite));
+    house.hear(kRequest);
+    house.hear(encode_adu(5, kReadOne));
+    ASSERT_THAT(house.bus.requests, SizeIs(3));
+    EXPECT_EQ(house.bus.requests[0].station, 0);
+    EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[1].client));
+    EXPECT_NE(house.bus.requests[0].client, house.bus.requests[1].client);
+}
+
+TEST(SerialMaster, KeepsAFewBroadcastsOpen) {
+    House house;
+    for (int i = 0; i < 100; ++i) house.hear(encode_adu(0, kWrite));
+    EXPECT_THAT(house.bus.requests, SizeIs(house.settings.open_broadcasts));
+    house.answer(FakeBus::reply(kWrite));
+    EXPECT_TRUE(house.master.idle());
+    house.hear(encode_adu(0, kWrite));
+    EXPECT_THAT(house.bus.requests, SizeIs(house.settings.open_broadcasts + 1));
+}
+
+TEST(SerialMaster, AnswersWhatItTookBeforeItEnds) {
+    House house;
+    house.hear(kRequest);
+    house.master.finish();
+    EXPECT_FALSE(house.master.idle());
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_THAT(house.wire->written, SizeIs(1));
+    EXPECT_TRUE(house.master.idle());
+}
+
+TEST(SerialMaster, TakesBackWhatWaitsWhenItStops) {
+    House house;
+    house.hear(kRequest);
+    house.master.stop();
+    EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[0].client));
+    house.run();
+    EXPECT_THAT(house.wire->written, IsEmpty());
+}
+
+TEST(SerialMaster, OutlivesAPortThatGoesWhileItReplies) {
+    House house;
+    house.wire->fail_writes = true;
+    house.hear(kRequest);
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_FALSE(house.master.counters().up);
+    house.wire->fail_writes = false;
+    house.wire->written.clear();
+    house.wire->events()->on_up();
+    house.hear(kRequest);
+    house.answer(FakeBus::reply(kOneValue));
+    EXPECT_THAT(house.wire->written, SizeIs(1));
+}
+
+}  // namespace
+}  // namespace panelgate::serial_server::test

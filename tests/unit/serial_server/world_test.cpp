@@ -1,0 +1,179 @@
+// A master with other slaves on its line, noise, retries and slow panels behind the gateway, in
+// virtual time: whatever it takes for the answer to a request is one.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "talk.hpp"
+
+namespace panelgate::serial_server::test {
+namespace {
+
+struct Faults {
+    unsigned damage_percent = 0;  ///< of the master's frames
+    bool echo = false;
+    bool tells_timeout = false;
+};
+
+class World {
+  public:
+    World(unsigned seed, Faults faults) : random_(seed), faults_(faults), talk_(settings()) {}
+
+    void run(int exchanges) {
+        for (int i = 0; i < exchanges; ++i) {
+            if (chance(15)) {
+                hear_others();
+            } else if (chance(5)) {
+                say(modbus::encode_adu(0, modbus::encode_write_register(1, 2)));
+            } else {
+                ask_and_wait();
+            }
+            pass(10ms + 1ms * number(40));
+        }
+        pass(2s);
+    }
+
+    int right = 0;
+    int wrong = 0;        ///< taken for an answer, and none
+    int interrupted = 0;  ///< sent while the master was heard talking, or not yet silent
+    int retries = 0;
+    const Talk& talk() const { return talk_; }
+
+  private:
+    Settings settings() const {
+        Settings made = Talk::rtu();
+        made.echo = EchoMode::automatic;
+        if (faults_.tells_timeout) made.response_timeout = kTimeout;
+        return made;
+    }
+    bool chance(unsigned percent) { return random_() % 100 < percent; }
+    int number(int below) { return static_cast<int>(random_() % static_cast<unsigned>(below)); }
+
+    void ask_and_wait() {
+        const auto address = static_cast<std::uint16_t>(random_() % 50);
+        const auto unit = static_cast<std::uint8_t>(kOurs + random_() % 2);
+        const Bytes pdu = chance(30)
+                              ? modbus::encode_write_register(address, 7)
+                              : modbus::encode_read(modbus::Table::holding_registers, address, 1);
+        for (int attempt = 0; attempt < 3; ++attempt) {
+            retries += attempt > 0 ? 1 : 0;
+            say(modbus::encode_adu(unit, pdu));
+            if (hears_answer(unit, pdu)) return;
+        }
+    }
+
+    /// Of a slave that has nothing to do with the gateway; its values may look like requests.
+    void hear_others() {
+        say(modbus::encode_adu(kOther, kReadOne));
+        pass(5ms);
+        Bytes pdu{3, 8};
+        const Bytes inside = modbus::encode_adu(kOurs, kReadOne);
+        pdu.insert(pdu.end(), inside.begin(), inside.end());
+        say(modbus::encode_adu(kOther, pdu));
+    }
+
+    /// As an adapter hands it over.
+    void say(Bytes frame) {
+        if (chance(faults_.damage_percent)) {
+            const std::size_t at = random_() % frame.size();
+            if (chance(50)) {
+                frame[at] ^= static_cast<std::uint8_t>(1u << random_() % 8);
+            } else {
+                frame.erase(frame.begin() + static_cast<std::ptrdiff_t>(at));
+            }
+        }
+        const std::size_t piece = 1 + random_() % 8;
+        for (std::size_t at = 0; at < frame.size(); at += piece) {
+            const std::size_t end = std::min(at + piece, frame.size());
+            pass(wire_time(Talk::rtu().device.serial, end - at));
+            talk_.hear({frame.begin() + static_cast<std::ptrdiff_t>(at),
+                        frame.begin() + static_cast<std::ptrdiff_t>(end)});
+            talking_ = true;
+        }
+        talking_ = false;
+        silent_since_ = talk_.now;
+        if (chance(10)) talk_.hear({0x00});
+    }
+
+    bool hears_answer(std::uint8_t unit, const Bytes& pdu) {
+        const TimePoint until = talk_.now + kTimeout;
+        const std::size_t before = talk_.sent.size();
+        while (talk_.now < until && talk_.sent.size() == before) pass(1ms);
+        if (talk_.sent.size() == before) return false;
+        const auto frame = modbus::decode_adu(talk_.sent.back());
+        if (frame->station != unit || !modbus::answers(pdu, frame->pdu)) return false;
+        const bool is_write = pdu[0] == modbus::kWriteSingleRegister;
+        const bool is_it = is_write || frame->pdu[3] == pdu[2];
+        ++(is_it ? right : wrong);
+        return true;
+    }
+
+    void pass(Duration by) {
+        const TimePoint end = talk_.now + by;
+        while (talk_.now < end) {
+            talk_.pass(std::min<Duration>(1ms, end - talk_.now));
+            serve();
+        }
+    }
+
+    /// The panels behind the gateway: each register holds its address.
+    void serve() {
+        for (; seen_ < talk_.asks.size(); ++seen_)
+            panel_.push_back({talk_.now + 1ms * (1 + number(350)), talk_.asks[seen_]});
+        while (!panel_.empty() && panel_.front().first <= talk_.now) {
+            const Ask ask = panel_.front().second;
+            panel_.pop_front();
+            const Bytes& pdu = ask.adu.pdu;
+            const bool is_write = pdu[0] == modbus::kWriteSingleRegister;
+            talk_.answer_to(ask.ticket, is_write ? pdu : Bytes{pdu[0], 2, 0, pdu[2]});
+        }
+        for (; judged_ < talk_.sent.size(); ++judged_) {
+            const bool too_early = talk_.sent_at[judged_] < silent_since_ + kSilence;
+            interrupted += talking_ || too_early ? 1 : 0;
+            if (faults_.echo) talk_.hear(talk_.sent[judged_]);
+        }
+    }
+
+    static constexpr Duration kTimeout = 250ms;
+    const Duration kSilence = silent_interval(Talk::rtu().device.serial);
+    std::mt19937 random_;
+    Faults faults_;
+    Talk talk_;
+    std::deque<std::pair<TimePoint, Ask>> panel_;
+    std::size_t seen_ = 0;
+    std::size_t judged_ = 0;
+    bool talking_ = false;
+    TimePoint silent_since_{};
+};
+
+TEST(World, OfAMasterThatIsHeardWell) {
+    World world(1, {.tells_timeout = true});
+    world.run(5000);
+    EXPECT_EQ(world.wrong, 0);
+    EXPECT_EQ(world.interrupted, 0);
+    EXPECT_GT(world.right, 3000);
+}
+
+TEST(World, OfAMasterThatIsHeardBadly) {
+    for (unsigned seed = 1; seed <= 10; ++seed) {
+        World world(seed,
+                    {.damage_percent = 20, .echo = seed % 2 == 0, .tells_timeout = seed % 3 == 0});
+        world.run(2000);
+        EXPECT_EQ(world.wrong, 0) << seed;
+        EXPECT_EQ(world.interrupted, 0) << seed;
+        EXPECT_GT(world.right, 1000) << seed;
+        EXPECT_GT(world.retries, 100) << seed;
+    }
+}
+
+}  // namespace
+}  // namespace panelgate::serial_server::test

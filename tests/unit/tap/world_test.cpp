@@ -1,0 +1,185 @@
+#include "world.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <deque>
+#include <iostream>
+#include <ostream>
+#include <string>
+#include <variant>
+
+#include "panelgate/tap/matcher.hpp"
+
+using namespace panelgate;
+using namespace panelgate::tap;
+using tap_world::Asked;
+using tap_world::Manner;
+using tap_world::World;
+
+namespace {
+
+struct Score {
+    std::size_t asked = 0;
+    std::size_t answerable = 0;  ///< to which their panel has said something that the master took
+    std::size_t right = 0;
+    std::size_t doubtful = 0;
+    std::size_t wrong = 0;
+    std::size_t invented = 0;  ///< told, not in doubt, and never asked
+    std::string example;
+};
+
+/// Holds what is told against what really was.
+class Judge {
+  public:
+    Judge(const World& world, Duration latency) : world_(world), slack_(latency + 2ms) {}
+
+    void hear(const Frame& frame) {
+        history_.push_back(std::to_string(to_seconds(frame.at.time_since_epoch())) + ' ' +
+                           std::string(label(frame.kind)) + ' ' + to_hex(frame.bytes, ""));
+        constexpr std::size_t kKept = 8;
+        if (history_.size() > kKept) history_.pop_front();
+    }
+    void judge(const Transaction& made) {
+        if (made.doubtful) {
+            ++score.doubtful;
+            return;
+        }
+        const Asked* asked = find(made);
+        if (asked == nullptr) return complain(score.invented, made);
+        if (made.end != End::answered) return;
+        if (asked->replies.contains(made.reply) || answers_same(made)) {
+            ++score.right;
+        } else {
+            complain(score.wrong, made);
+        }
+    }
+    Score score;
+
+  private:
+    /// The one that was asked then.
+    const Asked* find(const Transaction& made) {
+        const auto& all = world_.asked();
+        for (std::size_t i = all.size(); i-- > 0 && made.asked - all[i].begin < 10s;) {
+            if (all[i].station != made.station || all[i].pdu != made.request) continue;
+            if (std::chrono::abs(made.asked - all[i].begin) <= slack_) return &all[i];
+        }
+        return nullptr;
+    }
+    /// The very same request before it has this answer, and its values are told as old as that.
+    bool answers_same(const Transaction& made) {
+        const auto& all = world_.asked();
+        for (std::size_t i = all.size(); i-- > 0 && made.asked - all[i].begin < 10s;) {
+            const bool same = all[i].station == made.station && all[i].pdu == made.request;
+            if (same && all[i].replies.contains(made.reply))
+                return made.sampled <= all[i].begin + slack_;
+        }
+        return false;
+    }
+    void complain(std::size_t& count, const Transaction& made) {
+        constexpr std::size_t kShown = 3;
+        if (++count > kShown) return;
+        for (const std::string& frame : history_) score.example += "\n    " + frame;
+        score.example += &count == &score.wrong ? "\n  wrong " : "\n  invented ";
+        score.example += std::to_string(made.station) + ": " + to_hex(made.request, "") + " -> " +
+                         to_hex(made.reply, "") + " asked at " +
+                         std::to_string(to_seconds(made.asked.time_since_epoch()));
+    }
+
+    const World& world_;
+    Duration slack_;
+    std::deque<std::string> history_;  ///< frames
+};
+
+Score play(const Manner& manner, std::size_t turns) {
+    World world(manner);
+    Judge judge(world, manner.latency);
+    Matcher matcher(Settings{SerialFormat{38400, 8, Parity::none, 1}});
+    const auto collect = [&] {
+        while (const auto event = matcher.poll_action()) {
+            if (const auto* made = std::get_if<Transaction>(&*event)) judge.judge(*made);
+            if (const auto* frame = std::get_if<Frame>(&*event)) judge.hear(*frame);
+        }
+    };
+    TimePoint last{};
+    for (std::size_t i = 0; i < turns; ++i) {
+        world.turn();
+        if (i % 50 != 49) continue;  // chunks hold bytes of more than one turn
+        for (const World::Chunk& chunk : world.take_chunks()) {
+            for (auto next = matcher.next_deadline(); next && *next < chunk.at;
+                 next = matcher.next_deadline()) {
+                matcher.on_deadline(*next);
+                collect();
+            }
+            last = std::max(last, chunk.at);
+            matcher.on_rx(last, chunk.bytes);
+            collect();
+        }
+    }
+    judge.score.asked = world.asked().size();
+    for (const Asked& asked : world.asked())
+        judge.score.answerable += asked.replies.empty() ? 0u : 1u;
+    return judge.score;
+}
+
+std::ostream& operator<<(std::ostream& out, const Score& score) {
+    return out << score.asked << " asked, " << score.answerable << " answered, " << score.right
+               << " right, " << score.doubtful << " in doubt, " << score.wrong << " wrong, "
+               << score.invented << " invented; " << score.example;
+}
+
+std::size_t turns() {
+    const char* const set = std::getenv("PANELGATE_TAP_TURNS");
+    return set != nullptr ? std::stoul(set) : 100'000;
+}
+
+}  // namespace
+
+TEST(TapWorld, EachPairIsFoundOnAHealthyLine) {
+    for (const Duration latency : {0ms, 4ms, 16ms}) {
+        Manner manner;
+        manner.latency = latency;
+        const Score score = play(manner, 20'000);
+        EXPECT_EQ(score.wrong + score.invented, 0u) << score;
+        EXPECT_LE(score.doubtful, 2u) << score;
+        // Frames of no known length, joined: only a silence or what follows can end them.
+        const std::size_t least =
+            latency == 0ms ? score.answerable - 2 : score.answerable * 97 / 100;
+        EXPECT_GE(score.right, least) << score;
+    }
+}
+
+TEST(TapWorld, NoPairIsWrongAmongPanelsWithFaults) {
+    for (const Duration latency : {0ms, 16ms}) {
+        Manner manner;
+        manner.latency = latency;
+        manner.silent = 0.02;
+        manner.late = 0.02;
+        manner.damaged = 0.02;
+        manner.doubled = 0.01;
+        manner.slow = 0.02;
+        manner.noise = 0.01;
+        const Score score = play(manner, turns());
+        EXPECT_EQ(score.wrong, 0u) << score;
+        EXPECT_LT(score.invented * 2000, score.asked) << score;
+        EXPECT_LT(score.doubtful * 20, score.asked) << score;
+        EXPECT_GT(score.right * 20, score.answerable * 18) << score;
+        std::cout << score << '\n';
+    }
+}
+
+/// What it does not hear at all it cannot miss: then an echo is taken for the request.
+TEST(TapWorld, HardlyAPairIsWrongForATapThatMishears) {
+    for (const unsigned seed : {1u, 2u}) {
+        Manner manner;
+        manner.seed = seed;
+        manner.silent = 0.01;
+        manner.late = 0.01;
+        manner.misheard = 0.02;
+        manner.unheard = 0.002;
+        const Score score = play(manner, turns());
+        EXPECT_LT(score.wrong * 10'000, score.asked) << score;
+        EXPECT_LT(score.invented * 300, score.asked) << score;
+        std::cout << score << '\n';
+    }
+}
