@@ -20,7 +20,8 @@ std::optional<std::string> environment(const std::string& name) {
 
 }  // namespace
 
-Loaded load_file(const std::string& path) {
+Loaded load_file(const std::string& typed) {
+    const std::string path = typed == "-" ? "/dev/stdin" : typed;
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
         const std::string why =

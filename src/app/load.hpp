@@ -20,8 +20,8 @@ struct Loaded {
     std::vector<yaml::Problem> problems;
 };
 
-/// Reads and checks a file. Its warnings are told by whoever uses it.
-Loaded load_file(const std::string& path);
+/// Reads and checks a file, `-` for standard input. Its warnings are told by whoever uses it.
+Loaded load_file(const std::string& typed);
 /// The same for text; `name` stands in messages.
 Loaded load_text(std::string_view text, const std::string& name);
 /// To stderr, a line each: of commands that keep no log.

@@ -136,7 +136,8 @@ class CommandLine {
     }
 
     void add_file(CLI::App* command) {
-        command->add_option("-c,--config", file_, "configuration file")->capture_default_str();
+        command->add_option("-c,--config", file_, "configuration file, - for standard input")
+            ->capture_default_str();
     }
 
     void add_run() {

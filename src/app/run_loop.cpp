@@ -102,6 +102,8 @@ class Loop {
 SignalLoop::SignalLoop(asio::io_context& io)
     : io_(io), ends_(io, SIGTERM, SIGINT), reloads_(io, SIGHUP) {
     std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
+    std::signal(SIGUSR1, SIG_IGN);  // a habit of those who rotate logs; it would end the gateway
+    std::signal(SIGUSR2, SIG_IGN);
 }
 
 ExitCode SignalLoop::run(const Ending& ending) {

@@ -50,6 +50,19 @@ bool is_any_address(const std::string& address) {
            std::ranges::all_of(buffer, [](unsigned char byte) { return byte == 0; });
 }
 
+std::string network_of(const Cidr& cidr) {
+    std::array<unsigned char, 16> bytes{};
+    const int family = is_ipv6(cidr.address) ? AF_INET6 : AF_INET;
+    if (inet_pton(family, cidr.address.c_str(), bytes.data()) != 1) return "";
+    const auto typed = bytes;
+    for (std::size_t bit = cidr.prefix; bit < 8 * bytes.size(); ++bit)
+        bytes.at(bit / 8) &= static_cast<unsigned char>(~(0x80U >> (bit % 8)));
+    if (bytes == typed) return "";
+    std::array<char, INET6_ADDRSTRLEN> text{};
+    inet_ntop(family, bytes.data(), text.data(), text.size());
+    return std::string(text.data()) + '/' + std::to_string(cidr.prefix);
+}
+
 std::optional<Cidr> parse_cidr(std::string_view text) {
     const std::size_t slash = text.find('/');
     Cidr cidr{std::string(text.substr(0, slash)), 0};

@@ -71,8 +71,15 @@ void drop_extensions(yaml::Node& tree) {
                   [](const yaml::Entry& entry) { return entry.key.starts_with("x-"); });
 }
 
+constexpr std::string_view kHttp = "did you mean 'http'? It serves REST, pages and metrics";
+
 /// Keys that people write at the left margin.
-constexpr std::array<yaml::Elsewhere, 12> kElsewhere{{{"level", "log", {}},
+constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
+                                                      {"api", {}, {}, kHttp},
+                                                      {"web", {}, {}, kHttp},
+                                                      {"metrics", {}, {}, kHttp},
+                                                      {"prometheus", {}, {}, kHttp},
+                                                      {"level", "log", {}},
                                                       {"format", "log", {}},
                                                       {"listen", {}, "modbus_tcp or http"},
                                                       {"allow", {}, "modbus_tcp or http"},
@@ -84,6 +91,12 @@ constexpr std::array<yaml::Elsewhere, 12> kElsewhere{{{"level", "log", {}},
                                                       {"serial", {}, "a line, one of 'lines'"},
                                                       {"baud", {}, "a line's serial"},
                                                       {"points", {}, "a station"}}};
+
+bool is_http(std::string_view key) {
+    return std::ranges::any_of(kElsewhere, [key](const yaml::Elsewhere& place) {
+        return place.key == key && place.instead == kHttp;
+    });
+}
 
 void load_tree(Loading& loading, yaml::Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
@@ -103,13 +116,17 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     const yaml::Node* listeners = root.child("modbus_tcp");
     const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
                                                    listeners->items.empty());
-    const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http");
+    const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
+                          std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
+                              return is_http(entry.key);
+                          });
     const bool has_other = root.child("http") != nullptr || root.child("serial_masters") != nullptr;
     if (is_empty && !has_other && !mistyped)
         loading.problems.add({1, 1},
                              "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
                              "[{listen: 127.0.0.1:502}]");
     root.elsewhere(kElsewhere);
+    root.refuse("mqtt", "is not in this version; remove it");
     root.has("templates");  // known, though nothing of it is left
     root.finish();
     if (loading.problems.empty()) warn_of_doors(loading, tree);
@@ -197,6 +214,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
             problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
         return std::nullopt;
     }
+    drop_extensions(tree);  // before anything of them is judged
     yaml::Problems unset(problems.file());
     yaml::expand_variables(tree, environment, unset);
     refuse_control_characters(tree, unset);

@@ -1,6 +1,7 @@
 #include "load_hosts.hpp"
 
 #include <algorithm>
+#include <string>
 #include <string_view>
 
 #include "address_hints.hpp"
@@ -20,14 +21,22 @@ bool is_host(std::string_view text) {
     });
 }
 
+/// [fd00::1], as an address stands in a URL.
+std::string without_brackets(const std::string& text) {
+    if (!text.starts_with('[') || !text.ends_with(']')) return text;
+    const std::string inside = text.substr(1, text.size() - 2);
+    return is_ipv6(inside) ? inside : text;
+}
+
 }  // namespace
 
 void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
     const yaml::Node* list = in.sequence("hosts");
     if (list == nullptr) return;
     for (const yaml::Node& item : list->items) {
-        if (is_host(item.scalar)) {
-            settings.hosts.push_back(item.scalar);
+        const std::string host = without_brackets(item.scalar);
+        if (is_host(host)) {
+            settings.hosts.push_back(host);
         } else {
             loading.problems.add(
                 item.mark,

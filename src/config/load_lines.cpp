@@ -22,7 +22,18 @@ using yaml::Node;
 /// False when there was a fault: then nothing may be concluded from the format.
 bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
     const std::size_t before = loading.problems.list().size();
-    const Node* node = line.map("serial", serial_example(line.child("serial")));
+    const Node* typed = line.child("serial");
+    const std::string example = serial_example(typed);
+    const bool is_list = typed != nullptr && typed->kind == Node::Kind::sequence;
+    const bool is_values = is_list && std::ranges::all_of(typed->items, [](const Node& item) {
+                               return item.kind == Node::Kind::scalar;
+                           });
+    if (is_values && !typed->items.empty()) {  // [9600, 8, N, 1]
+        line.has("serial");
+        line.problem("serial", "serial must be a map of keys, not a list; write " + example);
+        return false;
+    }
+    const Node* node = line.map("serial", example);
     if (node == nullptr) return loading.problems.list().size() == before;
     MapReader in(*node, loading.problems, "serial");
     format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
@@ -118,11 +129,18 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
 
 /// /dev/ttyUSB0:9600 and the like; paths by name have colons, too.
 void check_path(MapReader& in, const std::string& path) {
-    const std::size_t end = path.find_first_of(":,; ");
+    const std::size_t end = path.find_first_of(":,; \t");
     if (!path.starts_with("/dev/tty") || end == path.npos) return;
     if (end + 1 == path.size()) {
         in.problem("device", "device must be a path alone, not " + yaml::quote(path) + "; write " +
                                  path.substr(0, end));
+        return;
+    }
+    const std::string number = path.substr(std::min(path.find_first_not_of(' ', end), path.size()));
+    constexpr std::size_t kLongest = 2;  // digits of /dev/ttyUSB12
+    if (path[end] == ' ' && number.size() <= kLongest && yaml::parse_integer(number)) {
+        in.problem("device", "device must be a path without blanks, not " + yaml::quote(path) +
+                                 "; write " + path.substr(0, end) + number);
         return;
     }
     Node behind;
@@ -132,8 +150,19 @@ void check_path(MapReader& in, const std::string& path) {
                              ", and what is behind it as serial: " + serial_example(&behind));
 }
 
+/// sim#simulated, /dev/ttyUSB0#left: a '#' begins a comment behind a blank only.
+bool check_comment(MapReader& in, const std::string& device) {
+    const std::size_t sign = device.find('#');
+    const std::string path = device.substr(0, sign);
+    if (sign == device.npos || (path != "sim" && !path.starts_with("/dev/tty"))) return false;
+    in.problem("device", "a blank is missing before the '#' of a comment in " +
+                             yaml::quote(device) + "; write " + path + ' ' + device.substr(sign));
+    return true;
+}
+
 void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
+    if (check_comment(in, line.device.device)) return;
     for (const Line& other : loading.config.lines) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
         if (other.device.device != line.device.device) continue;
@@ -196,9 +225,12 @@ arbiter::Quarantine load_quarantine(MapReader& in) {
 constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
 constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
+constexpr std::string_view kAtTheTop =
+    "it stands at the top of the file, in the column of 'lines', not inside a line";
+
 /// Keys that people write beside `device`.
 constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
-constexpr std::array<yaml::Elsewhere, 22> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 28> kElsewhere{
     {{"baud", "serial", {}},
      {"data_bits", "serial", {}},
      {"parity", "serial", {}, {}, kParities},
@@ -219,6 +251,12 @@ constexpr std::array<yaml::Elsewhere, 22> kElsewhere{
      {"poll", {}, "a station"},
      {"profile", {}, "a station"},
      {"listen", {}, "modbus_tcp or http"},
+     {"relays", {}, {}, kAtTheTop},
+     {"templates", {}, {}, kAtTheTop},
+     {"modbus_tcp", {}, {}, kAtTheTop},
+     {"http", {}, {}, kAtTheTop},
+     {"log", {}, {}, kAtTheTop},
+     {"realtime", {}, {}, kAtTheTop},
      {"type", {}, {}, "remove it: 'device' says what the line is"},
      {"method", {}, {}, "remove it: every line is RTU"}}};
 

@@ -99,6 +99,14 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     const bool is_text = entry.value.kind == Node::Kind::scalar && !entry.value.comma;
     if (!raw || !is_text || entry.value.scalar.empty()) {
         const bool turned = yaml::parse_integer(entry.value.scalar).has_value();
+        const bool is_null = raw && entry.value.kind == Node::Kind::null;
+        if (is_null) {
+            in.problems().add(entry.mark,
+                              "a label must be a text, not nothing; for the word null "
+                              "write 'null' in quotes: " +
+                                  entry.key + ": 'null'");
+            return;
+        }
         in.problems().add(entry.mark,
                           "labels are RAW-NUMBER: text, such as 1: running" +
                               (turned ? "; write " + entry.value.scalar + ": " + entry.key
@@ -163,7 +171,7 @@ void load_no_value(MapReader& in, Point& point) {
     }
     const RawRange range = no_value_range(point.type);
     for (const Node& item : list->items) {
-        const bool plain = item.kind == Node::Kind::scalar && !item.quoted;
+        const bool plain = item.kind == Node::Kind::scalar && !item.is_text();
         const auto raw = plain ? yaml::parse_integer(item.scalar) : std::nullopt;
         if (!raw) {
             in.problems().add(item.mark, "no_value is a list of raw numbers, such as [-32768]");
@@ -210,7 +218,30 @@ bool is_point_name(std::string_view text) {
 constexpr const char* kListens =
     "the line is only listened to (mode: listen): nothing can be written there; leave writable out";
 
+/// None, when a variable brings nothing.
+std::string load_unit(MapReader& in) {
+    const Node* typed = in.child("unit");
+    if (typed != nullptr && !typed->variable.empty() && typed->scalar.empty()) return "";
+    return in.text("unit").value_or("");
+}
+
+/// `temperature: UW100` for a point: told.
+bool refuse_short_form(Loading& loading, const Node& node) {
+    constexpr std::array<std::string_view, 14> kKeys{
+        "name",   "at",  "bit", "type", "length",   "word_order", "scale",
+        "offset", "min", "max", "unit", "writable", "labels",     "every"};
+    if (node.entries.size() != 1 || node.entries[0].value.kind != Node::Kind::scalar) return false;
+    const auto& [name, mark, at] = node.entries[0];
+    const bool is_key = std::ranges::find(kKeys, name) != kKeys.end();
+    if (is_key || at.scalar.find_first_of("0123456789") == at.scalar.npos) return false;
+    loading.problems.add(node.mark, "a point must be a map of name and at; write {name: " +
+                                        (is_point_name(name) ? name : "NAME") +
+                                        ", at: " + at.scalar + '}');
+    return true;
+}
+
 void load_point(Loading& loading, const Node& node, Station& station) {
+    if (refuse_short_form(loading, node)) return;
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
     point.name = in.required_text("name").value_or("");
@@ -229,7 +260,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     }
     load_type(in, point);
     load_scale(in, point);
-    point.unit = in.text("unit").value_or("");
+    point.unit = load_unit(in);
     point.writable = in.boolean("writable").value_or(false);
     if (point.writable && station.read_only)
         in.problem("writable", "station '" + station.name + "' is read_only");

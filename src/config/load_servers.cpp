@@ -207,6 +207,12 @@ void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
         const auto cidr = parse_cidr(item.scalar);
         if (cidr) {
             allow.push_back({cidr->address, cidr->prefix});
+            const std::string network = network_of(*cidr);
+            if (!network.empty())
+                loading.warn(item.mark, item.scalar + " is all of " + network +
+                                            "; write that, or " + cidr->address +
+                                            (is_ipv6(cidr->address) ? "/128" : "/32") +
+                                            " for one machine");
         } else {
             loading.problems.add(item.mark, "allow lists networks such as 192.168.1.0/24, not " +
                                                 yaml::quote(item.scalar) +

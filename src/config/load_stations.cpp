@@ -64,7 +64,7 @@ const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
 /// 0: none, and a problem.
 std::uint8_t load_id(MapReader& in, const Line& line) {
     const Node* node = in.child("id");
-    const bool plain = node != nullptr && node->kind == Node::Kind::scalar && !node->quoted;
+    const bool plain = node != nullptr && node->kind == Node::Kind::scalar && !node->is_text();
     const auto number = plain ? yaml::parse_integer(node->scalar) : std::nullopt;
     if (number && (*number == 0 || (*number > modbus::kMaxStation && *number < 256))) {
         const bool broadcast = *number == 0;  // serial line V1.02, 2.2

@@ -17,11 +17,19 @@ bool has_control_character(std::string_view text) {
     return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
 }
 
+/// The path that a variable brought: nobody sees it in the configuration. A text that is none may
+/// be the token itself.
+std::string path_of(const Node* file) {
+    const bool is_path =
+        file != nullptr && !file->variable.empty() && file->scalar.starts_with('/');
+    return is_path ? ' ' + file->scalar : "";
+}
+
 /// A token's secret: the file's text without blanks around it, and without the mark that editors
-/// put before UTF-8.
-std::string load_secret(Loading& loading, MapReader& in) {
+/// put before UTF-8. `elsewhere`: it stands where it must not, which is told.
+std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
     constexpr std::string_view kBlanks = " \t\r\n";
-    const auto file = in.required_text("file");
+    const auto file = elsewhere ? in.text("file") : in.required_text("file");
     if (!file) return "";
     if (loading.files.is_special(*file)) {
         in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
@@ -31,9 +39,9 @@ std::string load_secret(Loading& loading, MapReader& in) {
     if (text && text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
     if (!text) {
         // Not the text: whoever took the token for its file has written that.
-        in.problem("file",
-                   "cannot read the token file; give the path of a file that holds the token and "
-                   "that this program may read");
+        in.problem("file", "cannot read the token file" + path_of(in.child("file")) +
+                               "; give the path of a file that holds the token and "
+                               "that this program may read");
         return "";
     }
     const std::size_t first = text->find_first_not_of(kBlanks);
@@ -52,15 +60,27 @@ std::string load_secret(Loading& loading, MapReader& in) {
 
 constexpr std::string_view kExample = "{name: ops, role: operator, file: /run/secrets/ops}";
 
+constexpr std::string_view kInFile =
+    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "read, and here file: with its path";
+constexpr std::array<yaml::Elsewhere, 4> kElsewhere{{{"token", {}, {}, kInFile},
+                                                     {"secret", {}, {}, kInFile},
+                                                     {"password", {}, {}, kInFile},
+                                                     {"value", {}, {}, kInFile}}};
+
 web::Token load_token(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a token", kExample);
+    in.elsewhere(kElsewhere);
+    const bool elsewhere = std::ranges::any_of(node.entries, [](const yaml::Entry& entry) {
+        return std::ranges::find(kElsewhere, entry.key, &yaml::Elsewhere::key) != kElsewhere.end();
+    });
     web::Token token;
     token.name = in.required_text("name").value_or("");
     constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
         {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
     if (in.required_text("role"))
         token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
-    token.secret = load_secret(loading, in);
+    token.secret = load_secret(loading, in, elsewhere);
     in.finish();
     return token;
 }

@@ -1,9 +1,11 @@
 #include "templates.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -64,6 +66,21 @@ void add_missing(Node& map, const Node& from) {
     }
 }
 
+/// What an alias repeats keeps the places of its keys.
+using Place = std::pair<int, int>;
+Place place_of(const Entry& entry) { return {entry.mark.line, entry.mark.column}; }
+
+/// `lines` may be null.
+template <class Do>
+void for_stations(Node* lines, const Do& todo) {
+    if (lines == nullptr) return;
+    for (Node& line : lines->items) {
+        Node* stations = find(line, "stations");
+        if (stations == nullptr) continue;
+        for (Node& station : stations->items) todo(station);
+    }
+}
+
 struct Template {
     yaml::Mark mark;
     Node body;
@@ -81,6 +98,7 @@ class Templates {
                                   "templates must be a map of stations by name, such as "
                                   "templates: {meter: {profile: generic}}");
         }
+        move_bodies(list);
         for (Entry& entry : list.entries) read_one(entry);
     }
 
@@ -109,10 +127,18 @@ class Templates {
         }
     }
 
-    std::vector<Node> take_unused() {
+    /// `lines` may have taken something of them over by a merge key.
+    std::vector<Node> take_unused(Node* lines) {
+        std::set<Place> taken;
+        for_stations(lines, [&](const Node& station) {
+            for (const Entry& entry : station.entries) taken.insert(place_of(entry));
+        });
         std::vector<Node> unused;
         for (auto& [name, one] : templates_) {
-            if (one.used) continue;
+            const bool merged = std::ranges::any_of(one.body.entries, [&](const Entry& entry) {
+                return taken.contains(place_of(entry));
+            });
+            if (one.used || merged) continue;
             loading_.warn(one.mark, "no station has template: " + name);
             if (one.body.kind == Node::Kind::map) unused.push_back(std::move(one.body));
         }
@@ -120,6 +146,31 @@ class Templates {
     }
 
   private:
+    /// The keys of a station behind a name without a body are meant as this.
+    void move_bodies(Node& list) {
+        constexpr std::array<std::string_view, 11> kKeys{
+            "profile", "access",   "timing", "retries", "retry_writes", "max_age",
+            "guard",   "simulate", "poll",   "points",  "translate"};
+        std::vector<Entry> kept;
+        for (Entry& entry : list.entries) {
+            Entry* name = kept.empty() ? nullptr : &kept.back();
+            const bool open = name != nullptr &&
+                              (name->value.kind == Node::Kind::null || opened_.contains(name->key));
+            if (!open || std::ranges::find(kKeys, entry.key) == kKeys.end()) {
+                kept.push_back(std::move(entry));
+                continue;
+            }
+            loading_.problems.add(entry.mark, "'" + entry.key + "' must stand deeper than '" +
+                                                  name->key + "' (line " +
+                                                  std::to_string(name->mark.line) +
+                                                  "), whose body it is: type 2 blanks before it");
+            opened_.insert(name->key);
+            name->value.kind = Node::Kind::map;
+            name->value.entries.push_back(std::move(entry));
+        }
+        list.entries = std::move(kept);
+    }
+
     void read_one(Entry& entry) {
         if (!is_name(entry.key))
             loading_.problems.add(entry.mark,
@@ -156,6 +207,7 @@ class Templates {
     Loading& loading_;
     std::map<std::string, Template> templates_;
     Size given_;
+    std::set<std::string> opened_;  ///< whose bodies do not stand deeper
 };
 
 }  // namespace
@@ -164,14 +216,8 @@ std::vector<Node> apply_templates(Loading& loading, Node& tree) {
     Templates templates(loading);
     if (auto list = take(tree, "templates")) templates.read(*list);
     Node* lines = find(tree, "lines");
-    if (lines != nullptr) {
-        for (Node& line : lines->items) {
-            Node* stations = find(line, "stations");
-            if (stations == nullptr) continue;
-            for (Node& station : stations->items) templates.apply(station);
-        }
-    }
-    return templates.take_unused();
+    for_stations(lines, [&](Node& station) { templates.apply(station); });
+    return templates.take_unused(lines);
 }
 
 }  // namespace panelgate::config

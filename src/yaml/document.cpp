@@ -122,7 +122,10 @@ class Builder final : public YAML::EventHandler {
         problems_.add(mark_of(mark),
                       "a tag (" + quote(tag) + ") has no meaning here; " +
                           (lookup ? "a variable of the environment is written ${NAME}"
-                                  : "leave it out, or put the text in quotes"));
+                           : tag == "!include"
+                               ? "the configuration is one file; put in its place what the other "
+                                 "one holds"
+                               : "leave it out, or put the text in quotes"));
     }
     void open(Node::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
         if (stack_.size() >= kMaxDepth) throw TooLarge{mark_of(mark), kTooDeep};

@@ -216,7 +216,7 @@ std::string boolean_hint(const Node& node) {
     const bool is_true = std::ranges::find(kTrue, word) != kTrue.end();
     const bool is_false = std::ranges::find(kFalse, word) != kFalse.end();
     if (!is_true && !is_false) return "";
-    return write(is_true ? "true" : "false") + (node.quoted ? " without quotes" : "");
+    return write(is_true ? "true" : "false") + (node.is_text() ? " without quotes" : "");
 }
 
 std::string variable_hint(std::string_view text) {
@@ -229,6 +229,11 @@ std::string variable_hint(std::string_view text) {
         if (word) name += c;
     }
     return write("${" + (name.empty() ? "NAME" : name) + "} for a variable of the environment");
+}
+
+std::string origin_hint(const Node& node, std::string_view told) {
+    if (node.variable.empty() || told.find("variable") != told.npos) return "";
+    return "; it is the value of ${" + node.variable + "}: change the variable, or its default";
 }
 
 std::string text_hint(const Node& node, char opening) {
@@ -257,6 +262,9 @@ std::string number_blank_hint(std::string_view key) {
 }
 
 std::string blank_hint(std::string_view text) {
+    if (text.starts_with("<<") && text.find('*') != text.npos)
+        return write("<<: " + std::string(text.substr(text.find('*'))));
+    if (text.starts_with('(')) return "; the brackets of a map are { and }";
     const std::size_t colon = text.find_first_of(":=");
     const auto is_letter = [](char c) {
         return c == '_' || c == '-' || (lower_of(c) >= 'a' && lower_of(c) <= 'z');

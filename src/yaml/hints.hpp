@@ -11,6 +11,9 @@ namespace panelgate::yaml {
 // when nobody knows.
 
 std::string duration_hint(std::string_view text);
+/// "; it is the value of ${BAUD}: ..." for a value that a variable brought, unless the message says
+/// so already; else "".
+std::string origin_hint(const Node& node, std::string_view told);
 /// `whole`: only a number without a fraction will do.
 std::string number_hint(std::string_view text, bool whole);
 std::string boolean_hint(const Node& node);

@@ -31,7 +31,7 @@ std::optional<Finding> missing_colon(const Scanned& text, std::size_t token) {
     const std::size_t end = std::min(word.find_first_of(":= \t\xEF"), word.size());
     const std::string_view key = word.substr(0, end);
     const std::string_view rest = word.substr(end);
-    if (!is_word(key)) return std::nullopt;
+    if (!is_word(key) && key != "<<") return std::nullopt;
     constexpr std::string_view kWide = "\xEF\xBC\x9A";  // U+FF1A, as Asian keyboards type it
     const auto shown = [&](std::string_view value) {
         value.remove_prefix(std::min(value.find_first_not_of(" \t:="), value.size()));

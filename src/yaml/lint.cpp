@@ -44,16 +44,17 @@ std::string_view Scanned::rest(std::size_t token) const {
 
 Findings find_traps(const Scanned& text) {
     if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
-    static constexpr std::array<Find, 5> kFinds{find_odd_blanks, find_odd_dashes, find_open_quotes,
-                                                find_typeset_quotes, find_directives};
+    static constexpr std::array<Find, 6> kFinds{find_odd_blanks,  find_odd_dashes,
+                                                find_open_quotes, find_typeset_quotes,
+                                                find_directives,  find_placeholders};
     return run(text, kFinds);
 }
 
 Findings find_causes(const Scanned& text) {
     if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
-    static constexpr std::array<Find, 9> kFinds{
-        find_odd_blanks, find_odd_dashes, find_open_quotes, find_typeset_quotes, find_directives,
-        find_quote_ends, find_brackets,   find_odd_starts,  find_columns};
+    static constexpr std::array<Find, 10> kFinds{
+        find_odd_blanks,   find_odd_dashes, find_open_quotes, find_typeset_quotes, find_directives,
+        find_placeholders, find_quote_ends, find_brackets,    find_odd_starts,     find_columns};
     return run(text, kFinds);
 }
 

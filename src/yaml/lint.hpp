@@ -49,6 +49,9 @@ bool is_oddly_indented(const Scanned& text, const Token& first);
 /// Empty when it is no address.
 std::string address_hint(std::string_view word, std::string_view all);
 
+/// `*name` takes nothing beside it: how it and the keys `more` are written.
+std::string alias_and_more(std::string_view alias, std::string_view more);
+
 /// `bytes`, which differ from the text in no offset, with blanks for the tabs of lines that hold
 /// nothing, or a comment alone: those indent nothing.
 std::string without_idle_tabs(const Scanned& text, std::string bytes);
@@ -60,6 +63,7 @@ void find_odd_blanks(const Scanned& text, Findings& findings);
 void find_odd_dashes(const Scanned& text, Findings& findings);
 void find_typeset_quotes(const Scanned& text, Findings& findings);
 void find_quote_ends(const Scanned& text, Findings& findings);
+void find_placeholders(const Scanned& text, Findings& findings);
 void find_brackets(const Scanned& text, Findings& findings);
 void find_directives(const Scanned& text, Findings& findings);
 void find_odd_starts(const Scanned& text, Findings& findings);

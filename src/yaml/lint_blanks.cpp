@@ -32,7 +32,7 @@ std::size_t find_unseen(std::string_view word) {
 
 std::string odd_blank(char32_t c, std::string_view where) {
     const bool is_no_break = c == 0xA0;
-    if (is_unseen(c) && where.ends_with("text"))
+    if (is_unseen(c) && !where.starts_with("behind '"))
         return name_of(c) + " (which nobody sees) stands " + std::string(where) + "; remove it";
     return name_of(c) + (is_no_break ? " (a no-break space)" : " (an odd blank)") + " stands " +
            std::string(where) + "; type an ordinary blank in its place";

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "encoding.hpp"
+#include "key_hints.hpp"
 #include "lint.hpp"
 #include "panelgate/yaml/quote.hpp"
 
@@ -63,6 +64,17 @@ std::size_t hiding_comment(const Scanned& text, std::size_t open) {
     return std::string_view::npos;
 }
 
+/// {id: 5, name: press]: the bracket of another kind that stands where the right one should.
+const Token* wrong_close(const Scanned& text, std::size_t open) {
+    constexpr std::size_t kFar = 200;  // tokens
+    for (std::size_t i = open + 1; i < open + kFar && text.follows(i); ++i) {
+        const Token& token = text.tokens[i];
+        if (token.kind == Kind::close && token.state == State::stray) return &token;
+        if (token.depth <= text.tokens[open].depth) break;
+    }
+    return nullptr;
+}
+
 void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
     const Token& token = text.tokens[i];
     const std::size_t comment =
@@ -82,7 +94,13 @@ void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
         return;
     }
     const bool list = text.text(token) == "[";
-    if (token.state == State::unclosed) {
+    const Token* wrong = token.state == State::unclosed ? wrong_close(text, i) : nullptr;
+    if (wrong != nullptr) {
+        findings.push_back({wrong->begin, '\'' + std::string(text.text(*wrong)) +
+                                              "' closes nothing; the " + (list ? "'['" : "'{'") +
+                                              " before it ends with '" + (list ? ']' : '}') +
+                                              "': type that in its place"});
+    } else if (token.state == State::unclosed) {
         findings.push_back({token.begin, std::string(list ? "'['" : "'{'") +
                                              " is never closed; a '" + (list ? ']' : '}') +
                                              "' is missing behind it"});
@@ -136,13 +154,25 @@ void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
 }
 
 /// {{ name }}: braces of other programs.
-bool find_placeholder(const Scanned& text, const Token& token, Findings& findings) {
-    if (!text.source.text().substr(token.begin).starts_with("{{")) return false;
-    findings.push_back({token.begin, "'{{' means nothing here; a variable is written ${NAME}"});
-    return true;
+bool is_placeholder(const Scanned& text, const Token& token) {
+    return token.kind == Kind::open && text.source.text().substr(token.begin).starts_with("{{");
 }
 
 }  // namespace
+
+void find_placeholders(const Scanned& text, Findings& findings) {
+    for (const Token& token : text.tokens) {
+        if (!is_placeholder(text, token)) continue;
+        constexpr std::size_t kLongest = 60;
+        std::string_view name = text.source.text().substr(token.begin + 2, kLongest);
+        name = name.substr(0, name.find_first_of("}\n"));
+        while (name.starts_with(' ')) name.remove_prefix(1);
+        while (name.ends_with(' ')) name.remove_suffix(1);
+        const bool word = is_word(name) && name.find('-') == name.npos;
+        findings.push_back({token.begin, "'{{' means nothing here; a variable is written ${" +
+                                             std::string(word ? name : "NAME") + '}'});
+    }
+}
 
 std::string address_hint(std::string_view word, std::string_view all) {
     const std::size_t port = all.find_first_not_of(" \t", std::min(word.size() + 1, all.size()));
@@ -160,7 +190,7 @@ void find_brackets(const Scanned& text, Findings& findings) {
         const Token& token = text.tokens[i];
         while (pairs.size() > token.depth) pairs.pop_back();
         if (token.kind == Kind::open) {
-            if (!find_placeholder(text, token, findings)) find_unclosed(text, i, findings);
+            if (!is_placeholder(text, token)) find_unclosed(text, i, findings);
             pairs.push_back({i, false});
         } else if (token.kind == Kind::close) {
             find_unclosed(text, i, findings);

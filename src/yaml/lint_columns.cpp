@@ -127,10 +127,18 @@ class Columns {
         const std::size_t column = text_.column(text_.tokens[token]);
         while (levels_.size() > 1 && levels_.back().column > column) levels_.pop_back();
         if (levels_.empty()) {
-            if (auto finding = missing_colon(text_, token)) findings_.push_back(*finding);
+            auto finding = missing_colon(text_, token);
+            if (!finding) return;
+            findings_.push_back(*finding);
+            push(token, false);
+            levels_.back().waits = true;  // what follows is of this key
             return;
         }
         Level& level = levels_.back();
+        if (level.column < column && text_.text(text_.tokens[token]).starts_with("<<")) {
+            if (auto finding = missing_colon(text_, token)) findings_.push_back(*finding);
+            return;
+        }
         if (level.column < column) {
             level.waits = false;
             return;
@@ -216,7 +224,16 @@ class Columns {
         levels_.push_back(item);
     }
 
+    /// `serial: *a`, and a key of its own below.
+    bool below_alias(const Level& item, const Level& level) {
+        if (!level.text || text_.tokens[*level.text].kind != Kind::alias || item.list) return false;
+        tell(*level.text,
+             alias_and_more(text_.text(text_.tokens[*level.text]), text_.rest(item.first)));
+        return true;
+    }
+
     void tell_below_value(const Level& item, const Level& level) {
+        if (below_alias(item, level)) return;
         if (level.text && text_.tokens[level.last].kind == Kind::dash) {
             if (auto finding = missing_colon(text_, *level.text)) {
                 findings_.push_back(*finding);

@@ -36,6 +36,34 @@ void find_alias(const Token& token, std::string_view name, const std::set<std::s
     }
 }
 
+/// Of the line behind the token's begin, what a message shows: lines may be long, and many tokens
+/// stand on one.
+std::string_view near(const Scanned& text, const Token& token) {
+    constexpr std::size_t kShown = 100;
+    const std::string_view all = text.source.text().substr(token.begin, kShown);
+    return all.substr(0, all.find_first_of("\r\n"));
+}
+
+/// `*a {parity: none}`
+void find_map_behind(const Scanned& text, std::size_t alias, Findings& findings) {
+    if (!text.follows(alias + 1) || text.text(text.tokens[alias + 1]) != "{") return;
+    std::string_view more = near(text, text.tokens[alias + 1]).substr(1);
+    more = more.substr(0, more.find('}'));
+    findings.push_back(
+        {text.tokens[alias].begin, alias_and_more(text.text(text.tokens[alias]), more)});
+}
+
+/// `(id: 5, name: press)`
+void find_round(const Scanned& text, std::size_t i, Findings& findings) {
+    const Token& token = text.tokens[i];
+    const std::string_view rest = near(text, token);
+    const bool is_map = text.follows(i + 1) && text.tokens[i + 1].kind == Kind::colon;
+    if (token.kind != Kind::plain || token.depth > 0 || !is_map || rest.front() != '(') return;
+    const std::string_view inside = rest.substr(1, rest.find(')') - 1);
+    findings.push_back(
+        {token.begin, "'(' begins no map; write {" + std::string(clip(inside, 60)) + '}'});
+}
+
 void find_odd(const Scanned& text, std::size_t i, Findings& findings) {
     const Token& token = text.tokens[i];
     const std::string_view word = text.text(token);
@@ -53,17 +81,23 @@ bool find_copied(const Token& token, std::string_view word, Findings& findings) 
     const auto begins = [word](std::string_view with) { return word.starts_with(with); };
     if (token.kind == Kind::anchor && begins("&nbsp;")) {
         findings.push_back({token.begin, "'&nbsp;' is a blank of a web page; type blanks"});
+    } else if (word == "?" && token.kind == Kind::plain) {
+        findings.push_back({token.begin, "a '?' is no value; write what is meant"});
     } else if (!token.first) {
         return false;
-    } else if (begins("//") || begins("/*") || begins("-- ")) {
+    } else if (token.kind == Kind::tag && begins("!include")) {
+        findings.push_back({token.begin,
+                            "'!include' has no meaning here: the configuration is one file; put "
+                            "what the other one holds in place of this line"});
+    } else if (begins("//") || begins("/*") || begins("-- ") || begins("<!--")) {
         findings.push_back({token.begin, "a comment begins with '#'"});
     } else if (begins("```") || begins("$ ") || begins("cat >") || begins("cat <") ||
                begins("sudo ") || word == "EOF") {
         findings.push_back({token.begin, "this line is no part of the file; remove it"});
-    } else if (word == "..." && token.kind == Kind::plain) {
-        findings.push_back({token.begin,
-                            "'...' stands for something that was left out; write what "
-                            "is meant, or remove the line"});
+    } else if ((word == "..." || word == "\u2026") && token.kind == Kind::plain) {
+        findings.push_back({token.begin, quote(word) +
+                                             " stands for something that was left out; write what "
+                                             "is meant, or remove the line"});
     } else {
         return false;
     }
@@ -83,6 +117,12 @@ bool is_typeset_quote(std::string_view character) {
 }
 
 }  // namespace
+
+std::string alias_and_more(std::string_view alias, std::string_view more) {
+    return "no key may stand beside or below " + quote(alias) +
+           "; write {<<: " + std::string(clip(alias, 40)) + ", " + std::string(clip(more, 60)) +
+           '}';
+}
 
 void find_typeset_quotes(const Scanned& text, Findings& findings) {
     for (const Token& token : text.tokens) {
@@ -124,8 +164,12 @@ void find_odd_starts(const Scanned& text, Findings& findings) {
         const std::string_view word = text.text(token);
         if (find_copied(token, word, findings)) continue;
         if (token.kind == Kind::anchor) anchors.insert(word.substr(1));
-        if (token.kind == Kind::alias) find_alias(token, word.substr(1), anchors, findings);
+        if (token.kind == Kind::alias) {
+            find_alias(token, word.substr(1), anchors, findings);
+            find_map_behind(text, i, findings);
+        }
         if (token.kind == Kind::odd) find_odd(text, i, findings);
+        find_round(text, i, findings);
     }
 }
 

@@ -1,6 +1,7 @@
 #include "panelgate/yaml/map_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 
@@ -50,11 +51,24 @@ std::string two_values(const Node& node) {
     return quote(node.scalar) + " is two values in { }; put a text that holds a ',' in quotes";
 }
 
+/// {id 5, name: press}
+bool lacks_colon(const Entry& entry, std::string_view key) {
+    return entry.value.kind == Node::Kind::null && entry.key.size() > key.size() + 1 &&
+           entry.key.starts_with(std::string(key) + ' ');
+}
+
 /// Nobody counts 1440 minutes.
 std::string limit(Duration duration) {
     const bool hours = duration > 1h && duration % 1h == Duration::zero();
     return format_duration(duration) +
            (hours ? " (" + std::to_string(duration / 1h) + " h)" : std::string());
+}
+
+/// +5 (YAML 1.2, 10.3.2)
+std::string_view without_plus(std::string_view text) {
+    constexpr std::string_view kNumber = ".0123456789";
+    const bool plus = text.size() > 1 && text[0] == '+' && kNumber.find(text[1]) != text.npos;
+    return plus ? text.substr(1) : text;
 }
 
 bool has_leading_zero(std::string_view text) {
@@ -97,7 +111,7 @@ bool MapReader::is_mistyped(std::string_view key) const {
         const Entry& entry = node_->entries[i];
         if (entry.key == key || std::ranges::find(known_, entry.key) != known_.end()) continue;
         const Entry* parent = shallow_parent(i);
-        if (nearest(entry.key, std::span(&key, 1)) == key ||
+        if (nearest(entry.key, std::span(&key, 1)) == key || lacks_colon(entry, key) ||
             entry.key.starts_with(std::string(key) + ':') ||
             (parent != nullptr && parent->key == key))
             return true;
@@ -134,10 +148,10 @@ std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
     const Node* node = scalar(key, wanted);
     if (node == nullptr) return std::nullopt;
-    const auto value = node->quoted ? std::nullopt : parse_integer(node->scalar);
+    const auto value = node->is_text() ? std::nullopt : parse_integer(without_plus(node->scalar));
     if (value && *value >= min && *value <= max) return value;
     std::string why;
-    if (node->quoted && parse_integer(node->scalar))
+    if (node->is_text() && parse_integer(node->scalar))
         why = " in quotes; write " + node->scalar + " without";
     if (has_leading_zero(node->scalar)) why = " (no leading zeros)";
     if (why.empty() && !value) why = number_hint(node->scalar, true);
@@ -155,16 +169,17 @@ std::optional<double> MapReader::number(std::string_view key) {
     const Node* node = scalar(key, "a number");
     if (node == nullptr) return std::nullopt;
     double value = 0;
-    const char* end = node->scalar.data() + node->scalar.size();
-    const auto [stop, error] = std::from_chars(node->scalar.data(), end, value);
+    const std::string_view typed = without_plus(node->scalar);
+    const char* end = typed.data() + typed.size();
+    const auto [stop, error] = std::from_chars(typed.data(), end, value);
     const bool whole = error == std::errc() && stop == end && std::isfinite(value);
-    const std::size_t sign = node->scalar.starts_with('-') ? 1 : 0;
-    const bool zeros = has_leading_zero(std::string_view(node->scalar).substr(sign));
-    if (whole && !zeros && !node->quoted) return value;
+    const std::size_t sign = typed.starts_with('-') ? 1 : 0;
+    const bool zeros = has_leading_zero(typed.substr(sign));
+    if (whole && !zeros && !node->is_text()) return value;
     const std::string why =
-        zeros          ? " (no leading zeros)"
-        : node->quoted ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
-                       : number_hint(node->scalar, false);
+        zeros             ? " (no leading zeros)"
+        : node->is_text() ? " in quotes" + (whole ? "; write " + node->scalar + " without" : "")
+                          : number_hint(node->scalar, false);
     problem(key, wrong(key, "a number", *node) + why);
     return std::nullopt;
 }
@@ -172,8 +187,11 @@ std::optional<double> MapReader::number(std::string_view key) {
 std::optional<bool> MapReader::boolean(std::string_view key) {
     const Node* node = scalar(key, "true or false");
     if (node == nullptr) return std::nullopt;
-    if (!node->quoted && node->scalar == "true") return true;
-    if (!node->quoted && node->scalar == "false") return false;
+    constexpr std::array<std::string_view, 3> kTrue{"true", "True", "TRUE"};
+    constexpr std::array<std::string_view, 3> kFalse{"false", "False", "FALSE"};
+    const bool plain = !node->is_text();
+    if (plain && std::ranges::find(kTrue, node->scalar) != kTrue.end()) return true;
+    if (plain && std::ranges::find(kFalse, node->scalar) != kFalse.end()) return false;
     problem(key, wrong(key, "true or false", *node) + boolean_hint(*node));
     return std::nullopt;
 }
@@ -217,7 +235,12 @@ const Node* MapReader::map(std::string_view key, std::string_view example) {
     parents_.emplace_back(key);
     if (node == nullptr || node->kind == Node::Kind::map) return node;
     const std::string text = text_hint(*node, '{') + none_hint(key, example, *node);
+    const bool is_list = node->kind == Node::Kind::sequence && !node->items.empty() &&
+                         std::ranges::all_of(node->items, [](const Node& item) {
+                             return item.kind == Node::Kind::map;
+                         });
     problem(key, wrong(key, "a map of keys" + such_as(example), *node) +
+                     (is_list ? "; remove the '-' (or the [ ]) around its keys" : "") +
                      (text.empty() ? blank_hint(node->scalar) : text));
     return nullptr;
 }
@@ -238,6 +261,9 @@ Mark MapReader::mark(std::string_view key) const {
 }
 
 void MapReader::problem(std::string_view key, std::string message) {
+    for (const Entry& entry : node_->entries) {
+        if (entry.key == key) message += origin_hint(entry.value, message);
+    }
     problems_->add(mark(key), std::move(message));
 }
 
@@ -266,6 +292,11 @@ std::string MapReader::unknown(std::size_t entry) const {
     const std::string message = is_unknown(key);
     const std::string blank = blank_hint(key);
     if (!blank.empty()) return message + blank;
+    for (const std::string_view word : known) {
+        if (lacks_colon(node_->entries[entry], word))
+            return message + "; a ':' is missing: write " + std::string(word) + ": " +
+                   key.substr(word.size() + 1);
+    }
     if (const Entry* parent = shallow_parent(entry))
         return message + "; below " + quote(parent->key) + " (line " +
                std::to_string(parent->mark.line) +

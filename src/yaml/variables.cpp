@@ -38,12 +38,17 @@ class Expansion {
 
     void expand(Node& node) {
         if (node.kind == Node::Kind::scalar && node.scalar.find('$') != std::string::npos)
-            node.scalar = expanded(node);
+            expand_scalar(node);
         for (Node& item : node.items) expand(item);
         for (Entry& entry : node.entries) expand(entry.value);
     }
 
   private:
+    void expand_scalar(Node& node) {
+        named_.clear();
+        node.scalar = expanded(node);
+        node.variable = named_;
+    }
     std::string expanded(const Node& node) {
         const std::string_view from = node.scalar;
         std::string to;
@@ -96,6 +101,7 @@ class Expansion {
                                          "digits and '_'; a dollar itself is $$");
             return text;
         }
+        named_ = variable->name;
         auto value = environment_ ? environment_(variable->name) : std::nullopt;
         if (variable->fallback && value.value_or("").empty()) value = variable->fallback;
         if (!value) {
@@ -120,6 +126,7 @@ class Expansion {
     const Environment& environment_;
     Problems& problems_;
     std::size_t brought_ = 0;
+    std::string named_;  ///< the last variable of the scalar in work
 };
 
 }  // namespace

@@ -81,6 +81,14 @@ class CommandLine(unittest.TestCase):
         self.assertEqual(program.returncode, 0, told)
         self.assertNotIn("stdout", told)
 
+    def test_a_configuration_comes_from_standard_input_too(self):
+        for text, code in ((good(), 0), ("lines\n", BAD_CONFIG)):
+            ended = subprocess.run([harness.PANELGATE, "check", "-c", "-"], input=text,
+                                   capture_output=True, text=True, timeout=harness.PATIENCE,
+                                   check=False)
+            self.assertEqual(ended.returncode, code, ended.stderr)
+        self.assertIn("/dev/stdin:1:6: a ':' is missing", ended.stderr)
+
     def test_version_and_help_are_commands_too(self):
         version = self.expect(0, "--version").stdout
         for asked in (["version"], ["-V"]):

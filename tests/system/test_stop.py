@@ -1,6 +1,7 @@
 """P3: who ends the gateway waits for the answers that it owes."""
 import contextlib
 import pathlib
+import signal
 import tempfile
 import unittest
 
@@ -34,6 +35,13 @@ class Stop(unittest.TestCase):
             program.process.terminate()
             self.assertEqual(client.receive()[2], b"\x03\x02\x00\x2a")
             self.assertEqual(program.wait(), 0)
+
+    def test_signals_that_rotate_logs_elsewhere_end_nothing(self):
+        with harness.configured(config.gateway(config.line())) as program:
+            for habit in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
+                program.process.send_signal(habit)
+            program.log.wait_for("no reload")
+            self.assertIsNone(program.process.poll())
 
     def test_a_second_sigterm_ends_at_once_with_a_code_and_a_line_when_requests_are_cut(self):
         with awaited(None) as (program, _):

@@ -28,5 +28,7 @@ struct Cidr {
     unsigned prefix = 0;
 };
 std::optional<Cidr> parse_cidr(std::string_view text);
+/// "192.168.0.0/24" for 192.168.0.5/24; "" when the address is the first of its network.
+std::string network_of(const Cidr& cidr);
 
 }  // namespace panelgate::config

@@ -59,10 +59,15 @@ struct Node {
     Kind kind = Kind::null;
     Mark mark;                   ///< of a null in a map: its key's mark
     std::string scalar;          ///< Kind::scalar
-    bool quoted = false;         ///< the scalar stood in quotes: it is text, never a number
+    bool quoted = false;         ///< the scalar stood in quotes
+    std::string variable;        ///< whose value is in the scalar, such as BAUD; then quotes only
+                                 ///< fence it
     bool comma = false;          ///< typed with a ',' in { }, where that ends a value: no text
     std::vector<Node> items;     ///< Kind::sequence
     std::vector<Entry> entries;  ///< Kind::map
+
+    /// Typed in quotes: never a number, nor true or false.
+    bool is_text() const { return quoted && variable.empty(); }
 };
 
 struct Entry {

@@ -46,12 +46,13 @@ class MapReader {
     std::optional<std::string> text(std::string_view key);
     /// As text(), and its absence is a problem.
     std::optional<std::string> required_text(std::string_view key);
-    /// A decimal integer without leading zeros or quotes, inside [min, max].
+    /// A decimal integer without leading zeros or quotes (those around a variable aside), inside
+    /// [min, max].
     std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max);
     std::optional<std::int64_t> required_integer(std::string_view key, std::int64_t min,
                                                  std::int64_t max);
     std::optional<double> number(std::string_view key);
-    /// `true` or `false`, nothing else (no yes, no on).
+    /// `true` or `false`, also as True and TRUE, nothing else (no yes, no on).
     std::optional<bool> boolean(std::string_view key);
     /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a
     /// unit.

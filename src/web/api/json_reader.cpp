@@ -1,7 +1,9 @@
 #include "json_reader.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/json/basic_parser_impl.hpp>
+#include <boost/json/error.hpp>
 #include <boost/json/value_stack.hpp>
 #include <boost/system/errc.hpp>
 #include <boost/system/error_code.hpp>
@@ -12,6 +14,7 @@
 
 #include "json_handler.hpp"
 #include "panelgate/base/decimal.hpp"
+#include "panelgate/base/utf8.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
@@ -108,10 +111,74 @@ class Builder : public JsonHandler {
     std::string number_;
 };
 
-std::string why_no_json(std::string_view rest, const error_code& error) {
-    for (const char* const word : {"NaN", "Infinity"})
-        if (rest.starts_with(word)) return std::string(word) + " is no number of JSON";
-    return error.message();
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+struct Slip {
+    std::string_view begins;
+    std::string_view words;
+};
+constexpr std::string_view kNoComments = "JSON has no comments; remove it";
+constexpr std::array<Slip, 17> kSlips{{
+    {"NaN", "NaN is no number of JSON"},
+    {"Infinity", "Infinity is no number of JSON"},
+    {"\xEF\xBB\xBF", "a byte order mark (U+FEFF) stands before the value; send the body without"},
+    {"/", kNoComments},
+    {"#", kNoComments},
+    {"+", "a number of JSON has no '+'; remove it"},
+    {".", "a number of JSON has a digit before its '.'; write 0."},
+    {"'", "a text of JSON stands in double quotes"},
+    {"True", "it is written true"},
+    {"TRUE", "it is written true"},
+    {"False", "it is written false"},
+    {"FALSE", "it is written false"},
+    {"None", "it is written null"},
+    {"NULL", "it is written null"},
+    {"=", "a ':' follows a name in JSON"},
+    {";", "a ',' separates the members of JSON"},
+    {",", "a value is missing before this ','"},
+}};
+
+/// What was done at `at`, where the parser stopped; "" when nobody knows.
+std::string slip_at(std::string_view text, std::size_t at) {
+    const std::string_view rest = text.substr(at);
+    if (rest.empty()) return "";
+    for (const Slip& slip : kSlips)
+        if (rest.starts_with(slip.begins)) return std::string(slip.words);
+    const char before = at == 0 ? ' ' : text[at - 1];
+    if (is_digit(rest[0]) && before == '0')
+        return "a number of JSON has no leading zeros; write it without";
+    if (static_cast<unsigned char>(rest[0]) < 0x20)
+        return "a line end, a tab or another control character inside a text; write \\n, \\t or "
+               "\\u00XX";
+    const std::size_t last = text.substr(0, at).find_last_not_of(" \t\r\n");
+    if ((rest[0] == '}' || rest[0] == ']') && last != text.npos && text[last] == ',')
+        return "a ',' too many before this";
+    return "";
+}
+
+/// Where the first byte is that belongs to no character.
+std::size_t end_of_utf8(std::string_view text) {
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t length = utf8_sequence(text.substr(at));
+        if (length == 0) return at;
+        at += length;
+    }
+    return text.size();
+}
+
+/// The parser stopped at `used`.
+JsonFault fault_at(std::string_view text, std::size_t used, const error_code& error) {
+    if (text.find_first_not_of(" \t\r\n") == text.npos)
+        return {0, "it is empty; send an object, such as {\"value\": 1}"};
+    if (!is_utf8(text)) return {end_of_utf8(text), "this is not UTF-8"};
+    // Of a number or a word that it had begun, it stops at the end.
+    std::string slip = slip_at(text, used);
+    if (!slip.empty()) return {used, std::move(slip)};
+    if (used >= text.size() || error == boost::json::error::incomplete)
+        return {used, "it ends before it is complete; a bracket or a quote is not closed"};
+    return {used, error == boost::json::error::syntax
+                      ? "a value, a quote, a ':' or a ',' is missing here"
+                      : error.message()};
 }
 
 }  // namespace
@@ -125,8 +192,12 @@ JsonRead read_json(std::string_view text) {
         return {nullptr,
                 JsonFault{begin, excerpt(*number) + " is beyond what a 64-bit number holds", true}};
     }
-    if (error) return {nullptr, JsonFault{used, why_no_json(text.substr(used), error)}};
-    if (used < text.size()) return {nullptr, JsonFault{used, "something follows the value"}};
+    if (error) return {nullptr, fault_at(text, used, error)};
+    if (used < text.size()) {
+        const bool comment = text[used] == '/' || text[used] == '#';
+        return {nullptr, JsonFault{used, comment ? std::string(kNoComments)
+                                                 : "something follows the value"}};
+    }
     return {parser.handler().release(), std::nullopt};
 }
 

@@ -22,11 +22,14 @@ std::string_view header(const HttpRequest& request, const char* name) {
     return found == request.headers.end() ? std::string_view() : found->second;
 }
 
-/// The token after "Bearer " (RFC 6750 2.1; schemes are compared without case, RFC 9110 11.1).
+/// The token after "Bearer" and its blanks (RFC 9110 11.4; schemes are compared without
+/// case, 11.1).
 std::optional<std::string_view> bearer_token(std::string_view authorization) {
     constexpr std::string_view kScheme = "bearer ";
     if (to_lower(authorization.substr(0, kScheme.size())) != kScheme) return std::nullopt;
-    return authorization.substr(kScheme.size());
+    authorization.remove_prefix(kScheme.size());
+    while (authorization.starts_with(' ')) authorization.remove_prefix(1);
+    return authorization;
 }
 
 /// The token that it carries; null for one that nobody has. All are compared, whichever matches.
@@ -68,10 +71,26 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         if (settings.anonymous >= needed) return std::nullopt;
         return unauthorized("this needs a token");
     }
+    // Nothing of it is repeated: without a scheme it may be the token.
+    if (!carries_token(request))
+        return unauthorized("this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
     const Token* token = token_of(request, settings);
     if (token == nullptr) return unauthorized("this token is not known");
     if (token->role < needed) return problem(403, "this needs the role operator");
     return std::nullopt;
+}
+
+bool carries_token(const HttpRequest& request) {
+    return bearer_token(header(request, "authorization")).has_value();
+}
+
+std::optional<Problem> check_encoding(const HttpRequest& request) {
+    const std::string_view coding = header(request, "content-encoding");
+    if (request.body.empty() || coding.empty() || to_lower(coding) == "identity")
+        return std::nullopt;
+    Problem made = problem(415, "send the body as it is, without a Content-Encoding");
+    made.headers.emplace_back("Accept-Encoding", "identity");  // RFC 9110 15.5.16
+    return made;
 }
 
 std::string token_name(const HttpRequest& request, const Settings& settings) {

@@ -15,6 +15,12 @@ namespace panelgate::web {
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
                                     const Settings& settings);
 
+/// It carries a token, right or wrong: all else in its Authorization is no guess.
+bool carries_token(const HttpRequest& request);
+
+/// 415 for a body that was compressed, or coded in any other way: nobody here decodes it.
+std::optional<Problem> check_encoding(const HttpRequest& request);
+
 /// The name of the token that it carries, "" without one that is known.
 std::string token_name(const HttpRequest& request, const Settings& settings);
 

@@ -109,7 +109,7 @@ void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
 asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
                                               Shared* shared) {
     const Settings& settings = shared->site->settings;
-    if (needed == Role::none || !request->headers.contains("authorization"))
+    if (needed == Role::none || !carries_token(*request))
         co_return check_access(*request, needed, settings);
     const std::string& address = request->caller->address();
     const Duration turn = shared->logins.turn(shared->site->now(), address);
@@ -152,7 +152,9 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     const auto refused = co_await admit(&request, found.route->needed, shared);
     if (request.caller->has_left()) co_return HttpResponse();
     if (refused) co_return to_response(*refused);
-    const auto mistaken = check_queries(request, found.route->queries);
+    // Probes are answered whatever their makers add.
+    auto mistaken = free ? std::nullopt : check_queries(request, found.route->queries);
+    if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
     if (request.caller) request.caller->uses_token(token_name(request, site->settings));
     request.arguments = std::move(found.arguments);

@@ -12,6 +12,7 @@
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <exception>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -96,12 +97,16 @@ asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
     if (!target) co_return to_response(problem(400, "the request target cannot be understood"));
     if (const auto repeated = repeated_field(message)) co_return to_response(*repeated);
     auto host = host_of(message, *target);
-    if (!host) co_return to_response(host.error());
+    std::optional<Problem> barred;
+    if (!host) barred = host.error();
+    // Probes are asked for no name; what has two is no request.
+    if (barred && message.count(http::field::host) > 0) co_return to_response(*barred);
     departure_.ask_by(nullptr);
     if (message.version() >= 11) departure_.ask_by([this] { send_interim(); });
-    HttpRequest request = to_request(std::move(message), std::move(*target), std::move(*host));
+    HttpRequest request =
+        to_request(std::move(message), std::move(*target), host ? *host : std::string());
     request.caller = caller_;
-    asio::awaitable<HttpResponse> handling = handle(std::move(request));
+    asio::awaitable<HttpResponse> handling = handle(std::move(request), std::move(barred));
     HttpResponse response = co_await std::move(handling);
     co_return response;
 }
@@ -167,10 +172,11 @@ asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
 }
 
 /// The handler's answer; exceptions end here.
-asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request) {
+asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request,
+                                                  std::optional<Problem> barred) {
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
-    std::optional<Problem> barred = check_origin(request, shared_->hosts, local_);
+    if (!barred) barred = check_origin(request, shared_->hosts, local_);
     if (probes_only_) barred = no_place();
     try {
         asio::awaitable<HttpResponse> handling =

@@ -43,7 +43,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<ErrorCode> receive_body();
     boost::asio::awaitable<bool> serve_one();
     boost::asio::awaitable<HttpResponse> answer(BeastRequest message);
-    boost::asio::awaitable<HttpResponse> handle(HttpRequest request);
+    boost::asio::awaitable<HttpResponse> handle(HttpRequest request, std::optional<Problem> barred);
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
     boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);

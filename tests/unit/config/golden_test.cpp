@@ -52,7 +52,9 @@ std::optional<std::string> environment(const std::string& name) {
                                                          {"BELL", "\a"},
                                                          {"LIST", "[10.0.0.0/8, 192.168.0.0/16]"},
                                                          {"PAIR", "10.0.0.0/8,192.168.0.0/16"},
-                                                         {"MAP", "{baud: 9600}"}};
+                                                         {"MAP", "{baud: 9600}"},
+                                                         {"RATE", "9,600"},
+                                                         {"LINES", "/dev/ttyUSB0\nname: x"}};
     const auto found = kSet.find(name);
     return found == kSet.end() ? std::nullopt : std::optional(found->second);
 }

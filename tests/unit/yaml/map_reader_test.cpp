@@ -93,14 +93,16 @@ TEST(MapReader, ReadsNumbersWithAFraction) {
 }
 
 TEST(MapReader, KnowsTrueAndFalseOnly) {
-    Subject s("a: true\nb: false\nc: yes\nd: 'true'\ne: True\n");
+    Subject s("a: true\nb: false\nc: yes\nd: 'true'\ne: tRue\nf: True\ng: FALSE\n");
     EXPECT_EQ(s.read().boolean("a"), true);
     EXPECT_EQ(s.read().boolean("b"), false);
+    EXPECT_EQ(s.read().boolean("f"), true);
+    EXPECT_EQ(s.read().boolean("g"), false);
     for (const char* key : {"c", "d", "e"}) EXPECT_EQ(s.read().boolean(key), std::nullopt);
     EXPECT_EQ(s.problems(),
               "f:3:4: c must be true or false, not 'yes'; write true\n"
               "f:4:4: d must be true or false, not 'true'; write true without quotes\n"
-              "f:5:4: e must be true or false, not 'True'; write true\n");
+              "f:5:4: e must be true or false, not 'tRue'; write true\n");
 }
 
 TEST(MapReader, ReadsDurationsWithTheirUnit) {

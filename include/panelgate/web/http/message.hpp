@@ -24,8 +24,8 @@ struct HttpRequest {
 };
 /// The request headers that anything here looks at.
 inline constexpr const char* kHeadersRead[] = {
-    "accept-encoding", "authorization",  "origin",        "content-type",
-    "sec-fetch-site",  "sec-fetch-mode", "sec-fetch-dest"};
+    "accept-encoding",  "authorization",  "origin",         "content-type",
+    "content-encoding", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest"};
 
 /// A body that several are sent, so that it is in memory once.
 using SharedText = std::shared_ptr<const std::string>;

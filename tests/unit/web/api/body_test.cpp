@@ -49,6 +49,28 @@ TEST(Body, WantsValues) {
     }
 }
 
+TEST(Body, SaysWhatAHandTypesThatIsNoJson) {
+    const auto told = [](std::string_view body) {
+        const std::string text = value_of(body).error().detail;
+        return text.substr(std::string_view("the body is not JSON: line 1, ").size());
+    };
+    EXPECT_EQ(told(""), "column 1: it is empty; send an object, such as {\"value\": 1}");
+    EXPECT_EQ(
+        told("\xEF\xBB\xBF{\"value\": 1}"),
+        "column 1: a byte order mark (U+FEFF) stands before the value; send the body without");
+    EXPECT_EQ(told("{\"value\": \"\xFF\"}"), "column 12: this is not UTF-8");
+    EXPECT_EQ(told("{\"value\": +21}"), "column 11: a number of JSON has no '+'; remove it");
+    EXPECT_EQ(told("{\"value\": .5}"),
+              "column 11: a number of JSON has a digit before its '.'; write 0.");
+    EXPECT_EQ(told("{\"value\": 021}"),
+              "column 12: a number of JSON has no leading zeros; write it without");
+    EXPECT_EQ(told("{\"value\": 1} // one"), "column 14: JSON has no comments; remove it");
+    EXPECT_EQ(told("{\"value\": 1,}"), "column 13: a ',' too many before this");
+    EXPECT_EQ(told("{\"value\": True}"), "column 11: it is written true");
+    EXPECT_EQ(told("{\"value\": 1"),
+              "column 12: it ends before it is complete; a bracket or a quote is not closed");
+}
+
 TEST(Body, PointsAtWhatIsNoJson) {
     EXPECT_THAT(registers_error("{\"values\":\n [1,, 2]}"),
                 StartsWith("the body is not JSON: line 2, column 5: "));

@@ -38,6 +38,13 @@ TEST_F(Hosts, OfOthersAreMisdirected) {
 TEST_F(Hosts, AreNotAskedOfProbes) {
     EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: pod.cluster\r\n"), 200u);
     EXPECT_EQ(status("GET /readyz HTTP/1.0\r\n"), 200u);
+    EXPECT_EQ(status("GET /healthz HTTP/1.1\r\n"), 200u);
+    EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: x\r\nHost: x\r\n"), 400u);
+}
+
+TEST_F(Hosts, OfProbesMayAddQueries) {
+    EXPECT_EQ(status("GET /healthz?x=1 HTTP/1.1\r\nHost: x\r\n"), 200u);
+    EXPECT_EQ(status("GET /readyz?x=1&x=2 HTTP/1.1\r\nHost: x\r\n"), 200u);
 }
 
 TEST_F(Hosts, StandInARequestOnce) {

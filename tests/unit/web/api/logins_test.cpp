@@ -28,8 +28,11 @@ TEST_F(LoginAttempts, AreCountedAndLoggedWhenTheyFail) {
     EXPECT_EQ(get("/api/v1/lines").status(), 401u);       // nobody tried
     EXPECT_EQ(status("wrong", "/healthz"), 200u);         // nobody looks
     EXPECT_EQ(status("wrong", "/api/v1/nothing"), 404u);  // nobody looks
+    EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: Basic b3BzOnJpZ2h0\r\n").status(),
+              401u)
+        << "no token, no guess";
     EXPECT_EQ(server->counters().login_failures, 1u);
-    EXPECT_EQ(server->counters().requests.at(401), 2u);
+    EXPECT_EQ(server->counters().requests.at(401), 3u);
     EXPECT_EQ(server->counters().requests.at(200), 2u);
     EXPECT_EQ(log.count("login failed"), 1u);
     EXPECT_EQ(log.count("client=127.0.0.1"), 1u);

@@ -48,7 +48,7 @@ TEST(Access, GivesATokenItsOwnRoleEvenWhereAnonymousMayDoMore) {
 }
 
 TEST(Access, TakesASecretOnlyWholeAndNeverAnEmptyOne) {
-    for (const char* token : {"let-m", "let-mee", "let-melet-me", "LET-ME", "", " let-me"}) {
+    for (const char* token : {"let-m", "let-mee", "let-melet-me", "LET-ME", "", "let me"}) {
         EXPECT_EQ(refusal(asking(std::string("Bearer ") + token), Role::viewer, Role::none), 401u)
             << token;
     }
@@ -56,9 +56,32 @@ TEST(Access, TakesASecretOnlyWholeAndNeverAnEmptyOne) {
 
 TEST(Access, ReadsTheSchemeWithoutRegardToCase) {
     EXPECT_EQ(refusal(asking("bEARER let-me"), Role::operator_, Role::none), 0u);
+    EXPECT_EQ(refusal(asking("Bearer  let-me"), Role::operator_, Role::none), 0u);
     for (const char* text : {"Basic let-me", "Bearer", "Bearerlet-me", "let-me"}) {
         EXPECT_EQ(refusal(asking(text), Role::viewer, Role::none), 401u) << text;
     }
+}
+
+TEST(Access, OfAnotherSchemeSaysWhichIsMeantAndRepeatsNothing) {
+    for (const char* text : {"Basic bGV0LW1l", "let-me"}) {
+        const auto refused = check_access(asking(text), Role::viewer, with_tokens(Role::none));
+        ASSERT_TRUE(refused);
+        EXPECT_EQ(refused->detail,
+                  "this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
+        EXPECT_FALSE(carries_token(asking(text)));
+    }
+    EXPECT_TRUE(carries_token(asking("Bearer wrong")));
+}
+
+TEST(Access, TakesABodyOnlyAsItIs) {
+    HttpRequest request = asking("", "PUT");
+    request.headers["content-encoding"] = "gzip";
+    EXPECT_FALSE(check_encoding(request)) << "nothing is coded";
+    request.body = "x";
+    ASSERT_TRUE(check_encoding(request));
+    EXPECT_EQ(check_encoding(request)->status, 415u);
+    request.headers["content-encoding"] = "Identity";
+    EXPECT_FALSE(check_encoding(request));
 }
 
 TEST(Access, SaysHowToAskAgain) {
