@@ -2,16 +2,20 @@
 
 #include <algorithm>
 #include <boost/asio/ip/host_name.hpp>
+#include <memory>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <variant>
 
 #include "address_families.hpp"
+#include "inventory.hpp"
 #include "panelgate/bus/listening_bus.hpp"
 #include "panelgate/line/tcp_line.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "simulated_line.hpp"
 #include "wiring.hpp"
 
@@ -171,6 +175,8 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };
+    providers.configuration =
+        std::make_shared<const std::string>(web::json_text(inventory_json(config_)));
     directory_ = directory_of(plant_, *config_.profiles->find("generic"));
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }

@@ -20,18 +20,6 @@ std::int64_t milliseconds(Duration duration) {
 
 std::string_view access(bool read_only) { return read_only ? "read_only" : "read_write"; }
 
-std::string_view word(web::Role role) {
-    switch (role) {
-        case web::Role::none:
-            return "none";
-        case web::Role::viewer:
-            return "viewer";
-        case web::Role::operator_:
-            return "operator";
-    }
-    std::abort();
-}
-
 /// An array of what `make` makes of each.
 template <class List, class Make>
 json::array each(const List& list, const Make& make) {
@@ -162,10 +150,10 @@ json::object listener_json(const tcp_server::Settings& listener) {
 
 json::object http_json(const web::Settings& http) {
     const auto token = [](const web::Token& one) {
-        return json::object{{"name", one.name}, {"role", word(one.role)}};
+        return json::object{{"name", one.name}, {"role", label(one.role)}};
     };
     return {{"listen", http.name()},
-            {"anonymous", word(http.anonymous)},
+            {"anonymous", label(http.anonymous)},
             {"tokens", each(http.tokens, token)},
             {"hosts", each(http.hosts, text_json)},
             {"allow", each(http.allow, network_json)}};

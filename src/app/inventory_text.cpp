@@ -79,7 +79,11 @@ std::string clients_of(const config::Line& line) {
 
 std::string text_of(const config::Line& line) {
     std::string text = "line " + line.name + ": " + line.device.device;
-    if (line.kind != config::Line::Kind::tcp) text += ", " + to_string(line.device.serial);
+    if (line.kind != config::Line::Kind::tcp) {
+        text += ", " + to_string(line.device.serial);
+    } else if (line.device.serial.mode == SerialMode::ascii) {
+        text += ", ASCII";
+    }
     if (line.listens) text += ", only listened to";
     text += '\n';
     for (std::size_t i = 0; i < line.stations.size(); ++i)
@@ -135,8 +139,8 @@ std::string text_of(const tcp_server::Settings& listener) {
 
 std::string text_of(const serial_server::Settings& master) {
     std::string text = "serial master " + master.name + ": " + master.device.device + ", " +
-                       to_string(master.device.serial) + ", " +
-                       std::string(modbus::label(master.access.framing)) + ':';
+                       to_string(master.device.serial) +
+                       (master.access.framing == modbus::Framing::rtu ? ", rtu:" : ":");
     for (const std::string& line : master.access.lines) text += ' ' + line;
     const bool silent = master.on_failure == serial_server::OnFailure::silence;
     text += ", " + rights(master.access.read_only) + ", told of failures by " +

@@ -39,7 +39,7 @@ class ScanRun final : public line::Line::Events {
 
     // Host of the scanner's drive
     void act(const scan::SetFormat& set) { line_->set_format(set.format); }
-    void act(const scan::Transmit& transmit) { line_->write(transmit.request.adu()); }
+    void act(const scan::Transmit& transmit) { line_->write(scan::on_wire(transmit)); }
     void on_deadline(TimePoint now);
     void settled(TimePoint now);
 

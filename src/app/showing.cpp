@@ -60,7 +60,8 @@ web::Directory directory_of(const Plant& plant, const profile::PanelProfile& gen
     directory.generic = &generic;
     for (const Line& line : plant.lines()) {
         directory.lines.push_back(
-            {line.configured->name, line.device, line.bus, !line.configured->refuse_unlisted});
+            {line.configured->name, line.device, line.bus, !line.configured->refuse_unlisted,
+             line.configured->arbiter.queue.deadline, line.configured->device.serial});
     }
     for (const Station& station : plant.stations()) directory.stations.push_back(entry_of(station));
     return directory;

@@ -14,13 +14,18 @@ Arbiter::Arbiter(Settings settings)
       orders_(crc_orders(settings_)),
       stations_(settings_),
       schedule_(settings_),
-      quiet_(wire_time(settings_.serial, modbus::kMaxRtuAdu), silent_interval(settings_.serial)),
+      quiet_(frame_time(settings_.serial, modbus::kMaxRtuAdu), silent_interval(settings_.serial)),
       strays_(settings_.serial, orders_),
       reception_(settings_),
       echo_memory_(settings_.echo),
       ledger_(settings_) {
     settings_.end_of_frame = std::max(settings_.end_of_frame, silent_interval(settings_.serial));
+    // Of ASCII each other character tells something.
+    if (settings_.serial.mode == SerialMode::ascii)
+        settings_.end_of_frame += byte_time(settings_.serial);
     settings_.reply_hole = std::max(settings_.reply_hole, settings_.end_of_frame);
+    if (settings_.serial.mode == SerialMode::ascii)
+        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
@@ -74,6 +79,7 @@ void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
     resetting_ = false;
     proved_ = now;
+    if (ascii_) ascii_->cut();
     quiet_.on_open(now);
     stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, now);
@@ -92,8 +98,11 @@ void Arbiter::on_line_down(TimePoint now) {
         note(now, active_->take_strays());
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
-        if (!attempt.is_broadcast())
+        if (attempt.is_broadcast()) {
+            schedule_.on_broadcast(attempt.timing().sent, group.request.pdu());
+        } else {
             stations_.of(group.station).owe(now, group.request.pdu(), attempt.timing().sent);
+        }
         for (const Job& job : group.jobs) ledger_.finish(job, Fault::line_lost);
     }
     for (const Job& job : schedule_.backlog().clear())
@@ -103,6 +112,17 @@ void Arbiter::on_line_down(TimePoint now) {
 void Arbiter::on_rx(TimePoint now, ByteView bytes) {
     if (bytes.empty() || !up_) return;
     expire_active(now);
+    if (ascii_) {
+        ascii_->feed(now, bytes);
+        while (const auto piece = ascii_->next()) hear_piece(now, *piece);
+        quiet_.on_begun(ascii_->inside() ? now + settings_.end_of_frame : TimePoint{});
+    } else {
+        hear(now, bytes);
+    }
+    step(now);
+}
+
+void Arbiter::hear(TimePoint now, ByteView bytes) {
     if (!active_ || active_->is_broadcast()) {
         hear_idle(now, bytes);
     } else {
@@ -116,7 +136,17 @@ void Arbiter::on_rx(TimePoint now, ByteView bytes) {
         if (const Bytes stale = active_->take_stale(); !stale.empty()) hear_idle(now, stale);
         conclude(now, verdict);
     }
-    step(now);
+}
+
+/// Whose is what has ended: of the attempt, of nobody, or a part of both.
+void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& piece) {
+    using End = modbus::AsciiTranscript::Piece::End;
+    if (!piece.bytes.empty()) hear(now, piece.bytes);
+    if (piece.end == End::none) return;
+    const bool good = piece.end == End::frame;
+    if (active_ && !active_->is_broadcast())
+        conclude(now, active_->on_frame_end(good, ends_attempt(now)));
+    if (strays_.pending()) note(now, strays_.take_told(quiet_.station(), good));
 }
 
 void Arbiter::on_end(TimePoint now, Duration left) {
@@ -138,6 +168,7 @@ void Arbiter::check_active(TimePoint now) {
     if (active_->is_broadcast()) return end_broadcast(now);
     expire_active(now);  // a reply that was held back may be too late for some
     conclude(now, active_->on_deadline(now, ends_attempt(now)));
+    if (ascii_ && ascii_->has_given()) ascii_->cut();
 }
 
 void Arbiter::expire(TimePoint now) {
@@ -170,7 +201,10 @@ void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
     if (strays_.full()) judge_idle(now);
 }
 
-void Arbiter::judge_idle(TimePoint now) { note(now, strays_.take(quiet_.station())); }
+void Arbiter::judge_idle(TimePoint now) {
+    if (ascii_) ascii_->cut();
+    note(now, strays_.take(quiet_.station()));
+}
 
 void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
     const bool idle = !active_;
@@ -196,6 +230,8 @@ void Arbiter::start(TimePoint now, Group group) {
     for (Job& job : group.jobs) {
         if (job.attempts++ == 0) ledger_.on_started(now, job);
     }
+    Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
+    if (ascii_) ascii_->cut();
     Attempt::Timing timing = Attempt::timing_of(settings_, now, adu.size(), lead_);
     timing.pause = now - quiet_.since();
     timing.confirm_end = confirm_ends_;
@@ -220,7 +256,7 @@ void Arbiter::start(TimePoint now, Group group) {
     strays_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
-    ledger_.transmit(now, *active_, std::move(adu), std::move(why));
+    ledger_.transmit(now, *active_, std::move(adu), std::move(wire), std::move(why));
 }
 
 std::optional<TimePoint> Arbiter::next_deadline() const {

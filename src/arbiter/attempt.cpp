@@ -1,6 +1,7 @@
 #include "panelgate/arbiter/attempt.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "panelgate/arbiter/job_queue.hpp"
@@ -15,14 +16,15 @@ using modbus::Unused;
 Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::size_t size,
                                    Duration lead) {
     Timing timing;
-    const Duration leaving = lead + wire_time(line.serial, size);
+    const Duration leaving = lead + frame_time(line.serial, size);
     timing.started = now;
     timing.sent = now + leaving;
     timing.end_of_frame = line.end_of_frame;
     timing.hole = line.reply_hole;
-    timing.longest_reply = 2 * wire_time(line.serial, modbus::kMaxLongRtuAdu) + line.reply_hole;
+    timing.longest_reply = 2 * frame_time(line.serial, modbus::kMaxLongRtuAdu) + line.reply_hole;
     timing.serial = line.serial;
-    timing.steady = !line.may_stall;
+    // ASCII has longer pauses than frames, and a character tells less than its time.
+    timing.steady = !line.may_stall && line.serial.mode == SerialMode::rtu;
     // Rates may differ by 2 %, and both ends in the same direction.
     if (line.paced) timing.tolerance = leaving * 3 / 100 + character_time(line.serial);
     return timing;
@@ -34,7 +36,9 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       timing_(timing),
       orders_(orders),
       echo_(std::move(echo)),
-      framer_(group_.station, group_.request.pdu(), orders_),
+      framer_(
+          group_.station, group_.request.pdu(), orders_,
+          ends_are_told() ? modbus::ReplyFramer::Ends::told : modbus::ReplyFramer::Ends::by_length),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
@@ -51,16 +55,16 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     // Who looks late, or is told late, is no slower line.
-    const Duration slack = std::max<Duration>(2 * character(), 1ms);
+    const Duration slack = std::max<Duration>(2 * byte(), 1ms);
     const auto planned = next_look();
     since_ += bytes.size();
     looked_ = now;
-    const TimePoint latest = now - since_ * character();
+    const TimePoint latest = now - since_ * byte();
     hasty_ = hasty_ || (began_ && latest < *began_ - slack);
     began_ = began_ ? std::min(*began_, latest) : latest;
     const Verdict verdict = hear(now, bytes, ends);
     if (planned && planned->end && now >= planned->at && !end_look_) {
-        const bool whole = since_ * character() >= planned->reply;
+        const bool whole = since_ * byte() >= planned->reply;
         overslept_ = verdict == Verdict::replied && !whole;
         if (!overslept_) end_look_ = {planned->reply, whole};
     }
@@ -75,7 +79,7 @@ std::optional<Attempt::NextLook> Attempt::next_look() const {
     const std::size_t rest = missing();
     if (rest == 0) return std::nullopt;
     NextLook next;
-    next.reply = (since_ + rest) * character();
+    next.reply = (since_ + rest) * byte();
     next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
     next.at = *began_ + next.reply;
     const Duration early = timing_.notice + timing_.drift.early(next.reply);
@@ -104,10 +108,11 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     if (echo_.complete() && !was_complete) {
         since_ = rest.size();
         began_.reset();
-        if (since_ > 0) began_ = now - since_ * character();
+        if (since_ > 0) began_ = now - since_ * byte();
     }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
-    if (echo_.complete() && !was_complete && echo_.frame().back() == group_.station) {
+    const bool may_lend = !ends_are_told() && echo_.complete() && !was_complete;
+    if (may_lend && echo_.frame().back() == group_.station) {
         lender_.emplace(group_.station, group_.request.pdu(), orders_);
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
@@ -134,6 +139,7 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
 
 /// The silence behind bytes that are no part of the reply was longer than any inside a frame.
 void Attempt::drop_what_ended(TimePoint now, std::size_t size) {
+    if (ends_are_told()) return;
     const TimePoint first = now - wire_time(timing_.serial, size);
     const bool over = first >= last_byte_ + 3 * character_time(timing_.serial) / 2;
     if (heard_ && over && framer_.has_pending() && !framer_.has_candidate()) framer_.drop_pending();
@@ -158,8 +164,11 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
         return Verdict::open;
     }
     // Of two that are equal nobody knows which one it is.
-    if (const auto copy = std::exchange(held_, std::nullopt); copy && copy != reply)
+    if (const auto copy = std::exchange(held_, std::nullopt); copy && copy != reply) {
         stray_frame(*copy);
+    } else if (copy) {
+        said_twice_ = held_at_;
+    }
     reply_ = std::move(reply);
     return Verdict::replied;
 }
@@ -186,7 +195,7 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
         // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
-        const int function = part.bytes[1] & ~modbus::kExceptionBit;
+        const std::uint8_t function = modbus::plain_function(part.bytes[1]);
         const bool other = !exception && function != group_.request.function();
         refused_other_ = refused_other_ || (exception && function != group_.request.function());
         (other ? disturbed_ : wrong_) = true;
@@ -199,8 +208,9 @@ void Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
+        const bool in_front = i + behind < parts.size();
+        frames_in_front_ = frames_in_front_ || (in_front && parts[i].kind != Unused::Kind::damaged);
         if (parts[i].kind == Unused::Kind::damaged && !foreign) {
-            const bool in_front = i + behind < parts.size();
             if (in_front) noise_in_front_ += parts[i].bytes.size();
             fragment_ = fragment_ || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
             append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);
@@ -229,10 +239,7 @@ TimePoint Attempt::deadline() const {
 Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     if (now < deadline()) return Verdict::open;
     if (is_hearing()) {
-        if (const Bytes held = echo_.release(); !held.empty()) {
-            heard_ = true;
-            if (feed(held, ends) == Verdict::replied) return Verdict::replied;
-        }
+        if (take_held(ends) == Verdict::replied) return Verdict::replied;
         const std::size_t before = strays_.size();
         if (accept(framer_.on_silence()) == Verdict::replied) return Verdict::replied;
         judge_strays(before, ends);
@@ -252,6 +259,22 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 
+Verdict Attempt::take_held(const Ends& ends) {
+    const Bytes held = echo_.release();
+    if (held.empty()) return Verdict::open;
+    heard_ = true;
+    return feed(held, ends);
+}
+
+Verdict Attempt::on_frame_end(bool good, const Ends& ends) {
+    take_held(ends);
+    const std::size_t before = strays_.size();
+    if (accept(framer_.on_end(good)) == Verdict::replied) return Verdict::replied;
+    judge_strays(before, ends);
+    if (wrong_) return Verdict::wrong;
+    return framer_.was_damaged_whole() ? Verdict::damaged : Verdict::open;
+}
+
 void Attempt::on_end(TimePoint now, Duration left) {
     constexpr Duration kMaxShift = 1s;
     if (!wants_end(now)) return;
@@ -263,16 +286,26 @@ void Attempt::on_end(TimePoint now, Duration left) {
     timing_.sent = end;
 }
 
-/// Nothing, when what stands in front of the reply may have been an echo that was damaged.
+/// Nothing, when what stands in front of the reply may have been an echo that was damaged, or tells
+/// that the way was held up, and what had come before may be lost.
 void Attempt::teach(EchoMemory& memory) const {
-    const bool clean = !echo_.mismatch() && noise_in_front_ * 2 < echo_.frame().size();
+    const bool noisy = noise_in_front_ * 2 >= echo_.frame().size();
+    const bool clean = !echo_.mismatch() && !noisy && !frames_in_front_;
     if (!echoed() && (fragment_ || clean)) memory.on_reply_without_echo(group_.request, fragment_);
 }
 
 Duration Attempt::waited(TimePoint now) const {
     if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
-    const Duration reply = wire_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
+    const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
+}
+
+bool Attempt::said_damaged_before() const {
+    if (noise_in_front_ < reply_->size() + modbus::kAduOverhead) return false;
+    const std::array head{group_.station, reply_->front()};
+    const auto behind = std::ranges::search(damaged_bytes_, head).end();
+    // A part of our own request's echo begins like the reply, but goes on as we did.
+    return behind != damaged_bytes_.end() && *behind != group_.request.pdu()[1];
 }
 
 void Attempt::stray_frame(const Bytes& pdu) {
@@ -302,7 +335,7 @@ void Attempt::hold_reply(Duration needed, bool doubted) {
 
 bool Attempt::is_stale(TimePoint now, std::size_t size) const {
     if (!timing_.tolerance || heard_) return false;
-    const Duration before = wire_time(timing_.serial, size - 1);
+    const Duration before = (size - 1) * byte();
     return now - before < timing_.sent - *timing_.tolerance;
 }
 

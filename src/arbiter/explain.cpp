@@ -80,6 +80,11 @@ std::string shed(const Job& job, const ClientNames& names) {
     return who(job, names) + " given up: the queue is full, and its host has the most waiting";
 }
 
+std::string doubted(const Job& job, const ClientNames& names) {
+    return who(job, names) +
+           " asked once more: its answer repeats an earlier one and may be a copy of that";
+}
+
 std::string line_rests(Duration rest, const Group& group) {
     return "nobody but this request for " + ms(rest) + ": station " +
            std::to_string(group.station) + " did not answer and may do so late";

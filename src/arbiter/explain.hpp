@@ -19,6 +19,7 @@ std::string offline(TimePoint now, const Job& job, const StationHealth& health,
 std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,
                  const ClientNames& names);
 std::string shed(const Job& job, const ClientNames& names);
+std::string doubted(const Job& job, const ClientNames& names);
 std::string line_rests(Duration rest, const Group& group);
 std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names);
 

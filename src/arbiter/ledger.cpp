@@ -59,12 +59,12 @@ StationCounters& Ledger::of(std::uint8_t station) {
     return found == stations_.end() ? stations_[kUnlisted] : found->second;
 }
 
-void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Reason why) {
+void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
-    actions_.push_back(Note{now, kind_of(group), adu, std::move(why)});
-    actions_.push_back(Transmit{std::move(adu)});
+    actions_.push_back(Note{now, kind_of(group), std::move(adu), std::move(why)});
+    actions_.push_back(Transmit{std::move(wire)});
 }
 
 void Ledger::finish(const Job& job, Result<Bytes> pdu, bool shared) {

@@ -13,12 +13,12 @@ void Reception::stamp(TimePoint now, Job& job) {
     const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
         std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
-    const Duration needed = job.station == kBroadcast
-                                ? wire_time(serial_, request)
-                                : wire_time(serial_, request + reply) + silent_interval(serial_);
+    const Duration needed = job.station == kBroadcast ? frame_time(serial_, request)
+                                                      : frame_time(serial_, request + reply, 2) +
+                                                            silent_interval(serial_);
     job.ticket = ++last_ticket_;
     job.arrived = now;
-    job.deadline = now + deadline_;
+    job.deadline = now + std::min(deadline_, job.within);
     job.start_by = job.deadline - needed;
 }
 

@@ -36,12 +36,6 @@ Group learning_for(const Job& job, const Station& station) {
     return group;
 }
 
-/// At once when the reply that its station owes is to this very request, else behind that (P1).
-TimePoint repeat_from(const Group& group, const Stations& stations) {
-    const Station* station = stations.find(group.station);
-    return station->may_ask(TimePoint{}, group.request.pdu()) ? TimePoint{} : station->rested();
-}
-
 }  // namespace
 
 Schedule::Schedule(const Settings& settings)
@@ -49,6 +43,26 @@ Schedule::Schedule(const Settings& settings)
       may_stall_(settings.may_stall),
       backlog_(settings.queue),
       sharing_(settings.share_reads) {}
+
+/// Nothing else can come then that would be taken for the reply to this request: to what it was
+/// asked before (P1), or to a broadcast (P8). No reply is that to a broadcast.
+TimePoint Schedule::rested(const Stations& stations, std::uint8_t id,
+                           const modbus::Request& request) const {
+    if (id == kBroadcast) return {};
+    const Station* station = stations.find(id);
+    const Duration window =
+        station != nullptr ? station->broadcast_window() : stations.settings(id).response_timeout;
+    const TimePoint broadcasts = broadcasts_.over(request, window);
+    return station != nullptr ? std::max(station->rested(), broadcasts) : broadcasts;
+}
+
+/// At once when the reply that its station owes is to this very request, else behind that (P1).
+TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
+    const Station& station = *stations.find(group.station);
+    if (!station.may_ask(TimePoint{}, group.request.pdu()))
+        return rested(stations, group.station, group.request);
+    return broadcasts_.over(group.request, station.broadcast_window());
+}
 
 Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
                               const EchoMemory& echo, TimePoint proved) {
@@ -118,9 +132,8 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
                                   const Quiet& quiet) const {
     return [&, this, now](const Job& job) {
         if (now < quiet.quarantined_until()) return false;
-        const Station* station = stations.find(job.station);
-        const bool rested = station == nullptr || now >= station->rested();
-        return rested && !backlog_.has_retry(job.station);
+        return now >= rested(stations, job.station, job.request) &&
+               !backlog_.has_retry(job.station);
     };
 }
 
@@ -164,9 +177,7 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     // As a rule the first of them may start at once: however many wait, nothing starts sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
-        const Station* station = stations.find(job.station);
-        const TimePoint rested = station != nullptr ? station->rested() : free;
-        earlier(std::max(quiet.quarantined_until(), rested));
+        earlier(std::max(quiet.quarantined_until(), rested(stations, job.station, job.request)));
         return *next <= free;
     });
     if (at_once) return next;

@@ -9,6 +9,7 @@ namespace panelgate::arbiter {
 modbus::CrcOrders crc_orders(const Settings& settings) {
     using modbus::CrcOrder;
     modbus::CrcOrders orders;
+    if (settings.serial.mode == SerialMode::ascii) return orders;
     for (const StationSettings& station : settings.stations)
         orders.set(station.id, station.crc_order);
     const bool all_old = !settings.stations.empty() &&

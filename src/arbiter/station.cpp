@@ -121,6 +121,9 @@ void Station::learn_of_copies(TimePoint now, const Attempt& attempt) {
     } else if (!group.doubted.empty()) {
         copies_.on_denied(group.doubted_at, group.doubted);
     }
+    if (const auto first = attempt.said_twice(); first && !owes())
+        copies_.on_said_twice(now, *first, attempt.reply());
+    if (attempt.said_damaged_before()) copies_.on_doubt(CopyGuard::kSaidAgain);
     copies_.on_reply(now, group.request.pdu(), attempt.reply());
 }
 

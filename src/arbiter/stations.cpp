@@ -15,7 +15,7 @@ Stations::Stations(const Settings& settings)
     : offline_(settings.offline),
       unlisted_(settings.unlisted),
       standard_gap_(silent_interval(settings.serial)),
-      frame_(wire_time(settings.serial, kUsualReply)) {
+      frame_(frame_time(settings.serial, kUsualReply)) {
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
 }
 

@@ -16,8 +16,6 @@ using Part = Ledger::Part;
 
 namespace {
 
-ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - modbus::kAduOverhead); }
-
 /// A good frame that can only be a request, another master's.
 bool is_request(ByteView adu) {
     const modbus::ReplyLength as_reply = modbus::reply_length(adu);
@@ -44,14 +42,21 @@ Part part_of(Stray stray) {
 void Strays::hear(ByteView bytes) { idle_.insert(idle_.end(), bytes.begin(), bytes.end()); }
 
 std::vector<Unused> Strays::take(std::uint8_t asked) {
+    if (serial_.mode == SerialMode::ascii) return take_told(asked, false);
     return modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
+}
+
+std::vector<Unused> Strays::take_told(std::uint8_t asked, bool good) {
+    const Bytes bytes = std::exchange(idle_, {});
+    if (bytes.empty()) return {};
+    return {modbus::told_part(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
 /// A reply to the broadcast of a moment ago: a panel that does not know that it should be silent.
 bool Strays::answers_broadcast(ByteView adu) const {
     constexpr unsigned kRecent = 4;  // requests sent since
     return !broadcast_.empty() && sent_since_ <= kRecent &&
-           modbus::answers(pdu_of(broadcast_), pdu_of(adu));
+           modbus::answers(modbus::pdu_of(broadcast_), modbus::pdu_of(adu));
 }
 
 Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) const {
@@ -62,7 +67,7 @@ Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) 
     if (part.kind == Unused::Kind::damaged) return Part::damaged;
     const Station* station = stations.find(part.station);
     const bool owed =
-        station != nullptr && station->judge(now, pdu_of(part.bytes)) != Stray::unasked;
+        station != nullptr && station->judge(now, modbus::pdu_of(part.bytes)) != Stray::unasked;
     if (!owed && answers_broadcast(part.bytes)) return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
@@ -75,12 +80,13 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
         if (what != Part::unasked) {
             ledger.on_stray(now, part, what, quiet.station());
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
+            if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
         const Station::Heard heard =
-            stations.of(part.station).on_stray_frame(heard_at, pdu_of(part.bytes));
+            stations.of(part.station).on_stray_frame(heard_at, modbus::pdu_of(part.bytes));
         ledger.on_stray(now, part, part_of(heard.stray), quiet.station(), heard.lateness);
         if (heard.stray == Stray::late) ledger.event(Kind::late, part.station, heard.lateness);
         if (heard.back) {
@@ -96,11 +102,11 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
 void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                             Quiet& quiet) const {
     const std::size_t size = modbus::request_adu_length(request);
-    const ByteView pdu = pdu_of(request.first(size));
+    const ByteView pdu = modbus::pdu_of(request.first(size));
     if (request.size() > size || request[0] == kBroadcast) return;  // its reply is heard as well
     constexpr std::size_t kShort = modbus::kReadRequestAdu;
     const Duration reply =
-        wire_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
+        frame_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
     const Duration think = std::clamp<Duration>(3 * stations.slowest().value_or(10ms), 20ms, 100ms);
     quiet.rest_until(now + silent_interval(serial_) + think + reply);
 }
@@ -109,7 +115,7 @@ bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& station
     if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu))
         return false;
     const Station* station = stations.find(adu[0]);
-    return station != nullptr && station->judge(now, pdu_of(adu)) == Stray::unasked;
+    return station != nullptr && station->judge(now, modbus::pdu_of(adu)) == Stray::unasked;
 }
 
 }  // namespace panelgate::arbiter

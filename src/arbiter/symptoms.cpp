@@ -78,7 +78,7 @@ void Ledger::count_damaged(const Attempt& attempt) {
     Symptoms& symptoms = symptoms_of(group.station);
     const auto expected = group.request.reply_length();
     const bool head = bytes.size() >= 2 && bytes[0] == group.station &&
-                      (bytes[1] & ~modbus::kExceptionBit) == group.request.function();
+                      modbus::plain_function(bytes[1]) == group.request.function();
     if (expected && bytes.size() == *expected) {
         ++symptoms.damaged_exact;
     } else if (expected && bytes.size() < *expected) {

@@ -38,6 +38,7 @@ void Arbiter::conclude(TimePoint now, Verdict verdict) {
 void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
+    schedule_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
     for (const Job& job : attempt.group().jobs) {
         if (job.deadline <= now) {  // nobody looked at the clock in between
             ledger_.finish(job, Fault::timeout);
@@ -93,8 +94,10 @@ void Arbiter::ask_again(TimePoint now) {
     Station& station = stations_.of(group.station);
     station.owe(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
-    if (in_time(now, group) && !group.abandoned())
+    if (in_time(now, group) && !group.abandoned()) {
+        ledger_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
         return schedule_.retry(std::move(group), station.usual());
+    }
     for (const Job& job : group.jobs)
         ledger_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
 }

@@ -2,7 +2,9 @@
 
 #include <utility>
 
+#include "account.hpp"
 #include "answers.hpp"
+#include "client_accounts.hpp"
 #include "client_shares.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
@@ -13,11 +15,9 @@
 #include "panelgate/modbus/translation.hpp"
 #include "panelgate/rt/log.hpp"
 #include "refusals.hpp"
-#include "request_counters.hpp"
 #include "station_events.hpp"
 #include "trace_book.hpp"
 #include "wall.hpp"
-#include "write_log.hpp"
 
 namespace panelgate::bus {
 
@@ -42,6 +42,7 @@ struct Bus::State final : public line::Line::Events {
         std::optional<Deed> deed{};
         Bytes asked{};             ///< of a request that is translated: what its client wants
         std::uint8_t sent_as = 0;  ///< ... and its function on the wire; 0: the one asked
+        ClientId client = 0;
     };
 
     State(asio::any_io_executor e, rt::Clock& c, Settings s, std::unique_ptr<line::Line> l)
@@ -51,7 +52,7 @@ struct Bus::State final : public line::Line::Events {
           line(std::move(l)),
           arbiter(settings.arbiter),
           rights(settings.stations),
-          counters(settings.stations),
+          account(settings),
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
@@ -66,7 +67,6 @@ struct Bus::State final : public line::Line::Events {
 
     void transact(Request request, AnswerHandler handler);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
-    void tell_refused(std::uint8_t station, ByteView pdu, ClientId client);
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
         arbiter.set_latency(line->latency());
@@ -78,7 +78,8 @@ struct Bus::State final : public line::Line::Events {
     void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
     void act(arbiter::StationEvent& event);
     void act(const arbiter::Written& written) {
-        observe(WriteEvent{written.station, written.items, written.ended, written.client});
+        observe(settings,
+                WriteEvent{written.station, written.items, written.ended, written.client});
     }
     void act(arbiter::Reset& reset) { line->reset(std::string(reset.why)); }
     void confirm_end(TimePoint now) {
@@ -98,14 +99,9 @@ struct Bus::State final : public line::Line::Events {
         verb();
         --calls;
     }
-    void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
-                 Outcome outcome, Duration took);
     void answer(Pending pending, Answer answer);
     LineCounts counts() const {
         return {arbiter.station_counters(), arbiter.counters().broadcasts, *line};
-    }
-    void observe(const BusEvent& event) const {
-        if (settings.observe) settings.observe(event);
     }
 
     asio::any_io_executor executor;
@@ -114,7 +110,8 @@ struct Bus::State final : public line::Line::Events {
     std::unique_ptr<line::Line> line;
     arbiter::Arbiter arbiter;
     Rights rights;
-    RequestCounters counters;
+    Account account;
+    ClientAccounts clients;
     LineDoctor doctor;
     LoadMeter load;
     Refusals refusals;
@@ -133,7 +130,7 @@ void Bus::State::on_up() {
     up = true;
     ++ups;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
-    observe(LineEvent{true, {}});
+    observe(settings, LineEvent{true, {}});
     arbiter.set_lead(line->lead());
     arbiter.confirm_ends(line->unsent().has_value());
     drive.hear([this](TimePoint now) {
@@ -146,7 +143,7 @@ void Bus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe(LineEvent{false, why});
+    observe(settings, LineEvent{false, why});
     drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
 }
 
@@ -161,6 +158,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
     entry.deed = deed_of(request, arbiter.client_names());
+    entry.client = request.client;
+    clients.asked(request.client);
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -180,7 +179,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .client = request.client,
                      .host = request.host,
                      .priority = priority,
-                     .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function};
+                     .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
+                     .within = request.within};
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
@@ -195,12 +195,6 @@ void Bus::State::refuse(Pending entry, Result<Bytes> pdu, std::optional<Refusal>
     answer(std::move(entry), std::move(refused));
 }
 
-void Bus::State::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
-    if (pdu.empty()) return;
-    account(station, pdu[0], deed_of(pdu, client, arbiter.client_names()), Outcome::refused,
-            Duration::zero());
-}
-
 void Bus::State::act(arbiter::Finish& finish) {
     const auto found = pending.find(finish.ticket);
     if (found == pending.end()) return;
@@ -209,7 +203,8 @@ void Bus::State::act(arbiter::Finish& finish) {
     Answer result;
     result.pdu = std::move(finish.pdu);
     if (entry.sent_as != 0) {
-        if (finish.transmitted) counters.translated(entry.station, entry.function, entry.sent_as);
+        if (finish.transmitted)
+            account.counters().translated(entry.station, entry.function, entry.sent_as);
         if (result.pdu) result.pdu = modbus::translated_back(entry.asked, *result.pdu);
     }
     result.transmitted = finish.transmitted;
@@ -222,7 +217,7 @@ void Bus::State::act(arbiter::Finish& finish) {
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
-    observe(event);
+    observe(settings, event);
     log_event(settings, event);
 }
 
@@ -239,22 +234,15 @@ void Bus::State::check_delivery(TimePoint now) {
         line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
-/// For the metrics, the log and who watches.
-void Bus::State::account(std::uint8_t station, std::uint8_t function,
-                         const std::optional<Deed>& deed, Outcome outcome, Duration took) {
-    counters.count(station, function, outcome, took);
-    if (deed) log_deed(settings, station, *deed, outcome);
-    observe(TransactionEvent{station, function, outcome, took});
-}
-
 /// The one place that answers: counted, then handed over from the loop, never from inside a call.
 void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    account(entry.station, entry.function, entry.deed, outcome, took);
+    account.add(entry.station, entry.function, entry.deed, outcome, took);
+    clients.answered(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
-    if (success) counters.succeeded(entry.station, wall_seconds_of(wall.at(now)));
+    if (success) account.counters().succeeded(entry.station, wall_seconds_of(wall.at(now)));
     if (!result.pdu && result.pdu.error() == Fault::line_down)
         result.why = up ? "its device is being closed" : why_down;
     const bool refused = !result.transmitted && result.source == Source::bus;
@@ -299,12 +287,13 @@ void Bus::transact(Request request, AnswerHandler handler) {
 }
 
 void Bus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
-    state_->tell_refused(station, pdu, client);
+    state_->account.add_refused(station, pdu, client, state_->arbiter.client_names());
 }
 
 void Bus::cancel(ClientId client) {
     state_->call(
         [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
+    state_->clients.forget(client);
 }
 
 void Bus::name_client(ClientId client, std::string name) {
@@ -326,7 +315,8 @@ LineStatus Bus::status() const {
 }
 
 std::vector<ClientShare> Bus::clients() const {
-    return client_shares(state_->arbiter.shares(), state_->arbiter.client_names());
+    return client_shares(state_->arbiter.shares(), state_->arbiter.client_names(), state_->clients,
+                         state_->clock.now());
 }
 
 StationStatus Bus::station_status(std::uint8_t station) const {
@@ -339,7 +329,7 @@ StationStatus Bus::station_status(std::uint8_t station) const {
 }
 
 OutcomeCounts Bus::outcomes(std::uint8_t station) const {
-    return state_->counters.outcomes(station);
+    return state_->account.counters().outcomes(station);
 }
 
 std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
@@ -369,7 +359,7 @@ LineReport Bus::report() const {
     report.queue_depth = state_->arbiter.queue_depth();
     report.wire = state_->arbiter.counters();
     report.device = state_->line->counters();
-    report.stations = state_->counters.report(state_->arbiter);
+    report.stations = state_->account.counters().report(state_->arbiter);
     return report;
 }
 

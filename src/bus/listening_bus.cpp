@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "account.hpp"
 #include "heard_stations.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/client_names.hpp"
@@ -12,10 +13,8 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tap/matcher.hpp"
 #include "refusals.hpp"
-#include "request_counters.hpp"
 #include "trace_book.hpp"
 #include "wall.hpp"
-#include "write_log.hpp"
 
 namespace panelgate::bus {
 
@@ -51,7 +50,7 @@ struct ListeningBus::State final : public line::Line::Events {
           line(std::move(l)),
           matcher(tap_settings(settings.arbiter)),
           heard(settings.stations, settings.arbiter.offline.after),
-          counters(settings.stations),
+          account(settings),
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
@@ -71,20 +70,16 @@ struct ListeningBus::State final : public line::Line::Events {
     }
     void act(tap::Frame& frame);
     void act(const tap::Transaction& made);
-    void account(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed);
     void refuse(Request request, AnswerHandler handler);
     Refusal refusal(std::uint8_t station) const;
     LineCounts counts() const { return {heard.wire(), heard.line().broadcasts, *line}; }
-    void observe(const BusEvent& event) const {
-        if (settings.observe) settings.observe(event);
-    }
 
     rt::Clock& clock;
     Settings settings;
     std::unique_ptr<line::Line> line;
     tap::Matcher matcher;
     HeardStations heard;
-    RequestCounters counters;
+    Account account;
     arbiter::ClientNames names;
     mutable LineDoctor doctor;
     LoadMeter load;
@@ -100,7 +95,7 @@ void ListeningBus::State::on_up() {
     up = true;
     rt::log(rt::LogLevel::info, "line up",
             {{"line", settings.name}, {"device", settings.device}, {"mode", "listen"}});
-    observe(LineEvent{true, {}});
+    observe(settings, LineEvent{true, {}});
     drive.hear([this](TimePoint now) { doctor.begin(now, counts()); });
 }
 
@@ -108,7 +103,7 @@ void ListeningBus::State::on_down(const std::string& why) {
     up = false;
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe(LineEvent{false, why});
+    observe(settings, LineEvent{false, why});
     drive.hear([this](TimePoint now) { matcher.on_line_down(now); });
 }
 
@@ -124,12 +119,12 @@ void ListeningBus::State::act(const tap::Transaction& made) {
     if (made.end == tap::End::answered || !made.doubtful) {
         const Outcome outcome = outcome_of(made);
         const Duration took = made.ended - made.asked;
-        counters.count(made.station, made.request[0], outcome, took);
+        account.add(made.station, made.request[0], {}, outcome, took);
         const bool success = outcome == Outcome::ok && made.station != 0;
-        if (success) counters.succeeded(made.station, wall_seconds_of(wall.at(made.ended)));
-        observe(TransactionEvent{made.station, made.request[0], outcome, took});
+        if (success)
+            account.counters().succeeded(made.station, wall_seconds_of(wall.at(made.ended)));
     }
-    observe(made);
+    observe(settings, made);
 }
 
 Refusal ListeningBus::State::refusal(std::uint8_t station) const {
@@ -137,17 +132,10 @@ Refusal ListeningBus::State::refusal(std::uint8_t station) const {
             modbus::ExceptionCode::gateway_path_unavailable, settings.name};
 }
 
-/// What nobody may ask here: for the metrics, the log and who watches.
-void ListeningBus::State::account(std::uint8_t station, std::uint8_t function,
-                                  const std::optional<Deed>& deed) {
-    counters.count(station, function, Outcome::refused, Duration::zero());
-    if (deed) log_deed(settings, station, *deed, Outcome::refused);
-    observe(TransactionEvent{station, function, Outcome::refused, Duration::zero()});
-}
-
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
-    account(request.station, function, deed_of(request, names));
+    account.add(request.station, function, deed_of(request, names), Outcome::refused,
+                Duration::zero());
     Answer answer;
     answer.refusal = refusal(request.station);
     answer.pdu = answer_to(*answer.refusal, function);
@@ -172,8 +160,7 @@ void ListeningBus::transact(Request request, AnswerHandler handler) {
 }
 
 void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
-    if (pdu.empty()) return;
-    state_->account(station, pdu[0], deed_of(pdu, client, state_->names));
+    state_->account.add_refused(station, pdu, client, state_->names);
 }
 
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
@@ -226,9 +213,9 @@ LineReport ListeningBus::report() const {
     report.up = state_->up;
     report.wire = state_->heard.line();
     report.device = state_->line->counters();
-    report.stations = state_->counters.report(state_->heard.wire(), [this](std::uint8_t station) {
-        return state_->heard.health(station);
-    });
+    report.stations = state_->account.counters().report(
+        state_->heard.wire(),
+        [this](std::uint8_t station) { return state_->heard.health(station); });
     return report;
 }
 

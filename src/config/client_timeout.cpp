@@ -30,8 +30,8 @@ Duration longest_gap(const Line& line) {
 /// a request and keep a gap, and one brings `values` bytes.
 Duration wait_of(const Line& line, int retries, std::size_t values) {
     const SerialFormat& serial = line.device.serial;
-    const Duration request = wire_time(serial, modbus::kReadRequestAdu) + longest_gap(line);
-    const Duration reply = wire_time(serial, modbus::kReadReplyOverhead + values);
+    const Duration request = frame_time(serial, modbus::kReadRequestAdu) + longest_gap(line);
+    const Duration reply = frame_time(serial, modbus::kReadReplyOverhead + values);
     const Duration each = (kDeadline - reply) / (retries + 1) - request;
     return std::max(each / kStep * kStep, Duration::zero());
 }

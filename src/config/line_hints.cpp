@@ -90,10 +90,13 @@ std::string serial_example(const yaml::Node* typed) {
     std::string baud;
     std::string parity;
     std::string stop_bits;
+    std::string mode;
     for (const std::string& piece : pieces(typed == nullptr ? "" : all_of(*typed))) {
         const auto number = yaml::parse_integer(piece);
         constexpr std::int64_t kLeastBaud = 50;
-        if (number && *number >= kLeastBaud) {
+        if (piece == "ascii" || (piece == "7" && parity.empty())) {
+            mode = "ascii";
+        } else if (number && *number >= kLeastBaud) {
             if (baud.empty()) baud = piece;
         } else if (number && !parity.empty() && (piece == "1" || piece == "2")) {
             stop_bits = piece;
@@ -105,6 +108,7 @@ std::string serial_example(const yaml::Node* typed) {
     const auto add = [&keys](std::string_view key, const std::string& value) {
         if (!value.empty()) keys += (keys.empty() ? "" : ", ") + std::string(key) + ": " + value;
     };
+    add("mode", mode);
     add("baud", baud);
     add("parity", parity);
     add("stop_bits", stop_bits);

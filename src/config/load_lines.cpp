@@ -7,6 +7,7 @@
 
 #include "line_hints.hpp"
 #include "load_port.hpp"
+#include "load_serial.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
@@ -18,36 +19,6 @@ namespace {
 
 using yaml::MapReader;
 using yaml::Node;
-
-/// False when there was a fault: then nothing may be concluded from the format.
-bool load_serial(Loading& loading, MapReader& line, SerialFormat& format) {
-    const std::size_t before = loading.problems.list().size();
-    const Node* typed = line.child("serial");
-    const std::string example = serial_example(typed);
-    const bool is_list = typed != nullptr && typed->kind == Node::Kind::sequence;
-    const bool is_values = is_list && std::ranges::all_of(typed->items, [](const Node& item) {
-                               return item.kind == Node::Kind::scalar;
-                           });
-    if (is_values && !typed->items.empty()) {  // [9600, 8, N, 1]
-        line.has("serial");
-        line.problem("serial", "serial must be a map of keys, not a list; write " + example);
-        return false;
-    }
-    const Node* node = line.map("serial", example);
-    if (node == nullptr) return loading.problems.list().size() == before;
-    MapReader in(*node, loading.problems, "serial");
-    format.baud = static_cast<int>(in.integer("baud", 50, 4'000'000).value_or(format.baud));
-    const auto data_bits = in.integer("data_bits", 0, 99).value_or(8);
-    if (data_bits == 7) {
-        in.problem("data_bits", "RTU needs 8 data bits; 7 is for ASCII mode");
-    } else if (data_bits != 8) {
-        in.problem("data_bits", "data_bits must be 8, not '" + std::to_string(data_bits) + '\'');
-    }
-    format.parity = in.choice<Parity>("parity", kParityWords).value_or(format.parity);
-    format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
-    in.finish();
-    return loading.problems.list().size() == before;
-}
 
 void load_queue(Loading& loading, MapReader& line, arbiter::QueueSettings& queue) {
     const Node* node = line.map("queue", "{limit: 256}");
@@ -198,6 +169,12 @@ void load_mode(MapReader& in, Line& line) {
         return;
     }
     constexpr std::array<std::string_view, 2> kModes{"master", "listen"};
+    if (given != nullptr && (given->scalar == "ascii" || given->scalar == "rtu")) {
+        in.problem("mode", "mode " + given->scalar +
+                               " is of serial; write serial: {mode: " + given->scalar + '}');
+        in.has("mode");
+        return;
+    }
     line.listens = in.choice_index("mode", kModes) == std::size_t{1};
     line.device.listen_only = line.listens;
     if (line.listens && line.kind == Line::Kind::simulated) {
@@ -230,7 +207,7 @@ constexpr std::string_view kAtTheTop =
 
 /// Keys that people write beside `device`.
 constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
-constexpr std::array<yaml::Elsewhere, 29> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 30> kElsewhere{
     {{"baud", "serial", {}},
      {"data_bits", "serial", {}},
      {"parity", "serial", {}, {}, kParities},
@@ -259,7 +236,8 @@ constexpr std::array<yaml::Elsewhere, 29> kElsewhere{
      {"log", {}, {}, kAtTheTop},
      {"realtime", {}, {}, kAtTheTop},
      {"type", {}, {}, "remove it: 'device' says what the line is"},
-     {"method", {}, {}, "remove it: every line is RTU"}}};
+     {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
+     {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}}};
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
@@ -270,7 +248,10 @@ Line load_line(Loading& loading, const Node& node) {
         in.problem("name", "there are two lines '" + line.name + '\'');
     load_device(loading, in, line);
     load_mode(in, line);
-    const bool serial_known = load_serial(loading, in, line.device.serial);
+    const bool serial_known =
+        load_serial(loading, in, line.device.serial, &line.arbiter.ascii_digits);
+    if (line.listens && line.device.serial.mode == SerialMode::ascii)
+        in.problem("mode", "mode listen understands RTU only, not ASCII");
     line.arbiter.serial = line.device.serial;
     load_rs485(loading, in, line, line.device.rs485);
     line.arbiter.echo = load_echo(in);
@@ -292,7 +273,7 @@ Line load_line(Loading& loading, const Node& node) {
 
 }  // namespace
 
-bool load_port(Loading& loading, MapReader& in, line::Settings& port) {
+bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode mode) {
     Line line;  // what a port has is a part of it
     line.device.device = port.device = in.required_text("device").value_or("");
     if (!port.device.empty() && port.device[0] != '/') {
@@ -304,7 +285,8 @@ bool load_port(Loading& loading, MapReader& in, line::Settings& port) {
     } else {
         check_path(in, port.device);
     }
-    const bool serial_known = load_serial(loading, in, port.serial);
+    port.serial.mode = mode;
+    const bool serial_known = load_serial(loading, in, port.serial, nullptr);
     load_rs485(loading, in, line, port.rs485);
     return serial_known;
 }

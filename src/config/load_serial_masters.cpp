@@ -92,8 +92,8 @@ void each_station(const Config& config, const Settings& settings, Use use) {
 Duration longest_read(const Line& line, const arbiter::StationSettings& station) {
     const std::size_t bytes =
         std::max<std::size_t>(2 * station.max_registers, (station.max_bits + 7) / 8);
-    return wire_time(line.device.serial,
-                     modbus::kReadRequestAdu + modbus::kReadReplyOverhead + bytes);
+    return frame_time(line.device.serial,
+                      modbus::kReadRequestAdu + modbus::kReadReplyOverhead + bytes, 2);
 }
 
 /// What a panel may still answer comes too late for a master that waits for less.
@@ -132,13 +132,21 @@ void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
                                 (lines.empty() ? "LINE" : lines.front()) + "/31}");
 }
 
+/// What `framing` says; its faults are told where it is read.
+SerialMode mode_of(const Node& master) {
+    const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
+    const bool ascii =
+        framing != master.entries.end() && framing->value.scalar == modbus::label(Framing::ascii);
+    return ascii ? SerialMode::ascii : SerialMode::rtu;
+}
+
 Settings load_master(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a serial master", kExample);
     Settings settings;
     settings.access.diagnostics_unit.reset();
     settings.name = load_name(in, true).value_or("");
     check_name(loading, in, settings);
-    const bool serial_known = load_port(loading, in, settings.device);
+    const bool serial_known = load_port(loading, in, settings.device, mode_of(node));
     check_device(loading, in, settings.device);
     load_access(loading, in, settings.access);
     check_units(in, settings);

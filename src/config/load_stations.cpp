@@ -26,9 +26,9 @@ std::string join(const std::vector<T>& values, const Format& format) {
     return list;
 }
 
-/// The line's serial format against what the panel can be set to.
+/// The line's serial format against what the panel can be set to. Manuals speak of RTU.
 void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& profile) {
-    if (!work.serial_known) return;
+    if (!work.serial_known || work.line.device.serial.mode == SerialMode::ascii) return;
     const profile::Serial& serial = profile.serial;
     const SerialFormat& format = work.line.device.serial;
     const std::string source = " (" + profile.manual + ", " + serial.source + ')';
@@ -154,6 +154,11 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     settings.retry_writes = in.boolean("retry_writes").value_or(false);
     settings.crc_order = in.choice<modbus::CrcOrder>("crc_order", modbus::kCrcOrders)
                              .value_or(station.profile->crc_order);
+    if (work.line.device.serial.mode == SerialMode::ascii) {
+        settings.crc_order = modbus::CrcOrder::low_first;
+        if (in.has("crc_order"))
+            in.problem("crc_order", "ASCII has no CRC, and one order of its LRC; leave it out");
+    }
     using namespace modbus;
     settings.max_registers =
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
@@ -218,17 +223,20 @@ bool needs_8n1(const Station& station) {
     return serial.parity == std::vector{Parity::none} && !allows(serial.stop_bits, 2);
 }
 
-/// RTU characters have 11 bits (serial line V1.02, 2.5.1).
+/// RTU characters have 11 bits, those of ASCII 10 (serial line V1.02, 2.5.1, 2.5.2).
 void warn_of_character(Loading& loading, MapReader& in, const LineInWork& work) {
     const SerialFormat& format = work.line.device.serial;
-    if (!work.serial_known || format.bits_per_character() == 11) return;
+    const bool ascii = format.mode == SerialMode::ascii;
+    const int right = ascii ? 10 : 11;
+    if (!work.serial_known || format.bits_per_character() == right) return;
+    if (ascii && format.data_bits == 8) return;  // as its panels have it
     const bool needed = std::ranges::any_of(work.line.stations, needs_8n1);
     if (format.bits_per_character() == 10 && needed) return;
-    const bool common = format.bits_per_character() == 10;
+    const bool common = !ascii && format.bits_per_character() == 10;
     loading.warn(in.mark("serial"), to_string(format) + " is outside the Modbus specification (" +
                                         std::to_string(format.bits_per_character()) +
-                                        "-bit characters instead of 11)" +
-                                        (common ? " but common" : ""));
+                                        "-bit characters instead of " + std::to_string(right) +
+                                        ')' + (common ? " but common" : ""));
 }
 
 /// One frame cannot have both orders (arbiter::crc_orders()).

@@ -47,7 +47,7 @@ void load_response_timeout(MapReader& in, StationSettings& settings) {
 
 /// 3.5 characters at any rate: what tells frames apart for a panel that counts its own characters.
 /// The standard's 1.75 ms above 19200 bit/s only spare it short timers (serial line
-/// V1.02, 2.5.1.1).
+/// V1.02, 2.5.1.1). ASCII tells them apart without any.
 Duration shortest_gap(const SerialFormat& serial) { return wire_time(serial, 7) / 2; }
 
 /// Nothing = auto. Where the wire does not begin at the gateway, any gap will do.
@@ -60,14 +60,17 @@ void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
     if (!gap) return;
     timing.frame_gap = gap;
     const SerialFormat& serial = work.line.device.serial;
-    const bool free = work.line.kind != Line::Kind::serial || !work.serial_known;
+    const bool free = work.line.kind != Line::Kind::serial || !work.serial_known ||
+                      serial.mode == SerialMode::ascii;
     if (free || *gap >= shortest_gap(serial)) return;
     in.problem("frame_gap", "frame_gap must be at least " + at_least(shortest_gap(serial)) +
                                 " (3.5 characters at " + to_string(serial) + "), not " +
                                 yaml::format_duration(*gap));
 }
 
+/// Manuals speak of RTU.
 Duration asked_gap(const SerialFormat& serial, const profile::PanelProfile& profile) {
+    if (serial.mode == SerialMode::ascii) return {};
     const double characters = profile.timing.frame_gap_characters;
     return std::chrono::duration_cast<Duration>(characters * character_time(serial));
 }
@@ -101,7 +104,7 @@ void check_gap(Loading& loading, const LineInWork& work, const Station& station,
     const Duration asked = asked_gap(serial, *station.profile);
     const Duration wanted = std::max(silent_interval(serial), asked);
     const Duration gap = timing.frame_gap.value_or(wanted);
-    if (!work.serial_known || gap >= wanted) return;
+    if (!work.serial_known || gap >= wanted || serial.mode == SerialMode::ascii) return;
     if (!own && was_warned(work, station, gap, asked)) return;
     const bool by_panel = asked > silent_interval(serial);
     warn_of_gap(loading, own.value_or(place), gap, wanted,
@@ -111,9 +114,11 @@ void check_gap(Loading& loading, const LineInWork& work, const Station& station,
 /// What no healthy way to the panels exceeds. A tty: a USB latency timer (16 ms), a busy machine,
 /// and the time of one chunk of an adapter's FIFO, because its bytes are handed over together: at
 /// low rates that alone is longer. TCP: a segment that is lost twice; the first retransmission
-/// comes after 200 ms at least, the second after twice as long (RFC 6298, 5.5; Linux).
+/// comes after 200 ms at least, the second after twice as long (RFC 6298, 5.5; Linux). In ASCII the
+/// panel may pause besides, for a second (serial line V1.02, 2.5.2.1).
 Duration automatic_hole(const Line& line) {
     constexpr std::size_t kChunk = 32;
+    if (line.device.serial.mode == SerialMode::ascii) return 1s;
     if (line.kind == Line::Kind::tcp) return 700ms;
     return 60ms + wire_time(line.device.serial, kChunk);
 }
@@ -157,7 +162,8 @@ void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
         turnaround = timing.duration("broadcast_turnaround", 1ms, 1min).value_or(turnaround);
         timing.finish();
         const Duration gap = work.timing.frame_gap.value_or(silent_interval(serial));
-        if (work.serial_known && gap < silent_interval(serial))
+        const bool free = !work.serial_known || serial.mode == SerialMode::ascii;
+        if (!free && gap < silent_interval(serial))
             warn_of_gap(loading, timing.mark("frame_gap"), gap, silent_interval(serial),
                         standard(serial));
     }

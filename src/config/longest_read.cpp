@@ -18,7 +18,7 @@ void keep_longer(std::optional<Read>& longest, Read read) {
 }  // namespace
 
 Duration Read::on_wire(const SerialFormat& serial) const {
-    return wire_time(serial, kReadOverhead + bytes());
+    return frame_time(serial, kReadOverhead + bytes(), 2);
 }
 
 std::optional<Read> longest_poll(const Line& line) {
@@ -50,8 +50,10 @@ std::optional<Read> longest_read(const Line& line) {
 
 std::size_t most_items(const SerialFormat& serial, bool bits, Duration within) {
     const auto characters = static_cast<std::size_t>((within - 1ns) / character_time(serial));
-    if (characters <= kReadOverhead) return 0;
-    const std::size_t bytes = characters - kReadOverhead;
+    const bool ascii = serial.mode == SerialMode::ascii;
+    const std::size_t overhead = ascii ? 2 * kReadOverhead + 2 : kReadOverhead;
+    if (characters <= overhead) return 0;
+    const std::size_t bytes = (characters - overhead) / (ascii ? 2 : 1);
     return bits ? bytes * 8 : bytes / 2;
 }
 

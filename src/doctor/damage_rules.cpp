@@ -78,6 +78,8 @@ Cause cause_of_damage(const Case& c, const Symptoms& s) {
         const line::UartErrors& uart = *c.window.uart;
         return uart.parity > uart.framing ? Cause::wrong_parity : Cause::wrong_baud;
     }
+    if (c.facts.serial.mode == SerialMode::ascii)  // what is damaged has no bytes to count
+        return s.damaged_heads * 2 >= s.damaged() ? Cause::noise : Cause::wrong_baud;
     if (checked && same_pace && alike && s.damaged_zeros * 4 >= s.damaged_bytes)
         return Cause::wrong_parity;
     if (s.damaged_heads * 2 >= s.damaged()) return Cause::noise;
@@ -114,6 +116,11 @@ void find_all_damaged(Case& c) {
               "Set `serial.parity`, data and stop bits as in the panels' communication settings "
               "(now " +
                   now + ").",
+              evidence);
+    } else if (cause == Cause::wrong_baud && c.facts.serial.mode == SerialMode::ascii) {
+        c.add(cause, {}, "What comes is no Modbus ASCII: baud, data bits or parity differ.",
+              "Set `serial` as in the panels' communication settings (now " + now +
+                  "); panels that are set to RTU need `mode: rtu`.",
               evidence);
     } else if (cause == Cause::wrong_baud) {
         const bool breaks = c.window.uart && c.window.uart->breaks * 2 > c.window.uart->framing;

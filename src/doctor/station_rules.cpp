@@ -242,7 +242,8 @@ void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
         other_answers = other_answers || (id != station && other.answered > 0 && lately);
     }
     if (!other_answers) return;
-    const bool by_crc = s.answered == 0 && !c.facts.crc_high_first.contains(station);
+    const bool by_crc = s.answered == 0 && !c.facts.crc_high_first.contains(station) &&
+                        c.facts.serial.mode == SerialMode::rtu;
     c.add(Cause::station_silent, station,
           "Station " + std::to_string(station) + " does not answer; others do.",
           std::string("The line is fine: check this panel's power, its address and its plug.") +

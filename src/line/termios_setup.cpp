@@ -14,12 +14,13 @@ namespace {
 
 termios2 raw(const termios2& before, const SerialFormat& format) {
     termios2 t = before;
-    t.c_iflag = IGNBRK;  // a break is no byte; parity errors pass and the CRC judges
+    t.c_iflag = IGNBRK;  // a break is no byte; parity errors pass and CRC or LRC judge
     t.c_oflag = 0;
     t.c_lflag = 0;
     t.c_cflag &=
         ~static_cast<tcflag_t>(CSIZE | PARENB | PARODD | CMSPAR | CSTOPB | CRTSCTS | CBAUD);
-    t.c_cflag |= CS8 | CREAD | CLOCAL | BOTHER;
+    t.c_cflag |= CREAD | CLOCAL | BOTHER;
+    t.c_cflag |= format.data_bits == 7 ? CS7 : CS8;
     if (format.parity != Parity::none) {
         t.c_cflag |= PARENB;
         t.c_iflag |= INPCK;

@@ -121,7 +121,8 @@ struct WireCounter {
     std::uint64_t arbiter::StationCounters::* field;
 };
 constexpr std::array kWireCounters = {
-    WireCounter{"panelgate_retries_total", "Reads sent once more after a silent or damaged reply.",
+    WireCounter{"panelgate_retries_total",
+                "Reads sent once more after silence, damage, or what may be a copy.",
                 &arbiter::StationCounters::retries},
     WireCounter{"panelgate_late_frames_total",
                 "Good frames that answer a request already given up; thrown away.",

@@ -11,8 +11,7 @@ namespace {
 constexpr std::uint8_t kBegin = ':';
 constexpr std::uint8_t kCarriageReturn = '\r';
 constexpr std::uint8_t kLineFeed = '\n';
-constexpr std::size_t kMinBytes = 3;            // station, function, LRC
-constexpr std::size_t kMaxBytes = kMaxPdu + 2;  // station and LRC around it
+constexpr std::size_t kMinBytes = 3;  // station, function, LRC
 
 std::optional<unsigned> value_of(std::uint8_t digit, HexDigits digits) {
     if (digit >= '0' && digit <= '9') return digit - unsigned{'0'};
@@ -46,6 +45,42 @@ Bytes encode_ascii(std::uint8_t station, ByteView pdu) {
     return out.take();
 }
 
+AsciiReader::Step AsciiReader::take(std::uint8_t character) {
+    if (character == kBegin) {
+        state_ = State::digits;
+        bytes_.clear();
+        half_ = false;
+        return Step::begun;
+    }
+    if (state_ == State::between) return Step::outside;
+    if (state_ == State::digits) return take_digit(character);
+    const bool good = character == kLineFeed && lrc(bytes_) == 0;
+    return end(good ? Step::whole : Step::broken);
+}
+
+AsciiReader::Step AsciiReader::take_digit(std::uint8_t character) {
+    if (character == kCarriageReturn) {
+        if (half_ || bytes_.size() < kMinBytes) return end(Step::broken);
+        state_ = State::at_end;
+        return Step::inside;
+    }
+    const auto value = value_of(character, digits_);
+    const bool full = bytes_.size() == longest_ && !half_;
+    if (!value || full) return end(Step::broken);
+    if (std::exchange(half_, !half_)) {
+        bytes_.back() = static_cast<std::uint8_t>(unsigned{bytes_.back()} << 4 | *value);
+        return Step::byte;
+    }
+    bytes_.push_back(static_cast<std::uint8_t>(*value));
+    return Step::inside;
+}
+
+AsciiReader::Step AsciiReader::end(Step step) {
+    state_ = State::between;
+    if (std::exchange(half_, false)) bytes_.pop_back();
+    return step;
+}
+
 void AsciiFramer::feed(TimePoint now, ByteView characters) {
     if (characters.empty()) return;
     if (partial() && now - last_ > pause_) drop();
@@ -63,60 +98,40 @@ std::optional<SerialAdu> AsciiFramer::next() {
     }
     text_.take(taken);
     if (!whole) return std::nullopt;
+    const Bytes& bytes = reader_.bytes();
     SerialAdu adu;
-    adu.station = bytes_.front();
-    adu.pdu.assign(bytes_.begin() + 1, bytes_.end() - 1);
-    state_ = State::between;
+    adu.station = bytes.front();
+    adu.pdu.assign(bytes.begin() + 1, bytes.end() - 1);
     discarded_ = 0;
     return adu;
 }
 
-/// Is `bytes_` a good frame now?
+/// Does it make a frame whole?
 bool AsciiFramer::take(std::uint8_t character) {
-    if (character == kBegin) {
-        if (partial()) drop();
-        begin();
-        return false;
+    if (character == kBegin && partial()) drop();
+    switch (reader_.take(character)) {
+        case AsciiReader::Step::outside:
+            ++discarded_;
+            return false;
+        case AsciiReader::Step::begun:
+            begun_ = 1;
+            return false;
+        case AsciiReader::Step::inside:
+        case AsciiReader::Step::byte:
+            ++begun_;
+            return false;
+        case AsciiReader::Step::whole:
+            return true;
+        case AsciiReader::Step::broken:
+            ++begun_;
+            drop();
+            return false;
     }
-    if (state_ == State::between) {
-        ++discarded_;
-        return false;
-    }
-    ++begun_;
-    if (state_ == State::digits) {
-        take_digit(character);
-        return false;
-    }
-    const bool good = character == kLineFeed && lrc(bytes_) == 0;
-    if (!good) drop();
-    return good;
-}
-
-void AsciiFramer::take_digit(std::uint8_t character) {
-    if (character == kCarriageReturn) {
-        if (half_ || bytes_.size() < kMinBytes) return drop();
-        state_ = State::at_end;
-        return;
-    }
-    const auto value = value_of(character, digits_);
-    const bool full = bytes_.size() == kMaxBytes && !half_;
-    if (!value || full) return drop();
-    if (std::exchange(half_, !half_)) {
-        bytes_.back() = static_cast<std::uint8_t>(unsigned{bytes_.back()} << 4 | *value);
-    } else {
-        bytes_.push_back(static_cast<std::uint8_t>(*value));
-    }
-}
-
-void AsciiFramer::begin() {
-    state_ = State::digits;
-    bytes_.clear();
-    half_ = false;
-    begun_ = 1;
+    return false;
 }
 
 void AsciiFramer::drop() {
-    state_ = State::between;
+    reader_.give_up();
     discarded_ += begun_;
     ++faults_;
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_request_framer.hpp"
 
 namespace panelgate::modbus {
 namespace {
@@ -211,9 +212,9 @@ std::size_t request_adu_length(ByteView heard) {
     constexpr std::size_t kByteCount = 6;
     if (heard.size() <= kByteCount) return 0;
     const std::uint8_t function = heard[1];
-    if (function >= kReadCoils && function <= kWriteSingleRegister) return kReadRequestAdu;
+    const bool one = function >= kReadCoils && function <= kWriteSingleRegister;
     const bool many = function == kWriteMultipleCoils || function == kWriteMultipleRegisters;
-    return many ? kReadRequestAdu + 1 + heard[kByteCount] : 0;
+    return one || many ? request_length(heard).length : 0;
 }
 
 std::optional<std::size_t> reply_length_from_request(ByteView pdu) {

@@ -30,7 +30,7 @@ bool crc_ok(ByteView adu, const CrcOrders& orders) {
 
 std::optional<RtuFrame> decode_adu(ByteView adu) {
     if (!crc_ok(adu)) return std::nullopt;
-    return RtuFrame{adu[0], adu.subspan(1, adu.size() - kAduOverhead)};
+    return RtuFrame{adu[0], pdu_of(adu)};
 }
 
 }  // namespace panelgate::modbus

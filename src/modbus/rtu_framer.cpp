@@ -7,6 +7,7 @@
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "reply_size.hpp"
 
 namespace panelgate::modbus {
 namespace {
@@ -74,33 +75,48 @@ ReplyLength reply_length(ByteView b) {
     }
 }
 
-namespace {
-
-/// 0: that cannot be told yet, or only by silence.
-std::size_t known_reply_length(ByteView heard) {
-    const ReplyLength length = reply_length(heard);
-    return length.kind == ReplyLength::Kind::known ? length.length : 0;
-}
-
-}  // namespace
-
-ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders)
+ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders,
+                         Ends ends)
     : station_(station),
       request_(std::move(request_pdu)),
       orders_(orders),
+      ends_(ends),
       expected_(reply_length_from_request(request_)) {}
 
 std::optional<Bytes> ReplyFramer::feed(ByteView bytes) {
     heard_.insert(heard_.end(), bytes.begin(), bytes.end());
-    if (auto reply = scan(false)) return reply;
+    if (ends_ == Ends::told) {
+        look_at_head();
+    } else if (auto reply = scan(false)) {
+        return reply;
+    }
     if (heard_.size() > kMaxHeard) discard(heard_.size() - kMaxHeard / 2);
     return std::nullopt;
 }
 
 std::optional<Bytes> ReplyFramer::on_silence() {
-    auto reply = scan(true);
+    auto reply = ends_ == Ends::told ? std::nullopt : scan(true);
     if (!reply) discard(heard_.size());
     return reply;
+}
+
+std::optional<Bytes> ReplyFramer::on_end(bool good) {
+    std::optional<Bytes> reply;
+    const bool whole = good && crc_ok(heard_, orders_);
+    if (whole && heard_[0] == station_) reply = answering(heard_);
+    if (!reply && !heard_.empty()) step_over(told_part(heard_, station_, whole));
+    heard_.clear();
+    forget_starts();
+    open_length_ = false;
+    return reply;
+}
+
+/// A frame begins with what was fed first.
+void ReplyFramer::look_at_head() {
+    if (looked_ > 0 || heard_.size() < 2) return;
+    looked_ = heard_.size();
+    open_length_ = is_start(heard_[0], heard_[1]);
+    if (open_length_) starts_.push_back(0);
 }
 
 std::vector<Unused> ReplyFramer::take_unused() {
@@ -175,19 +191,13 @@ std::size_t ReplyFramer::missing_as_asked() const {
 }
 
 bool ReplyFramer::ends_with_other_frame() const {
+    if (ends_ == Ends::told) return false;
     if (has_start() || heard_.size() < kMinAdu || heard_[0] != station_) return false;
     return known_reply_length(heard_) == heard_.size() && crc_ok(heard_, orders_);
 }
 
 bool ReplyFramer::is_start(std::uint8_t address, std::uint8_t function) const {
-    return address == station_ && (function & ~kExceptionBit) == request_[0];
-}
-
-bool ReplyFramer::holds_start(ByteView bytes) const {
-    for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
-        if (is_start(bytes[i], bytes[i + 1])) return true;
-    }
-    return false;
+    return address == station_ && plain_function(function) == request_[0];
 }
 
 void ReplyFramer::forget_starts() {
@@ -241,7 +251,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
 /// The PDU of this frame, when it is good and answers.
 std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
     if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame, orders_)) return std::nullopt;
-    const ByteView pdu = frame.subspan(1, frame.size() - kAduOverhead);
+    const ByteView pdu = pdu_of(frame);
     if (!answers(request_, pdu)) return std::nullopt;
     return Bytes(pdu.begin(), pdu.end());
 }
@@ -264,54 +274,7 @@ void ReplyFramer::discard(std::size_t count) {
     heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(count));
     forget_starts();
     open_length_ = false;
-    collect_starts();
-}
-
-/// Not a part of our own frame, which may begin like it.
-bool ReplyFramer::is_own_reply(ByteView damaged) const {
-    if (!is_read(request_[0]) || !expected_) return false;
-    const auto count = static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead);
-    return damaged.size() >= std::min(*expected_, kReadRequestAdu + 1) && damaged[0] == station_ &&
-           damaged[1] == request_[0] && damaged[2] == count && request_[1] != count;
-}
-
-void ReplyFramer::classify(ByteView bytes) {
-    for (Unused& part : classify_heard(bytes, station_, orders_)) {
-        if (part.kind == Unused::Kind::damaged && holds_start(part.bytes)) {
-            damaged_ = true;
-            damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
-            own_header_ = own_header_ || is_own_reply(part.bytes);
-        }
-        constexpr std::size_t kKept = 64;  // parts; beyond, only their bytes matter
-        if (unused_.size() < kKept) {
-            unused_.push_back(std::move(part));
-        } else if (unused_.back().bytes.size() < kMaxHeard) {
-            unused_.back().bytes.insert(unused_.back().bytes.end(), part.bytes.begin(),
-                                        part.bytes.end());
-        }
-    }
-}
-
-std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,
-                                   const CrcOrders& orders) {
-    std::vector<Unused> parts;
-    while (!bytes.empty()) {
-        const std::size_t length = known_reply_length(bytes);
-        const bool whole =
-            length >= kMinAdu && length <= bytes.size() && crc_ok(bytes.first(length), orders);
-        const bool rest_is_frame = !whole && bytes.size() >= kMinAdu &&
-                                   bytes.size() <= kMaxLongRtuAdu && crc_ok(bytes, orders);
-        const std::size_t size = whole ? length : bytes.size();
-        Unused part;
-        part.bytes.assign(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
-        if (whole || rest_is_frame) {
-            part.station = bytes[0];
-            part.kind = bytes[0] == own_station ? Unused::Kind::own : Unused::Kind::foreign;
-        }
-        parts.push_back(std::move(part));
-        bytes = bytes.subspan(size);
-    }
-    return parts;
+    if (ends_ == Ends::by_length) collect_starts();
 }
 
 }  // namespace panelgate::modbus

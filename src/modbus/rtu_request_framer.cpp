@@ -17,12 +17,6 @@ RequestLength counted(ByteView b, std::size_t count, std::size_t overhead) {
     return b.size() <= count ? RequestLength{} : known(overhead + b[count]);
 }
 
-/// With one word of data, as nearly all are.
-bool is_usual_loopback(ByteView b) {
-    constexpr std::size_t kSize = kReadRequestAdu;
-    return b.size() >= kSize && b[1] == kDiagnostics && crc_ok(b.first(kSize));
-}
-
 bool is_frame(ByteView b) { return b.size() >= kMinAdu && b.size() <= kMaxRtuAdu && crc_ok(b); }
 
 /// Size of the good frame of a known length that begins here; 0: there is none.
@@ -73,6 +67,18 @@ RequestLength request_length(ByteView b) {
     }
 }
 
+RequestLength usual_request_length(ByteView frame) {
+    constexpr std::size_t kUsual = kReadRequestAdu;
+    const bool is_usual =
+        frame.size() >= kUsual && frame[1] == kDiagnostics && crc_ok(frame.first(kUsual));
+    return is_usual ? known(kUsual) : request_length(frame);
+}
+
+SerialAdu serial_adu_of(ByteView frame) {
+    const ByteView pdu = pdu_of(frame);
+    return {frame[0], Bytes(pdu.begin(), pdu.end())};
+}
+
 std::optional<SerialAdu> RtuRequestFramer::next() {
     if (ended_by_silence_ != 0) return take(std::exchange(ended_by_silence_, 0));
     while (!heard_.empty()) {
@@ -85,10 +91,9 @@ std::optional<SerialAdu> RtuRequestFramer::next() {
 }
 
 RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
-    const RequestLength length = request_length(start);
+    const RequestLength length = usual_request_length(start);
     if (length.kind == Kind::need_more) return {Judgement::Kind::open};
     if (length.kind == Kind::by_silence) {
-        if (is_usual_loopback(start)) return {Judgement::Kind::frame, kReadRequestAdu};
         const bool may_be = aligned_ && start.size() <= kMaxRtuAdu;
         return {may_be ? Judgement::Kind::open : Judgement::Kind::nothing};
     }
@@ -121,10 +126,7 @@ std::size_t RtuRequestFramer::size_by_silence() const {
 }
 
 SerialAdu RtuRequestFramer::take(std::size_t size) {
-    const RtuFrame frame = *decode_adu(heard_.view().first(size));
-    SerialAdu adu;
-    adu.station = frame.station;
-    adu.pdu.assign(frame.pdu.begin(), frame.pdu.end());
+    SerialAdu adu = serial_adu_of(heard_.view().first(size));
     heard_.take(size);
     discarded_ = 0;
     aligned_ = true;

@@ -317,8 +317,8 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count) {
     const std::size_t data =
         modbus::is_bit_table(table) ? (std::size_t{count} + 7) / 8 : std::size_t{count} * 2;
-    return wire_time(limits.serial, modbus::kReadRequestAdu) + limits.gap + limits.think_time +
-           wire_time(limits.serial, modbus::kReadReplyOverhead + data) + limits.gap;
+    return frame_time(limits.serial, modbus::kReadRequestAdu) + limits.gap + limits.think_time +
+           frame_time(limits.serial, modbus::kReadReplyOverhead + data) + limits.gap;
 }
 
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits) {

@@ -27,6 +27,10 @@ const Reading& StationPoints::reading(const Poll& block) const {
     return (*readings_)[points_->size() + index];
 }
 
+const std::vector<std::uint16_t>& StationPoints::items(const Point& point) const {
+    return (*readings_)[static_cast<std::size_t>(&point - points_->data())].values;
+}
+
 PointReading StationPoints::read(const Point& point, TimePoint now) const {
     const auto index = static_cast<std::size_t>(&point - points_->data());
     const Reading& reading = (*readings_)[index];

@@ -19,8 +19,8 @@ constexpr std::size_t kDamage = 3;
 
 Attempt::Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent, Patience patience)
     : request_(std::move(request)),
-      start_by_(sent + wire_time(format, request_.adu().size()) + patience.start),
-      latest_(start_by_ + kBabble + wire_time(format, modbus::kMaxLongRtuAdu)),
+      start_by_(sent + frame_time(format, request_.adu().size()) + patience.start),
+      latest_(start_by_ + kBabble + frame_time(format, modbus::kMaxLongRtuAdu)),
       settle_(patience.settle),
       gap_(std::max(kAdapterPause, wire_time(format, kPauseCharacters))) {}
 
@@ -34,7 +34,7 @@ ByteView Attempt::without_echo() const {
 
 bool Attempt::holds_beginning(ByteView bytes) const {
     for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
-        const int function = bytes[i + 1] & ~modbus::kExceptionBit;
+        const std::uint8_t function = modbus::plain_function(bytes[i + 1]);
         if (bytes[i] == request_.station() && function == request_.pdu()[0]) return true;
     }
     return false;

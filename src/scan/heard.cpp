@@ -12,7 +12,7 @@ namespace panelgate::scan {
 namespace {
 
 bool is_plausible(ByteView bytes) {
-    const auto function = static_cast<std::uint8_t>(bytes[1] & ~modbus::kExceptionBit);
+    const std::uint8_t function = modbus::plain_function(bytes[1]);
     if (bytes[0] > modbus::kMaxStation || !modbus::is_known(function)) return false;
     return bytes[0] != 0 || modbus::is_broadcastable(bytes[1]);
 }

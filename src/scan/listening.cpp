@@ -8,8 +8,7 @@ constexpr std::size_t kGlitches = 2;  // bytes that mean nothing
 }  // namespace
 
 void note(Talk& talk, const Frame& frame) {
-    const int function = frame.pdu[0] & ~modbus::kExceptionBit;
-    talk[frame.station].insert(static_cast<std::uint8_t>(function));
+    talk[frame.station].insert(modbus::plain_function(frame.pdu[0]));
 }
 
 void Scanner::State::listen(TimePoint now, Duration how_long) {

@@ -28,14 +28,13 @@ std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
 /// First pass, second pass and the other order of the CRC of who will be silent, examination of
 /// who has answered.
 Duration Scanner::State::asking_cost() const {
-    const Duration wire = wire_time(format, modbus::kReadRequestAdu);
+    const Duration wire = frame_time(format, modbus::kReadRequestAdu);
     const auto first = static_cast<std::int64_t>(first_pass.size());
     const auto second = static_cast<std::int64_t>(second_pass.size()) + first;
     std::int64_t high_first = static_cast<std::int64_t>(high_first_pass.size());
     for (const auto* pass : {&first_pass, &second_pass}) {
-        high_first += std::ranges::count_if(*pass, [this](std::uint8_t station) {
-            return may_be_high_first(profiles, station, known_format());
-        });
+        high_first += std::ranges::count_if(
+            *pass, [this](std::uint8_t station) { return may_be_old(station); });
     }
     const Duration examining = settings.repeats * (settings.settle + kProbe) + kProbes * kProbe;
     const auto open = static_cast<std::int64_t>(to_examine.size()) + (examination ? 1 : 0);
@@ -91,6 +90,11 @@ Result Scanner::result() const {
     if (!result.stations.empty() || !result.talk.empty()) {
         result.format =
             result.remote ? supposed_format(state.profiles, result) : state.known_format();
+        if (result.remote && result.format && state.format.mode == SerialMode::ascii) {
+            const int baud = result.format->baud;  // all that manuals tell of ASCII
+            result.format = state.format;
+            result.format->baud = baud;
+        }
     }
     std::ranges::sort(result.stations, std::less(), &StationFinding::station);
     tell_duplicates(result);

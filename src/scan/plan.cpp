@@ -16,6 +16,7 @@ using profile::allows;
 namespace {
 
 constexpr int kUsualRates[] = {9600, 19200, 38400, 115200, 57600, 4800, 2400};
+constexpr int kAsciiRates[] = {9600, 19200, 38400, 115200};  // others where they are asked for
 constexpr Parity kParities[] = {Parity::none, Parity::even, Parity::odd};
 constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third has the rest
 constexpr std::uint8_t kUsualLast = 31;    // of panels: their settings screens end there
@@ -35,6 +36,17 @@ std::vector<SerialFormat> profile_formats(const profile::Catalogue& profiles) {
     return ordered;
 }
 
+std::vector<int> with_wanted(std::vector<int> rates, const Settings& settings) {
+    for (const int rate : settings.baud) append_new(rates, rate);
+    return rates;
+}
+
+void keep_allowed(std::vector<SerialFormat>& formats, const Settings& settings) {
+    std::erase_if(formats, [&](const SerialFormat& format) {
+        return !allows(settings.baud, format.baud) || !allows(settings.parity, format.parity);
+    });
+}
+
 }  // namespace
 
 std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
@@ -42,14 +54,31 @@ std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
     if (settings.remote) return {SerialFormat{}};
     std::vector<SerialFormat> all = profile_formats(profiles);
     append_new(all, SerialFormat{});
-    std::vector<int> rates(std::begin(kUsualRates), std::end(kUsualRates));
-    for (const int rate : settings.baud) append_new(rates, rate);
-    for (const int rate : rates) {
+    for (const int rate : with_wanted({std::begin(kUsualRates), std::end(kUsualRates)}, settings)) {
         for (const Parity parity : kParities) append_new(all, SerialFormat{rate, 8, parity, 1});
     }
-    std::erase_if(all, [&](const SerialFormat& format) {
-        return !allows(settings.baud, format.baud) || !allows(settings.parity, format.parity);
-    });
+    keep_allowed(all, settings);
+    return all;
+}
+
+std::vector<SerialFormat> ascii_formats(const Settings& settings) {
+    constexpr auto kAscii = SerialMode::ascii;
+    SerialFormat standard;
+    standard.data_bits = 7;
+    standard.mode = kAscii;
+    if (settings.remote) return {standard};
+    std::vector<SerialFormat> all;
+    for (const SerialFormat& format :
+         {SerialFormat{0, 7, Parity::even, 1, kAscii}, SerialFormat{0, 8, Parity::none, 1, kAscii},
+          SerialFormat{0, 7, Parity::odd, 1, kAscii},
+          SerialFormat{0, 7, Parity::none, 2, kAscii}}) {
+        for (const int rate :
+             with_wanted({std::begin(kAsciiRates), std::end(kAsciiRates)}, settings)) {
+            all.push_back(format);
+            all.back().baud = rate;
+        }
+    }
+    keep_allowed(all, settings);
     return all;
 }
 
@@ -74,12 +103,14 @@ std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
 }
 
 bool offers(const profile::PanelProfile& panel, const SerialFormat& format) {
-    return allows(panel.serial.baud, format.baud) && allows(panel.serial.parity, format.parity) &&
-           allows(panel.serial.stop_bits, format.stop_bits);
+    return format.mode == SerialMode::ascii ||
+           (allows(panel.serial.baud, format.baud) && allows(panel.serial.parity, format.parity) &&
+            allows(panel.serial.stop_bits, format.stop_bits));
 }
 
 bool may_be_high_first(const profile::Catalogue& profiles, std::uint8_t station,
                        const std::optional<SerialFormat>& format) {
+    if (format && format->mode == SerialMode::ascii) return false;
     return std::ranges::any_of(profiles.all(), [&](const auto& entry) {
         const profile::PanelProfile& panel = entry.second;
         return panel.crc_order == modbus::CrcOrder::high_first && station >= panel.first_station &&
@@ -98,6 +129,11 @@ std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
 
 SearchPlan::SearchPlan(const std::vector<SerialFormat>& formats,
                        const std::vector<std::uint8_t>& stations) {
+    add(formats, stations);
+}
+
+void SearchPlan::add(const std::vector<SerialFormat>& formats,
+                     const std::vector<std::uint8_t>& stations) {
     std::size_t from = 0;
     for (std::size_t round = 0; from < stations.size(); ++round) {
         const std::size_t left = stations.size() - from;
@@ -147,7 +183,7 @@ void SearchPlan::hint(const Cell& cell) {
 Duration SearchPlan::cost(const Settings& settings) const {
     Duration total{};
     for (std::size_t i = at_; i < cells_.size(); ++i) {
-        total += settings.search_timeout + wire_time(cells_[i].format, modbus::kReadRequestAdu);
+        total += settings.search_timeout + frame_time(cells_[i].format, modbus::kReadRequestAdu);
         const bool changes = i + 1 == cells_.size() || cells_[i + 1].format != cells_[i].format;
         if (changes)
             total += settings.leave_timeout - settings.search_timeout + settings.after_format;

@@ -16,11 +16,14 @@ namespace panelgate::scan {
 /// what the settings allow; never empty.
 std::vector<SerialFormat> likely_formats(const profile::Catalogue& profiles,
                                          const Settings& settings);
+/// What may be tried besides, for panels that speak ASCII: the usual rates with 7E1, the standard's
+/// (V1.02, 2.5.2), then as 8N1 and with the standard's other parities. May be empty.
+std::vector<SerialFormat> ascii_formats(const Settings& settings);
 /// First and last addresses of the profiles, then the rest upwards.
 std::vector<std::uint8_t> likely_stations(const profile::Catalogue& profiles,
                                           const Settings& settings);
 
-/// The panel's manual offers this format.
+/// The panel's manual offers this format. Of ASCII manuals say nothing.
 bool offers(const profile::PanelProfile& panel, const SerialFormat& format);
 /// The likeliest format that all of these offer: what a remote line is probably set to.
 std::optional<SerialFormat> common_format(const profile::Catalogue& profiles,
@@ -44,6 +47,8 @@ struct Cell {
 class SearchPlan {
   public:
     SearchPlan(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
+    /// When nobody has answered at all: the same in other formats.
+    void add(const std::vector<SerialFormat>& formats, const std::vector<std::uint8_t>& stations);
     /// When nobody has answered at all: where a panel may be that has the CRC's high byte first.
     void add_high_first(const profile::Catalogue& profiles, const Settings& settings,
                         const std::vector<SerialFormat>& formats,

@@ -111,7 +111,8 @@ std::string yaml_serial(const Result& result) {
     const SerialFormat& format = *result.format;
     const std::string supposed =
         result.remote ? "    # what the far end is set to; supposed from the panels found\n" : "";
-    return supposed + "    serial: {baud: " + std::to_string(format.baud) +
+    const std::string mode = format.mode == SerialMode::ascii ? "mode: ascii, " : "";
+    return supposed + "    serial: {" + mode + "baud: " + std::to_string(format.baud) +
            ", data_bits: " + std::to_string(format.data_bits) +
            ", parity: " + to_string(format.parity) +
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
@@ -147,7 +148,7 @@ std::string talk_text(const Talk& talk) {
 std::string nothing_answered(const Result& result) {
     if (result.damaged_formats.empty()) {
         return "nothing answered: is the device the right one, are A and B swapped, are the panels "
-               "powered and set to Modbus RTU? --stations 1-247 asks further addresses";
+               "powered and set to Modbus RTU or ASCII? --stations 1-247 asks further addresses";
     }
     std::string formats;
     for (const SerialFormat& format : result.damaged_formats)

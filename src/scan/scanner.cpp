@@ -25,6 +25,9 @@ Scanner::State::State(const profile::Catalogue& catalogue, Settings s, TimePoint
       format(formats.front()),
       not_before(now) {
     plan.add_high_first(profiles, settings, formats, stations);
+    const std::vector<SerialFormat> ascii = ascii_formats(settings);
+    plan.add(ascii, stations);
+    formats.insert(formats.end(), ascii.begin(), ascii.end());
     if (!settings.remote) actions.emplace_back(SetFormat{format});
     result.remote = settings.remote;
     listen(now, settings.listen);
@@ -43,6 +46,8 @@ void Scanner::State::set_format(TimePoint now, const SerialFormat& wanted) {
     if (wanted == format) return;
     format = wanted;
     asked.reset();
+    transcript.cut();
+    if (settings.remote) return;  // only what is said changes
     actions.emplace_back(SetFormat{format});
     not_before = now + settings.after_format;
 }
@@ -118,7 +123,8 @@ void Scanner::State::transmit(TimePoint now, const Ask& wanted, Purpose why) {
     purpose = why;
     asked.set(wanted.request.station());
     attempt = std::make_unique<Attempt>(wanted.request, format, now, patience);
-    actions.emplace_back(Transmit{wanted.request});
+    transcript.cut();
+    actions.emplace_back(Transmit{wanted.request, format.mode});
 }
 
 void Scanner::State::finish_attempt() {
@@ -160,9 +166,7 @@ void Scanner::State::ask_again_later(std::uint8_t station) {
 
 /// It is silent to what all others understand.
 void Scanner::State::try_high_first(std::uint8_t station) {
-    if (orders.of(station) == modbus::CrcOrder::high_first ||
-        !may_be_high_first(profiles, station, known_format()))
-        return;
+    if (orders.of(station) == modbus::CrcOrder::high_first || !may_be_old(station)) return;
     orders.set(station, modbus::CrcOrder::high_first);
     high_first_pass.push_back(station);
 }
@@ -227,14 +231,30 @@ std::optional<SerialFormat> Scanner::State::known_format() const {
     return settings.remote ? std::nullopt : std::optional(format);
 }
 
+bool Scanner::State::may_be_old(std::uint8_t station) const {
+    if (format.mode == SerialMode::ascii) return false;
+    return may_be_high_first(profiles, station, known_format());
+}
+
+void Scanner::State::take_in(TimePoint now, ByteView bytes) {
+    if (attempt) return attempt->on_rx(now, bytes);
+    if (phase != Phase::listening) return;  // of the format before
+    append_up_to(kMaxHeard, heard, bytes);
+}
+
+Bytes on_wire(const Transmit& transmit) {
+    const Bytes& adu = transmit.request.adu();
+    return transmit.mode == SerialMode::ascii ? modbus::to_ascii(adu) : adu;
+}
+
 Scanner::Scanner(const profile::Catalogue& profiles, Settings settings, TimePoint now)
     : state_(std::make_unique<State>(profiles, std::move(settings), now)) {}
 Scanner::~Scanner() = default;
 
 void Scanner::on_rx(TimePoint now, ByteView bytes) {
-    if (state_->attempt) return state_->attempt->on_rx(now, bytes);
-    if (state_->phase != State::Phase::listening) return;  // of the format before
-    append_up_to(kMaxHeard, state_->heard, bytes);
+    if (state_->format.mode == SerialMode::rtu) return state_->take_in(now, bytes);
+    state_->transcript.feed(now, bytes);
+    while (const auto piece = state_->transcript.next()) state_->take_in(now, piece->bytes);
 }
 
 void Scanner::on_deadline(TimePoint now) {

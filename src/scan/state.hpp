@@ -10,6 +10,7 @@
 
 #include "attempt.hpp"
 #include "examination.hpp"
+#include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/scan/scanner.hpp"
 #include "plan.hpp"
 
@@ -61,6 +62,10 @@ struct Scanner::State {
     void settle();
     void found(std::uint8_t station);
     std::optional<SerialFormat> known_format() const;
+    /// May have the CRC's high byte first, as far as is known of the format.
+    bool may_be_old(std::uint8_t station) const;
+    /// What is heard in this format, as RTU says it.
+    void take_in(TimePoint now, ByteView bytes);
     Duration asking_cost() const;
     std::string activity() const;
 
@@ -76,6 +81,8 @@ struct Scanner::State {
     Phase phase = Phase::listening;
     SerialFormat format;  ///< of the line, now
     TimePoint not_before;
+    /// Of what is heard since the format was set, or a request was sent.
+    modbus::AsciiTranscript transcript{modbus::HexDigits::any_case};
 
     std::size_t listening_at = 0;  ///< index of formats
     bool listened_again = false;

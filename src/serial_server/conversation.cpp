@@ -48,8 +48,9 @@ void Conversation::on_line_down() {
     reset();
 }
 
+/// When bytes were looked at is known, and not when they came: a time that has passed before them
+/// counts for nothing, unless somebody looked and there were none.
 void Conversation::on_rx(TimePoint now, ByteView bytes) {
-    if (echo_until_ && now > *echo_until_) end_echo(now);
     const ByteView rest = echo_.feed(bytes);
     if (echo_until_ && echo_.complete()) {
         if (echo_teaches_) echo_state_ = EchoState::present;
@@ -59,7 +60,6 @@ void Conversation::on_rx(TimePoint now, ByteView bytes) {
 }
 
 void Conversation::hear(TimePoint now, ByteView bytes) {
-    look_at_silence(now);  // before these: nobody may have had the time
     heard_at_ = now;
     was_silent_ = false;
     unexplained_ += bytes.size();
@@ -109,7 +109,8 @@ void Conversation::supersede() {
 /// Behind it, what is pending gets nothing more.
 Duration Conversation::pause() const {
     if (settings_.access.framing == modbus::Framing::ascii) return settings_.access.ascii_pause;
-    if (hearing_->pending() < modbus::kMinAdu) return settings_.glitch + silence_;
+    const bool begun = hearing_->pending() >= modbus::kMinAdu || hearing_->knows_rest();
+    if (!begun) return settings_.glitch + silence_;
     return settings_.hole + wire_time(settings_.device.serial, kChunk);
 }
 
@@ -129,6 +130,7 @@ void Conversation::look_at_silence(TimePoint now) {
 /// taken for its answer. What is shorter is a glitch.
 void Conversation::judge_noise() {
     if (hearing_->pending() > 0) return;
+    disturbed_ = disturbed_ || unexplained_ > 0;
     if (std::exchange(unexplained_, 0) >= modbus::kMinAdu) supersede();
 }
 
@@ -151,10 +153,12 @@ void Conversation::on_deadline(TimePoint now) {
     try_send(now);
 }
 
-/// What looked like the beginning of an echo was the master's.
+/// What looked like the beginning of an echo was the master's. Damage may have been the echo, which
+/// met something that the master said.
 void Conversation::end_echo(TimePoint now) {
     const Bytes held = echo_.release();
-    if (held.empty() && echo_teaches_ && settings_.echo == EchoMode::automatic)
+    const bool clear = held.empty() && unexplained_ == 0 && !disturbed_;
+    if (clear && echo_teaches_ && settings_.echo == EchoMode::automatic)
         echo_state_ = EchoState::absent;
     echo_ = {};
     echo_until_.reset();
@@ -172,6 +176,7 @@ void Conversation::watch_echo(TimePoint now, const Bytes& sent) {
     if (!watch) return;
     echo_ = arbiter::EchoFilter(sent, arbiter::EchoFilter::Expect::perhaps);
     echo_until_ = std::max(now, sent_by_) + settings_.hole;
+    disturbed_ = false;
 }
 
 /// Bytes that may become a frame are waited for.

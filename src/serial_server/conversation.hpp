@@ -98,6 +98,7 @@ class Conversation {
     arbiter::EchoFilter echo_;     ///< of it
     std::optional<TimePoint> echo_until_;
     bool echo_teaches_ = false;  ///< its echo could be nothing else
+    bool disturbed_ = false;     ///< there was noise since it was sent
     EchoState echo_state_ = EchoState::unknown;
     bool finishing_ = false;
     Counters counters_;

@@ -23,6 +23,7 @@ class AsciiHearing final : public Hearing {
         framer_ = fresh_;
     }
     std::size_t pending() const override { return framer_.partial() ? modbus::kMinAsciiAdu : 0; }
+    bool knows_rest() const override { return framer_.partial(); }
     std::size_t take_faults() override {
         return framer_.take_faults() + std::exchange(dropped_, 0);
     }

@@ -30,6 +30,8 @@ class Hearing {
     virtual void drop_pending() = 0;
     /// Bytes that may become a frame, or a part of one.
     virtual std::size_t pending() const = 0;
+    /// What is pending tells that it goes on, and how far: a silence is only a hole in it.
+    virtual bool knows_rest() const = 0;
     /// How often something was no good, since the last call.
     virtual std::size_t take_faults() = 0;
 };

@@ -11,12 +11,6 @@ namespace {
 
 using Length = modbus::ReplyLength;
 
-/// 08/0000 with one word of data, as nearly all are.
-bool is_usual_loopback(ByteView b) {
-    constexpr std::size_t kSize = modbus::kReadRequestAdu;
-    return b.size() >= kSize && b[1] == modbus::kDiagnostics && modbus::crc_ok(b.first(kSize));
-}
-
 }  // namespace
 
 void RtuHearing::feed(TimePoint, ByteView bytes) {
@@ -40,7 +34,7 @@ std::optional<modbus::SerialAdu> RtuHearing::next() {
 }
 
 RtuHearing::Judgement RtuHearing::judge(ByteView start, bool aligned) const {
-    const Judgement request = weigh(modbus::request_length(start), start, aligned);
+    const Judgement request = weigh(modbus::usual_request_length(start), start, aligned);
     if (request.kind == Judgement::Kind::frame || concerns_us(start[0])) return request;
     const Judgement reply = weigh(modbus::reply_length(start), start, aligned);
     return reply.kind == Judgement::Kind::nothing ? request : reply;
@@ -51,7 +45,6 @@ RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool alig
     if (length.kind == Length::Kind::need_more)
         return {silent_ && !aligned ? Kind::nothing : Kind::open};
     if (length.kind == Length::Kind::by_silence) {
-        if (is_usual_loopback(start)) return {Kind::frame, modbus::kReadRequestAdu};
         const bool may_be = aligned && start.size() <= modbus::kMaxRtuAdu;
         if (may_be && silent_ && modbus::crc_ok(start)) return {Kind::frame, start.size()};
         return {may_be ? Kind::open : Kind::nothing};
@@ -68,15 +61,17 @@ void RtuHearing::on_silence() {
     if (!knows_rest()) step_to_last();
 }
 
-/// By its header, the front is a frame that goes on: a silence is only a hole in it.
+/// By its header. An exception is too short to hide anything, and glitches look like one.
 bool RtuHearing::knows_rest() const {
     const ByteView all = heard_.view();
+    if (all.empty()) return false;
     const auto goes_on = [&](const Length& length) {
         return length.kind == Length::Kind::known && length.length > all.size() &&
                length.length <= modbus::kMaxLongRtuAdu;
     };
     if (goes_on(modbus::request_length(all))) return true;
-    return !concerns_us(all[0]) && goes_on(modbus::reply_length(all));
+    const bool exception = all.size() > 1 && (all[1] & modbus::kExceptionBit) != 0;
+    return !exception && !concerns_us(all[0]) && goes_on(modbus::reply_length(all));
 }
 
 /// What waits for more gives way to a good frame that ends with what was heard.
@@ -93,10 +88,7 @@ bool RtuHearing::step_to_last() {
 }
 
 modbus::SerialAdu RtuHearing::take(std::size_t size) {
-    const modbus::RtuFrame frame = *modbus::decode_adu(heard_.view().first(size));
-    modbus::SerialAdu adu;
-    adu.station = frame.station;
-    adu.pdu.assign(frame.pdu.begin(), frame.pdu.end());
+    modbus::SerialAdu adu = modbus::serial_adu_of(heard_.view().first(size));
     heard_.take(size);
     aligned_ = true;
     return adu;

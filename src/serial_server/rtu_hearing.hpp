@@ -26,6 +26,7 @@ class RtuHearing final : public Hearing {
     void on_silence() override;
     void drop_pending() override;
     std::size_t pending() const override { return heard_.size(); }
+    bool knows_rest() const override;
     std::size_t take_faults() override;
 
   private:
@@ -37,7 +38,6 @@ class RtuHearing final : public Hearing {
     bool concerns_us(std::uint8_t station) const { return station == 0 || served_[station]; }
     Judgement judge(ByteView start, bool aligned) const;
     Judgement weigh(modbus::ReplyLength length, ByteView start, bool aligned) const;
-    bool knows_rest() const;
     bool step_to_last();
     modbus::SerialAdu take(std::size_t size);
     void step_over(std::size_t count);

@@ -6,12 +6,14 @@
 namespace panelgate::sim {
 namespace {
 
-constexpr std::size_t kDataBits = 8;
+std::size_t data_bits(const SerialFormat& format) {
+    return static_cast<std::size_t>(format.data_bits);
+}
 
 /// The levels of one character: start bit 0, data from the least significant bit, parity, stop 1.
 void append_character(std::vector<bool>& levels, std::uint8_t byte, const SerialFormat& format) {
     levels.push_back(false);
-    for (std::size_t i = 0; i < kDataBits; ++i) levels.push_back((byte >> i & 1) != 0);
+    for (std::size_t i = 0; i < data_bits(format); ++i) levels.push_back((byte >> i & 1) != 0);
     const bool odd_ones = std::popcount(byte) % 2 != 0;
     if (format.parity == Parity::even) levels.push_back(odd_ones);
     if (format.parity == Parity::odd) levels.push_back(!odd_ones);
@@ -40,11 +42,12 @@ HeardBytes collide(ByteView first, ByteView second, std::size_t later, const Ser
             continue;
         }
         unsigned byte = 0;
-        for (std::size_t i = 0; i < kDataBits; ++i) byte |= (line[at + 1 + i] ? 1u : 0u) << i;
+        for (std::size_t i = 0; i < data_bits(format); ++i)
+            byte |= (line[at + 1 + i] ? 1u : 0u) << i;
         heard.bytes.push_back(static_cast<std::uint8_t>(byte));
         heard.ends.push_back(static_cast<std::uint32_t>(at + character));
-        at +=
-            1 + kDataBits + (format.parity == Parity::none ? 0 : 1);  // a stop bit of 0 starts one
+        // A stop bit of 0 starts one.
+        at += 1 + data_bits(format) + (format.parity == Parity::none ? 0 : 1);
     }
     return heard;
 }

@@ -9,6 +9,7 @@
 
 #include "panelgate/base/number_text.hpp"
 #include "panelgate/base/suggest.hpp"
+#include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/sim/collision.hpp"
 
@@ -114,12 +115,13 @@ Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
     if (happens(faults.late)) spoken.delay += faults.late_by;
     if (happens(faults.foreign_id)) {
         const auto other = static_cast<std::uint8_t>(spoken.adu[0] == 247 ? 1 : spoken.adu[0] + 1);
-        spoken.adu = modbus::encode_adu(
-            other, ByteView(spoken.adu).subspan(1, spoken.adu.size() - modbus::kAduOverhead));
+        spoken.adu = modbus::encode_adu(other, modbus::pdu_of(spoken.adu));
     }
+    const bool ascii = format.mode == SerialMode::ascii;
+    if (ascii) spoken.adu = modbus::to_ascii(spoken.adu);
     if (happens(faults.damage)) {
         std::uniform_int_distribution<std::size_t> place(0, spoken.adu.size() - 1);
-        spoken.adu[place(chance)] ^= 0x10;
+        spoken.adu[place(chance)] ^= ascii ? 0x01 : 0x10;  // mostly another digit
     }
     if (happens(faults.truncate)) spoken.adu.resize((spoken.adu.size() + 1) / 2);
     if (happens(faults.duplicate)) answer_twice(spoken, chance, format);

@@ -10,6 +10,7 @@
 
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/termios_setup.hpp"
+#include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::sim {
@@ -20,6 +21,8 @@ using boost::system::error_code;
 namespace {
 
 constexpr std::size_t kMaxRequest = 520;  // the GT's 512 bytes, and what shows that it was more
+constexpr std::size_t kMaxAsciiRequest = 2 * kMaxRequest + 1;
+constexpr Duration kAsciiPause = 1s;  // the longest between two characters (SL 2.5.2.1)
 constexpr Duration kTick = 1ms;  // reply bytes are handed over at this grain, the last one exactly
 
 }  // namespace
@@ -40,7 +43,9 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     void read_all();
     void hear(TimePoint now, ByteView bytes);
     void at(TimePoint when, void (State::*next)());
+    TimePoint request_over() const;
     void request_ended();
+    Bytes heard_adu(Bytes wire) const;
     Bytes reply_to(ByteView adu);
     void speak(Spoken spoken);
     TimePoint end_of(std::size_t byte) const;
@@ -81,13 +86,41 @@ void SimulatedBus::State::read_all() {
 
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     if (!reply.empty()) return;  // a collision: neither side understands the other
+    const auto colon = std::find(bytes.rbegin(), bytes.rend(), ':');
+    if (settings.serial.mode == SerialMode::ascii && colon != bytes.rend()) {  // it begins anew
+        request.clear();
+        bytes = bytes.last(static_cast<std::size_t>(colon - bytes.rbegin()) + 1);
+    }
     const bool first = request.empty();
     foreign_format = (!first && foreign_format) || !line::tty_speaks(pty.master(), settings.serial);
     longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
-    append_up_to(kMaxRequest, request, bytes);
-    at(request_end + silent_interval(settings.serial), &State::request_ended);
+    const bool ascii = settings.serial.mode == SerialMode::ascii;
+    append_up_to(ascii ? kMaxAsciiRequest : kMaxRequest, request, bytes);
+    at(request_over(), &State::request_ended);
+}
+
+/// Silence ends a frame of RTU, its last character one of ASCII.
+TimePoint SimulatedBus::State::request_over() const {
+    const bool open = settings.serial.mode == SerialMode::ascii && request.back() != '\n';
+    return request_end + (open ? kAsciiPause : silent_interval(settings.serial));
+}
+
+/// As RTU says it. In ASCII the last frame, if there is one.
+Bytes SimulatedBus::State::heard_adu(Bytes wire) const {
+    if (settings.serial.mode == SerialMode::rtu) return wire;
+    modbus::AsciiTranscript transcript(modbus::HexDigits::upper_only);
+    transcript.feed(request_end, wire);
+    Bytes open;
+    Bytes frame;
+    while (const auto piece = transcript.next()) {
+        open.insert(open.end(), piece->bytes.begin(), piece->bytes.end());
+        if (piece->end == modbus::AsciiTranscript::Piece::End::none) continue;
+        frame = std::exchange(open, {});
+        if (piece->end == modbus::AsciiTranscript::Piece::End::damage) frame.clear();
+    }
+    return frame;
 }
 
 void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
@@ -95,15 +128,13 @@ void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
 }
 
 void SimulatedBus::State::request_ended() {
-    const Bytes adu = std::exchange(request, {});
-    if (settings.echo && ::write(descriptor.native_handle(), adu.data(), adu.size()) < 0) return;
+    Bytes wire = std::exchange(request, {});
+    if (settings.echo && ::write(descriptor.native_handle(), wire.data(), wire.size()) < 0) return;
     if (foreign_format) return;
-    Spoken spoken{reply_to(adu), {}, {}};
-    if (const auto found = settings.faults.find(adu.empty() ? std::uint8_t{0} : adu[0]);
-        found != settings.faults.end()) {
-        spoken = misbehave(found->second, std::move(spoken.adu), chance, settings.serial);
-    }
-    speak(std::move(spoken));
+    const Bytes adu = heard_adu(std::move(wire));
+    const auto found = settings.faults.find(adu.empty() ? std::uint8_t{0} : adu[0]);
+    const Misbehaviour faults = found == settings.faults.end() ? Misbehaviour{} : found->second;
+    speak(misbehave(faults, reply_to(adu), chance, settings.serial));
 }
 
 void SimulatedBus::State::speak(Spoken spoken) {
@@ -126,7 +157,7 @@ TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
 /// Empty when nobody answers: damage, a broadcast, an address that nobody has.
 Bytes SimulatedBus::State::reply_to(ByteView adu) {
     if (adu.size() < modbus::kMinAdu) return {};
-    const ByteView pdu = adu.subspan(1, adu.size() - modbus::kAduOverhead);
+    const ByteView pdu = modbus::pdu_of(adu);
     const TimePoint now = clock.now();
     const std::int64_t wall = rt::local_wall_seconds();
     Bytes answer;

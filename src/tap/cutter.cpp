@@ -21,12 +21,6 @@ constexpr std::size_t kLongest = modbus::kMaxLongRequestPdu + modbus::kAduOverhe
 /// Of a function without a length rule. The more sizes are tried, the sooner a CRC fits by chance.
 constexpr std::size_t kLongestUnknown = 128;
 
-ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - modbus::kAduOverhead); }
-
-std::uint8_t plain(std::uint8_t function) {
-    return static_cast<std::uint8_t>(function & ~modbus::kExceptionBit);
-}
-
 /// Behind the function, the reply begins as the request does.
 bool is_echoed(std::uint8_t function) {
     return modbus::is_broadcastable(function) || function == modbus::kMaskWriteRegister;
@@ -41,7 +35,8 @@ bool begins_like(ByteView frame, ByteView pdu) {
 
 /// Length of the answer that begins here; nothing when it cannot be one.
 std::optional<ReplyLength> answer_length(const Question& question, ByteView frame) {
-    if (frame[0] != question.station || plain(frame[1]) != question.pdu[0]) return std::nullopt;
+    if (frame[0] != question.station || modbus::plain_function(frame[1]) != question.pdu[0])
+        return std::nullopt;
     const ReplyLength told = modbus::reply_length(frame);
     if (frame[1] != question.pdu[0]) return told;
     if (is_echoed(frame[1]) && !begins_like(frame, question.pdu)) return std::nullopt;
@@ -64,18 +59,10 @@ bool makes_sense(std::uint8_t station, ByteView pdu) {
 
 bool is_exception_known(ByteView frame) {
     constexpr std::uint8_t kLast = 0x0B;  // AP 7
-    return modbus::is_known(plain(frame[1])) && frame[2] >= 1 && frame[2] <= kLast;
+    return modbus::is_known(modbus::plain_function(frame[1])) && frame[2] >= 1 && frame[2] <= kLast;
 }
 
 bool is_exception(ByteView frame) { return (frame[1] & modbus::kExceptionBit) != 0; }
-
-/// 08/0000 may be of any length; nearly all have one word.
-ReplyLength request_length(ByteView frame) {
-    constexpr std::size_t kUsual = modbus::kReadRequestAdu;
-    const bool usual = frame[1] == modbus::kDiagnostics && frame.size() >= kUsual &&
-                       modbus::crc_ok(frame.first(kUsual));
-    return usual ? ReplyLength{ReplyLength::Kind::known, kUsual} : modbus::request_length(frame);
-}
 
 }  // namespace
 
@@ -115,19 +102,19 @@ Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool 
     const Verdict waits{silence ? Verdict::Kind::nothing : Verdict::Kind::open, 0};
     if (frame[0] > modbus::kMaxStation) return {};
     if (frame.size() < 2) return waits;
-    if (plain(frame[1]) == 0) return {};
+    if (modbus::plain_function(frame[1]) == 0) return {};
     const bool aligned = start == 0 && aligned_;
     bool open = false;
     const auto answer = question != nullptr ? answer_length(*question, frame) : std::nullopt;
     if (answer) {
         const std::size_t size = size_of(start, *answer, silence, open);
-        if (size != 0 && modbus::answers(question->pdu, pdu_of(frame.first(size))))
+        if (size != 0 && modbus::answers(question->pdu, modbus::pdu_of(frame.first(size))))
             return {Verdict::Kind::frame, size, Piece::Kind::answer, is_request(start, size)};
         if (open) return waits;
     }
     if (!is_exception(frame)) {
-        const std::size_t size = size_of(start, request_length(frame), silence, open);
-        if (size != 0 && (aligned || makes_sense(frame[0], pdu_of(frame.first(size)))))
+        const std::size_t size = size_of(start, modbus::usual_request_length(frame), silence, open);
+        if (size != 0 && (aligned || makes_sense(frame[0], modbus::pdu_of(frame.first(size)))))
             return {Verdict::Kind::frame, size, Piece::Kind::request};
         // A zero behind a good frame leaves it good: its first seven bytes may pass for a reply.
         if (open) return waits;
@@ -197,7 +184,8 @@ std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
 bool Cutter::goes_on_well(std::size_t start, bool through_another) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     if (frame.size() < modbus::kMinAdu || frame[0] > modbus::kMaxStation) return false;
-    for (const ReplyLength& length : {request_length(frame), modbus::reply_length(frame)}) {
+    for (const ReplyLength& length :
+         {modbus::usual_request_length(frame), modbus::reply_length(frame)}) {
         const bool whole = length.kind == ReplyLength::Kind::known && length.length <= frame.size();
         if (whole && modbus::crc_ok(frame.first(length.length))) return true;
     }
@@ -216,9 +204,9 @@ bool Cutter::is_gap_behind(std::size_t place) const {
 bool Cutter::is_request(std::size_t start, std::size_t size) const {
     const ByteView frame = ByteView(heard_).subspan(start, size);
     if (is_exception(frame)) return false;
-    const ReplyLength length = request_length(frame);
+    const ReplyLength length = modbus::usual_request_length(frame);
     const bool fits = length.kind == ReplyLength::Kind::by_silence || length.length == size;
-    return fits && (!modbus::is_known(frame[1]) || makes_sense(frame[0], pdu_of(frame)));
+    return fits && (!modbus::is_known(frame[1]) || makes_sense(frame[0], modbus::pdu_of(frame)));
 }
 
 Piece Cutter::cut(std::size_t size, const Verdict& verdict) {

@@ -15,9 +15,7 @@ namespace {
 /// Sooner than any master gives up: an adapter's latency timer, and a panel that thinks.
 constexpr Duration kQuickest = 30ms;
 
-ByteView pdu_of(const Piece& piece) {
-    return ByteView(piece.bytes).subspan(1, piece.bytes.size() - modbus::kAduOverhead);
-}
+ByteView pdu_of(const Piece& piece) { return modbus::pdu_of(piece.bytes); }
 
 Bytes copy_of(ByteView bytes) { return Bytes(bytes.begin(), bytes.end()); }
 

@@ -18,8 +18,8 @@ import traceback
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-from measures import (counts, crowd, dead, figures, growth, latency, lines, memory, micro,  # noqa: E402
-                      plot, report, rig, rivals, saturated, scrape)
+from measures import (counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
+                      micro, plot, report, rig, rivals, saturated, scrape)
 
 Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
 Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
@@ -33,6 +33,7 @@ TOPICS = {
     "beside": saturated.measure_beside,
     "latency": latency.measure,
     "crowd": crowd.measure,
+    "master": master.measure,
     "dead": dead.measure,
     "writes": dead.measure_writes,
     "lines": lines.measure,
@@ -45,7 +46,8 @@ TOPICS = {
     "micro": micro.measure,
 }
 BROKEN = "broken off:"
-BARS = [bar for topic in (saturated, latency, crowd, lines, memory, counts, scrape) for bar in topic.BARS]
+BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape)
+        for bar in topic.BARS]
 
 
 def program(text):

@@ -32,7 +32,7 @@ sys.path.insert(0, str(HERE.parents[1] / "system"))
 import config  # noqa: E402
 import harness  # noqa: E402
 import zoo_line  # noqa: E402
-from harness import Output  # noqa: E402
+from harness import Helper  # noqa: E402
 
 BUILT = pathlib.Path(os.environ.get("FOREIGN_BUILT", harness.ROOT / "build/release"))
 SOURCES = HERE.parent / "foreign"
@@ -46,23 +46,6 @@ SLAVES = {"libmodbus": [BUILT / "libmodbus_slave"],
 
 Seen = namedtuple("Seen", "plain gateway ratio failed plain_failed findings")
 Seen.__doc__ = "Good answers a second, the median of their ratios; what went wrong, by kind."
-
-
-class Helper:
-    """A program beside the gateway, ended with the block; `out`: its lines."""
-
-    def __init__(self, command, **options):
-        self.process = subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True, **options)
-        self.out = Output(self.process.stdout)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.stdin.close()
-        self.process.terminate()
-        self.process.wait(harness.PATIENCE)
 
 
 class Master(Helper):

@@ -112,6 +112,8 @@ class Checker : public Witness {
     void check_idling(TimePoint now);
     void check_write_sent(std::uint8_t station, ByteView pdu);
     void check_again(std::uint8_t station, ByteView pdu, FrameKind what);
+    void check_crc(const Bytes& adu);
+    TimePoint behind_broadcasts(const Open& open) const;
     std::optional<TimePoint> good_work_since(TimePoint since) const;
     bool waits_in_order(TimePoint since, arbiter::Ticket ticket, const Open& open) const;
     bool is_noisy(TimePoint now) const;
@@ -155,6 +157,7 @@ class Checker : public Witness {
     std::unordered_set<std::uint8_t> doublers_;       ///< that were heard to say a reply twice
     std::unordered_set<std::uint8_t> retried_;        ///< whose last request was a retry
     std::map<std::uint8_t, Bytes> asked_;             ///< what each station was asked last
+    std::map<Bytes, TimePoint> spread_;  ///< when broadcasts had left, by what would answer them
     std::map<std::uint8_t, TimePoint> excused_from_;  ///< see on_copy()
     std::uint64_t first_copies_ = 0;
     std::uint64_t excused_ = 0;

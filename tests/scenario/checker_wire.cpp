@@ -4,6 +4,8 @@
 
 #include "checker.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "support/read_span.hpp"
 
 namespace panelgate::scenario {
@@ -71,11 +73,12 @@ void Checker::on_copy(TimePoint now, std::uint8_t station) {
 /// Bytes without a pause for longer than any frame: nobody's answer, and no reason to wait
 /// (LAT-02).
 bool Checker::is_noisy(TimePoint now) const {
-    return now >= noisy_since_ + wire_time(settings_.serial, kLongestAdu);
+    return now >= noisy_since_ + frame_time(settings_.serial, kLongestAdu);
 }
 
 void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool dead) {
     check_moment(now);
+    check_crc(adu);
     close_attempt(now);
     check_idling(now);
     ++frames_;
@@ -100,7 +103,7 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     }
     attempt_.station = station;
     attempt_.started = now;
-    attempt_.sent = sent_until_ = now + wire_time(settings_.serial, adu.size());
+    attempt_.sent = sent_until_ = now + frame_time(settings_.serial, adu.size());
     attempt_.dead = dead;
     attempt_.answered = station == kBroadcast;
     attempt_.heard = false;
@@ -115,6 +118,21 @@ void Checker::on_transmit(TimePoint now, const Bytes& adu, FrameKind what, bool 
     if (write) check_write_sent(station, pdu);
     mark_sent(station, pdu, what);
     if (write) truth_.on_write_sent(now, station, pdu);
+    if (station == kBroadcast) spread_[modbus::normal_write_reply(pdu)] = attempt_.sent;
+}
+
+/// A frame whose CRC is in the other order is no frame for its panel; a broadcast can be right for
+/// some.
+void Checker::check_crc(const Bytes& adu) {
+    const auto concerned = [&](const PanelPlan& p) {
+        return adu[0] == kBroadcast || p.id == adu[0];
+    };
+    const auto understands = [&](const PanelPlan& p) {
+        return concerned(p) && modbus::crc_ok(adu, p.crc_order);
+    };
+    if (std::ranges::any_of(plan_.panels, concerned) &&
+        std::ranges::none_of(plan_.panels, understands))
+        fail("P4: a frame that its panel takes for damage");
 }
 
 void Checker::check_moment(TimePoint now) {
@@ -164,7 +182,7 @@ TimePoint Checker::owed_until() const {
 void Checker::check_idling(TimePoint now) {
     // Gaps that were lengthened for what follows replies: at slow rates that takes its own time.
     constexpr std::size_t kReply = 45;
-    const Duration slack = 100ms + wire_time(settings_.serial, kReply);
+    const Duration slack = 100ms + frame_time(settings_.serial, kReply);
     // An answer that repeats another one may be held back for as long as its station needs: it
     // could be a copy of that, with its own still to come (P1).
     const TimePoint held = heard_until_ + watch_.own_slowest(attempt_.station) + 20ms;
@@ -191,10 +209,24 @@ std::optional<TimePoint> Checker::good_work_since(TimePoint since) const {
                           !watch_.is_silent(station) && watch_.is_good(station, since) &&
                           !(o.write && echoes_) && !waits_in_order(since, ticket, o);
         if (!good) continue;
-        const TimePoint from = std::max({since, o.submitted, watch_.rests_until(station)});
+        const TimePoint from =
+            std::max({since, o.submitted, watch_.rests_until(station), behind_broadcasts(o)});
         if (!first || from < *first) first = from;
     }
     return first;
+}
+
+/// P8: until when a panel that answers broadcasts may say what would confirm this write: for as
+/// long as it has ever needed, or, where it does so, as it may be late with anything.
+TimePoint Checker::behind_broadcasts(const Open& open) const {
+    const auto found = open.write ? spread_.find(modbus::normal_write_reply(open.job.request.pdu()))
+                                  : spread_.end();
+    if (found == spread_.end()) return {};
+    const auto panel = std::ranges::find(plan_.panels, open.job.station, &PanelPlan::id);
+    const bool answers = panel != plan_.panels.end() && panel->answers_broadcasts;
+    const Duration timeout = settings_.unlisted.response_timeout;
+    return found->second + (answers ? timeout + settings_.unlisted.late_window.value_or(8 * timeout)
+                                    : 2 * watch_.own_slowest(open.job.station) + 50ms);
 }
 
 /// Its client's broadcast goes before it, and behind a request to a station that is silent.

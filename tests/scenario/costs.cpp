@@ -19,12 +19,12 @@ Costs::Costs(const Plan& plan, const Watch& watch) : settings_(plan.settings), w
 /// Both frames, gaps at both ends, a full receive FIFO, and whatever a gap was lengthened to.
 Duration Costs::frames(const Attempt& attempt) const {
     constexpr std::size_t kShortReply = 60;
-    return attempt.sent - attempt.started + wire_time(settings_.serial, kShortReply) +
+    return attempt.sent - attempt.started + frame_time(settings_.serial, kShortReply) +
            2 * silent_interval(settings_.serial) + 25ms;
 }
 
 Duration Costs::surprise() const {
-    return settings_.unlisted.response_timeout + wire_time(settings_.serial, 60) +
+    return settings_.unlisted.response_timeout + frame_time(settings_.serial, 60) +
            2 * silent_interval(settings_.serial) + 25ms;
 }
 

@@ -89,6 +89,17 @@ TEST(Field, P8OneByteBehindEachReplyLeavesWritesConfirmed) {
     EXPECT_EQ(broken(plan), "");
 }
 
+TEST(Field, P8AnAnswerToABroadcastThatOutlastsTheTurnaroundConfirmsNoWrite) {
+    Plan plan = quiet_line(19200, 2, 120ms);
+    plan.settings.broadcast_turnaround = 20ms;
+    plan.panels[0].answers_broadcasts = true;
+    plan.panels[0].broadcast_think = 100ms;
+    plan.panels[0].drop = 0.5;
+    plan.transactions = 3000;
+    add_client(plan, {1}, 1).broadcasts = 0.3;
+    EXPECT_EQ(broken(plan), "");
+}
+
 TEST(Field, P7APauseInsideAReplyIsPartOfIt) {
     for (const int baud : {2400, 9600, 115200}) {
         Plan plan = quiet_line(baud, 2);

@@ -3,6 +3,8 @@
 #include <utility>
 #include <variant>
 
+#include "panelgate/modbus/rtu_frame.hpp"
+
 namespace panelgate::scenario {
 namespace {
 
@@ -29,15 +31,25 @@ House::House(const HousePlan& plan, HouseSeam::Flaw flaw)
                [this](std::function<void()> call) { reach(std::move(call)); },
                flaw == HouseSeam::Flaw::deaf)),
       seam_(bus_, plan_, judge_, agenda_, flaw),
-      clients_(plan_, agenda_, random_, judge_, make_shared_state(),
+      questions_(random_),
+      clients_(plan_, agenda_, random_, questions_, judge_, make_shared_state(),
                [this](std::function<void()> call) { reach(std::move(call)); }),
       poller_(make_poller()),
       relays_(clock_, routes()) {
     for (const PanelPlan& panel : plan_.line.panels)
         panels_.emplace_back(panel, plan_.line, agenda_, wire_, random_, judge_);
+    if (plan_.master) {
+        if (flaw == HouseSeam::Flaw::serves_others) {
+            plan_.master->serves_others = plan_.master->on_failure_exception = true;
+            plan_.master->others = 0.5;
+        }
+        master_.emplace(plan_, kLine, seam_, clock_, agenda_, questions_, judge_,
+                        [this](std::function<void()> call) { reach(std::move(call)); });
+    }
     if (flaw != HouseSeam::Flaw::untold) hear_write_ = poller_->write_listener();
     wire_.connect([this](ByteView bytes, bool) { line_->come(bytes); },
                   [this](ByteView adu, std::uint64_t connection) {
+                      if (adu[0] == 0) judge_.on_broadcast(modbus::pdu_of(adu));
                       for (Panel& panel : panels_) {
                           if (adu[0] == 0 || panel.id() == adu[0]) panel.hear(adu, connection);
                       }
@@ -138,6 +150,7 @@ void House::run() {
     bus_.start();
     for (Panel& panel : panels_) panel.start();
     clients_.start();
+    if (master_) master_->start();
     poller_->start();
     relays_.start();
     every_so_often(plan_.line.line.losses,
@@ -146,14 +159,17 @@ void House::run() {
     const TimePoint end = agenda_.now() + plan_.length;
     run_until(end, [] { return false; });
     clients_.end();
+    if (master_) master_->end();
     poller_->stop();
     polling_ = false;
     relays_.stop();
     run_until(end + 1min, [this] {
-        return seam_.idle() && clients_.idle() && bus_.idle() && uncalled_.empty();
+        return seam_.idle() && clients_.idle() && is_master_idle() && bus_.idle() &&
+               uncalled_.empty();
     });
     if (!seam_.idle()) judge_.fail("a request was never answered");
     if (!clients_.idle()) judge_.fail("a client was never answered");
+    if (!is_master_idle()) judge_.fail("the port of the serial master still has something to do");
     if (!bus_.idle()) judge_.fail("the bus still has something to do");
 }
 

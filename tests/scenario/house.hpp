@@ -5,13 +5,16 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "agenda.hpp"
 #include "house_clients.hpp"
 #include "house_line.hpp"
+#include "house_master.hpp"
 #include "house_plan.hpp"
+#include "house_questions.hpp"
 #include "house_seam.hpp"
 #include "panel.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -25,7 +28,8 @@
 namespace panelgate::scenario {
 
 /// The gateway's own shells in virtual time, on the wire of a Plan: pipelines of connections, a
-/// poller and a relay over one bus. The loop is a real one whose time is made.
+/// serial master's port, a poller and a relay over one bus. The loop is a real one whose time is
+/// made.
 class House {
   public:
     House(const HousePlan& plan, HouseSeam::Flaw flaw);
@@ -42,6 +46,8 @@ class House {
     std::uint64_t good() const { return judge_.good; }
     std::uint64_t polls() const { return seam_.polls(); }
     std::uint64_t relayed() const { return seam_.relayed(); }
+    /// Answers that a serial master took.
+    std::uint64_t to_master() const { return master_ ? master_->answered() : 0; }
 
   private:
     bus::Settings bus_settings();
@@ -52,6 +58,7 @@ class House {
     void judge_poll(std::uint8_t station, const std::vector<std::size_t>& wants);
     void judge_points();
 
+    bool is_master_idle() const { return !master_ || master_->idle(); }
     void settle();
     bool step(TimePoint until);
     void run_until(TimePoint until, const std::function<bool()>& done);
@@ -72,7 +79,9 @@ class House {
     std::function<void(const bus::WriteEvent&)> hear_write_;  ///< the bus tells to its end
     bus::Bus bus_;
     HouseSeam seam_;
+    Questions questions_;
     HouseClients clients_;
+    std::optional<HouseMaster> master_;
     std::unique_ptr<points::Poller> poller_;
     points::Relays relays_;
     std::uint64_t judged_ = 0;  ///< answers, when the points were last looked at

@@ -43,7 +43,8 @@ void HouseClients::ask(Client& client) {
         if (!client.pipeline->has_room()) return;
         const std::uint8_t unit = draw_unit(client);
         const bool write = unit == 0 || random_.chance(client.plan.writes);
-        const Bytes pdu = write ? draw_write() : draw_read(client);
+        const Bytes pdu = write ? questions_.write() : draw_read(client);
+        if (write) judge_.allow_write(unit, pdu);
         client.open.push_back({judge_.ask(unit, pdu), ++client.transaction});
         agenda_.tell("client asks unit " + std::to_string(unit), pdu);
         client.pipeline->take({client.transaction, unit, pdu});
@@ -112,24 +113,9 @@ std::uint8_t HouseClients::draw_unit(Client& client) {
     return client.plan.stations[random_.below(count)];
 }
 
-/// Few addresses, so that reads are equal, contained and adjacent often.
 Bytes HouseClients::draw_read(const Client& client) {
-    constexpr unsigned kBusyCells = 16;
     if (client.plan.scans) return Writer().u8(3).u16(0).u16(1).take();
-    if (random_.chance(0.2))
-        return Writer().u8(3).u16(kMemory + random_.below(kBusyCells)).u16(2).take();
-    const unsigned function = random_.chance(0.8) ? 3 : 4;
-    const unsigned count = random_.chance(0.5) ? 4 : random_.between(1, 10);
-    return Writer().u8(function).u16(10 * random_.below(12)).u16(count).take();
-}
-
-/// Every write is another one, so that one that comes twice is seen.
-Bytes HouseClients::draw_write() {
-    const unsigned id = ++last_write_ & 0xFFFF;
-    const unsigned cell = kMemory + random_.below(16);
-    if (random_.chance(0.4)) return Writer().u8(5).u16(id).u16(0xFF00).take();
-    if (random_.chance(0.5)) return Writer().u8(6).u16(cell).u16(id).take();
-    return Writer().u8(16).u16(cell).u16(2).u8(4).u16(id).u16(~id & 0xFFFF).take();
+    return questions_.read();
 }
 
 }  // namespace panelgate::scenario

@@ -9,6 +9,7 @@
 
 #include "agenda.hpp"
 #include "house_plan.hpp"
+#include "house_questions.hpp"
 #include "house_seam.hpp"
 #include "pipeline.hpp"
 #include "random.hpp"
@@ -24,11 +25,12 @@ class HouseClients {
     /// As soon as the process runs.
     using Reach = std::function<void(std::function<void()>)>;
 
-    HouseClients(const HousePlan& plan, Agenda& agenda, Random& random, HouseJudge& judge,
-                 std::shared_ptr<tcp_server::Shared> shared, Reach reach)
+    HouseClients(const HousePlan& plan, Agenda& agenda, Random& random, Questions& questions,
+                 HouseJudge& judge, std::shared_ptr<tcp_server::Shared> shared, Reach reach)
         : plan_(plan),
           agenda_(agenda),
           random_(random),
+          questions_(questions),
           judge_(judge),
           shared_(std::move(shared)),
           reach_(std::move(reach)) {}
@@ -61,16 +63,15 @@ class HouseClients {
     void leave_some_time(Client& client);
     std::uint8_t draw_unit(Client& client);
     Bytes draw_read(const Client& client);
-    Bytes draw_write();
 
     const HousePlan& plan_;
     Agenda& agenda_;
     Random& random_;
+    Questions& questions_;
     HouseJudge& judge_;
     std::shared_ptr<tcp_server::Shared> shared_;
     Reach reach_;
     std::list<Client> clients_;
-    unsigned last_write_ = 0;
     unsigned connections_ = 0;
     bool ended_ = false;
 };

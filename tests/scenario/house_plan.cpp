@@ -21,6 +21,8 @@ std::string_view label(HouseKind kind) {
             return "memory";
         case HouseKind::loss:
             return "loss";
+        case HouseKind::master:
+            return "master";
     }
     std::abort();
 }
@@ -40,6 +42,8 @@ Kind line_of(HouseKind kind, Random& random) {
             return Kind::crowd;
         case HouseKind::loss:
             return Kind::loss;
+        case HouseKind::master:
+            return random.chance(0.5) ? Kind::voices : Kind::faults;
     }
     std::abort();
 }
@@ -73,6 +77,48 @@ void leave_out_copies(Plan& plan) {
     for (PanelPlan& panel : plan.panels) panel.duplicate = panel.damaged_first = 0;
 }
 
+Duration timeout_of(Random& random, Manner manner) {
+    switch (manner) {
+        case Manner::libmodbus:
+            return random.chance(0.5) ? 500ms : random.between(300ms, 5s);
+        case Manner::mbpoll:
+            return 1s;
+        case Manner::impatient:
+            return random.between(20ms, 200ms);
+    }
+    std::abort();
+}
+
+/// Of its own, so that the rest of the house is what it is without.
+MasterPlan draw_master(std::uint64_t seed, Duration deadline) {
+    constexpr int kRates[] = {9600, 19200, 38400, 115200};
+    Random random(seed ^ 0x3A57E2);
+    MasterPlan master;
+    master.port.settings.serial.baud = kRates[random.below(4)];
+    master.port.settings.serial.parity = random.chance(0.5) ? Parity::even : Parity::none;
+    master.port.line.echo = random.chance(0.3);
+    master.manner = static_cast<Manner>(random.below(3));
+    master.timeout = timeout_of(random, master.manner);
+    master.pause = random.chance(0.5) ? random.between(2ms, 20ms) : random.between(2ms, 500ms);
+    master.tells_timeout = random.chance(0.3);
+    master.on_failure_exception = random.chance(0.4);
+    const bool good = master.manner != Manner::impatient && random.chance(0.4);
+    const auto maybe = [&](double most) { return random.chance(0.4) ? random.share() * most : 0; };
+    master.writes = maybe(0.5);
+    master.broadcasts = maybe(0.1);
+    master.others = maybe(0.3);
+    if (good) {
+        master.on_failure_exception = true;
+        master.timeout = deadline + random.between(400ms, Duration(1s));
+        return master;
+    }
+    master.damaged = maybe(0.2);
+    master.pieces = maybe(0.3);
+    master.glitches = maybe(0.2);
+    master.talks_over = master.manner == Manner::impatient ? 0.3 : maybe(0.1);
+    return master;
+}
+
 }  // namespace
 
 HousePlan draw_house(HouseKind kind, std::uint64_t seed) {
@@ -88,6 +134,8 @@ HousePlan draw_house(HouseKind kind, std::uint64_t seed) {
         const Duration usual = random.chance(0.5) ? random.between(20ms, 2s) : Duration{};
         house.polled.push_back(house.calm ? Duration(1ms) : usual);
     }
+    if (kind == HouseKind::master || (!house.calm && seed % 3 == 1))
+        house.master = draw_master(seed, house.line.settings.queue.deadline);
     house.relay = !house.calm && house.line.panels.size() > 1 && random.chance(0.7);
     return house;
 }

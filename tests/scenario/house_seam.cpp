@@ -22,8 +22,20 @@ constexpr Duration kSlack = 2ms;
 
 void HouseJudge::on_executed(TimePoint now, std::uint8_t station, ByteView pdu) {
     truth_.on_executed(now, station, pdu);
-    if (never_sent_.contains(scenario::key_of(station, pdu)))
-        fail("P2: a write was executed that was answered as never sent");
+    const std::string key = scenario::key_of(station, pdu);
+    if (never_sent_.contains(key)) fail("P2: a write was executed that was answered as never sent");
+    const auto found =
+        std::ranges::find(plan_.line.settings.stations, station, &arbiter::StationSettings::id);
+    if (found != plan_.line.settings.stations.end() && found->retry_writes) return;
+    const auto allowed = allowed_.find(Bytes(pdu.begin(), pdu.end()));
+    if (allowed != allowed_.end() && ++executed_[key] > allowed->second)
+        fail("P2: a write was executed more often than it was asked for");
+}
+
+void HouseJudge::on_broadcast(ByteView pdu) {
+    const Bytes all(pdu.begin(), pdu.end());
+    if (++spread_[all] > allowed_[all])
+        fail("P2: a broadcast went out more often than it was asked for");
 }
 
 std::optional<Duration> HouseJudge::max_age(std::uint8_t station) const {
@@ -98,8 +110,10 @@ void HouseSeam::transact(bus::Request request, bus::AnswerHandler handler) {
     Open open{judge_.ask(request.station, request.request.pdu()), request.client, request.poll,
               polls_};
     if (open.poll) judge_relay(open);
+    judge_master(open);
     const std::uint64_t id = ++last_;
     open_[id] = open;
+    ask_twice(request);
     if (flaw_ == Flaw::polls_first && open.poll) request.poll = false;
     if (flaw_ == Flaw::answers_at_once && id % 50 == 0) {
         inside_ = true;
@@ -138,11 +152,61 @@ void HouseSeam::hand_over(const Open& open, bus::Answer answer, const bus::Answe
         const std::string key = key_of(open.question.station, open.question.pdu);
         answer = remembered_.try_emplace(key, answer).first->second;
     }
+    if (is_masters(open) && flaw_ == Flaw::silent_to_masters && id % 20 == 0)
+        return on_answer(id, answer);
+    if (is_masters(open) && flaw_ == Flaw::answers_the_next) {
+        const bool given_up = open_.at(id).withdrawn;
+        on_answer(id, answer);
+        if (spoils_master(open, given_up, answer)) handler(std::move(answer));
+        return;
+    }
     const int times = flaw_ == Flaw::answers_twice && id % 50 == 0 ? 2 : 1;
     for (int i = 0; i < times; ++i) {
         on_answer(id, answer);
         handler(answer);
     }
+}
+
+void HouseSeam::name_client(bus::ClientId client, std::string name) {
+    if (name.starts_with("serial ")) masters_.insert(client);
+    bus_.name_client(client, std::move(name));
+}
+
+void HouseSeam::cancel(bus::ClientId client) {
+    if (flaw_ == Flaw::keeps_withdrawn && masters_.contains(client)) return;
+    for (auto& [id, open] : open_) open.withdrawn = open.withdrawn || open.client == client;
+    bus_.cancel(client);
+}
+
+/// Who is alone on its line has one request open at most: what it says next gives up the one
+/// before.
+void HouseSeam::judge_master(const Open& open) {
+    if (!is_masters(open)) return;
+    const bool second = std::ranges::any_of(open_, [&](const auto& entry) {
+        const Open& other = entry.second;
+        return other.client == open.client && other.question.station != 0 && !other.withdrawn;
+    });
+    if (second) judge_.fail("two requests of a serial master are open at once");
+}
+
+/// Broken on purpose: the reply to what was given up is told as that to what is asked now. False:
+/// this answer is kept for it.
+bool HouseSeam::spoils_master(const Open& open, bool given_up, bus::Answer& answer) {
+    if (open.question.pdu[0] > 4 || !answer.pdu) return true;
+    if (given_up) {
+        given_up_ = std::move(answer);
+        return false;
+    }
+    if (given_up_) answer = *std::exchange(given_up_, std::nullopt);
+    return true;
+}
+
+void HouseSeam::ask_twice(const bus::Request& request) {
+    const bool spreads = flaw_ == Flaw::spreads_twice && request.station == 0;
+    const bool writes =
+        flaw_ == Flaw::writes_twice && request.station != 0 && !request.request.is_read();
+    if (masters_.contains(request.client) && (spreads || writes))
+        bus_.transact(request, [](const bus::Answer&) {});
 }
 
 void HouseSeam::on_answer(std::uint64_t id, const bus::Answer& answer) {

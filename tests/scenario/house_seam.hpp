@@ -51,10 +51,20 @@ class HouseJudge final : public Witness {
     std::optional<Duration> max_age(std::uint8_t station) const;
     /// Nobody ran the loop between these two.
     void on_paused(TimePoint from, TimePoint to) { pauses_.emplace_back(from, to); }
+    /// Somebody says this write, which nobody else says: each may execute it once more.
+    void allow_write(std::uint8_t station, const Bytes& pdu) {
+        never_sent_.erase(scenario::key_of(station, pdu));
+        ++allowed_[pdu];
+    }
+    /// P2: a broadcast leaves on the line.
+    void on_broadcast(ByteView pdu);
     /// P3: answered by `deadline`, or as soon as the process ran again.
     bool in_time(TimePoint deadline) const;
     /// P2: this write was answered as one that never left.
-    void on_never_sent(const Question& question) { never_sent_.insert(key_of(question)); }
+    void on_never_sent(const Question& question) {
+        const auto allowed = allowed_.find(question.pdu);
+        if (allowed == allowed_.end() || allowed->second == 1) never_sent_.insert(key_of(question));
+    }
 
     void fail(std::string what) {
         if (violation_.empty()) violation_ = std::move(what);
@@ -74,6 +84,9 @@ class HouseJudge final : public Witness {
     std::uint64_t garbled_ = 0;
     std::set<Bytes> lucky_;
     std::set<std::string> never_sent_;
+    std::map<Bytes, unsigned> allowed_;         ///< how often each write was asked for
+    std::map<Bytes, unsigned> spread_;          ///< how often each broadcast has left
+    std::map<std::string, unsigned> executed_;  ///< how often each write was executed
     std::vector<std::pair<TimePoint, TimePoint>> pauses_;
     std::string violation_;
 };
@@ -91,14 +104,21 @@ class HouseSeam final : public bus::BusClient {
         remembers,          ///< a reply longer than it may
         polls_first,        ///< a poll gives way to nobody
         deaf,               ///< the driver does not read before it looks at the clock
-        untold              ///< the poller does not hear of writes
+        untold,             ///< the poller does not hear of writes
+        keeps_withdrawn,    ///< a serial master's request stays when it says something else
+        answers_the_next,   ///< a serial master's with the reply to the one it gave up
+        spreads_twice,      ///< a serial master's broadcast
+        writes_twice,       ///< what a serial master writes
+        silent_to_masters,  ///< serial ones, now and then
+        serves_others       ///< answers for a slave on the master's own wire
     };
     HouseSeam(bus::BusClient& bus, const HousePlan& plan, HouseJudge& judge, const Agenda& agenda,
               Flaw flaw)
         : bus_(bus), plan_(plan), judge_(judge), agenda_(agenda), flaw_(flaw) {}
 
     void transact(bus::Request request, bus::AnswerHandler handler) override;
-    void cancel(bus::ClientId client) override { bus_.cancel(client); }
+    void cancel(bus::ClientId client) override;
+    void name_client(bus::ClientId client, std::string name) override;
     bus::LineStatus status() const override { return bus_.status(); }
     bus::StationStatus station_status(std::uint8_t station) const override {
         return bus_.station_status(station);
@@ -116,7 +136,14 @@ class HouseSeam final : public bus::BusClient {
         bus::ClientId client = 0;
         bool poll = false;
         std::uint64_t polls = 0;  ///< answered before
+        bool withdrawn = false;
     };
+    bool is_masters(const Open& open) const {
+        return masters_.contains(open.client) && open.question.station != 0;
+    }
+    void judge_master(const Open& open);
+    bool spoils_master(const Open& open, bool given_up, bus::Answer& answer);
+    void ask_twice(const bus::Request& request);
     void on_answer(std::uint64_t id, const bus::Answer& answer);
     void judge(const Open& open, const bus::Answer& answer);
     void judge_relay(const Open& open);
@@ -138,6 +165,8 @@ class HouseSeam final : public bus::BusClient {
     TimePoint relay_asked_{};
     std::optional<bus::Answer> last_read_;
     std::map<std::string, bus::Answer> remembered_;
+    std::set<bus::ClientId> masters_;  ///< serial ones
+    std::optional<bus::Answer> given_up_;
 };
 
 /// What the relay copies, and where to.

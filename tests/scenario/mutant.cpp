@@ -10,7 +10,7 @@ std::string not_caught(const Mutant& mutant) {
     constexpr std::uint64_t kSeeds = 400;
     std::string others;
     for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
-        Plan plan = draw(mutant.kind, seed);
+        Plan plan = draw(mutant.kind, seed, mutant.mode);
         mutant.shape(plan);
         const auto subject = mutant.make(plan.settings);
         Checker checker(plan);

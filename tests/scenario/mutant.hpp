@@ -77,6 +77,7 @@ struct Mutant {
     Kind kind;
     Make make;
     Shape shape = [](Plan&) {};
+    SerialMode mode = SerialMode::rtu;
 };
 
 template <class T>

@@ -10,6 +10,7 @@
 #include "checker.hpp"
 #include "field.hpp"
 #include "mutant.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
 #include "plan.hpp"
 
 namespace panelgate::scenario {
@@ -198,12 +199,66 @@ const Mutant kMutants[] = {
          s.paced = false;
      }),
      only_writes},
+    {"MixesUpTheCrcOrderOfOneStation", "P4: a frame that its panel takes for damage", Kind::faults,
+     misled([](arbiter::Settings& s) {
+         modbus::CrcOrder& order = s.stations.back().crc_order;
+         const bool low = order == modbus::CrcOrder::low_first;
+         order = low ? modbus::CrcOrder::high_first : modbus::CrcOrder::low_first;
+     })},
     {"TakesMoreThanItsQueueHolds", "P9: more requests wait", Kind::crowd,
      misled([](arbiter::Settings& s) {
          s.queue.limit *= 4;
          s.queue.per_client *= 4;
      })},
 };
+
+/// Makes the LRC of each line that is heard right.
+struct BelievesAnyLrc : Subject {
+    using Subject::Subject;
+    void on_rx(TimePoint now, ByteView bytes) override {
+        constexpr std::size_t kEnd = 4;  // LRC, CR LF
+        for (const std::uint8_t byte : bytes) {
+            if (byte == ':') line_.clear();
+            line_.push_back(byte);
+            if (byte != '\n' || line_.size() <= kEnd || line_.front() != ':') continue;
+            const std::string text(line_.begin() + 1, line_.end() - kEnd);
+            const auto said = from_hex(text);
+            if (said && said->size() > 1)
+                line_ = modbus::encode_ascii(said->front(), ByteView(*said).subspan(1));
+            Subject::on_rx(now, std::exchange(line_, {}));
+        }
+    }
+    Bytes line_;
+};
+
+const Mutant kAsciiMutants[] = {
+    {"BelievesAnyLrc", "P1: a value", Kind::faults,
+     [](const arbiter::Settings& s) { return std::make_unique<BelievesAnyLrc>(s); }},
+    {"HasNoQuarantine", "P1: a value", Kind::faults, misled([](arbiter::Settings& s) {
+         each_station(s, [](auto& station) { station.late_window = 0ms; });
+     }),
+     late_panels},
+    {"BelievesAnEcho", "P8: a write was confirmed", Kind::echo, misled([](arbiter::Settings& s) {
+         s.echo = EchoMode::off;
+         s.paced = false;
+     }),
+     only_writes},
+    {"KeepsTheGapOfAFasterLine", "P5: transmitted", Kind::faults, misled([](arbiter::Settings& s) {
+         s.serial.baud *= 4;
+         each_station(s, [](auto& station) { station.frame_gap = 0us; });
+     })},
+};
+
+class AsciiMutation : public testing::TestWithParam<Mutant> {};
+
+TEST_P(AsciiMutation, IsCaught) {
+    Mutant mutant = GetParam();
+    mutant.mode = SerialMode::ascii;
+    EXPECT_EQ(not_caught(mutant), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Every, AsciiMutation, testing::ValuesIn(kAsciiMutants),
+                         [](const auto& info) { return std::string(info.param.name); });
 
 class Mutation : public testing::TestWithParam<Mutant> {};
 
@@ -221,9 +276,9 @@ TEST(Checker, CatchesDeadStationsThatTakeTooMuch) {
     checker.on_line_up(now);
     for (int second = 0; second < 600; ++second) {
         now += 900ms;
-        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x0A}, FrameKind::probe, true);
+        checker.on_transmit(now, {2, 3, 0, 0, 0, 1, 0x84, 0x39}, FrameKind::probe, true);
         now += 100ms;
-        checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x39}, FrameKind::request, false);
+        checker.on_transmit(now, {1, 3, 0, 0, 0, 1, 0x84, 0x0A}, FrameKind::request, false);
         checker.on_answered(now + 50ms);
     }
     EXPECT_FALSE(checker.failed()) << checker.violation();

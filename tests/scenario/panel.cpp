@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "speech.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -64,11 +65,12 @@ void Panel::hear(ByteView adu, std::uint64_t connection) {
 
 void Panel::answer_broadcast(ByteView pdu, std::uint64_t connection) {
     Said said;
-    said.bytes = modbus::encode_adu(plan_.id, pdu.first(5), plan_.crc_order);
+    said.bytes = spoken(line_.serial, plan_.id, pdu.first(5), plan_.crc_order);
     said.rate = plan_.own_rate;
     said.connection = connection;
-    agenda_.at(agenda_.now() + random_.between(500us, Duration(8ms)),
-               [this, said = std::move(said)] { wire_.say(said); });
+    const bool quick = plan_.broadcast_think == Duration::zero();
+    const Duration after = quick ? random_.between(500us, Duration(8ms)) : plan_.broadcast_think;
+    agenda_.at(agenda_.now() + after, [this, said = std::move(said)] { wire_.say(said); });
 }
 
 void Panel::serve_next() {

@@ -201,17 +201,19 @@ void mix_crc_orders(Plan& plan) {
 
 }  // namespace
 
-Plan draw(Kind kind, std::uint64_t seed) {
+Plan draw(Kind kind, std::uint64_t seed, SerialMode mode) {
     Random random(seed * 31 + static_cast<std::uint64_t>(kind));
     Plan plan;
     plan.seed = seed;
+    plan.settings.serial.mode = mode;
+    if (mode == SerialMode::ascii) plan.settings.serial.data_bits = 7;
     draw_line(random, plan);
     if (is_of_sound_panels(kind)) {
         draw_sound(random, plan, kind);
     } else {
         draw_faulty(random, plan, kind);
     }
-    if (seed % 4 == 3) mix_crc_orders(plan);
+    if (seed % 4 == 3 && mode == SerialMode::rtu) mix_crc_orders(plan);
     return plan;
 }
 

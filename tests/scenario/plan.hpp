@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/settings.hpp"
+#include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::scenario {
@@ -35,6 +36,7 @@ struct PanelPlan {
     unsigned refusal = 3;       ///< the exception for more than those; 0 = silence
     double wrong_function = 0;  ///< answers with an exception of another function
     bool answers_broadcasts = false;
+    Duration broadcast_think{};  ///< before it does; 0 = up to 8 ms
     bool dead = false;
     Duration flapping{};  ///< dead and alive in turns of this length; 0 = no
     Duration reboots{};   ///< in each such time it is silent for 8 s and then says some text
@@ -167,7 +169,7 @@ struct Plan {
     /// Nothing but silence of panels keeps a line idle: replies are never late, nothing is held.
     bool is_calm() const;
 };
-Plan draw(Kind kind, std::uint64_t seed);
+Plan draw(Kind kind, std::uint64_t seed, SerialMode mode = SerialMode::rtu);
 /// A line on which one panel is odd, and all others are as good as panels get.
 Plan draw_odd(Oddity oddity, std::uint64_t seed);
 /// The same with that panel as good as the others.

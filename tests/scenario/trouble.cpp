@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "panelgate/modbus/rtu_frame.hpp"
+#include "speech.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -55,7 +55,7 @@ void Trouble::babble() {
     const auto coils = static_cast<std::uint8_t>(random_.between(1, 8));
     Bytes pdu{1, coils};
     pdu.resize(2u + coils, 0x55);
-    said.bytes = modbus::encode_adu(id, pdu, plan_.panels.back().crc_order);
+    said.bytes = spoken(plan_.settings.serial, id, pdu, plan_.panels.back().crc_order);
     said.connection = wire_.connection();
     wire_.say(std::move(said));
     agenda_.at(agenda_.now() + plan_.line.babble, [this] { babble(); });
@@ -73,14 +73,14 @@ void Trouble::listen() {
 
 void Trouble::ask_own_panel() {
     Said question;
-    question.bytes = modbus::encode_adu(kForeignPanel, foreign_read());
+    question.bytes = spoken(plan_.settings.serial, kForeignPanel, foreign_read());
     question.connection = wire_.connection();
     const TimePoint end = wire_.say(std::move(question));
     const TimePoint reply =
         end + silent_interval(plan_.settings.serial) + random_.between(2ms, Duration(20ms));
     agenda_.at(reply, [this] {
         Said answer;
-        answer.bytes = modbus::encode_adu(kForeignPanel, Bytes{3, 4, 0, 1, 0, 2});
+        answer.bytes = spoken(plan_.settings.serial, kForeignPanel, Bytes{3, 4, 0, 1, 0, 2});
         answer.connection = wire_.connection();
         const TimePoint done = wire_.say(std::move(answer));
         next_question_ = done + random_.between(20ms, Duration(400ms));

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "panelgate/modbus/rtu_frame.hpp"
+#include "speech.hpp"
 
 namespace panelgate::scenario {
 
@@ -27,7 +27,7 @@ std::uint8_t Voice::glitch() { return random_.chance(0.5) ? 0x00 : 0xFF; }
 
 std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
     std::vector<Utterance> all;
-    const Bytes good = modbus::encode_adu(plan_.id, reply_pdu, plan_.crc_order);
+    const Bytes good = spoken(line_.serial, plan_.id, reply_pdu, plan_.crc_order);
     add_preface(all, reply_pdu, spare);
     // Behind a piece that could be this reply, the reply is a frame of its own.
     const bool first = all.empty() || all.back().said.answer_to == 0;
@@ -38,21 +38,23 @@ std::vector<Utterance> Voice::speak(const Bytes& reply_pdu, Duration spare) {
 
 /// What goes before the reply. It has to end in time: see `spare`.
 void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duration spare) {
-    const Bytes good = modbus::encode_adu(plan_.id, reply, plan_.crc_order);
+    const Bytes good = spoken(line_.serial, plan_.id, reply, plan_.crc_order);
     const Duration frame = time_of(good.size());
     if (random_.chance(plan_.fragment)) {
         const Duration pause = random_.between(1ms, 30ms);
         if (pause + 2 * frame < spare) {
             // Then silence: the pause in front of the next piece is put behind this one.
-            Said head = said({good[0], good[1]});
+            constexpr std::ptrdiff_t kAsciiHead = 5;  // ':', address and function
+            const auto head_size = line_.serial.mode == SerialMode::ascii ? kAsciiHead : 2;
+            Said head = said(Bytes(good.begin(), good.begin() + head_size));
             all.push_back({Duration{}, std::move(head)});
             all.push_back({pause, said({})});
         }
     }
     if (random_.chance(plan_.noise)) all.push_back({Duration{}, said(random_bytes(1, 5))});
     if (random_.chance(plan_.foreign)) {
-        all.push_back({Duration{},
-                       said(modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 100), reply))});
+        all.push_back({Duration{}, said(spoken(line_.serial,
+                                               static_cast<std::uint8_t>(plan_.id + 100), reply))});
         all.push_back({silent_interval(line_.serial), said({})});
     }
     if (random_.chance(plan_.damaged_first) && 2 * frame + 60ms < spare) {
@@ -69,7 +71,7 @@ void Voice::add_preface(std::vector<Utterance>& all, const Bytes& reply, Duratio
 Said Voice::main_part(const Bytes& reply, const Bytes& good) {
     const bool other = random_.chance(plan_.wrong_id);
     const Bytes meant =
-        other ? modbus::encode_adu(static_cast<std::uint8_t>(plan_.id + 101), reply) : good;
+        other ? spoken(line_.serial, static_cast<std::uint8_t>(plan_.id + 101), reply) : good;
     Bytes frame = damage(meant);
     bool damaged = frame != meant;
     bool whole = frame == good;
@@ -78,7 +80,7 @@ Said Voice::main_part(const Bytes& reply, const Bytes& good) {
         longer.insert(longer.end(), {0, 0});
         if (random_.chance(0.5) && reply[0] < 5)
             longer[1] = static_cast<std::uint8_t>(longer[1] + 2);
-        frame = modbus::encode_adu(plan_.id, longer, plan_.crc_order);
+        frame = spoken(line_.serial, plan_.id, longer, plan_.crc_order);
         whole = damaged = false;
     }
     Said s = said({});
@@ -110,11 +112,18 @@ void Voice::add_epilogue(std::vector<Utterance>& all, const Bytes& good) {
         all.push_back({random_.between(500us, Duration(5ms)), said(random_bytes(1, 3))});
 }
 
-/// Damage that a CRC-16 always detects: up to three bits, or a missing end. What it lets pass (one
-/// of 65536 of anything else) is no arbiter's affair.
+/// Damage that a CRC-16 always detects: up to three bits, or a missing end; an LRC only one bit, or
+/// one character. What they let pass (one of 65536 or 256 of anything else) is no arbiter's affair.
 Bytes Voice::damage(Bytes adu) {
+    const bool ascii = line_.serial.mode == SerialMode::ascii;
     if (random_.chance(plan_.flip)) {
-        for (unsigned i = random_.between(1, 3); i > 0; --i) {
+        if (ascii && random_.chance(0.5)) {  // a character is lost
+            const auto lost = random_.below(static_cast<unsigned>(adu.size()));
+            adu.erase(adu.begin() + static_cast<std::ptrdiff_t>(lost));
+            return adu;
+        }
+        const unsigned most = ascii ? 1 : 3;
+        for (unsigned i = random_.between(1, most); i > 0; --i) {
             adu[random_.below(static_cast<unsigned>(adu.size()))] ^=
                 static_cast<std::uint8_t>(1u << random_.below(8));
         }

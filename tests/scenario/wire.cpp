@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "speech.hpp"
 
 namespace panelgate::scenario {
 
@@ -39,7 +40,7 @@ TimePoint Wire::say(Said said) {
     if (frame->damaged) {
         witness_.on_garbled(agenda_.now());
     } else {
-        witness_.on_said(frame->start, frame->bytes);
+        witness_.on_said(frame->start, understood(plan_.settings.serial, frame->bytes));
     }
     deliver_in_chunks(frame);
     return frame->end;
@@ -64,7 +65,7 @@ void Wire::send(Bytes adu) {
 
 void Wire::leave(Bytes adu, std::uint64_t connection) {
     Said said;
-    said.station = adu[0];
+    said.station = understood(plan_.settings.serial, adu)[0];
     said.bytes = std::move(adu);
     said.rate = plan_.line.own_rate;
     said.connection = connection;
@@ -140,7 +141,8 @@ void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
     const std::size_t begin = answer ? frame.answer_from : 0;
     const std::size_t end = answer ? frame.answer_to : frame.bytes.size();
     const bool last = end > from && end <= to && end - begin > 3;
-    const ByteView said = ByteView(frame.bytes).subspan(begin, last ? end - begin : 0);
+    const Bytes said = understood(plan_.settings.serial,
+                                  ByteView(frame.bytes).subspan(begin, last ? end - begin : 0));
     for (const auto& [word, order] : modbus::kCrcOrders) {
         if (modbus::crc_ok(said, order)) frame.bytes[end - 1] ^= 1;
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "speech.hpp"
+
 namespace panelgate::scenario {
 
 World::World(const Plan& plan, Subject& subject, Checker& checker)
@@ -105,7 +107,8 @@ void World::act(const arbiter::Note& note) {
 
 void World::act(const arbiter::Transmit& transmit) {
     agenda_.tell("sent, " + std::string(label(what_next_)), transmit.adu);
-    checker_.on_transmit(now(), transmit.adu, what_next_, is_dead(transmit.adu[0]));
+    const Bytes adu = understood(plan_.settings.serial, transmit.adu);
+    checker_.on_transmit(now(), adu, what_next_, is_dead(adu[0]));
     wire_.send(transmit.adu);
 }
 
@@ -145,7 +148,8 @@ void World::hear(ByteView bytes, bool answered) {
     if (!hold) read_device();
 }
 
-void World::ask_panels(ByteView adu, std::uint64_t connection) {
+void World::ask_panels(ByteView wire, std::uint64_t connection) {
+    const Bytes adu = understood(plan_.settings.serial, wire);
     for (Panel& panel : panels_) {
         if (adu[0] == 0 || panel.id() == adu[0]) panel.hear(adu, connection);
     }

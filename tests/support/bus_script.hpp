@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_step.hpp"
 #include "support/request.hpp"
@@ -86,10 +87,12 @@ class BusScript {
         heard_until_ = now_;
         drain();
     }
-    /// A whole reply of a station arrives now, its CRC added. Where the line is no real UART, the
-    /// request has left then.
+    /// A whole reply of a station arrives now, its CRC (or LRC) added. Where the line is no real
+    /// UART, the request has left then.
     void hear_reply(std::uint8_t station, ByteView pdu) {
         if (!settings_.paced) sent_until_ = std::min(sent_until_, now_);
+        if (settings_.serial.mode == SerialMode::ascii)
+            return hear(modbus::encode_ascii(station, pdu));
         hear(modbus::encode_adu(station, pdu, arbiter::crc_orders(settings_).of(station)));
     }
     /// Bytes arrive one by one from now on, at the line's pace.

@@ -44,7 +44,7 @@ class FakeBus : public bus::BusClient {
         cancelled.push_back(client);
         std::vector<Open> kept;
         for (Open& open : std::exchange(open_, {})) {
-            if (open.first == client) {
+            if (open.first == client && completes_on_cancel) {
                 settle(std::move(open.second), fault(Fault::cancelled, false));
             } else {
                 kept.push_back(std::move(open));
@@ -101,6 +101,7 @@ class FakeBus : public bus::BusClient {
     Script script;
     std::vector<bus::Request> requests;
     std::vector<bus::ClientId> cancelled;
+    bool completes_on_cancel = true;  ///< what is open waits; false: it is on the wire
     int told_refused = 0;
     bus::LineStatus line{"floor1", "/dev/ttyUSB0", true, "up", 0, 0, EchoState::absent};
     bus::Rights rights;  ///< to everything, at first

@@ -63,6 +63,24 @@ class Output:
         return self.text()
 
 
+class Helper:
+    """A program beside the gateway, ended with the block; `out`: its lines."""
+
+    def __init__(self, command, **options):
+        self.process = subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True, errors="replace",
+                                        **options)
+        self.out = Output(self.process.stdout)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        self.process.terminate()
+        self.process.wait(PATIENCE)
+
+
 class Program:
     """A running panelgate; a context manager that ends it and fails when it crashed."""
     ends_with = 0  # its exit code

@@ -68,6 +68,32 @@ class Rest(unittest.TestCase):
                              {"station": 0, "pdu": "06000A0001"}),
                 (202, {"transmitted": True, "confirmed": False}))
 
+    def test_P2_a_write_with_a_key_goes_out_once(self):
+        with harness.configured(PLANT) as program:
+            def write(value):
+                request = urllib.request.Request(
+                    program.url(PRESS + "devices/UW200"), method="PUT",
+                    data=b'{"values":[%d]}' % value, headers={"Idempotency-Key": "same"})
+                with urllib.request.urlopen(request, timeout=harness.PATIENCE) as answer:
+                    return answer.status, answer.headers.get("Idempotency-Replayed"), answer.read()
+            first = write(7)
+            self.assertEqual(first, (200, None, b'{"transmitted":true,"confirmed":true}\n'))
+            self.assertEqual(write(7), (200, "true", first[2]))
+            with self.assertRaises(urllib.error.HTTPError) as refused:
+                write(8)
+            self.assertEqual(refused.exception.code, 422)
+            refused.exception.close()
+            sent = [f for way, f in program.trace("floor1", 500) if way == "sent"]
+            self.assertEqual([f for f in sent if f[1] == 16],
+                             [harness.rtu(31, bytes.fromhex("1000C80001020007"))])
+
+    def test_P3_a_long_read_ends_within_the_deadline_of_its_line(self):
+        text = config.gateway(config.line(queue="{deadline: 300ms}"), http=config.OPERATOR)
+        with harness.configured(text) as program:
+            status, told = program.get(PRESS + "holding-registers/0?count=6000")
+            self.assertIn(status, (503, 504))  # it may be on the wire when its time is over
+            self.assertRegex(told["detail"], r"^the time of this request was over after \d+ of 6000")
+
     def test_a_line_that_is_down_says_over_rest_what_its_state_says(self):
         with harness.configured(PLANT) as program:
             status, told = program.get("/api/v1/stations/scale/holding-registers/0")

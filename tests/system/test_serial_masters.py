@@ -33,21 +33,8 @@ def written(address, values):
         bytes([len(data)]) + data
 
 
-class Helper:
-    """A test program that says `ready`, or answers a line on stdin by one."""
-
-    def __init__(self, *command):
-        self.process = subprocess.Popen([str(part) for part in command], stdin=subprocess.PIPE,
-                                        stdout=subprocess.PIPE, text=True)
-        self.out = harness.Output(self.process.stdout)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.stdin.close()
-        self.process.terminate()
-        self.process.wait(harness.PATIENCE)
+class Master(harness.Helper):
+    """A test program that answers a line on stdin by one."""
 
     def run(self, seconds):
         self.process.stdin.write(f"{seconds}\n")
@@ -60,7 +47,7 @@ class Port:
 
     def __init__(self, folder, baud):
         self.far, self.near = f"{folder}/far", f"{folder}/near"
-        self._pair = Helper(BUILT / "serial_pair", baud, self.far, self.near)
+        self._pair = harness.Helper([BUILT / "serial_pair", baud, self.far, self.near])
 
     def __enter__(self):
         self._pair.out.wait_for("ready")
@@ -158,7 +145,7 @@ class UnchangedMasters(unittest.TestCase):
     def test_libmodbus_polls_and_writes_within_its_timeout(self):
         for baud in (9600, 19200, 115200):
             with self.subTest(baud=baud), beside_clients(baud) as (program, port), \
-                    Helper(BUILT / "libmodbus_master", "rtu", port.near, baud, UNIT) as plc:
+                    Master([BUILT / "libmodbus_master", "rtu", port.near, baud, UNIT]) as plc:
                 with shared_by_eight(program):
                     seen = plc.run(3)
                 print(f"\n  {baud}: {seen['good'] / seen['seconds']:.0f} good answers a second")

@@ -16,7 +16,7 @@
 
 namespace panelgate::arbiter {
 
-/// Write these bytes in one piece, now.
+/// Write these bytes in one piece, now: a frame in the line's mode.
 struct Transmit {
     Bytes adu;
 };
@@ -29,7 +29,7 @@ struct Finish {
     /// Of a value that was read before and answers from memory (max_age).
     std::optional<Duration> age;
 };
-/// Something was seen on the wire, for the trace.
+/// Something was seen on the wire, for the trace. Frames stand there as RTU says them.
 struct Note {
     TimePoint at;  ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;

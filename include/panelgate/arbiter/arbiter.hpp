@@ -25,6 +25,7 @@
 #include "panelgate/arbiter/strays.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
+#include "panelgate/modbus/ascii_transcript.hpp"
 
 namespace panelgate::arbiter {
 
@@ -135,12 +136,15 @@ class Arbiter {
     void expire(TimePoint now);
     void expire_active(TimePoint now);
     Attempt::Ends ends_attempt(TimePoint now) const;
+    void hear(TimePoint now, ByteView bytes);
+    void hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& piece);
     void hear_idle(TimePoint now, ByteView bytes);
     void judge_idle(TimePoint now);
     void note(TimePoint now, const std::vector<modbus::Unused>& parts);
 
     Settings settings_;
     modbus::CrcOrders orders_;
+    std::optional<modbus::AsciiTranscript> ascii_;  ///< between the wire and everybody in here
     Stations stations_;
     Schedule schedule_;
     Quiet quiet_;

@@ -63,6 +63,9 @@ class Attempt {
             const modbus::CrcOrders& orders = {});
 
     Verdict on_rx(TimePoint now, ByteView bytes, const Ends& ends);
+    /// What came since the last end is one frame, when it is `good`, or none: where the line tells
+    /// (ASCII).
+    Verdict on_frame_end(bool good, const Ends& ends);
     /// Harmless when nothing is due.
     Verdict on_deadline(TimePoint now, const Ends& ends);
     TimePoint deadline() const;
@@ -126,6 +129,10 @@ class Attempt {
     /// behind it the attempt is doubtful.
     void hold_reply(Duration needed, bool doubted);
     bool was_held() const { return held_back_; }
+    /// As much as the reply, and perhaps that very reply, came damaged in front of it.
+    bool said_damaged_before() const;
+    /// When what was held back came, if its reply is that once more.
+    std::optional<TimePoint> said_twice() const { return said_twice_; }
     /// Notes in its group what made it doubtful.
     void remember_doubt() {
         group_.doubted = std::exchange(held_, std::nullopt).value_or(Bytes{});
@@ -170,7 +177,10 @@ class Attempt {
         bool end = false;  ///< at all of it
     };
     std::optional<NextLook> next_look() const;
-    Duration character() const { return character_time(timing_.serial); }
+    Duration byte() const { return byte_time(timing_.serial); }
+    bool ends_are_told() const { return timing_.serial.mode == SerialMode::ascii; }
+    /// What the echo filter has held back was no echo.
+    Verdict take_held(const Ends& ends);
     Verdict feed(ByteView bytes, const Ends& ends);
     Verdict accept(std::optional<Bytes> reply);
     bool may_be_echo(ByteView reply) const;
@@ -199,6 +209,7 @@ class Attempt {
     std::optional<Bytes> held_;  ///< a reply that may be a copy
     bool held_back_ = false;
     TimePoint held_at_{};
+    std::optional<TimePoint> said_twice_;
     bool doubted_ = false;  ///< what is held
     std::vector<modbus::Unused> strays_;
     Bytes damaged_bytes_;
@@ -221,6 +232,7 @@ class Attempt {
     bool own_frame_seen_ = false;  ///< behind something else, where only its echo was expected
     bool echo_possible_ = true;
     std::size_t noise_in_front_ = 0;  ///< bytes
+    bool frames_in_front_ = false;    ///< good ones
     bool borrowed_ = false;
     bool wrong_ = false;
     bool refused_other_ = false;

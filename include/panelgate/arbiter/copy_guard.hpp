@@ -74,13 +74,14 @@ class CopyGuard {
     void on_doubt(Duration wait) { doubt_ = std::max(doubt_, wait); }
     /// It has spoken twice lately.
     bool known() const { return hold() > Duration::zero(); }
-    /// This answer repeats that to another request, and the station has not shown yet that it gives
-    /// equal ones.
+    /// This answer repeats that to another request, or, where one that did was no answer to it, any
+    /// earlier one; and the station has not shown yet that it gives equal ones.
     bool suspicious(TimePoint now, ByteView request, ByteView reply) const {
         if (confirmed_[kind_of(request, reply)] >= kConfirmations) return false;
+        const bool any = denied_ > 0 && now - denied_at_ <= kForget;
         return std::ranges::any_of(slots_, [&](const Slot& slot) {
             return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
-                   !std::ranges::equal(request, slot.request);
+                   (any || !std::ranges::equal(request, slot.request));
         });
     }
     /// It was no copy: a read had the same values when it was asked once more; behind anything
@@ -98,6 +99,13 @@ class CopyGuard {
         denied_at_ = at;
         const TimePoint said = said_at(at, reply);
         if (denied_ >= kDenials && said != TimePoint{}) learn(at, at - said);
+    }
+    /// It was asked once, owed nothing, and said this at `first` and again: whichever was the
+    /// answer, one of them is a copy, of the other or of what it had said before.
+    void on_said_twice(TimePoint now, TimePoint first, ByteView reply) {
+        if (now - first > kLongest) return;
+        const TimePoint said = said_at(first, reply);
+        learn(now, std::max(now - first, said == TimePoint{} ? Duration::zero() : first - said));
     }
     /// How long after a reply the station is left alone.
     Duration hold() const { return learned_ * 3 / 2; }

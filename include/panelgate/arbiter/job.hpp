@@ -26,6 +26,7 @@ struct Job {
     PriorityClass priority = PriorityClass::read;
     /// The function that was asked for, where the request has another one instead; 0: its own.
     std::uint8_t asked_function = 0;
+    Duration within = Duration::max();  ///< its deadline, where the queue's is not sooner
     TimePoint arrived{};
     TimePoint deadline{};
     TimePoint start_by{};  ///< the last moment at which starting it makes sense

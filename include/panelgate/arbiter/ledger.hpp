@@ -23,7 +23,8 @@ class Ledger {
     explicit Ledger(const Settings& settings);
 
     std::optional<Action> poll();
-    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Reason why);
+    /// `wire`: the bytes that say `adu` on the line.
+    void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});

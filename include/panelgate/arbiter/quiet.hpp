@@ -28,7 +28,11 @@ class Quiet {
         station_ = station;
         until_ = {};
         noise_ = {};
+        begun_until_ = {};
     }
+    /// A frame has begun by its first character (ASCII), and its next one may come until then; no
+    /// time: it has ended.
+    void on_begun(TimePoint until) { begun_until_ = until; }
     /// Something is heard that belongs to a transaction.
     void on_heard(TimePoint now) {
         since_ = std::max(since_, now);
@@ -49,7 +53,7 @@ class Quiet {
     TimePoint free_at(Duration gap) const {
         const TimePoint silent = since_ + gap;
         const bool floats = noise_ != TimePoint{} && since_ - noise_ >= longest_;
-        return std::max(floats ? noise_ + longest_ : silent, until_);
+        return std::max({floats ? noise_ + longest_ : silent, until_, begun_until_});
     }
     TimePoint since() const { return since_; }
     /// Whose gap follows the last bit: who was asked last.
@@ -72,6 +76,7 @@ class Quiet {
     Duration pause_;
     TimePoint since_{};
     TimePoint until_{};
+    TimePoint begun_until_{};
     TimePoint noise_{};  ///< the first of the bytes that came without a pause
     TimePoint quarantined_until_{};
     std::uint8_t station_ = 0;

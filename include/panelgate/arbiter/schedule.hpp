@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "panelgate/arbiter/backlog.hpp"
+#include "panelgate/arbiter/broadcast_replies.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/settings.hpp"
@@ -36,6 +37,9 @@ class Schedule {
     std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
                                               const Station& station) const;
 
+    /// The last bit of a broadcast has left, or the line was lost under it.
+    void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
+
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
     /// The same request goes again and is waited for `patience` long. While only its station rests,
@@ -52,12 +56,16 @@ class Schedule {
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
                   TimePoint proved);
+    TimePoint rested(const Stations& stations, std::uint8_t station,
+                     const modbus::Request& request) const;
+    TimePoint repeat_from(const Group& group, const Stations& stations) const;
     JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;
 
     Quarantine quarantine_;
     bool may_stall_;
     Backlog backlog_;
     Sharing sharing_;
+    BroadcastReplies broadcasts_;
     Ticket learned_for_ = 0;        ///< a read was sent for it, to find out about the echo (P8)
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
     std::size_t turns_ = 0;         ///< that it leaves to them, at most

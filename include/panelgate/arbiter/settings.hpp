@@ -9,6 +9,7 @@
 #include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
 #include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::arbiter {
@@ -55,6 +56,7 @@ enum class Quarantine : std::uint8_t {
 
 struct Settings {
     SerialFormat serial;
+    modbus::HexDigits ascii_digits = modbus::HexDigits::upper_only;  ///< that are heard
     /// For stations without an entry in `stations`; its id is not used.
     StationSettings unlisted;
     std::vector<StationSettings> stations;
@@ -62,7 +64,8 @@ struct Settings {
     /// Silence that ends a reply whose length nothing tells (FRM-11); counted from its last byte.
     Duration end_of_frame = 20ms;
     /// The longest silence inside a reply of known length; counted from its last byte. The default
-    /// is for a tty: a USB latency timer (16 ms) and a busy machine.
+    /// is for a tty: a USB latency timer (16 ms) and a busy machine. In ASCII also the longest
+    /// between two characters of any frame.
     Duration reply_hole = 60ms;
     QueueSettings queue;
     OfflineSettings offline;
@@ -80,7 +83,8 @@ struct Settings {
     bool explain = false;
 };
 
-/// Those of the stations. A broadcast has the standard's, but where all listed stations have the
+/// Those of the stations. ASCII has no CRC: what it says is written down with the standard's. A
+/// broadcast has the standard's, but where all listed stations have the
 /// other one: no frame can be right for both.
 modbus::CrcOrders crc_orders(const Settings& settings);
 

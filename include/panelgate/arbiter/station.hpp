@@ -77,6 +77,14 @@ class Station {
         bool back = false;     ///< it was offline
         bool settled = false;  ///< it owes nothing any more
     };
+    /// It has answered a broadcast.
+    void on_broadcast_answered() { answers_broadcasts_ = true; }
+    /// How long after a broadcast it may do so: as long as it has ever needed. Who does it is
+    /// trusted no more than with any reply that it owes.
+    Duration broadcast_window() const {
+        return answers_broadcasts_ ? settings_.response_timeout + late_.value()
+                                   : usual() + late_.worst();
+    }
     /// The one judge of stray frames. `pdu`: without address and CRC.
     Heard on_stray_frame(TimePoint now, ByteView pdu);
     /// What on_stray_frame() would say; changes nothing.
@@ -230,7 +238,8 @@ class Station {
     int odd_ = 0;          ///< so many more replies until answers_as_asked()
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
     bool trail_told_ = false;
-    int probes_ = 0;  ///< in vain, since it was heard last
+    bool answers_broadcasts_ = false;  ///< it has, once
+    int probes_ = 0;                   ///< in vain, since it was heard last
 };
 
 }  // namespace panelgate::arbiter

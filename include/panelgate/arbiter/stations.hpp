@@ -29,6 +29,11 @@ class Stations {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_stray_bytes(now);
     }
+    /// A station has answered a broadcast, as none should.
+    void on_broadcast_answered(std::uint8_t id) {
+        const auto found = stations_.find(id);
+        if (found != stations_.end()) found->second.on_broadcast_answered();
+    }
     /// Bytes that are no frame.
     void on_damaged(TimePoint now, ByteView bytes) {
         for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);

@@ -43,6 +43,8 @@ class Strays {
     bool full() const { return idle_.size() > modbus::ReplyFramer::kMaxHeard; }
     /// A silence has ended what was gathered.
     std::vector<modbus::Unused> take(std::uint8_t asked);
+    /// The line has told that it ends, and whether it is a `good` frame (ASCII).
+    std::vector<modbus::Unused> take_told(std::uint8_t asked, bool good);
 
     /// Counts, traces, and tells the stations. `idle`: no request has wholly left since the last
     /// reply, so that bytes may be its trail.

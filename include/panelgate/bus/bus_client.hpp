@@ -37,6 +37,8 @@ struct Request {
     ClientId client = 0;
     Host host = 0;      ///< the client's address (host_of()); 0: it is its own
     bool poll = false;  ///< of the lowest class: clients' own requests go first
+    /// Its client waits no longer: its deadline, where that of the line's queue is not sooner.
+    Duration within = Duration::max();
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -73,12 +75,17 @@ struct TraceDecision {
     WallTime time{};  ///< `at`, by the clock on the wall
 };
 
-/// What one client has used of a line's time (P9).
+/// What one client has asked of a line, and used of its time (P9).
 struct ClientShare {
     std::string name;  ///< "modbus_tcp 10.0.0.7:51234"
     Duration busy{};
     double percent = 0;  ///< of what all clients that are there have used
     std::uint64_t transactions = 0;
+    std::optional<std::string> address{};  ///< without its port; nothing: it is no server's client
+    std::uint64_t requests = 0;
+    std::uint64_t failed = 0;             ///< of these, panels' exceptions too
+    std::optional<Outcome> last_error{};  ///< of the last that failed
+    Duration last_error_ago{};
 };
 
 /// What the line doctor takes for a cause of errors.

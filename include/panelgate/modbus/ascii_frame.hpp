@@ -7,6 +7,7 @@
 #include "panelgate/base/byte_queue.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/serial_adu.hpp"
 
 namespace panelgate::modbus {
@@ -25,41 +26,72 @@ Bytes encode_ascii(std::uint8_t station, ByteView pdu);
 /// The standard has upper-case digits only (V1.02, 2.5.2).
 enum class HexDigits : std::uint8_t { upper_only, any_case };
 
-/// Finds frames in a stream of characters, requests and replies alike. A ':' always begins a frame;
-/// what does not become a good one is dropped and counted, and nobody is told more: a slave does
-/// not answer it. Take with next() until it gives nothing before feeding more; then it holds one
-/// unfinished frame at most. Work is linear in the characters.
+/// Tells frames by their characters, one by one. A ':' always begins a frame. Pure; knows no time.
+class AsciiReader {
+  public:
+    /// `longest`: bytes of a frame with its LRC.
+    explicit AsciiReader(HexDigits digits, std::size_t longest = kMaxPdu + 2)
+        : digits_(digits), longest_(longest) {}
+
+    /// What a character is.
+    enum class Step : std::uint8_t {
+        outside,  ///< of no frame
+        begun,    ///< its ':'; a frame that was not whole is given up
+        inside,   ///< half a byte, or CR
+        byte,     ///< bytes() has one more
+        whole,    ///< the frame is good
+        broken,   ///< what had begun can be no frame
+    };
+    Step take(std::uint8_t character);
+    /// A frame has begun and is not whole.
+    bool partial() const { return state_ != State::between; }
+    /// Only its LF is missing.
+    bool at_end() const { return state_ == State::at_end; }
+    /// Of the frame, so far: station, PDU, LRC. Until the next ':'.
+    const Bytes& bytes() const { return bytes_; }
+    void give_up() { end(Step::broken); }
+
+  private:
+    enum class State : std::uint8_t { between, digits, at_end };
+    Step take_digit(std::uint8_t character);
+    Step end(Step step);
+
+    HexDigits digits_;
+    std::size_t longest_;
+    State state_ = State::between;
+    Bytes bytes_;
+    bool half_ = false;  ///< the last byte misses its second digit
+};
+
+/// Finds frames in a stream of characters, requests and replies alike. What does not become a good
+/// one is dropped and counted, and nobody is told more: a slave does not answer it. Take with
+/// next() until it gives nothing before feeding more; then it holds one unfinished frame at most.
+/// Work is linear in the characters.
 class AsciiFramer {
   public:
     /// `pause`: the longest between two characters of a frame (V1.02, 2.5.2.1).
     explicit AsciiFramer(HexDigits digits = HexDigits::upper_only, Duration pause = 1s)
-        : digits_(digits), pause_(pause) {}
+        : reader_(digits), pause_(pause) {}
 
     /// Characters that have come at `now`; it never goes back.
     void feed(TimePoint now, ByteView characters);
     std::optional<SerialAdu> next();
 
     /// A frame has begun and is not whole.
-    bool partial() const { return state_ != State::between; }
+    bool partial() const { return reader_.partial(); }
     /// Characters since the last good frame that belong to none.
     std::size_t discarded() const { return discarded_; }
     /// Frames that have begun and were no good, since the last call.
     std::size_t take_faults();
 
   private:
-    enum class State : std::uint8_t { between, digits, at_end };
     bool take(std::uint8_t character);
-    void take_digit(std::uint8_t character);
-    void begin();
     void drop();
 
-    HexDigits digits_;
+    AsciiReader reader_;
     Duration pause_;
     ByteQueue text_;
-    TimePoint last_{};  ///< character
-    State state_ = State::between;
-    Bytes bytes_;            ///< of the frame, so far
-    bool half_ = false;      ///< the last byte misses its second digit
+    TimePoint last_{};       ///< character
     std::size_t begun_ = 0;  ///< characters of the frame, so far
     std::size_t discarded_ = 0;
     std::size_t faults_ = 0;

@@ -30,6 +30,10 @@ enum Function : std::uint8_t {
     kEncapsulatedInterface = 0x2B,
 };
 inline constexpr std::uint8_t kExceptionBit = 0x80;
+/// Of a request or reply, the exception bit left out.
+constexpr std::uint8_t plain_function(std::uint8_t function) {
+    return static_cast<std::uint8_t>(function & ~kExceptionBit);
+}
 inline constexpr std::uint8_t kMeiDeviceIdentification = 0x0E;
 
 inline constexpr std::size_t kMaxPdu = 253;     ///< AP 4.1

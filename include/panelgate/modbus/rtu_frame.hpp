@@ -16,6 +16,9 @@ inline constexpr std::size_t kExceptionAdu = kMinAdu + 1;    ///< ... and code: 
 inline constexpr std::size_t kReadRequestAdu = kMinAdu + 4;  ///< 01 to 06: ... and two words
 inline constexpr std::size_t kReadReplyOverhead = kMinAdu + 1;  ///< 01 to 04: ... and byte count
 
+/// What stands between the address and the CRC. At least kMinAdu bytes.
+inline ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - kAduOverhead); }
+
 /// Address, PDU, CRC: what goes out in one write (TIM-02).
 Bytes encode_adu(std::uint8_t station, ByteView pdu, CrcOrder order = CrcOrder::low_first);
 

@@ -41,21 +41,30 @@ struct Unused {
 /// comes from the function and the header, the CRC is the judge, and silence only ends waiting:
 /// bytes may come in any pieces, and adapters and busy machines put pauses anywhere. Noise before
 /// the reply and good frames of other stations are stepped over; a frame is accepted only if
-/// station, function, byte count and echoed fields answer the request (FRM-04, P1). Work is linear
-/// in the bytes heard, memory bounded.
+/// station, function, byte count and echoed fields answer the request (FRM-04, P1). Where the line
+/// itself tells the ends of frames (an AsciiTranscript), these alone are judged, whole. Work is
+/// linear in the bytes heard, memory bounded.
 class ReplyFramer {
   public:
     /// Heard bytes that are kept at most; older ones become Unused.
     static constexpr std::size_t kMaxHeard = 1024;
 
+    enum class Ends : std::uint8_t {
+        by_length,  ///< or by silence: RTU
+        told        ///< on_end() comes behind every frame, and behind what is none
+    };
     /// `orders`: of all that may speak. A frame counts only in the order of its own address.
-    ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders = {});
+    ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrders& orders = {},
+                Ends ends = Ends::by_length);
 
     /// Takes bytes; gives the reply PDU as soon as its last byte is there.
     std::optional<Bytes> feed(ByteView bytes);
     /// The line has been silent for the end-of-frame time. Gives a reply that only silence could
     /// end (or that stood behind noise that looked like the start of a frame); forgets the rest.
     std::optional<Bytes> on_silence();
+    /// What was fed since the last end is one frame, when it is `good`, or none. Gives the reply if
+    /// it is that; forgets the rest. For Ends::told.
+    std::optional<Bytes> on_end(bool good);
 
     /// Bytes wait for more, or for the silence that judges them.
     bool has_pending() const { return !heard_.empty(); }
@@ -96,20 +105,26 @@ class ReplyFramer {
     std::optional<Bytes> answering(ByteView frame) const;
     bool has_start() const { return judged_ < starts_.size(); }
     void forget_starts();
-    bool ends_with_address() const { return !heard_.empty() && heard_.back() == station_; }
+    bool ends_with_address() const {
+        if (ends_ == Ends::told && heard_.size() > 1) return false;
+        return !heard_.empty() && heard_.back() == station_;
+    }
     enum class Inside : std::uint8_t { no, perhaps, yes };
     Inside inside_other(std::size_t start, std::size_t end) const;
     bool is_start(std::uint8_t address, std::uint8_t function) const;
     bool holds_start(ByteView bytes) const;
     bool is_own_reply(ByteView damaged) const;
     void collect_starts();
+    void look_at_head();
     std::optional<Bytes> accept(std::size_t start, Bytes pdu);
     void discard(std::size_t count);
     void classify(ByteView bytes);
+    void step_over(Unused part);
 
     std::uint8_t station_;
     Bytes request_;
     CrcOrders orders_;
+    Ends ends_;
     std::optional<std::size_t> expected_;  ///< from the request (FRM-04)
     Bytes heard_;
     std::size_t looked_ = 0;          ///< offsets below were tried as a start
@@ -123,6 +138,9 @@ class ReplyFramer {
     std::size_t behind_ = 0;
     std::vector<Unused> unused_;
 };
+
+/// One part, as its end told it: `good` says that it is a frame.
+Unused told_part(ByteView bytes, std::uint8_t own_station, bool good);
 
 /// Cuts bytes into good frames (any station) and the rest, for counters: linear time.
 std::vector<Unused> classify_heard(ByteView bytes, std::uint8_t own_station,

@@ -15,6 +15,11 @@ namespace panelgate::modbus {
 /// that the standard does not define.
 using RequestLength = ReplyLength;
 RequestLength request_length(ByteView frame);
+/// ... but of 08/0000 with one word of data, as nearly all are, the length is known once its CRC
+/// fits.
+RequestLength usual_request_length(ByteView frame);
+/// What a good RTU frame says.
+SerialAdu serial_adu_of(ByteView frame);
 
 /// Finds requests in what a client says, as a slave does, but without the silence around frames
 /// that a stream does not keep: the function and the header give the length, the CRC judges. What

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -40,6 +41,8 @@ class StationPoints {
     /// Whose want this is; null: a poll block's.
     const Point* point_of(std::size_t want) const;
     PointReading read(const Point& point, TimePoint now) const;
+    /// What it was read from: registers, or bits as 0 and 1; empty until the first success.
+    const std::vector<std::uint16_t>& items(const Point& point) const;
     const std::vector<Poll>& blocks() const { return *blocks_; }
     /// What has become of one of the blocks.
     const Reading& reading(const Poll& block) const;

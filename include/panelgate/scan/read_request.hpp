@@ -18,7 +18,7 @@ class ReadRequest {
                                            modbus::CrcOrder order = modbus::CrcOrder::low_first);
 
     std::uint8_t station() const { return adu_.front(); }
-    ByteView pdu() const { return ByteView(adu_).subspan(1, adu_.size() - modbus::kAduOverhead); }
+    ByteView pdu() const { return modbus::pdu_of(adu_); }
     const Bytes& adu() const { return adu_; }
     modbus::CrcOrder crc_order() const { return order_; }
 

@@ -21,7 +21,10 @@ struct SetFormat {
 };
 struct Transmit {
     ReadRequest request;
+    SerialMode mode = SerialMode::rtu;  ///< that of the format
 };
+/// What is to be written, in one piece.
+Bytes on_wire(const Transmit& transmit);
 using Action = std::variant<SetFormat, Transmit>;
 
 /// Looks for stations on one line: listens, finds the serial format, asks every station, tells

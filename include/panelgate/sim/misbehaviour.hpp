@@ -20,9 +20,10 @@ FaultNumbers to_numbers(const Misbehaviour& faults);
 /// What is not named is off. Nothing, or what is wrong and would be right.
 std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviour& faults);
 
-/// What a misbehaving panel makes of a good reply ADU. Pure, but for the chance it is given.
+/// What a misbehaving panel makes of a good reply ADU, in the format's mode. Pure, but for the
+/// chance it is given.
 struct Spoken {
-    Bytes adu;         ///< empty: silence
+    Bytes adu;         ///< as it stands on the wire; empty: silence
     Duration delay{};  ///< more than its think time
     /// Bit times from the first start bit to the end of each byte; empty: without pauses.
     std::vector<std::uint32_t> ends;

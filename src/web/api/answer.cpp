@@ -65,7 +65,7 @@ const char* detail_of(Fault fault, bool transmitted) {
                                : "nothing was sent: the station is silent; it is probed from time "
                                  "to time";
         case Fault::cancelled:
-            return "the gateway is stopping";
+            return "its client had gone, or the gateway is stopping";
     }
     std::abort();
 }
@@ -122,13 +122,12 @@ std::optional<Problem> problem_of(const bus::Answer& answer, const profile::Pane
     return std::nullopt;
 }
 
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile) {
-    const auto failed = problem_of(answer, profile);
-    if (failed) return to_response(*failed);
+HttpResponse broadcast_answer(const bus::Answer& answer) {
+    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
     json::object body;
     body["transmitted"] = true;
-    body["confirmed"] = true;
-    return json_response(200, body);
+    body["confirmed"] = false;
+    return json_response(202, body);
 }
 
 std::int64_t whole_ms(Duration duration) {

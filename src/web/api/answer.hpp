@@ -27,8 +27,8 @@ Problem problem_of(const bus::Answer& answer);
 /// What is wrong with an answer: that, or an exception. Nothing when it carries what was asked.
 std::optional<Problem> problem_of(const bus::Answer& answer, const profile::PanelProfile& profile);
 
-/// What a client is told of its write.
-HttpResponse write_answer(const bus::Answer& answer, const profile::PanelProfile& profile);
+/// What a client is told of its broadcast: 202, because nobody answers one.
+HttpResponse broadcast_answer(const bus::Answer& answer);
 
 /// For members that end in _ms: rounded towards zero.
 std::int64_t whole_ms(Duration duration);

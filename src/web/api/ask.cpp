@@ -52,12 +52,15 @@ void introduce(Caller& caller, bus::BusClient* bus) {
 
 asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
                                  bus::Request request) {
+    if (caller->has_hung_up() && !caller->has_left()) co_return bus::Answer{};  // cancelled
     if (!caller->has_left()) {
+        const bool changes = !request.request.is_read();
         introduce(*caller, bus);
         request.client = caller->id();
         if (!caller->address().empty()) request.host = bus::host_of(caller->address());
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);
+        if (answer.transmitted && changes) caller->take_effect();
         if (!caller->has_left()) co_return answer;
     }
     throw boost::system::system_error(asio::error::operation_aborted);

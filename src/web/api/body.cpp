@@ -111,16 +111,16 @@ Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, mod
     return cells;
 }
 
-Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
-    const auto object = parse_object(body, {"values"});
-    if (!object) return object.error();
-    return values_member(*object, table);
+Parsed<bool> flag_member(const json::object& object, std::string_view name) {
+    const json::value* member = object.if_contains(name);
+    if (member == nullptr) return false;
+    if (member->is_bool()) return member->get_bool();
+    return problem(
+        400, std::string(name) + " must be true or false, not " + excerpt(json_text(*member)));
 }
 
-Parsed<points::Value> value_of(std::string_view text) {
-    const auto body = parse_object(text, {"value"});
-    if (!body) return body.error();
-    const json::value* value = body->if_contains("value");
+Parsed<points::Value> value_member(const json::object& object) {
+    const json::value* value = object.if_contains("value");
     if (value == nullptr) return problem(400, "the body needs \"value\"");
     if (value->is_bool()) return points::Value(value->get_bool());
     if (value->is_int64()) return points::Value(value->get_int64());

@@ -35,10 +35,9 @@ Parsed<std::string> string_member(const boost::json::object& object, std::string
 /// or -32768..-1 for their two's complement. At least one.
 Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
                                                  modbus::Table table);
-/// The same of a body that is nothing else: {"values": [...]}.
-Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table);
-
-/// A point's new value: {"value": ...}.
-Parsed<points::Value> value_of(std::string_view body);
+/// The member "value": a point's new one.
+Parsed<points::Value> value_member(const boost::json::object& object);
+/// True or false; false where there is no such member.
+Parsed<bool> flag_member(const boost::json::object& object, std::string_view name);
 
 }  // namespace panelgate::web

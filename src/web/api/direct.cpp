@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "answer.hpp"
 #include "ask.hpp"
 #include "body.hpp"
@@ -7,57 +5,13 @@
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
+#include "patience.hpp"
 #include "refusal.hpp"
 #include "station_path.hpp"
-#include "write_plan.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
 namespace {
-
-/// The function that most of the line's listed panels take as a broadcast; the preferred one when
-/// they do not decide.
-std::uint8_t broadcast_function(const Directory& directory, const LineEntry& line,
-                                const std::vector<std::uint8_t>& functions) {
-    const auto takers = [&](std::uint8_t function) {
-        return std::ranges::count_if(directory.stations, [&](const StationEntry& station) {
-            if (station.line != line.name) return false;
-            const auto* rule = station.profile->find_function(function);
-            return rule != nullptr && rule->broadcast;
-        });
-    };
-    return *std::ranges::max_element(functions, {}, takers);
-}
-
-Parsed<void> check_no_verify(const json::object& body) {
-    const json::value* verify = body.if_contains("verify");
-    if (verify == nullptr || (verify->is_bool() && !verify->get_bool())) return {};
-    return problem(400, "verify must be false: verifying a broadcast is not supported");
-}
-
-Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEntry& line,
-                                       const json::object& body) {
-    const auto verify = check_no_verify(body);
-    if (!verify) return verify.error();
-    const auto word = string_member(body, "table");
-    if (!word) return word.error();
-    const auto table = parse_table(*word, 400);
-    if (!table) return table.error();
-    if (!is_writable(*table)) return problem(422, *word + " cannot be written");
-    const auto address = number_member(body, "address", 0, 0xFFFF);
-    if (!address) return address.error();
-    const auto cells = values_member(body, *table);
-    if (!cells) return cells.error();
-
-    const auto functions = write_functions(*table, cells->size());
-    const std::uint8_t function = broadcast_function(directory, line, functions);
-    const unsigned limit = directory.generic->max_count(function);
-    if (cells->size() > limit || *address + static_cast<std::int64_t>(cells->size()) > 0x10000) {
-        return problem(422, "at most " + std::to_string(limit) +
-                                " values in one broadcast, up to address 65535");
-    }
-    return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
-}
 
 Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line, std::uint8_t id,
                                bool may) {
@@ -108,14 +62,6 @@ void tell_refused(Caller& caller, bus::BusClient& bus, const json::object& body)
     bus.tell_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
 }
 
-HttpResponse broadcast_answer(const bus::Answer& answer) {
-    if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
-    json::object body;
-    body["transmitted"] = true;
-    body["confirmed"] = false;
-    return json_response(202, body);
-}
-
 /// A panel's exception is an answer, too.
 HttpResponse raw_answer(const bus::Answer& answer) {
     if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
@@ -126,19 +72,6 @@ HttpResponse raw_answer(const bus::Answer& answer) {
 }
 
 }  // namespace
-
-Handling post_broadcast(HttpRequest request, const Api* api) {
-    const auto line = find_line(*api->directory, request.arguments[0]);
-    if (!line) co_return to_response(line.error());
-    const auto body = parse_object(request.body, {"table", "address", "values", "verify"});
-    if (!body) co_return to_response(body.error());
-    // What is no request says so first; one is the bus's to refuse, which counts and tells it.
-    auto planned = broadcast_request(*api->directory, **line, *body);
-    if (!planned) co_return to_response(planned.error());
-    bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
-    co_return broadcast_answer(answer);
-}
 
 Handling post_raw(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
@@ -152,6 +85,8 @@ Handling post_raw(HttpRequest request, const Api* api) {
     }
     bus::Request made = std::move(*planned);
     const bool broadcast = made.station == 0;
+    const Patience patience(request, (*line)->deadline, api->providers.now);
+    made.within = patience.left();
     bus::Answer answer = co_await ask(request.caller, (*line)->bus, std::move(made));
     co_return broadcast ? broadcast_answer(answer) : raw_answer(answer);
 }

@@ -21,6 +21,10 @@ const LineEntry* Directory::find_line(std::string_view name) const {
     return line == lines.end() ? nullptr : &*line;
 }
 
+const LineEntry& Directory::line_of(const StationEntry& station) const {
+    return *find_line(station.line);
+}
+
 std::optional<StationEntry> Directory::find_station(std::string_view name) const {
     const auto named = std::ranges::find(stations, name, &StationEntry::name);
     if (named != stations.end()) return *named;

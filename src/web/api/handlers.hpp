@@ -1,5 +1,8 @@
 #pragma once
 
+#include <memory>
+
+#include "key_book.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/site.hpp"
@@ -10,9 +13,15 @@ namespace panelgate::web {
 struct Api {
     const Directory* directory = nullptr;
     Providers providers;
+    std::shared_ptr<KeyBook> keys;  ///< never null
 };
+using Handler = Handling (*)(HttpRequest request, const Api* api);
 
 Handling get_index(HttpRequest request, const Api* api);
+Handling get_page(HttpRequest request, const Api* api);
+Handling get_configuration(HttpRequest request, const Api* api);
+Handling get_openapi(HttpRequest request, const Api* api);
+Handling get_docs(HttpRequest request, const Api* api);
 Handling get_healthz(HttpRequest request, const Api* api);
 Handling get_readyz(HttpRequest request, const Api* api);
 Handling get_metrics(HttpRequest request, const Api* api);
@@ -23,6 +32,9 @@ Handling get_trace(HttpRequest request, const Api* api);
 Handling post_broadcast(HttpRequest request, const Api* api);
 Handling post_raw(HttpRequest request, const Api* api);
 
+Handling post_read(HttpRequest request, const Api* api);
+Handling post_write(HttpRequest request, const Api* api);
+
 Handling get_stations(HttpRequest request, const Api* api);
 Handling get_station(HttpRequest request, const Api* api);
 Handling get_table(HttpRequest request, const Api* api);
@@ -30,6 +42,8 @@ Handling put_table(HttpRequest request, const Api* api);
 Handling get_points(HttpRequest request, const Api* api);
 Handling get_point(HttpRequest request, const Api* api);
 Handling put_point(HttpRequest request, const Api* api);
+Handling get_table_plan(HttpRequest request, const Api* api);
+Handling get_device_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
 Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);

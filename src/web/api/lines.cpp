@@ -79,6 +79,16 @@ json::array describe(const std::vector<bus::ClientShare>& clients) {
     for (const bus::ClientShare& client : clients) {
         json::object object;
         object["name"] = client.name;
+        object["address"] = nullptr;
+        if (client.address) object["address"] = *client.address;
+        object["requests"] = client.requests;
+        object["failed"] = client.failed;
+        object["last_error"] = nullptr;
+        object["last_error_ms"] = nullptr;
+        if (client.last_error) {
+            object["last_error"] = label(*client.last_error);
+            object["last_error_ms"] = whole_ms(client.last_error_ago);
+        }
         object["busy_seconds"] = to_seconds(client.busy);
         object["percent"] = std::round(client.percent * 10) / 10;
         object["transactions"] = client.transactions;

@@ -1,15 +1,19 @@
 #include <boost/json/array.hpp>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "answer.hpp"
 #include "ask.hpp"
-#include "body.hpp"
+#include "csv.hpp"
 #include "handlers.hpp"
 #include "long_answer.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "patience.hpp"
 #include "point_json.hpp"
-#include "refusal.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -18,59 +22,23 @@ namespace {
 
 using points::Point;
 
-json::object describe(const Api& api, const points::StationPoints& station, const Point& point) {
-    json::object object = point_json(point, station.read(point, api.providers.now()));
+constexpr std::string_view kColumns[] = {"name",   "value", "label", "unit",    "quality",
+                                         "age_ms", "at",    "type",  "writable"};
+
+json::object describe(const Api& api, const points::StationPoints& station, const Point& point,
+                      bool raw) {
+    const points::PointReading reading = station.read(point, api.providers.now());
+    json::object object = point_json(point, reading);
+    if (raw) {
+        object["raw"] = nullptr;
+        const auto& items = station.items(point);
+        if (reading.quality != points::Quality::bad)
+            object["raw"] = json::array(items.begin(), items.end());
+    }
     object["at"] = point.at;
     object["type"] = label(point.type);
     object["writable"] = point.writable;
     return object;
-}
-
-struct Found {
-    StationEntry station;
-    const Point* point = nullptr;
-};
-
-Parsed<Found> find_point(const HttpRequest& request, const Directory& directory) {
-    auto station = find_station(directory, request.arguments[0]);
-    if (!station) return station.error();
-    const Point* point =
-        station->points != nullptr ? station->points->find(request.arguments[1]) : nullptr;
-    if (point == nullptr) {
-        return problem(
-            404, "station '" + station->name + "' has no point '" + request.arguments[1] + '\'');
-    }
-    return Found{std::move(*station), point};
-}
-
-/// The query `round`: true or false, the default.
-Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
-    const auto given = request.query.find("round");
-    if (given == request.query.end() || given->second == "false") return points::Rounding::exact;
-    if (given->second == "true") return points::Rounding::nearest;
-    return problem(400, "round is true or false, not '" + given->second + '\'');
-}
-
-Parsed<points::PointWrite> write_of(const Found& found, const HttpRequest& request) {
-    const auto rounding = rounding_of(request);
-    if (!rounding) return rounding.error();
-    const auto value = value_of(request.body);
-    if (!value) return value.error();
-    auto write = points::write_request(*found.station.profile, *found.point, *value, *rounding);
-    if (write) return std::move(*write);
-    if (write.error().malformed) return problem(400, write.error().message);
-    const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
-    return problem(422, write.error().message + hint);
-}
-
-/// Confirmed: and what the point is now, which its next read will show.
-HttpResponse write_answer(const points::PointWrite& write) {
-    json::object body;
-    body["transmitted"] = true;
-    body["confirmed"] = true;
-    body["value"] = json_of(write.value);
-    if (write.label) body["label"] = *write.label;
-    return json_response(200, body);
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -93,39 +61,36 @@ json::array describe(const std::vector<points::Interpretation>& all) {
 Handling get_points(HttpRequest request, const Api* api) {
     const auto station = find_station(*api->directory, request.arguments[0]);
     if (!station) co_return to_response(station.error());
+    const auto raw = query_flag(request, "raw");
+    if (!raw) co_return to_response(raw.error());
+    const bool as_csv = prefers_csv(request.headers["accept"]);
+    if (as_csv && *raw) co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
     LongAnswer body;
+    std::string table = csv_line(kColumns);
     body.begin_list("points");
     const std::size_t count = station->points == nullptr ? 0 : station->points->points().size();
     for (std::size_t i = 0; i < count; ++i) {
-        body.add(describe(*api, *station->points, station->points->points()[i]));
+        const json::object one =
+            describe(*api, *station->points, station->points->points()[i], *raw);
+        if (as_csv) table += csv_line(one, kColumns);
+        body.add(one);
         if (!body.is_turn_over()) continue;
         boost::asio::awaitable<void> turn = others_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
     body.end_list();
-    co_return body.response();
+    HttpResponse response = as_csv ? csv_response(std::move(table)) : body.response();
+    response.headers.emplace_back("Vary", "Accept");
+    co_return response;
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(request, *api->directory);
+    const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
     if (!found) co_return to_response(found.error());
-    co_return json_response(200, describe(*api, *found->station.points, *found->point));
-}
-
-Handling put_point(HttpRequest request, const Api* api) {
-    const auto found = find_point(request, *api->directory);
-    if (!found) co_return to_response(found.error());
-    const auto write =
-        unless_refused(write_of(*found, request), *found->station.bus, found->station.id);
-    if (!write) co_return to_response(write.error());
-    auto planned = request_to(found->station.id, write->pdu);
-    if (!planned) co_return to_response(planned.error());
-    bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await ask(request.caller, found->station.bus, std::move(made));
-    const auto failed = problem_of(answer, *found->station.profile);
-    if (failed) co_return to_response(*failed);
-    co_return write_answer(*write);
+    const auto raw = query_flag(request, "raw");
+    if (!raw) co_return to_response(raw.error());
+    co_return json_response(200, describe(*api, *found->station.points, *found->point, *raw));
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {
@@ -134,7 +99,10 @@ Handling get_interpretations(HttpRequest request, const Api* api) {
     constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
+    const Duration deadline = api->directory->line_of(items->station).deadline;
+    const Patience patience(request, deadline, api->providers.now);
     bus::Request made{.station = items->station.id, .request = modbus::Request::read(items->span)};
+    made.within = patience.left();
     bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
     const auto failed = problem_of(answer, *items->station.profile);
     if (failed) co_return to_response(*failed);

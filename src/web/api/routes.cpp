@@ -1,8 +1,11 @@
 #include "routes.hpp"
 
 #include <algorithm>
+#include <boost/json/object.hpp>
 #include <string_view>
 #include <utility>
+
+#include "conduct.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -10,39 +13,54 @@ namespace {
 constexpr Role kFree = Role::none;
 constexpr Role kSee = Role::viewer;
 constexpr Role kChange = Role::operator_;
+constexpr std::string_view kReading = "count type order length raw";
+
+constexpr Manner kPlain{};
+constexpr Manner kTagged{.tagged = true};
+constexpr Manner kAsks{.asks = true};
+constexpr Manner kWrites{.asks = true, .once = true};
 
 struct Row {
     std::string_view verb;
     std::string_view pattern;
-    Handling (*handler)(HttpRequest, const Api*);
+    Handler handler;
     Role needed;
+    Manner manner = {};
     std::string_view queries = {};  ///< with a blank between them
 };
 constexpr Row kRows[] = {
     {"GET", "/", get_index, kSee},
+    {"GET", "/page/{}", get_page, kSee},
+    {"GET", "/docs", get_docs, kSee},
+    {"GET", "/openapi.json", get_openapi, kSee},
     {"GET", "/healthz", get_healthz, kFree},
     {"GET", "/readyz", get_readyz, kFree},
     {"GET", "/metrics", get_metrics, kSee},
-    {"GET", "/api/v1/lines", get_lines, kSee},
-    {"GET", "/api/v1/lines/{}", get_line, kSee},
-    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, "last since"},
-    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange},
-    {"POST", "/api/v1/lines/{}/raw", post_raw, kChange},
-    {"GET", "/api/v1/stations", get_stations, kSee},
-    {"GET", "/api/v1/stations/{}", get_station, kSee},
+    {"GET", "/api/v1/configuration", get_configuration, kSee, kTagged},
+    {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
+    {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
+    {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
+    {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange, kWrites},
+    {"POST", "/api/v1/lines/{}/raw", post_raw, kChange, kWrites},
+    {"POST", "/api/v1/read", post_read, kSee, kAsks},
+    {"POST", "/api/v1/write", post_write, kChange, kWrites},
+    {"GET", "/api/v1/stations", get_stations, kSee, kTagged},
+    {"GET", "/api/v1/stations/{}", get_station, kSee, kTagged},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
-    {"GET", "/api/v1/events", get_events, kSee, "types"},
-    {"GET", "/api/v1/relays", get_relays, kSee},
-    {"GET", "/api/v1/stations/{}/points", get_points, kSee},
-    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee},
-    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, "round"},
-    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, "count"},
+    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types"},
+    {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
+    {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
+    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},
+    {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
+    {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},
     // Before the tables: "devices" is none of them.
-    {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, "count type"},
-    {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange},
-    {"GET", "/api/v1/stations/{}/{}/{}", get_table, kSee, "count type"},
-    {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange},
+    {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kTagged, "count values"},
+    {"GET", "/api/v1/stations/{}/{}/{}/plan", get_table_plan, kSee, kTagged, "count values"},
+    {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, kAsks, kReading},
+    {"PUT", "/api/v1/stations/{}/devices/{}", put_device, kChange, kWrites},
+    {"GET", "/api/v1/stations/{}/{}/{}", get_table, kSee, kAsks, kReading},
+    {"PUT", "/api/v1/stations/{}/{}/{}", put_table, kChange, kWrites},
 };
 
 std::vector<std::string_view> words_of(std::string_view text) {
@@ -60,12 +78,21 @@ std::vector<std::string_view> words_of(std::string_view text) {
 std::vector<Route> routes(std::shared_ptr<const Api> api) {
     std::vector<Route> made;
     for (const Row& row : kRows) {
-        const auto call = [api, handler = row.handler](HttpRequest request) {
-            return handler(std::move(request), api.get());
+        const auto call = [api, &row](HttpRequest request) {
+            return conduct(std::move(request), api.get(), row.handler, row.manner);
         };
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries)});
     }
     return made;
+}
+
+boost::json::array offered() {
+    boost::json::array list;
+    for (const Row& row : kRows) {
+        list.push_back(boost::json::object{
+            {"method", row.verb}, {"path", row.pattern}, {"role", label(row.needed)}});
+    }
+    return list;
 }
 
 std::vector<Route> simulator_routes(std::shared_ptr<const Api> api) {

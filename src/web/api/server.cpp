@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "key_book.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/web/http/listener.hpp"
 #include "panelgate/web/http/site.hpp"
@@ -14,6 +15,8 @@ Server::Server(boost::asio::any_io_executor executor, Settings settings, const D
     auto api = std::make_shared<Api>();
     api->directory = &directory;
     api->providers = std::move(providers);
+    keys_ = std::make_shared<KeyBook>(api->providers.settings);
+    api->keys = keys_;
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
     site->product = "panelgate/" + api->providers.version;
@@ -24,7 +27,10 @@ Server::Server(boost::asio::any_io_executor executor, Settings settings, const D
     listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
 }
 
-Server::~Server() { listener_->abandon(); }
+Server::~Server() {
+    keys_->dismiss();
+    listener_->abandon();
+}
 
 boost::system::error_code Server::start() { return listener_->open(); }
 

@@ -6,6 +6,19 @@
 #include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
+namespace {
+
+/// As many as the query `count` says.
+Parsed<Items> counted(const HttpRequest& request, Parsed<Items> items) {
+    if (!items) return items;
+    const unsigned most = modbus::kTableItems - items->span.first;
+    const auto count = query_number(request, "count", 1, most, 1);
+    if (!count) return count.error();
+    items->span.count = *count;
+    return items;
+}
+
+}  // namespace
 
 Parsed<modbus::Table> parse_table(std::string_view word, unsigned status) {
     for (const modbus::Table table : modbus::kTables) {
@@ -36,44 +49,56 @@ Parsed<StationEntry> find_station(const Directory& directory, const std::string&
     return problem(404, "there is no station '" + name + "'");
 }
 
-Parsed<Items> items_of_table_path(const HttpRequest& request, const Directory& directory) {
-    Items items;
-    auto station = find_station(directory, request.arguments[0]);
+Parsed<PointOfStation> find_point(const Directory& directory, const std::string& name,
+                                  const std::string& point_name) {
+    auto station = find_station(directory, name);
     if (!station) return station.error();
-    items.station = std::move(*station);
-    const auto table = parse_table(request.arguments[1], 404);
-    if (!table) return table.error();
-    items.span.table = *table;
-    const auto address = parse_address(request.arguments[2]);
-    if (!address) return address.error();
-    items.span.first = *address;
-    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
-    if (!count) return count.error();
-    items.span.count = *count;
+    const points::Point* point =
+        station->points != nullptr ? station->points->find(point_name) : nullptr;
+    if (point == nullptr) {
+        return problem(404, "station '" + station->name + "' has no point '" + point_name + '\'');
+    }
+    return PointOfStation{std::move(*station), point};
+}
+
+Parsed<Items> item_of_table(StationEntry station, modbus::Table table, std::uint16_t address) {
+    Items items;
+    items.station = std::move(station);
+    items.span = {table, address, 1};
     return items;
 }
 
-Parsed<Items> items_of_device_path(const HttpRequest& request, const Directory& directory) {
-    Items items;
-    auto station = find_station(directory, request.arguments[0]);
-    if (!station) return station.error();
-    items.station = std::move(*station);
-    if (items.station.unknown_panel) {
-        return problem(422, "station '" + items.station.name +
+Parsed<Items> item_of_notation(StationEntry station, std::string_view notation) {
+    if (station.unknown_panel) {
+        return problem(422, "station '" + station.name +
                                 "' has no profile that explains notations; read its tables");
     }
-    const auto item = profile::parse_notation(*items.station.profile, request.arguments[1]);
+    const auto item = profile::parse_notation(*station.profile, notation);
     if (!item) {
         const bool outside = item.error().kind == profile::NotationError::Kind::out_of_range;
         return problem(outside ? 422 : 404, item.error().message);
     }
+    Items items;
+    items.station = std::move(station);
     items.area = item->area;
-    items.span.table = item->area->table;
-    items.span.first = item->address;
-    const auto count = query_number(request, "count", 1, modbus::kTableItems - items.span.first, 1);
-    if (!count) return count.error();
-    items.span.count = *count;
+    items.span = {item->area->table, item->address, 1};
     return items;
+}
+
+Parsed<Items> items_of_table_path(const HttpRequest& request, const Directory& directory) {
+    auto station = find_station(directory, request.arguments[0]);
+    if (!station) return station.error();
+    const auto table = parse_table(request.arguments[1], 404);
+    if (!table) return table.error();
+    const auto address = parse_address(request.arguments[2]);
+    if (!address) return address.error();
+    return counted(request, item_of_table(std::move(*station), *table, *address));
+}
+
+Parsed<Items> items_of_device_path(const HttpRequest& request, const Directory& directory) {
+    auto station = find_station(directory, request.arguments[0]);
+    if (!station) return station.error();
+    return counted(request, item_of_notation(std::move(*station), request.arguments[1]));
 }
 
 }  // namespace panelgate::web

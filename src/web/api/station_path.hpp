@@ -6,6 +6,7 @@
 
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/span.hpp"
+#include "panelgate/points/point.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/http/message.hpp"
@@ -28,9 +29,20 @@ Parsed<std::uint16_t> parse_address(std::string_view text);
 
 Parsed<const LineEntry*> find_line(const Directory& directory, const std::string& name);
 Parsed<StationEntry> find_station(const Directory& directory, const std::string& name);
-/// From /stations/{station}/{table}/{address}.
+struct PointOfStation {
+    StationEntry station;
+    const points::Point* point = nullptr;
+};
+Parsed<PointOfStation> find_point(const Directory& directory, const std::string& station,
+                                  const std::string& point);
+
+/// One item of a table, or of the memory that a notation names; its table is the area's own.
+Parsed<Items> item_of_table(StationEntry station, modbus::Table table, std::uint16_t address);
+Parsed<Items> item_of_notation(StationEntry station, std::string_view notation);
+
+/// From /stations/{station}/{table}/{address}; the query `count` says how many.
 Parsed<Items> items_of_table_path(const HttpRequest& request, const Directory& directory);
-/// From /stations/{station}/devices/{notation}; table is the area's own.
+/// The same from /stations/{station}/devices/{notation}.
 Parsed<Items> items_of_device_path(const HttpRequest& request, const Directory& directory);
 
 }  // namespace panelgate::web

@@ -1,6 +1,9 @@
+#include <boost/json/parse.hpp>
+#include <string>
 #include <string_view>
 #include <utility>
 
+#include "docs_page.hpp"
 #include "handlers.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/problem.hpp"
@@ -18,23 +21,17 @@ HttpResponse text_response(unsigned status, std::string body,
     return response;
 }
 
-constexpr std::string_view kIndex = R"(<!doctype html>
-<html lang="en"><head><meta charset="utf-8"><title>panelgate</title></head><body>
-<h1>panelgate</h1>
-<ul>
-<li><a href="/api/v1/stations">stations</a></li>
-<li><a href="/api/v1/lines">lines</a></li>
-<li><a href="/metrics">metrics</a></li>
-<li><a href="/healthz">healthz</a></li>
-<li><a href="/readyz">readyz</a></li>
-</ul>
-</body></html>
-)";
-
 }  // namespace
 
-Handling get_index(HttpRequest, const Api*) {
-    co_return text_response(200, std::string(kIndex), "text/html; charset=utf-8");
+Handling get_openapi(HttpRequest, const Api*) {
+    co_return text_response(200, openapi_text(), "application/json");
+}
+
+Handling get_docs(HttpRequest, const Api*) {
+    static const std::string page = docs_page(boost::json::parse(openapi_text()).as_object());
+    HttpResponse response = text_response(200, page, "text/html; charset=utf-8");
+    response.headers.emplace_back("Content-Security-Policy", std::string(kDocsPolicy));
+    co_return response;
 }
 
 Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok\n"); }

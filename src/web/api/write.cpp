@@ -1,69 +1,63 @@
-#include <algorithm>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include "answer.hpp"
-#include "ask.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
-#include "refusal.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "patience.hpp"
 #include "station_path.hpp"
-#include "write_plan.hpp"
+#include "writing.hpp"
 
 namespace panelgate::web {
+namespace json = boost::json;
 namespace {
 
-Problem not_writable(modbus::Table table) {
-    Problem made = problem(405, std::string(label(table)) + " cannot be written");
-    made.headers.emplace_back("Allow", "GET, HEAD");
-    return made;
+/// The query `round`.
+Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
+    const auto round = query_flag(request, "round");
+    if (!round) return round.error();
+    return *round ? points::Rounding::nearest : points::Rounding::exact;
 }
 
-/// The request that writes the body's values, or why there is none.
-Parsed<bus::Request> write_request(const Items& items, std::string_view body) {
-    if (!is_writable(items.span.table)) return not_writable(items.span.table);
-    const auto cells = cells_of(body, items.span.table);
-    if (!cells) return cells.error();
-    auto pdu = plan_write(items, *cells);
-    if (!pdu) return pdu.error();
-    return request_to(items.station.id, std::move(*pdu));
+Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api) {
+    if (!writing) co_return to_response(writing.error());
+    const Duration deadline = api->directory->line_of(writing->station).deadline;
+    const Patience patience(request, deadline, api->providers.now);
+    boost::asio::awaitable<Parsed<json::object>> writes =
+        write(request.caller, &*writing, patience);
+    const Parsed<json::object> told = co_await std::move(writes);
+    if (!told) co_return to_response(told.error());
+    co_return json_response(200, *told);
 }
 
-Handling write_items(HttpRequest request, Parsed<Items> items) {
+Handling put_items(HttpRequest request, Parsed<Items> items, const Api* api) {
     if (!items) co_return to_response(items.error());
-    auto planned =
-        unless_refused(write_request(*items, request.body), *items->station.bus, items->station.id);
-    if (!planned) co_return to_response(planned.error());
-    bus::Request made = std::move(*planned);
-    bus::Answer answer = co_await ask(request.caller, items->station.bus, std::move(made));
-    co_return write_answer(answer, *items->station.profile);
-}
-
-/// A notation names memory: any table that reaches it and can be written will do.
-Parsed<Items> device_to_write(const HttpRequest& request, const Directory& directory) {
-    auto items = items_of_device_path(request, directory);
-    if (!items) return items;
-    const auto& also = items->area->also;
-    const auto writable = std::ranges::find_if(also, is_writable);
-    if (!is_writable(items->span.table) && writable != also.end()) items->span.table = *writable;
-    if (is_writable(items->span.table) && !items->area->writable) {
-        return ruled_out(bus::Rule::write_protected,
-                         items->area->name + " is read-only in this panel");
-    }
-    return items;
+    auto writing = write_of(*items, parse_object(request.body, {"values", "verify"}));
+    boost::asio::awaitable<HttpResponse> done =
+        carry_out(std::move(request), std::move(writing), api);
+    co_return co_await std::move(done);
 }
 
 }  // namespace
 
 Handling put_table(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api->directory);
-    return write_items(std::move(request), std::move(items));
+    return put_items(std::move(request), std::move(items), api);
 }
 
 Handling put_device(HttpRequest request, const Api* api) {
-    auto items = device_to_write(request, *api->directory);
-    return write_items(std::move(request), std::move(items));
+    auto items = made_writable(items_of_device_path(request, *api->directory));
+    return put_items(std::move(request), std::move(items), api);
+}
+
+Handling put_point(HttpRequest request, const Api* api) {
+    const auto to = find_point(*api->directory, request.arguments[0], request.arguments[1]);
+    if (!to) co_return to_response(to.error());
+    auto writing =
+        write_of(*to, parse_object(request.body, {"value", "verify"}), rounding_of(request));
+    boost::asio::awaitable<HttpResponse> done =
+        carry_out(std::move(request), std::move(writing), api);
+    co_return co_await std::move(done);
 }
 
 }  // namespace panelgate::web

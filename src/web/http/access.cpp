@@ -93,6 +93,12 @@ std::optional<Problem> check_encoding(const HttpRequest& request) {
     return made;
 }
 
+Role role_of(const HttpRequest& request, const Settings& settings) {
+    if (header(request, "authorization").empty()) return settings.anonymous;
+    const Token* token = token_of(request, settings);
+    return token == nullptr ? Role::none : token->role;
+}
+
 std::string token_name(const HttpRequest& request, const Settings& settings) {
     const Token* token = token_of(request, settings);
     return token == nullptr ? std::string() : token->name;

@@ -21,6 +21,9 @@ bool carries_token(const HttpRequest& request);
 /// 415 for a body that was compressed, or coded in any other way: nobody here decodes it.
 std::optional<Problem> check_encoding(const HttpRequest& request);
 
+/// What it may do, by its token or without one; none for a token that nobody has.
+Role role_of(const HttpRequest& request, const Settings& settings);
+
 /// The name of the token that it carries, "" without one that is known.
 std::string token_name(const HttpRequest& request, const Settings& settings);
 

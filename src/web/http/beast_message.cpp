@@ -24,7 +24,7 @@ bool has_sound_framing(const BeastRequest& message) {
 
 std::optional<Problem> repeated_field(const BeastRequest& message) {
     for (const char* name : kHeadersRead) {
-        if (std::string_view(name) == "accept-encoding" || message.count(name) < 2) continue;
+        if (message.count(name) < 2) continue;
         return problem(400, "a request has one " + std::string(name) + ", not " +
                                 std::to_string(message.count(name)));
     }
@@ -54,6 +54,13 @@ HttpRequest to_request(BeastRequest&& message, Target target, std::string host) 
     for (const char* name : kHeadersRead) {
         const auto field = message.find(name);
         if (field != message.end()) request.headers[name] = field->value();
+    }
+    for (const char* name : kListsRead) {
+        const auto [first, end] = message.equal_range(name);
+        for (auto field = first; field != end; ++field) {
+            std::string& all = request.headers[name];
+            all += (all.empty() ? "" : ", ") + std::string(field->value());
+        }
     }
     request.body = std::move(message.body());
     return request;

@@ -41,7 +41,7 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     message.set(field::cache_control, "no-store");
     message.set("X-Content-Type-Options", "nosniff");
     for (const auto& [name, value] : response.headers) message.set(name, value);
-    if (response.status != 204) {  // it has no body, and must not say so (RFC 9110 8.6)
+    if (response.status != 204 && response.status != 304) {  // no body: RFC 9110 8.6, 15.4.5
         message.set(field::content_type, response.content_type);
         message.content_length(response.shared_body ? response.shared_body->size()
                                                     : response.body.size());

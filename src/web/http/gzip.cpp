@@ -54,6 +54,24 @@ bool accepts_gzip(std::string_view accept_encoding) {
     return false;
 }
 
+std::string unpacked(std::string_view body) {
+    z_stream z{};
+    if (inflateInit2(&z, kGzipWindow) != Z_OK) throw std::bad_alloc();
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(body.data()));
+    z.avail_in = static_cast<uInt>(body.size());
+    std::array<char, 64 * 1024> space;
+    std::string text;
+    int state = Z_OK;
+    while (state == Z_OK) {
+        z.next_out = reinterpret_cast<Bytef*>(space.data());
+        z.avail_out = static_cast<uInt>(space.size());
+        state = inflate(&z, Z_NO_FLUSH);
+        text.append(space.data(), space.size() - z.avail_out);
+    }
+    inflateEnd(&z);
+    return state == Z_STREAM_END ? text : std::string();
+}
+
 struct Gzip::Stream {
     Stream() {
         if (deflateInit2(&z, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)

@@ -18,6 +18,8 @@ std::string title_of(unsigned status) {
             return "Not Found";
         case 405:
             return "Method Not Allowed";
+        case 409:
+            return "Conflict";
         case 413:
             return "Content Too Large";
         case 415:
@@ -57,17 +59,21 @@ Problem unknown_name(const std::string& what, const std::string& name,
     return problem(400, std::move(text));
 }
 
-HttpResponse to_response(const Problem& problem) {
+boost::json::object json_of(const Problem& problem) {
     boost::json::object body;
     body["type"] = problem.kind.empty() ? "about:blank" : "urn:panelgate:problem:" + problem.kind;
     body["title"] = title_of(problem.status);
     body["status"] = problem.status;
     body["detail"] = problem.detail;
     for (const auto& [name, value] : problem.extensions) body[name] = value;
+    return body;
+}
+
+HttpResponse to_response(const Problem& problem) {
     HttpResponse response;
     response.status = problem.status;
     response.content_type = "application/problem+json";
-    response.body = json_text(body) + "\n";
+    response.body = json_text(json_of(problem)) + "\n";
     response.headers = problem.headers;
     return response;
 }

@@ -5,6 +5,8 @@
 #include <string>
 #include <system_error>
 
+#include "panelgate/web/http/json_text.hpp"
+
 namespace panelgate::web {
 
 std::optional<unsigned> to_number(std::string_view text, int base) {
@@ -33,6 +35,13 @@ Parsed<unsigned> query_number(const HttpRequest& request, const std::string& nam
     if (number && *number >= low && *number <= high) return *number;
     return problem(400, name + " must be a whole number from " + std::to_string(low) + " to " +
                             std::to_string(high));
+}
+
+Parsed<bool> query_flag(const HttpRequest& request, const std::string& name) {
+    const auto given = request.query.find(name);
+    if (given == request.query.end() || given->second == "false") return false;
+    if (given->second == "true") return true;
+    return problem(400, name + " is true or false, not '" + excerpt(given->second) + '\'');
 }
 
 }  // namespace panelgate::web

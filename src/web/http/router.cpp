@@ -157,6 +157,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
     if (request.caller) request.caller->uses_token(token_name(request, site->settings));
+    request.role = role_of(request, site->settings);
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);

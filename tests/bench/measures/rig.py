@@ -56,12 +56,13 @@ class Panelgate:
     def unavailable(self):
         return None if os.access(self.program, os.X_OK) else f"there is no {self.program}"
 
-    def configuration(self, link, baud, stations=STATIONS):
+    def configuration(self, link, baud, stations=STATIONS, **more):
+        """`more`: other parts of the file, as YAML."""
         gap = "0us" if link.startswith("tcp://") else UNPACED_GAP
         keys = {} if baud else {"timing": f"{{frame_gap: {gap}}}"}
         line = config.line("wire", link, config.station_ids(stations), baud=baud or UNPACED,
                            parity="even", **keys)
-        return config.gateway(line, http=self._how.get("http"))
+        return config.gateway(line, http=self._how.get("http"), **more)
 
     def takes(self, link, baud):
         """Whether this build accepts the configuration of such a line."""
@@ -72,9 +73,9 @@ class Panelgate:
                                   check=False).returncode == 0
 
     @contextlib.contextmanager
-    def serving(self, link, baud, stations=STATIONS):
+    def serving(self, link, baud, stations=STATIONS, **more):
         """A running gateway: its Modbus/TCP port is `port`, its process `pid`."""
-        with self.running(self.configuration(link, baud, stations)) as program:
+        with self.running(self.configuration(link, baud, stations, **more)) as program:
             program.log.wait_for("line up")
             yield program
 

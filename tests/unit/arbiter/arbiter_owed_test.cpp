@@ -143,6 +143,32 @@ TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
     EXPECT_TRUE(script.next_sent(100ms));
 }
 
+TEST_F(ArbiterDoubtTest, P1WhoSaysADoubtfulAnswerOnceMoreSpeaksTwiceAndIsLeftAloneFromThenOn) {
+    script.run_for(5ms);
+    script.hear_reply(17, kReply);
+    ASSERT_EQ(script.answer(doubted).pdu.value(), kReply);
+    const TimePoint replied = script.now();
+    script.submit(17, read_at(3), 1);
+    const auto next = script.next_sent(200ms);
+    ASSERT_TRUE(next);
+    EXPECT_GE(next->at - replied, Duration(5ms)) << "its copy would answer this";
+}
+
+TEST_F(ArbiterTest, P1BehindAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTwiceToo) {
+    bus.submit(17, kRead, 1);
+    bus.run_to_end_of_request();
+    bus.run_for(3ms);
+    Bytes damaged = modbus::encode_adu(17, kReply);
+    damaged[3] ^= 0x10;
+    bus.hear_paced(damaged);
+    bus.hear_paced(modbus::encode_adu(17, kReply));
+    const TimePoint replied = bus.now();
+    bus.submit(17, read_at(5), 1);
+    const auto next = bus.next_sent(300ms);
+    ASSERT_TRUE(next);
+    EXPECT_GE(next->at - replied, CopyGuard::kSaidAgain);
+}
+
 /// A busy panel says so twice and then gives the value: that is no copy.
 TEST_F(ArbiterTest, P5AnExceptionThatRepeatsAnotherOneIsNotAskedForOnceMore) {
     const auto refuse = [&](std::uint16_t address) {

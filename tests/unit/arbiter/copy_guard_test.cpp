@@ -142,6 +142,29 @@ TEST_F(CopyGuardTest, P1WhoIsDeniedIsNoLongerBelieved) {
     EXPECT_TRUE(guard_.suspicious(now_ + 20ms, kOtherRequest, kReply));
 }
 
+TEST_F(CopyGuardTest, P1BehindADenialAnEqualAnswerToTheVerySameRequestIsSuspiciousToo) {
+    reply();
+    EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kRequest, kReply));
+    guard_.on_denied(now_ + 20ms, kReply);
+    EXPECT_TRUE(guard_.suspicious(now_ + 40ms, kRequest, kReply));
+    guard_.on_confirmed(kRequest, kReply);
+    EXPECT_FALSE(guard_.suspicious(now_ + 60ms, kRequest, kReply)) << "it has not changed";
+    guard_.on_denied(now_ + 80ms, kReply);
+    now_ += CopyGuard::kForget + 1s;
+    reply();
+    EXPECT_FALSE(guard_.suspicious(now_ + 20ms, kRequest, kReply)) << "long ago";
+}
+
+TEST_F(CopyGuardTest, P1WhoSaysTheAnswerToOneRequestTwiceSpeaksTwice) {
+    guard_.on_said_twice(now_ + 30ms, now_ + 10ms, kReply);
+    EXPECT_EQ(guard_.hold(), Duration(30ms));
+    reply();
+    guard_.on_said_twice(now_ + 60ms, now_ + 50ms, kReply);
+    EXPECT_EQ(guard_.hold(), Duration(75ms)) << "the first may have been a copy of the one before";
+    guard_.on_said_twice(now_ + 60ms + CopyGuard::kLongest, now_ + 50ms, kReply);
+    EXPECT_EQ(guard_.hold(), Duration(75ms)) << "later, it is something else";
+}
+
 TEST_F(CopyGuardTest, P1WhatIsInDoubtIsWaitedForBehindOneMoreReply) {
     reply();
     guard_.on_doubt(20ms);

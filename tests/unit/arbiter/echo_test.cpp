@@ -177,6 +177,15 @@ TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
     EXPECT_EQ(memory.state(), EchoState::absent);
 }
 
+TEST_F(Echo, P8AReplyBehindAFrameOfSomebodyTellsNothingAboutAnEcho) {
+    BusScript bus(settings(EchoMode::automatic));
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.hear_paced(modbus::encode_adu(18, kReply));
+    bus.hear_paced(modbus::encode_adu(17, kReply));
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
+}
+
 TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     BusScript bus(settings(EchoMode::automatic));
     const Ticket ticket = bus.submit(17, kWriteCoil);

@@ -49,7 +49,7 @@ class LedgerTest : public testing::Test {
 
 TEST_F(LedgerTest, SaysEverythingOnceInTheOrderInWhichItHappened) {
     const Group group = test::group_of(17, kRead);
-    ledger.transmit(now, answered(group), kRead, {});
+    ledger.transmit(now, answered(group), kRead, kRead, {});
     ledger.event(StationEvent::Kind::online, 17);
     ledger.finish(group.jobs.front(), kReply);
     ledger.reset("stalled");
@@ -76,9 +76,9 @@ TEST_F(LedgerTest, AnAnswerSaysWhetherItsRequestWasEverSent) {
 }
 
 TEST_F(LedgerTest, ARepeatedRequestIsARetryOfItsStationAndABroadcastOfTheLine) {
-    ledger.transmit(now, answered(test::group_of(17, kRead, 1)), kRead, {});
+    ledger.transmit(now, answered(test::group_of(17, kRead, 1)), kRead, kRead, {});
     EXPECT_EQ(of(17).retries, 0u);
-    ledger.transmit(now, answered(test::group_of(17, kRead, 2)), kRead, {});
+    ledger.transmit(now, answered(test::group_of(17, kRead, 2)), kRead, kRead, {});
     EXPECT_EQ(of(17).retries, 1u);
     EXPECT_EQ(ledger.line().broadcasts, 0u);
 }

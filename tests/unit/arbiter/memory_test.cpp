@@ -127,6 +127,24 @@ TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
               "nobody but this request for 500.0 ms: station 17 did not answer and may do so late");
 }
 
+TEST(Explain, SaysWhyAReadThatWasAnsweredIsAskedOnceMore) {
+    Settings settings = settings_with(0s);
+    settings.explain = true;
+    BusScript bus(settings);
+    for (const Bytes& read : {kRead, "03 01 00 00 03"_hex}) {
+        bus.submit(17, read, 1);
+        bus.run_to_end_of_request();
+        bus.run_for(3ms);
+        bus.hear_reply(17, kReply);
+    }
+    ASSERT_TRUE(bus.next_sent(100ms));
+    ASSERT_EQ(bus.decisions.size(), 1u);
+    EXPECT_EQ(
+        bus.decisions[0].text,
+        "read of a client without a name to station 17 asked once more: its answer repeats an "
+        "earlier one and may be a copy of that");
+}
+
 TEST(Shares, P9TheTimeOfASharedTransactionIsSharedOut) {
     Settings settings = settings_with(0s);
     settings.paced = true;

@@ -62,6 +62,19 @@ TEST_F(ReceptionTest, P3TheDeadlineCountsFromTheArrival) {
     EXPECT_EQ(job.deadline, kNow + 700ms);
 }
 
+TEST_F(ReceptionTest, P3AClientThatWaitsForLessHasAnEarlierDeadline) {
+    Settings settings;
+    settings.queue.deadline = 700ms;
+    Reception reception(settings);
+    Job job = job_of(kRead);
+    job.within = 300ms;
+    reception.stamp(kNow, job);
+    EXPECT_EQ(job.deadline, kNow + 300ms);
+    job.within = 1h;
+    reception.stamp(kNow, job);
+    EXPECT_EQ(job.deadline, kNow + 700ms);
+}
+
 TEST_F(ReceptionTest, P3WhatStartsAtTheLastMomentCanStillBeAnsweredByItsNormalReply) {
     for (const int baud : {1200, 9600, 115200}) {
         const Settings settings = at(baud);

@@ -82,6 +82,24 @@ TEST(SerialFormat, IsTheStandardsByDefault) { EXPECT_EQ(to_string(SerialFormat()
 TEST(SerialFormat, IsWrittenAsPeopleWriteIt) {
     EXPECT_EQ(to_string(plain(38400)), "38400 8N1");
     EXPECT_EQ(to_string({9600, 8, Parity::odd, 2}), "9600 8O2");
+    EXPECT_EQ(to_string({9600, 7, Parity::even, 1, SerialMode::ascii}), "9600 7E1 ASCII");
+}
+
+TEST(SerialFormat, AFrameOfAsciiTakesTwoCharactersAByteAndOneBesides) {
+    const SerialFormat rtu{9600, 8, Parity::even, 1};
+    const SerialFormat ascii{9600, 7, Parity::even, 1, SerialMode::ascii};
+    EXPECT_EQ(frame_time(rtu, 8), wire_time(rtu, 8));
+    EXPECT_EQ(frame_time(ascii, 8), wire_time(ascii, 17));
+    EXPECT_EQ(frame_time(ascii, 8 + 11, 2), wire_time(ascii, 17 + 23));
+    EXPECT_EQ(byte_time(rtu), character_time(rtu));
+    EXPECT_EQ(byte_time(ascii), wire_time(ascii, 2));
+}
+
+TEST(SerialFormat, AsciiLeavesTimeToTurnRoundOnly) {
+    const SerialFormat slow{1200, 7, Parity::even, 1, SerialMode::ascii};
+    const SerialFormat fast{115200, 7, Parity::even, 1, SerialMode::ascii};
+    EXPECT_EQ(silent_interval(slow), wire_time(slow, 2));
+    EXPECT_EQ(silent_interval(fast), 1ms);
 }
 
 }  // namespace

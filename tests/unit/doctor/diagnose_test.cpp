@@ -74,6 +74,15 @@ TEST_F(Diagnose, OnlyDamageOfEverybodyIsBaudOrParity) {
                 ElementsAre("duplicate-address 1"));
 }
 
+TEST_F(Diagnose, WhereAllOfAsciiIsDamagedTheFormatDiffersAndPerhapsTheMode) {
+    facts.serial = {9600, 7, Parity::even, 1, SerialMode::ascii};
+    const auto found = findings({{1, Mix().garbage(9)}, {2, Mix().strange(9)}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].cause, Cause::wrong_baud);
+    EXPECT_NE(found[0].text.find("no Modbus ASCII"), std::string::npos);
+    EXPECT_NE(found[0].advice.find("9600 7E1 ASCII"), std::string::npos);
+}
+
 TEST_F(Diagnose, WithoutAParityCheckZerosAreNothingSpecial) {
     facts.serial.parity = Parity::none;
     EXPECT_THAT(causes({{1, Mix().long_damaged(9)}}), ElementsAre("noise"));

@@ -63,6 +63,8 @@ TEST_F(TermiosSetup, EveryFormatIsWhatItSays) {
     set_up({9600, 8, Parity::none, 2});
     EXPECT_EQ(kept.c_cflag & mask, static_cast<tcflag_t>(CS8 | CSTOPB));
     EXPECT_EQ(kept.c_iflag & INPCK, 0u);
+    set_up({9600, 7, Parity::even, 1, SerialMode::ascii});
+    EXPECT_EQ(kept.c_cflag & mask, static_cast<tcflag_t>(CS7 | PARENB));
 }
 
 TEST_F(TermiosSetup, ARateThatIsNearlyMetIsFine) {

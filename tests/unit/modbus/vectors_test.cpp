@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/mbap.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::modbus {
 namespace {
@@ -103,6 +105,44 @@ TEST_P(ExchangeVector, HasAReplyThatAnswers) {
     EXPECT_EQ(exception_of(reply).has_value(), (reply[0] & kExceptionBit) != 0);
 }
 
+/// The reply to this request, among what is said in ASCII.
+std::optional<Bytes> found_in_ascii(const Bytes& request, const Bytes& wire) {
+    ReplyFramer framer(request[0], pdu_of(request), {}, ReplyFramer::Ends::told);
+    AsciiTranscript transcript(HexDigits::upper_only);
+    transcript.feed({}, wire);
+    std::optional<Bytes> reply;
+    while (const auto piece = transcript.next()) {
+        EXPECT_EQ(framer.feed(piece->bytes), std::nullopt);
+        if (piece->end == AsciiTranscript::Piece::End::none) continue;
+        const auto found = framer.on_end(piece->end == AsciiTranscript::Piece::End::frame);
+        if (found) reply = found;
+    }
+    return reply;
+}
+
+TEST_P(ExchangeVector, SaysTheSameInAscii) {
+    const Vector& v = GetParam();
+    const Bytes request = good_frame(v, "request");
+    AsciiTranscript transcript(HexDigits::upper_only);
+    transcript.feed({}, to_ascii(encode_adu(request[0], pdu_of(request))));
+    const auto piece = transcript.next();
+    ASSERT_TRUE(piece);
+    EXPECT_EQ(piece->bytes, encode_adu(request[0], pdu_of(request)));
+    EXPECT_EQ(piece->end, AsciiTranscript::Piece::End::frame);
+    if (!v.bytes("response")) return;
+    const Bytes reply = good_frame(v, "response");
+    const Bytes wire = encode_ascii(reply[0], pdu_of(reply));
+    EXPECT_EQ(found_in_ascii(request, wire), pdu_of(reply));
+    for (std::size_t i = 0; i < wire.size(); ++i) {
+        Bytes damaged = wire;
+        damaged[i] ^= 1;
+        EXPECT_EQ(found_in_ascii(request, damaged), std::nullopt) << i;
+        Bytes shorter = wire;
+        shorter.erase(shorter.begin() + static_cast<std::ptrdiff_t>(i));
+        EXPECT_EQ(found_in_ascii(request, shorter), std::nullopt) << i;
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Vectors, ExchangeVector, ::testing::ValuesIn(vectors_where(is_exchange)),
                          name_of);
 
@@ -121,6 +161,8 @@ TEST_P(NegativeVector, IsNotAGoodReply) {
     EXPECT_EQ(crc_ok(heard), v.crc_ok("response_crc_ok"));
     const bool same_station = heard[0] == request[0];
     EXPECT_FALSE(crc_ok(heard) && same_station && answers(pdu_of(request), pdu_of(heard)));
+    if (!crc_ok(heard)) return;
+    EXPECT_EQ(found_in_ascii(request, encode_ascii(heard[0], pdu_of(heard))), std::nullopt);
 }
 
 INSTANTIATE_TEST_SUITE_P(Vectors, NegativeVector, ::testing::ValuesIn(vectors_where(is_negative)),

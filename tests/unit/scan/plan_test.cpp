@@ -38,6 +38,21 @@ TEST(LikelyFormats, AreOnlyWhatTheListsAllow) {
     EXPECT_EQ(likely_formats(shipped(), settings).size(), 1u);
 }
 
+TEST(AsciiFormats, AreTheStandardsThenWhatElseIsUsual) {
+    const auto formats = texts(ascii_formats({}));
+    ASSERT_EQ(formats.size(), 16u);
+    EXPECT_EQ(formats[0], "9600 7E1 ASCII");
+    EXPECT_EQ(formats[4], "9600 8N1 ASCII");
+    EXPECT_EQ(formats[8], "9600 7O1 ASCII");
+    EXPECT_EQ(formats[12], "9600 7N2 ASCII");
+    Settings settings;
+    settings.baud = {9600};
+    settings.parity = {Parity::even};
+    EXPECT_THAT(texts(ascii_formats(settings)), ElementsAre("9600 7E1 ASCII"));
+    settings.remote = true;
+    EXPECT_EQ(ascii_formats(settings).size(), 1u);
+}
+
 TEST(LikelyStations, BeginWithTheEndsOfTheProfilesRanges) {
     const auto usual = likely_stations(shipped(), {});
     EXPECT_EQ(usual.size(), 31u);
@@ -83,6 +98,9 @@ TEST(SearchPlan, TriesTheOtherParitiesFirstWhereSomethingDamagedAnswered) {
 TEST(SearchPlan, CostsAboutAMinuteWhenNothingAnswersAtAll) {
     const SearchPlan plan(likely_formats(shipped(), {}), likely_stations(shipped(), {}));
     EXPECT_LT(plan.cost({}), 75s);
+    SearchPlan with_ascii = plan;
+    with_ascii.add(ascii_formats({}), likely_stations(shipped(), {}));
+    EXPECT_LT(with_ascii.cost({}), 2min);
 }
 
 }  // namespace

@@ -41,6 +41,8 @@ class VirtualLine {
             others_.emplace(start + at + wire_time(format_, i + 1), bytes[i]);
     }
     void garble_other_parities() { garbles_ = true; }
+    /// The far end of a remote line has panels of this mode; nobody sets its format.
+    void say_in(SerialMode mode) { format_.mode = mode; }
     void seed(unsigned value) { chance_.seed(value); }
     void echo() { echo_ = true; }
     /// Nobody answers: a function of the request's ADU instead of the stations.
@@ -95,12 +97,13 @@ class VirtualLine {
             return;
         }
         const Bytes& adu = std::get<Transmit>(action).request.adu();
+        if (formats.empty()) speaks_.mode = std::get<Transmit>(action).mode;
         sent.push_back(adu);
-        if (echo_) put(now, adu, {});
+        if (echo_) put(now, on_wire(std::get<Transmit>(action)), {});
         transmit(adu);
     }
     void transmit(const Bytes& adu) {
-        const TimePoint end = now + wire_time(speaks_, adu.size()) + silent_interval(speaks_);
+        const TimePoint end = now + frame_time(speaks_, adu.size()) + silent_interval(speaks_);
         sim::Spoken spoken{speaks_.baud == format_.baud ? reply_to(adu) : Bytes(), {}, {}};
         if (speaks_ != format_ && !garbles_) spoken.adu.clear();
         if (const auto faults = faults_.find(adu[0]); faults != faults_.end())

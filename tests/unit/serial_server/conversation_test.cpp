@@ -108,6 +108,41 @@ TEST(Conversation, RepliesBehindAGlitchOfTheTransceiver) {
     EXPECT_THAT(talk.sent, ElementsAre(kReply));
 }
 
+TEST(Conversation, FindsNoRequestInAnotherUnitsDataBehindAPauseInItsHeader) {
+    Bytes pdu{0x03, 0x08};
+    pdu.insert(pdu.end(), kRequest.begin(), kRequest.end());
+    const Bytes reply = encode_adu(kOther, pdu);
+    for (const std::size_t first : {2u, 3u, 4u}) {
+        Talk talk;
+        talk.hear({reply.begin(), reply.begin() + static_cast<std::ptrdiff_t>(first)});
+        talk.pass(50ms);
+        talk.hear({reply.begin() + static_cast<std::ptrdiff_t>(first), reply.end()});
+        talk.pass(1s);
+        EXPECT_THAT(talk.asks, IsEmpty()) << first;
+        talk.hear(kRequest);
+        EXPECT_THAT(talk.asks, SizeIs(1)) << first;
+    }
+}
+
+TEST(Conversation, TakesNoTimeForASilenceInWhichNobodyLooked) {
+    for (const Duration late : {10ms, 5000ms}) {
+        Talk talk;
+        talk.hear(joined({{0x55, 0xAA}, kRequest}));  // counts behind noise when a silence follows
+        talk.now += late;
+        talk.hear({0xC8, 0x57});
+        talk.pass(1s);
+        EXPECT_THAT(talk.asks, IsEmpty());
+    }
+}
+
+TEST(Conversation, WaitsForTheRestOfARequestWhoseFunctionHasCome) {
+    Talk talk;
+    talk.hear({kRequest.begin(), kRequest.begin() + 2});
+    talk.pass(50ms);
+    talk.hear({kRequest.begin() + 2, kRequest.end()});
+    EXPECT_THAT(talk.asks, SizeIs(1));
+}
+
 TEST(Conversation, TakesDamageForTheMastersNextRequest) {
     Talk talk;
     talk.hear(kRequest);

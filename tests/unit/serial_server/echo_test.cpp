@@ -62,6 +62,28 @@ TEST(OwnEcho, ThatIsKnownToBeAbsentHidesNoRetry) {
     EXPECT_THAT(talk.asks, SizeIs(3));
 }
 
+TEST(OwnEcho, ThatIsLookedAtLateIsOneStill) {
+    Talk talk = with(EchoMode::automatic);
+    exchange(talk, kWrite, kWrite);
+    talk.now += 5s;  // the process stood still
+    talk.hear(talk.sent.back());
+    talk.pass(1s);
+    EXPECT_THAT(talk.asks, SizeIs(1));
+}
+
+TEST(OwnEcho, ThatCameDamagedIsNotAbsent) {
+    Talk talk = with(EchoMode::automatic);
+    exchange(talk, kReadOne, kOneValue);
+    Bytes met = talk.sent.back();  // something that the master said
+    for (std::uint8_t& byte : met) byte ^= 0x5A;
+    talk.hear_slowly(met, 1ms);
+    talk.pass(1s);
+    exchange(talk, kWrite, kWrite);
+    come_back(talk);
+    talk.pass(1s);
+    EXPECT_THAT(talk.asks, SizeIs(2));
+}
+
 TEST(OwnEcho, ThatMayBeARetryHidesItOnceAtMost) {
     Talk talk = with(EchoMode::automatic);
     exchange(talk, kWrite, kWrite);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/sim/station.hpp"
@@ -46,6 +47,22 @@ TEST(Misbehaviour, EachFaultDoesWhatItsNameSays) {
     faults.foreign_id = 1;
     EXPECT_EQ(once(faults).adu[0], 21);
     EXPECT_TRUE(modbus::crc_ok(once(faults).adu));
+}
+
+TEST(Misbehaviour, IsSaidInTheModeOfTheLine) {
+    const SerialFormat format{9600, 7, Parity::even, 1, SerialMode::ascii};
+    std::mt19937 chance(1);
+    const Bytes good = modbus::to_ascii(kReply);
+    EXPECT_EQ(misbehave({}, kReply, chance, format).adu, good);
+    Misbehaviour faults;
+    faults.damage = 1;
+    const Bytes damaged = misbehave(faults, kReply, chance, format).adu;
+    EXPECT_EQ(damaged.size(), good.size());
+    EXPECT_NE(damaged, good);
+    faults = {};
+    faults.foreign_id = 1;
+    EXPECT_EQ(misbehave(faults, kReply, chance, format).adu,
+              modbus::encode_ascii(21, "03 02 00 07"_hex));
 }
 
 TEST(Misbehaviour, AShareIsOfManyAnswers) {

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/station_ref.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -21,6 +23,8 @@ struct LineEntry {
     std::string device;             ///< as configured
     bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
     bool pass_unlisted_stations = true;
+    Duration deadline = 2s;  ///< of a request, from its arrival to its answer
+    SerialFormat serial{};   ///< what a read costs follows from it
 };
 
 /// The faults of a simulated panel, in numbers by name.
@@ -48,6 +52,8 @@ struct Directory {
     std::vector<StationEntry> stations;
 
     const LineEntry* find_line(std::string_view name) const;
+    /// Of a station that has a bus, whose line is always there.
+    const LineEntry& line_of(const StationEntry& station) const;
     /// By name or as LINE:ID; an unlisted id (1..247) is found where its line passes those.
     std::optional<StationEntry> find_station(std::string_view name) const;
 };

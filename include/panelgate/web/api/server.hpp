@@ -13,13 +13,16 @@
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/metrics_source.hpp"
+#include "panelgate/web/api/settings.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {
 
 class HttpListener;
+class KeyBook;
 
 /// What the server shows besides the directory. The functions are called in the one thread.
 struct Providers {
@@ -31,6 +34,8 @@ struct Providers {
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<std::vector<points::RelayStatus>()> relays;
     EventHub* events = nullptr;  ///< never null; outlives the server
+    SharedText configuration;    ///< in force, a JSON object without secrets; null: not shown
+    ApiSettings settings{};
 };
 
 /// Who is served: the gateway, or simulated panels alone, whose directory may be without buses.
@@ -59,6 +64,7 @@ class Server {
     const Counters& counters() const;
 
   private:
+    std::shared_ptr<KeyBook> keys_;
     std::shared_ptr<HttpListener> listener_;
 };
 

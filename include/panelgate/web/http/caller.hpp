@@ -25,6 +25,7 @@ class Caller {
     }
     /// The name of the token that its request of now carries; "" for none.
     void uses_token(std::string token) { token_ = std::move(token); }
+    const std::string& token() const { return token_; }
     /// The connection is over: nobody waits for an answer, and what the site is made of may be
     /// gone.
     bool has_left() const { return left_; }
@@ -33,16 +34,31 @@ class Caller {
     bool at_leaving(const void* whom, std::function<void()> farewell) {
         return farewells_.emplace(whom, std::move(farewell)).second;
     }
+    void forget(const void* whom) { farewells_.erase(whom); }
+    /// Whoever is to be told when this one leaves is told when the other one does.
+    void hand_over(Caller& to) { to.farewells_.merge(farewells_); }
     void leave() {
-        if (std::exchange(left_, true)) return;
+        left_ = true;
+        hang_up();
+    }
+    /// Nobody waits for an answer, but what has begun is still wanted to its end: nothing that has
+    /// not yet begun is.
+    void hang_up() {
+        hung_up_ = true;
         for (const auto& [whom, farewell] : std::exchange(farewells_, {})) farewell();
     }
+    bool has_hung_up() const { return hung_up_; }
+    /// Something came, or may have come, of what it asked for: asked again, it could come twice.
+    void take_effect() { has_effect_ = true; }
+    bool has_effect() const { return has_effect_; }
 
   private:
     std::uint64_t id_;
     std::string address_;
     std::string token_;
     bool left_ = false;
+    bool hung_up_ = false;
+    bool has_effect_ = false;
     std::map<const void*, std::function<void()>> farewells_;
 };
 

@@ -8,6 +8,7 @@
 
 #include "panelgate/web/http/caller.hpp"
 #include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/http/settings.hpp"
 
 namespace panelgate::web {
 
@@ -17,15 +18,19 @@ struct HttpRequest {
     std::string host;                               ///< lower case; empty: HTTP/1.0 without one
     std::vector<std::string> path;                  ///< segments, percent-decoded
     std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
-    std::map<std::string, std::string> headers;     ///< those of kHeadersRead, names in lower case
+    std::map<std::string, std::string> headers;     ///< those that are read, names in lower case
     std::string body;
     std::vector<std::string> arguments;  ///< what the route's {} stood for
     std::shared_ptr<Caller> caller;
+    Role role = Role::none;  ///< of whoever asks
 };
-/// The request headers that anything here looks at.
+/// The request headers that anything here looks at; each may come once.
 inline constexpr const char* kHeadersRead[] = {
-    "accept-encoding",  "authorization",  "origin",         "content-type",
-    "content-encoding", "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest"};
+    "authorization",  "origin",         "content-type",   "content-encoding",
+    "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "idempotency-key"};
+/// … and those that are lists: of several fields the values follow each other (RFC 9110 5.3).
+inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
+                                             "prefer"};
 
 /// A body that several are sent, so that it is in memory once.
 using SharedText = std::shared_ptr<const std::string>;

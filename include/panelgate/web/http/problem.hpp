@@ -32,6 +32,8 @@ Problem problem(unsigned status, std::string detail);
 /// "member", "query".
 Problem unknown_name(const std::string& what, const std::string& name,
                      std::span<const std::string_view> known);
+/// Its members, as the body of an answer has them.
+boost::json::object json_of(const Problem& problem);
 HttpResponse to_response(const Problem& problem);
 
 }  // namespace panelgate::web

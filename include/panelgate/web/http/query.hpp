@@ -21,4 +21,7 @@ std::optional<Problem> check_queries(const HttpRequest& request,
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
                               unsigned high, unsigned fallback);
 
+/// A query that is true or false; false when it is not given.
+Parsed<bool> query_flag(const HttpRequest& request, const std::string& name);
+
 }  // namespace panelgate::web

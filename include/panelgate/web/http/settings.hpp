@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/base/endpoint_text.hpp"
@@ -12,6 +14,11 @@
 namespace panelgate::web {
 
 enum class Role : std::uint8_t { none, viewer, operator_ };
+/// As the configuration writes it.
+inline std::string_view label(Role role) {
+    constexpr std::array<std::string_view, 3> kWords{"none", "viewer", "operator"};
+    return kWords[static_cast<std::size_t>(role)];
+}
 
 struct Token {
     std::string name;

@@ -84,7 +84,6 @@ TEST(Answer, OfAGuardSaysThatItWasRefusedHereAndByWhichRule) {
     EXPECT_EQ(told(problem).at("rule"), "range");
     EXPECT_EQ(told(problem).at("modbus_exception"), 2);
     EXPECT_EQ(told(problem).at("transmitted"), false);
-    EXPECT_EQ(write_answer(guarded, {}).status, 422u);
 }
 
 TEST(Answer, OfALineThatIsDownSaysWhatIsWrongWithIt) {
@@ -96,12 +95,11 @@ TEST(Answer, OfALineThatIsDownSaysWhatIsWrongWithIt) {
     EXPECT_EQ(problem.detail, "the line is down: cannot open /dev/ttyS0: Permission denied");
 }
 
-TEST(Answer, OfAWriteSaysWhatIsSure) {
-    const auto confirmed = write_answer(test::FakeBus::reply({6, 0, 1, 0, 2}), {});
-    EXPECT_EQ(confirmed.status, 200u);
-    EXPECT_EQ(confirmed.body, "{\"transmitted\":true,\"confirmed\":true}\n");
-    EXPECT_EQ(write_answer(test::FakeBus::reply({0x86, 2}), {}).status, 422u);
-    EXPECT_EQ(write_answer(test::FakeBus::fault(Fault::timeout, true), {}).status, 504u);
+TEST(Answer, OfABroadcastSaysThatNobodyHasConfirmedIt) {
+    const auto sent = broadcast_answer(test::FakeBus::reply({6, 0, 1, 0, 2}));
+    EXPECT_EQ(sent.status, 202u);
+    EXPECT_EQ(sent.body, "{\"transmitted\":true,\"confirmed\":false}\n");
+    EXPECT_EQ(broadcast_answer(test::FakeBus::fault(Fault::busy, false)).status, 503u);
 }
 
 TEST(Answer, RoundsMillisecondsTowardsZero) {

@@ -11,6 +11,17 @@
 namespace panelgate::web {
 namespace {
 
+Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
+    const auto object = parse_object(body, {"values"});
+    if (!object) return object.error();
+    return values_member(*object, table);
+}
+Parsed<points::Value> value_of(std::string_view body) {
+    const auto object = parse_object(body, {"value"});
+    if (!object) return object.error();
+    return value_member(*object);
+}
+
 using modbus::Table;
 using ::testing::ElementsAre;
 using ::testing::StartsWith;

@@ -129,6 +129,7 @@ class HttpRig : public ::testing::Test {
         providers.now = [this] { return now; };
         providers.relays = [this] { return relays; };
         providers.events = &events;
+        providers.configuration = configuration;
         server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
         EXPECT_FALSE(server->start());
         return *server;
@@ -175,6 +176,7 @@ class HttpRig : public ::testing::Test {
     TimePoint now{1h};
     std::vector<points::RelayStatus> relays;
     EventHub events;
+    SharedText configuration;
     FixedMetrics metrics{io.get_executor()};
     bool ready = true;
     std::string missing;

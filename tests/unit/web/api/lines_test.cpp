@@ -39,10 +39,15 @@ TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
 }
 
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
-    bus.shares = {{"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12}};
+    bus.shares = {
+        {"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12, "127.0.0.1", 20, 1, Outcome::timeout, 70ms},
+        {"poll of station 31", 500ms, 25, 4, {}, 4}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
-              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","busy_seconds":1.5,"percent":75,
-        "transactions":12}])"));
+              json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","address":"127.0.0.1","requests":20,
+        "failed":1,"last_error":"timeout","last_error_ms":70,"busy_seconds":1.5,"percent":75,
+        "transactions":12},{"name":"poll of station 31","address":null,"requests":4,"failed":0,
+        "last_error":null,"last_error_ms":null,"busy_seconds":0.5,"percent":25,
+        "transactions":4}])"));
 }
 
 TEST_F(ApiLines, P10ShowsStationsWithoutTouchingTheBus) {
@@ -184,7 +189,7 @@ TEST_F(ApiLines, RefusesBroadcastsThatCannotBe) {
     const auto status = [&](const char* body) {
         return ask("POST", "/api/v1/lines/floor1/broadcast", body).status();
     };
-    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":[1],"verify":true})"), 400u);
+    EXPECT_EQ(status(R"({"table":"coils","address":1,"values":[1],"verify":1})"), 400u);
     EXPECT_EQ(status(R"({"table":"relays","address":1,"values":[1]})"), 400u);
     EXPECT_EQ(status(R"({"table":"input-registers","address":1,"values":[1]})"), 422u);
     EXPECT_EQ(status(R"({"table":"coils","address":65536,"values":[1]})"), 400u);

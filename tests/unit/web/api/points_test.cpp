@@ -149,5 +149,33 @@ TEST_F(ApiPoints, InterpretsAFewRegisters) {
     EXPECT_EQ(bus.requests.size(), 1u);
 }
 
+TEST_F(ApiPoints, TellsWhatAValueWasReadFromToWhoeverAsks) {
+    EXPECT_EQ(get(std::string(kOil) + "?raw=true").at("raw"), nullptr);
+    poll(9);
+    EXPECT_EQ(get(std::string(kOil) + "?raw=true").at("raw"), json_of("[9]"));
+    EXPECT_EQ(get(kOil).json().count("raw"), 0u);
+    EXPECT_EQ(get(std::string(kOil) + "?raw=1").at("detail"), "raw is true or false, not '1'");
+}
+
+TEST_F(ApiPoints, AreATableForSpreadsheets) {
+    poll(9);
+    const Reply reply =
+        ask("GET", "/api/v1/stations/press/points", "", "Accept: text/csv, */*;q=0.1\r\n");
+    EXPECT_EQ(reply.header("Content-Type"), "text/csv; charset=utf-8; header=present");
+    EXPECT_EQ(reply.header("Vary"), "Accept");
+    EXPECT_EQ(reply.body(),
+              "name,value,label,unit,quality,age_ms,at,type,writable\r\n"
+              "oil,9,,bar,good,0,UW7,u16,true\r\nserial,9,,,good,0,UW8,u16,false\r\n");
+}
+
+TEST_F(ApiPoints, OfManyVaryWithBothHeadersThatTheyHeed) {
+    points.resize(100, points[0]);
+    std::vector<points::Reading> readings(100);
+    shown = std::make_unique<points::StationPoints>(points, blocks, readings);
+    directory.stations[0].points = shown.get();
+    const Reply reply = get("/api/v1/stations/press/points");
+    EXPECT_EQ(reply.header("Vary"), "Accept, Accept-Encoding");
+}
+
 }  // namespace
 }  // namespace panelgate::web

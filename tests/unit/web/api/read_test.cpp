@@ -33,12 +33,88 @@ TEST_F(ApiRead, UnderstandsNegativeNumbersWhenAsked) {
 }
 
 TEST_F(ApiRead, NamesTheTypesOfATable) {
-    const Reply registers = get("/api/v1/stations/press/holding-registers/1?type=f32");
-    EXPECT_EQ(registers.status(), 400u);
-    EXPECT_EQ(registers.at("detail"), "the type of a register is u16 or i16");
+    EXPECT_EQ(get("/api/v1/stations/press/holding-registers/1?type=float").at("detail"),
+              "there is no type 'float'; there are bool, u16, i16, u32, i32, u64, i64, f32, f64, "
+              "bcd16, bcd32, string");
     EXPECT_EQ(get("/api/v1/stations/press/coils/1?type=u16").at("detail"),
-              "the type of a bit is bool");
+              "the type of a bit is bool, not u16");
     EXPECT_EQ(get("/api/v1/stations/press/coils/1?type=bool").status(), 200u);
+}
+
+TEST_F(ApiRead, CountsValuesAndNotRegisters) {
+    const Reply reply = get("/api/v1/stations/press/holding-registers/1?type=u32&count=2&raw=true");
+    EXPECT_EQ(last_pdu(), "03 00 01 00 04");
+    EXPECT_EQ(reply.at("values"), json_of("[65538,196612]"));
+    EXPECT_EQ(reply.at("raw"), json_of("[1,2,3,4]"));
+    const Reply turned = get("/api/v1/stations/press/devices/UW1?type=u32&order=CDAB");
+    EXPECT_EQ(turned.at("values"), json_of("[131073]"));
+}
+
+TEST_F(ApiRead, KnowsAllTypesThatPointsHave) {
+    for (const points::Type type : points::kTypes) {
+        const auto word = std::string(label(type));
+        const Reply reply = get("/api/v1/stations/press/devices/UW16?type=" + word);
+        ASSERT_EQ(reply.status(), 200u) << word;
+        EXPECT_EQ(reply.at("values").as_array().size(), 1u) << word;
+    }
+}
+
+TEST_F(ApiRead, ReadsTextsOfALengthOrOneOfAllRegisters) {
+    bus.script = [](const bus::Request& request) {
+        Writer out;
+        out.u8(3).u8(2u * request.request.pdu()[4]);
+        for (unsigned i = 0; i < request.request.pdu()[4]; ++i) out.u16(0x4142 + i * 0x202);
+        return test::FakeBus::reply(out.take());
+    };
+    const std::string path = "/api/v1/stations/press/devices/UW0?type=string&count=2";
+    EXPECT_EQ(get(path).at("values"), json_of(R"(["ABCD"])"));
+    EXPECT_EQ(get(path + "&length=2").at("values"), json_of(R"(["AB","CD"])"));
+    EXPECT_EQ(get("/api/v1/stations/press/devices/UW0?length=2").status(), 400u);
+}
+
+TEST_F(ApiRead, AValueThatIsNoneIsNull) {
+    bus.script = [](const bus::Request&) {
+        return test::FakeBus::reply({3, 4, 0x7f, 0xc0, 0, 0});  // a NaN
+    };
+    EXPECT_EQ(get("/api/v1/stations/press/devices/UW0?type=f32").at("values"), json_of("[null]"));
+}
+
+TEST_F(ApiRead, SaysWhichWordsAQueryTakes) {
+    const std::string path = "/api/v1/stations/press/devices/UW0?";
+    EXPECT_EQ(get(path + "order=LITTLE").at("detail"),
+              "there is no order 'LITTLE'; there are ABCD, BADC, CDAB, DCBA");
+    EXPECT_EQ(get(path + "raw=yes").at("detail"), "raw is true or false, not 'yes'");
+    EXPECT_EQ(get("/api/v1/stations/press/coils/0?order=ABCD").at("detail"), "a bit has no order");
+    EXPECT_EQ(get("/api/v1/stations/press/holding-registers/65535?type=u32").status(), 400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiRead, P3IsAnsweredWithinTheLinesDeadlineHoweverManyTransactionsItTakes) {
+    directory.lines[0].deadline = 500ms;
+    bus.script = [this](const bus::Request& request) {
+        now += 200ms;
+        if (request.within < 200ms) return test::FakeBus::fault(Fault::expired, false);
+        return answer_from_addresses(request);
+    };
+    const Reply reply = get("/api/v1/stations/press/holding-registers/0?count=100");
+    EXPECT_EQ(reply.status(), 503u);
+    EXPECT_EQ(reply.at("detail"),
+              "the time of this request was over after 64 of 100 items; ask for fewer at once");
+    ASSERT_EQ(bus.requests.size(), 3u);
+    EXPECT_EQ(bus.requests[0].within, 500ms);
+    EXPECT_EQ(bus.requests[2].within, 100ms);
+}
+
+TEST_F(ApiRead, P3WaitsNoLongerThanItsClient) {
+    const auto within = [&](const std::string& prefer) {
+        ask("GET", "/api/v1/stations/press/coils/0", "", "Prefer: " + prefer + "\r\n");
+        return bus.requests.back().within;
+    };
+    EXPECT_EQ(within("wait=1"), 1s);
+    EXPECT_EQ(within("wait=10"), 2s);
+    EXPECT_EQ(within("respond-async, wait=1;x=y"), 1s);
+    EXPECT_EQ(within("wait=soon"), 2s);
+    EXPECT_EQ(within("respond-async\r\nPrefer: wait=\"1\""), 1s);
 }
 
 TEST_F(ApiRead, ReadsByTheVendorsNotation) {

@@ -47,6 +47,14 @@ TEST(Access, GivesATokenItsOwnRoleEvenWhereAnonymousMayDoMore) {
     EXPECT_EQ(refusal(asking("Bearer wrong"), Role::viewer, Role::operator_), 401u);
 }
 
+TEST(Access, TellsTheRoleOfWhoAsks) {
+    const Settings settings = with_tokens(Role::viewer);
+    EXPECT_EQ(role_of(asking(""), settings), Role::viewer);
+    EXPECT_EQ(role_of(asking("Bearer let-me"), settings), Role::operator_);
+    EXPECT_EQ(role_of(asking("Bearer see-me"), settings), Role::viewer);
+    EXPECT_EQ(role_of(asking("Bearer wrong"), settings), Role::none);
+}
+
 TEST(Access, TakesASecretOnlyWholeAndNeverAnEmptyOne) {
     for (const char* token : {"let-m", "let-mee", "let-melet-me", "LET-ME", "", "let me"}) {
         EXPECT_EQ(refusal(asking(std::string("Bearer ") + token), Role::viewer, Role::none), 401u)

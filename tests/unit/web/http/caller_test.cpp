@@ -20,6 +20,18 @@ TEST(Caller, TellsWhoeverWorksForItOnceThatItHasLeft) {
     EXPECT_EQ(second, 1);
 }
 
+TEST(Caller, ThatHangsUpHasNotLeft) {
+    Caller caller(7, "10.0.0.7");
+    int told = 0;
+    caller.at_leaving(&told, [&told] { ++told; });
+    caller.hang_up();
+    EXPECT_TRUE(caller.has_hung_up());
+    EXPECT_FALSE(caller.has_left());
+    caller.leave();
+    EXPECT_TRUE(caller.has_left());
+    EXPECT_EQ(told, 1);
+}
+
 TEST(Caller, IsCalledByItsAddressAndTheTokenOfItsLastRequest) {
     Caller caller(7, "10.0.0.9");
     EXPECT_EQ(caller.name(), "http 10.0.0.9");

@@ -38,6 +38,17 @@ TEST(Gzip, GivesBackWhatWentIn) {
 
 TEST(Gzip, OfNothingIsABody) { EXPECT_EQ(gunzip(Gzip().finish()), ""); }
 
+TEST(Unpacked, GivesBackWhatWasPackedAndNothingOfWhatWasNot) {
+    Gzip gzip;
+    const std::string text(300'000, 'x');
+    gzip.add(text);
+    const std::string body = gzip.finish();
+    EXPECT_EQ(unpacked(body), text);
+    EXPECT_EQ(unpacked(body.substr(0, body.size() / 2)), "");
+    EXPECT_EQ(unpacked("not packed"), "");
+    EXPECT_EQ(unpacked(""), "");
+}
+
 TEST(AcceptsGzip, WhereItIsNamedAndNotRefused) {
     for (const char* header : {"gzip", "GZIP", "deflate, gzip;q=1.0, *;q=0.5", "br,gzip ; q=0.1"})
         EXPECT_TRUE(accepts_gzip(header)) << header;

@@ -1,0 +1,52 @@
+# Writes OUTPUT, a C++ source with panelgate::web::shipped_page(): FILES of the dashboard, packed by
+# gzip, with a hash of each. @PRELOAD@ in the page stands for its modules, so that a browser asks for
+# all of them at once.
+cmake_minimum_required(VERSION 3.25)
+get_filename_component(FOLDER ${OUTPUT} DIRECTORY)
+set(PRELOAD "")
+foreach(FILE ${FILES})
+    get_filename_component(NAME ${FILE} NAME)
+    if(NAME MATCHES "\\.js$" AND NOT NAME MATCHES "\\.min\\.js$")
+        string(APPEND PRELOAD "<link rel=\"modulepreload\" href=\"page/${NAME}\">\n")
+    endif()
+endforeach()
+set(TYPE_css "text/css; charset=utf-8")
+set(TYPE_html "text/html; charset=utf-8")
+set(TYPE_js "text/javascript; charset=utf-8")
+set(TYPE_svg "image/svg+xml")
+
+set(ARRAYS "")
+set(ROWS "")
+set(NUMBER 0)
+foreach(FILE ${FILES})
+    get_filename_component(NAME ${FILE} NAME)
+    get_filename_component(ENDING ${FILE} LAST_EXT)
+    string(SUBSTRING ${ENDING} 1 -1 ENDING)
+    set(COPY ${FOLDER}/page_${NAME})
+    configure_file(${FILE} ${COPY} COPYONLY)
+    if(ENDING STREQUAL html)
+        file(READ ${FILE} TEXT)
+        string(REPLACE "@PRELOAD@\n" "${PRELOAD}" TEXT "${TEXT}")
+        file(WRITE ${COPY} "${TEXT}")
+    endif()
+    execute_process(COMMAND gzip -9nc ${COPY} OUTPUT_FILE ${COPY}.gz COMMAND_ERROR_IS_FATAL ANY)
+    file(SHA256 ${COPY} HASH)
+    string(SUBSTRING ${HASH} 0 16 HASH)
+    file(READ ${COPY}.gz BYTES HEX)
+    string(REGEX REPLACE "(................................)" "\\1\n" BYTES "${BYTES}")
+    string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," BYTES "${BYTES}")
+    string(APPEND ARRAYS "constexpr unsigned char kFile${NUMBER}[] = {\n${BYTES}};\n")
+    string(APPEND ROWS "    {\"${NAME}\", \"${TYPE_${ENDING}}\", \"${HASH}\", kFile${NUMBER}},\n")
+    math(EXPR NUMBER "${NUMBER} + 1")
+endforeach()
+file(WRITE ${OUTPUT} "#include \"page_file.hpp\"
+
+namespace panelgate::web {
+namespace {
+${ARRAYS}
+constexpr PageFile kFiles[] = {
+${ROWS}};
+}  // namespace
+std::span<const PageFile> shipped_page() { return kFiles; }
+}  // namespace panelgate::web
+")

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "handlers.hpp"
+#include "panelgate/web/http/message.hpp"
+
+namespace panelgate::web {
+
+/// What a route's answers have besides what its handler says.
+struct Manner {
+    bool asks = false;    ///< lines: it understands "Prefer: wait=N"
+    bool once = false;    ///< a write: it understands Idempotency-Key
+    bool tagged = false;  ///< status: it has an ETag
+};
+
+/// The handler's answer, in that manner; packed (gzip) where that pays and the client takes it.
+Handling conduct(HttpRequest request, const Api* api, Handler handler, Manner manner);
+
+/// A weak validator (RFC 9110 8.8.1) of a body: it does not count what only time changes, the
+/// members that end in _ms.
+std::string tag_of(std::string_view body);
+/// Does this If-None-Match name the tag? (RFC 9110 13.1.2)
+bool names_tag(std::string_view if_none_match, std::string_view tag);
+
+}  // namespace panelgate::web

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/web/api/settings.hpp"
+#include "panelgate/web/http/caller.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
+
+namespace panelgate::web {
+
+/// Writes that carry an Idempotency-Key, by client and key: those under way, and for a time what
+/// became of the others, so that a request that is sent again changes nothing again (P2). Nothing
+/// is forgotten before its time: who has no more room is refused. Pure; one thread.
+class KeyBook {
+  public:
+    using Key = std::pair<std::string, std::string>;  ///< the client, and what it said
+    struct Fresh {};
+
+    explicit KeyBook(const ApiSettings& settings) : settings_(settings) {}
+
+    /// To be carried out (then end() or drop() follows), the answer that the first one got, or why
+    /// neither: 422 for another request with this key, 409 while the first is under way, 503.
+    /// `request` tells requests apart. `worker` asks the lines for it.
+    std::variant<Fresh, HttpResponse, Problem> begin(TimePoint now, const Key& key,
+                                                     std::uint64_t request,
+                                                     std::shared_ptr<Caller> worker);
+    /// This is what came of it.
+    void end(TimePoint now, const Key& key, const HttpResponse& answer);
+    /// Nothing came of it: it may be tried again.
+    void drop(const Key& key);
+    /// Whoever works for one that is under way leaves: what it works on goes away.
+    void dismiss();
+
+    std::size_t size() const { return entries_.size(); }
+
+  private:
+    struct Entry {
+        std::uint64_t request = 0;
+        std::shared_ptr<Caller> worker;  ///< null: it is over
+        HttpResponse answer{};
+    };
+
+    void forget_old(TimePoint now);
+    void erase(std::map<Key, Entry>::iterator entry);
+
+    ApiSettings settings_;
+    std::map<Key, Entry> entries_;
+    std::map<std::string, std::size_t> of_client_;
+    std::deque<std::pair<TimePoint, Key>> over_;  ///< by when they ended
+    std::size_t bytes_ = 0;                       ///< of the answers
+};
+
+}  // namespace panelgate::web

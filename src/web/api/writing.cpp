@@ -1,0 +1,155 @@
+#include "writing.hpp"
+
+#include <algorithm>
+#include <boost/json/array.hpp>
+#include <utility>
+
+#include "answer.hpp"
+#include "ask.hpp"
+#include "body.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "point_json.hpp"
+#include "reading.hpp"
+#include "refusal.hpp"
+#include "write_plan.hpp"
+
+namespace panelgate::web {
+namespace json = boost::json;
+namespace {
+
+Problem not_writable(modbus::Table table) {
+    Problem made = problem(405, std::string(label(table)) + " cannot be written");
+    made.headers.emplace_back("Allow", "GET, HEAD");
+    return made;
+}
+
+/// With what reading back needs, when the body wants it.
+Parsed<Writing> writing_of(const StationEntry& station, Bytes pdu, const json::object& body) {
+    const auto verify = flag_member(body, "verify");
+    if (!verify) return verify.error();
+    auto request = request_to(station.id, std::move(pdu));
+    if (!request) return request.error();
+    Writing made{.station = station, .request = std::move(*request)};
+    if (!*verify) return made;
+    made.verification = Verification::of(made.request.request);
+    const auto readable = made.verification->span_to_read(*station.profile);
+    if (!readable) return readable.error();
+    return made;
+}
+
+Parsed<Writing> plan(const Items& items, const Parsed<json::object>& body) {
+    if (!is_writable(items.span.table)) return not_writable(items.span.table);
+    if (!body) return body.error();
+    const auto cells = values_member(*body, items.span.table);
+    if (!cells) return cells.error();
+    auto pdu = plan_write(items, *cells);
+    if (!pdu) return pdu.error();
+    return writing_of(items.station, std::move(*pdu), *body);
+}
+
+Parsed<Writing> plan(const PointOfStation& to, const Parsed<json::object>& body,
+                     const Parsed<points::Rounding>& rounding) {
+    if (!rounding) return rounding.error();
+    if (!body) return body.error();
+    const auto value = value_member(*body);
+    if (!value) return value.error();
+    auto write = points::write_request(*to.station.profile, *to.point, *value, *rounding);
+    if (!write) {
+        if (write.error().malformed) return problem(400, write.error().message);
+        const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
+        return problem(422, write.error().message + hint);
+    }
+    auto made = writing_of(to.station, write->pdu, *body);
+    if (made) made->point = std::move(*write);
+    return made;
+}
+
+/// Nobody knows what came of it: it was on the wire, and no reply told.
+bool is_unknown(const bus::Answer& answer) {
+    return answer.transmitted && !answer.refusal && !answer.pdu;
+}
+
+json::object confirmed(const Writing& writing) {
+    json::object body;
+    body["transmitted"] = true;
+    body["confirmed"] = true;
+    if (writing.point) {
+        body["value"] = json_of(writing.point->value);
+        if (writing.point->label) body["label"] = *writing.point->label;
+    }
+    return body;
+}
+
+}  // namespace
+
+void tell(json::object& told, const ReadBack& back) {
+    told["verified"] = nullptr;
+    if (!back.holds) {
+        told["verify_detail"] = back.why;
+        return;
+    }
+    told["verified"] = *back.holds;
+    if (!*back.holds) told["read_back"] = json::array(back.items.begin(), back.items.end());
+}
+
+boost::asio::awaitable<ReadBack> read_back(std::shared_ptr<Caller> caller,
+                                           const StationEntry* station, const Verification* written,
+                                           Patience patience) {
+    ReadBack back;
+    const auto span = written->span_to_read(*station->profile);
+    if (!span) {
+        back.why = span.error().detail;
+        co_return back;
+    }
+    boost::asio::awaitable<Parsed<Reading>> reads =
+        read_all(std::move(caller), station, *span, patience);
+    const Parsed<Reading> reading = co_await std::move(reads);
+    if (!reading) {
+        back.why = reading.error().detail;
+        co_return back;
+    }
+    back.holds = written->holds(reading->items);
+    if (!*back.holds) back.items = reading->items;
+    co_return back;
+}
+
+Parsed<Items> made_writable(Parsed<Items> items) {
+    if (!items || items->area == nullptr) return items;
+    const auto& also = items->area->also;
+    const auto writable = std::ranges::find_if(also, is_writable);
+    if (!is_writable(items->span.table) && writable != also.end()) items->span.table = *writable;
+    if (is_writable(items->span.table) && !items->area->writable) {
+        return ruled_out(bus::Rule::write_protected,
+                         items->area->name + " is read-only in this panel");
+    }
+    return items;
+}
+
+Parsed<Writing> write_of(const Items& items, const Parsed<json::object>& body) {
+    return unless_refused(plan(items, body), *items.station.bus, items.station.id);
+}
+
+Parsed<Writing> write_of(const PointOfStation& to, const Parsed<json::object>& body,
+                         const Parsed<points::Rounding>& rounding) {
+    return unless_refused(plan(to, body, rounding), *to.station.bus, to.station.id);
+}
+
+boost::asio::awaitable<Parsed<json::object>> write(std::shared_ptr<Caller> caller,
+                                                   const Writing* writing, Patience patience) {
+    bus::Request request = writing->request;
+    request.within = patience.left();
+    const bus::Answer answer = co_await ask(caller, writing->station.bus, std::move(request));
+    auto failed = problem_of(answer, *writing->station.profile);
+    json::object told = confirmed(*writing);
+    json::object& verified = failed ? failed->extensions : told;
+    if (writing->verification && (!failed || is_unknown(answer))) {
+        boost::asio::awaitable<ReadBack> reads =
+            read_back(std::move(caller), &writing->station, &*writing->verification, patience);
+        const ReadBack back = co_await std::move(reads);
+        tell(verified, back);
+    }
+    if (failed) co_return std::move(*failed);
+    co_return told;
+}
+
+}  // namespace panelgate::web

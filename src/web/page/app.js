@@ -1,0 +1,108 @@
+// The page: what is shown where, in which language and theme.
+import {gateway, hasToken, introduce, offers, useToken} from './api.js';
+import {attribute, choice, h, replace, text} from './dom.js';
+import {language, languages, store, stored, t} from './language.js';
+import {discoveryView} from './discovery.js';
+import {latencyView} from './latency.js';
+import {live} from './live.js';
+import {overviewView} from './overview.js';
+import {clientsView, relaysView} from './plain_views.js';
+import {pointsView} from './points.js';
+import {requestView} from './request.js';
+import {scopeView} from './scope.js';
+import {settingsView} from './settings.js';
+import {stationView} from './station.js';
+import {askToken, roleButton} from './token.js';
+
+const VIEWS = {'': overviewView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
+    clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
+const NAMED = {'': 'overview', scope: 'scope', latency: 'latency', points: 'points', relays: 'relays', clients: 'clients',
+    request: 'request', discovery: 'discovery', settings: 'settings'};
+/** Views that a gateway may not have the paths for. */
+const NEEDS = {discovery: 'POST /api/v1/lines/{}/discover'};
+const THEMES = ['auto', 'light', 'dark'];
+
+const main = document.getElementById('main');
+const banner = document.getElementById('banner');
+let shown = null;
+
+function theme(chosen) {
+    attribute(document.documentElement, 'data-theme', chosen === 'auto' ? null : chosen);
+    store('theme', chosen);
+}
+
+function build() {
+    const nav = document.getElementById('nav');
+    const links = Object.entries(NAMED).filter(([name]) => !NEEDS[name] || offers(NEEDS[name])).map(([name, key]) =>
+        h('a', {href: `#/${name}`, 'data-view': name}, t('nav.' + key)));
+    attribute(nav, 'aria-label', t('nav'));
+    replace(nav, links);
+    const menu = document.getElementById('menu');
+    attribute(menu, 'aria-label', t('menu'));
+    menu.addEventListener('click', () => open(nav.hidden || !nav.classList.contains('open')));
+    const open = (yes) => {
+        nav.classList.toggle('open', yes);
+        attribute(menu, 'aria-expanded', String(yes));
+    };
+    nav.addEventListener('click', () => open(false));
+    text(document.getElementById('skip'), t('skip'));
+    replace(document.getElementById('tools'), roleButton(),
+        choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
+        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+}
+
+function show() {
+    const [, name = '', ...parts] = location.hash.split('/');
+    const view = VIEWS[name] ? name : '';
+    const [argument, detail] = parts.map((part) => part === '' ? undefined : decodeURIComponent(part));
+    shown?.stop?.();
+    shown = VIEWS[view]({argument, detail});
+    replace(main, shown.node);
+    shown.update?.();
+    for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
+    document.title = `${main.querySelector('h1')?.textContent ?? ''} · panelgate`;
+    main.dataset.view = view;
+    window.scrollTo(0, 0);
+}
+
+function refresh() {
+    banner.hidden = live.reachable;
+    if (!live.reachable) text(banner, t('unreachable'));
+    shown?.update?.();
+}
+
+/** A token that this tab remembers may be none any more. */
+async function enter() {
+    try {
+        await introduce();
+    } catch (error) {
+        if (error.status !== 401) throw error;
+        if (hasToken()) await useToken('').catch(() => askToken());
+        else await askToken();
+    }
+}
+
+async function start() {
+    theme(stored('theme') ?? 'auto');
+    const first = live.refresh();
+    try {
+        await enter();
+    } catch {
+        banner.hidden = false;
+        text(banner, t('unreachable'));
+        setTimeout(start, 2000);
+        return;
+    }
+    build();
+    if (!gateway.configuration) return;
+    await first;
+    live.addEventListener('status', refresh);
+    live.start();
+    window.addEventListener('hashchange', () => { show(); main.focus(); });
+    document.addEventListener('role', show);
+    document.getElementById('version').textContent = gateway.configuration.version;
+    show();
+    performance.mark('shown');
+}
+
+start();

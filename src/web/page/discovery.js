@@ -1,0 +1,71 @@
+// Looks for stations that nobody has listed, on a line that runs.
+import {get, mayWrite, path, post} from './api.js';
+import {refusal} from './confirm.js';
+import {choice, h, replace, table, text} from './dom.js';
+import {t} from './language.js';
+import {live} from './live.js';
+import {askToken} from './token.js';
+
+class Discovery {
+    constructor(line) {
+        this.line = line;
+        this.stations = h('input', {id: 'stations', value: '1-247', autocomplete: 'off'});
+        this.share = h('input', {id: 'share', type: 'number', min: 1, max: 50, value: 10});
+        this.start = h('button', {class: 'primary'}, t('discovery.start'));
+        this.progress = h('progress', {hidden: true, 'aria-label': t('nav.discovery')});
+        this.said = h('p', {class: 'muted', role: 'status'});
+        this.result = h('div');
+        this.node = h('div', null, h('section', {class: 'card'}, h('p', {class: 'muted'}, t('discovery.hint')), this.#form(), this.progress, this.said), this.result);
+        this.told = ({detail}) => detail.line === line && this.#goes(detail);
+        live.addEventListener('discovery', this.told);
+        get(path('lines', line, 'discover')).then((report) => this.#show(report), () => {});
+    }
+
+    stop() { live.removeEventListener('discovery', this.told); }
+
+    #form() {
+        if (!mayWrite()) {
+            return h('div', null, h('p', null, t('role.needed')), h('button', {type: 'button', onclick: askToken}, t('token.enter')));
+        }
+        return h('form', {class: 'request three', onsubmit: (event) => { event.preventDefault(); this.#look(); }},
+            h('label', null, h('span', null, t('discovery.stations')), this.stations),
+            h('label', null, h('span', null, t('discovery.share')), this.share), this.start);
+    }
+
+    #goes({asked, of, found}) {
+        Object.assign(this.progress, {hidden: false, max: of, value: asked});
+        text(this.said, t('discovery.progress', {asked, of, found}));
+    }
+
+    async #look() {
+        this.start.disabled = true;
+        replace(this.result);
+        try {
+            this.#show(await post(path('lines', this.line, 'discover'), {stations: this.stations.value, share_percent: Number(this.share.value)}));
+        } catch (error) {
+            replace(this.result, refusal(error));
+        }
+        this.start.disabled = false;
+    }
+
+    #show(report) {
+        if (report.state === 'never') return text(this.said, t('discovery.never'));
+        this.#goes({asked: report.asked, of: report.of, found: report.stations.length});
+        if (report.state === 'running') return null;
+        this.progress.hidden = true;
+        if (report.stations.length === 0) return replace(this.result, h('p', {class: 'empty'}, t('discovery.none')));
+        const shown = table(t('nav.discovery'), [[t('id'), 'number'], [t('profile')], [t('discovery.evidence')]]);
+        shown.body.append(...report.stations.map((one) => h('tr', null, h('td', {class: 'number'}, String(one.id)),
+            h('td', null, one.profiles.join(', ') || t('no.profile')), h('td', {lang: 'en'}, [one.evidence].flat().join('; ')))));
+        return replace(this.result, shown.node, h('section', {class: 'card'}, h('h2', null, t('discovery.paste')),
+            h('pre', {class: 'yaml', tabindex: 0, 'aria-label': 'YAML', role: 'region'}, report.yaml)));
+    }
+}
+
+export function discoveryView({argument}) {
+    const line = argument ?? live.lines[0]?.name;
+    if (!live.line(line)) return {node: h('p', {class: 'empty'}, t('no.lines'))};
+    const discovery = new Discovery(line);
+    const chooser = live.lines.length < 2 ? null : choice(t('line'), live.lines.map((one) => [one.name, one.name]), line, (chosen) => { location.hash = `#/discovery/${chosen}`; });
+    return {node: h('div', null, h('h1', null, t('nav.discovery'), ' ', h('small', null, line)), chooser, discovery.node), stop: () => discovery.stop()};
+}

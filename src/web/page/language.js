@@ -1,0 +1,67 @@
+// The language of the page, from the one table of words.
+import {words} from './words.js';
+
+export const languages = [['en', 'English'], ['de', 'Deutsch'], ['ko', '한국어'], ['ja', '日本語']];
+const column = Object.fromEntries(languages.map(([name], index) => [name, index]));
+
+function first() {
+    const wanted = [stored('language'), ...navigator.languages.map((name) => name.slice(0, 2))];
+    return wanted.find((name) => name in column) ?? 'en';
+}
+
+/** What this browser remembers; null where it may not remember anything. */
+export function stored(name) {
+    try { return localStorage.getItem('panelgate.' + name); } catch { return null; }
+}
+
+export function store(name, value) {
+    try { localStorage.setItem('panelgate.' + name, value); } catch { /* private window */ }
+}
+
+export const language = first();
+document.documentElement.lang = language;
+
+/** The words of a key; {name} stands for a value. A key that nobody has is shown as it is. */
+export function t(key, values = {}) {
+    const all = words[key];
+    const said = all ? all[column[language]] : key;
+    return said.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+}
+
+/** The words for one of the gateway's own ("online"); its own where the table has none. */
+export function word(kind, name) {
+    const key = `${kind}.${name}`;
+    return key in words ? t(key) : String(name);
+}
+
+const formats = new Map();
+
+/** A number with at most so many digits behind the point. */
+export function number(value, digits = 0) {
+    if (!formats.has(digits)) {
+        formats.set(digits, new Intl.NumberFormat(language, {maximumFractionDigits: digits}));
+    }
+    return formats.get(digits).format(value);
+}
+
+/** Milliseconds as people say them: "6.8 ms", "12 s", "3 min". */
+export function duration(ms) {
+    if (ms === null || ms === undefined) return '–';
+    if (ms < 10) return `${number(ms, 1)} ms`;
+    if (ms < 1000) return `${number(ms)} ms`;
+    if (ms < 10000) return `${number(ms / 1000, 1)} s`;
+    if (ms < 120000) return `${number(ms / 1000)} s`;
+    if (ms < 7200000) return `${number(ms / 60000)} min`;
+    return `${number(ms / 3600000)} h`;
+}
+
+const clock = new Intl.DateTimeFormat('en-GB', {hour: '2-digit', minute: '2-digit', second: '2-digit'});
+
+/** "19:04:05", the same in all languages: it stands below plots. */
+export const clockTime = (date) => clock.format(date);
+
+/** Wall time of seconds since 1970, with milliseconds. */
+export function time(seconds) {
+    const ms = Math.floor((seconds * 1000) % 1000);
+    return `${clock.format(seconds * 1000)}.${String(ms).padStart(3, '0')}`;
+}

@@ -1,0 +1,135 @@
+// Lines with their load, and their stations as tiles.
+import {get, offers, path} from './api.js';
+import {attribute, h, list, replace, text} from './dom.js';
+import {duration, number, t, word} from './language.js';
+import {live} from './live.js';
+import {sparkline} from './plot.js';
+import {latency} from './timeline.js';
+import {traceOf} from './trace.js';
+
+const TRACED = 6;       // lines whose latencies are followed here
+const KEPT = 40;        // transactions of a sparkline
+const HISTORY = 120;    // loads of a sparkline
+const LOADED = 20;      // % of the wire that a sparkline shows at least
+const FINDINGS = 5000;  // ms between two looks at a line's findings
+
+/** How a state looks: 'good', 'bad' (nobody answers), 'idle' (nobody has asked). */
+export function tone(state) {
+    if (state === 'online' || state === 'heard' || state === 'up' || state === 'ok') return 'good';
+    return state === 'unknown' ? 'idle' : 'bad';
+}
+
+export function badge(kind, state) {
+    return h('span', {class: `badge ${tone(state)}`}, word(kind, state));
+}
+
+export function findingNote(finding) {
+    return h('li', {class: 'finding'}, h('strong', {lang: 'en'}, finding.text), ' ',
+        h('span', {lang: 'en'}, finding.advice), finding.evidence ? h('small', {lang: 'en'}, finding.evidence) : null);
+}
+
+/** A station's tile: {node, update}. */
+function tile(first) {
+    const name = h('span', {class: 'name'}, first.name);
+    const state = h('span', {class: 'badge'});
+    const spark = sparkline();
+    const figure = h('span', {class: 'figure'});
+    const facts = h('span', {class: 'muted'});
+    const finding = h('span', {class: 'tile-finding', lang: 'en'});
+    const node = h('a', {class: 'tile', href: `#/station/${encodeURIComponent(first.name)}`, 'data-station': first.name},
+        h('span', {class: 'head'}, name, state), h('span', {class: 'muted'}, `${first.line}:${first.id} · ${first.profile ?? t('no.profile')}`),
+        h('span', {class: 'head'}, spark.node, figure), facts, finding);
+    return {node, update: (station) => {
+        attribute(node, 'class', `tile ${tone(station.state)} ${station.state}`);
+        attribute(state, 'class', `badge ${tone(station.state)}`);
+        text(state, word('state', station.state));
+        const line = live.line(station.line);
+        const traced = traceOf(station.line).timeline.of(station.id).slice(-KEPT);
+        const answered = traced.filter((one) => one.total !== null).map((one) => one.total);
+        spark.update(answered);
+        text(figure, duration(latency(traced).total.mean));
+        text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
+        const told = line?.told?.find((one) => one.station === station.id);
+        text(finding, told ? told.text : '');
+    }};
+}
+
+/** What the gateway remembers of a line's load comes before what this page sees. */
+async function recall(line, history) {
+    if (!offers('GET /api/v1/lines/{}/history')) return;
+    try {
+        const {samples} = await get(path('lines', line, 'history'));
+        history.unshift(...samples.map((one) => one.load_percent ?? 0).slice(-HISTORY));
+    } catch { /* it begins now */ }
+}
+
+/** A line's card with its tiles: {node, update}. */
+function card(first) {
+    const meter = h('meter', {min: 0, max: 100, high: 80, optimum: 0, 'aria-label': t('load.of', {line: first.name})});
+    const load = h('span', {class: 'figure'});
+    const state = h('span', {class: 'badge'});
+    const facts = h('p', {class: 'muted'});
+    const spark = sparkline();
+    const history = [];
+    recall(first.name, history);
+    const findings = h('ul', {class: 'findings'});
+    const tiles = h('div', {class: 'tiles'});
+    const node = h('section', {class: 'line', 'aria-label': `${t('line')} ${first.name}`},
+        h('div', {class: 'card'},
+            h('div', {class: 'head'}, h('h2', null, first.name), state, h('span', {class: 'grow'}),
+                h('a', {href: `#/scope/${first.name}`}, t('nav.scope')), h('a', {href: `#/latency/${first.name}`}, t('nav.latency'))),
+            h('div', {class: 'load'}, meter, load, spark.node), facts, findings),
+        tiles);
+    return {node, update: (line) => {
+        attribute(state, 'class', `badge ${line.up ? 'good' : 'bad'}`);
+        text(state, line.up ? word('state', 'up') : line.state);
+        meter.value = line.load_percent;
+        text(load, t('load', {percent: number(line.load_percent, 1)}));
+        history.push(line.load_percent);
+        if (history.length > HISTORY) history.shift();
+        spark.update(history, 0, LOADED);
+        text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
+        const told = (line.told ?? []).map((one) => ({...one, key: `${one.cause} ${one.station} ${one.text}`}));
+        list(findings, told, (one) => one.key, (one) => ({node: findingNote(one)}));
+        list(tiles, live.stations.filter((station) => station.line === line.name), (station) => station.name, tile);
+    }};
+}
+
+const told = new Map();  // line -> {at, findings}
+
+/** A line's findings with their advice; asked for where the list of lines says that there are any. */
+async function findingsOf(line) {
+    if (line.findings.length === 0) return told.delete(line.name);
+    const before = told.get(line.name);
+    if (before && performance.now() - before.at < FINDINGS && before.count === line.findings.length) return false;
+    told.set(line.name, {findings: before?.findings ?? [], count: line.findings.length, at: performance.now()});
+    try {
+        told.get(line.name).findings = (await get(path('lines', line.name))).findings;
+    } catch { /* the next look will do */ }
+    return true;
+}
+
+/** Lines as they are, each with `told`: its findings in words. */
+export function linesWithFindings(changed) {
+    for (const line of live.lines) findingsOf(line).then((news) => news && changed());
+    return live.lines.map((line) => Object.assign(line, {told: told.get(line.name)?.findings ?? []}));
+}
+
+export function overviewView() {
+    const lines = h('div');
+    const counts = h('p', {class: 'counts', role: 'status'});
+    const node = h('div', null, h('h1', null, t('nav.overview')), counts, lines);
+    const update = () => {
+        const bad = live.stations.filter((station) => tone(station.state) === 'bad').length;
+        text(counts, t('counts', {lines: live.lines.length, stations: live.stations.length, bad}));
+        attribute(counts, 'class', bad > 0 ? 'counts bad' : 'counts');
+        list(lines, linesWithFindings(update), (line) => line.name, card);
+        if (live.lines.length === 0) replace(lines, h('p', {class: 'empty'}, t('no.lines')));
+    };
+    const ends = live.lines.slice(0, TRACED).map((line) => {
+        const trace = traceOf(line.name);
+        let seen = trace.timeline.end > 0;
+        return trace.watch(() => seen || (seen = true, update()));  // from then on with the status
+    });
+    return {node, update, stop: () => ends.forEach((end) => end())};
+}

@@ -1,0 +1,46 @@
+// What this page knows of points: their last values, and how a value is said.
+import {get, offers, path} from './api.js';
+import {number, t, word} from './language.js';
+import {live} from './live.js';
+
+const MANY = 200;        // points, of which fewer values are remembered each
+const kept = () => histories.size > MANY ? 120 : 3600;  // values of a point
+const histories = new Map();  // "press/temperature" -> [[ms since 1970, number]]
+
+export const keyOf = (station, name) => `${station}/${name}`;
+
+/** What is kept of a point: [[ms since 1970, number]], the oldest first. */
+export const historyOf = (key) => histories.get(key) ?? [];
+
+export function remember(key, value, at = Date.now()) {
+    if (typeof value === 'boolean') value = value ? 1 : 0;
+    if (typeof value !== 'number') return;
+    if (!histories.has(key)) histories.set(key, []);
+    const values = histories.get(key);
+    if (values.length > 0 && at <= values.at(-1)[0]) return;
+    values.push([at, value]);
+    while (values.length > kept()) values.shift();
+}
+
+live.addEventListener('point', ({detail}) => {
+    if (detail.quality === 'good') remember(keyOf(detail.station, detail.name), detail.value, Date.now() - (detail.age_ms ?? 0));
+});
+
+export function shownValue(point) {
+    if (point.value === null || point.value === undefined) return '–';
+    const value = typeof point.value === 'number' ? number(point.value, 6) : point.value === true ? t('on') : point.value === false ? t('off') : String(point.value);
+    return [point.label ? `${point.label} (${value})` : value, point.unit ? word('unit', point.unit) : ''].filter(Boolean).join(' ');
+}
+
+/** What the gateway remembers comes before what this page has seen. */
+export async function recall(station, name) {
+    if (!offers('GET /api/v1/stations/{}/points/{}/history')) return;
+    const key = keyOf(station, name);
+    try {
+        const {samples} = await get(path('stations', station, 'points', name, 'history'));
+        const seen = histories.get(key) ?? [];
+        const from = seen[0]?.[0] ?? Infinity;
+        const before = samples.filter((one) => one.value !== null).map((one) => [Date.parse(one.time), one.value]).filter(([at]) => at < from);
+        histories.set(key, [...before, ...seen].slice(-kept()));
+    } catch { /* the plot begins now */ }
+}

@@ -1,0 +1,68 @@
+// One station: how it does, what was found, how long it takes, its points and what to do with it.
+import {get, path} from './api.js';
+import {h, list, replace, text} from './dom.js';
+import {duration, number, t, word} from './language.js';
+import {badge, findingNote, linesWithFindings} from './overview.js';
+import {plot} from './plot.js';
+import {pointsTable} from './points.js';
+import {simulator} from './simulator.js';
+import {latency} from './timeline.js';
+import {traceOf} from './trace.js';
+import {live} from './live.js';
+
+function facts(station) {
+    const rows = [[t('line'), `${station.line}:${station.id}`], [t('profile'), station.profile ?? t('no.profile')],
+        [t('unit'), station.unit ?? '–'], [t('access'), word('access', station.read_only ? 'read_only' : 'read_write')],
+        [t('last'), duration(station.last_success_ms)]];
+    return rows.map(([name, value]) => h('div', null, h('dt', null, name), h('dd', null, String(value))));
+}
+
+function latencyPlot(station) {
+    const trace = traceOf(station.line);
+    const rows = () => trace.timeline.of(station.id).filter((one) => one.total !== null)
+        .map((one) => [new Date(one.request.wall * 1000), one.wire, one.think]);
+    const made = plot({title: t('nav.latency'), unit: 'ms', labels: [t('wire'), t('think')], colours: ['c0', 'c1'], stacked: true, rows});
+    return {...made, watch: (changed) => trace.watch(() => { made.update(); changed(); })};
+}
+
+function polls(body) {
+    if (!body.polls?.length) return null;
+    return h('section', {class: 'card'}, h('h2', null, t('polls')), h('ul', {class: 'plain'}, body.polls.map((poll) =>
+        h('li', null, h('code', null, `${poll.read} ×${poll.count}`), ` ${duration(poll.every_ms)} `,
+            h('span', {class: `badge ${poll.quality === 'good' ? 'good' : 'bad'}`}, word('quality', poll.quality)),
+            ` ${number(poll.good)} / ${number(poll.failed)} ${t('failed')}`))));
+}
+
+export function stationView({argument}) {
+    const first = live.station(argument);
+    if (!first) return {node: h('p', {class: 'empty'}, t('no.station', {name: argument ?? ''}))};
+    const state = h('span');
+    const list_ = h('dl', {class: 'facts'});
+    const findings = h('ul', {class: 'findings'});
+    const figures = h('p', {class: 'muted'});
+    const polled = h('div');
+    const points = pointsTable([first.name]);
+    const faults = simulator(first.name);
+    const graph = latencyPlot(first);
+    const node = h('div', null, h('h1', null, first.name, ' ', state),
+        h('div', {class: 'columns'}, h('section', {class: 'card'}, h('h2', null, t('station')), list_, findings,
+            h('p', null, h('a', {class: 'button', href: `#/request/${encodeURIComponent(first.name)}`}, t('nav.request')), ' ',
+                h('a', {class: 'button', href: `#/scope/${first.line}`}, t('nav.scope')))),
+        h('section', {class: 'card'}, graph.node, figures)),
+        h('h2', null, t('nav.points')), points.node, polled, faults.node);
+    get(path('stations', first.name)).then((body) => replace(polled, polls(body)), () => {});
+    const update = () => {
+        const station = live.station(first.name);
+        if (!station) return;
+        replace(state, badge('state', station.state));
+        replace(list_, facts(station));
+        const known = linesWithFindings(() => {}).find((line) => line.name === station.line)?.told ?? [];
+        list(findings, known.filter((one) => one.station === station.id), (one) => one.cause + one.text, (one) => ({node: findingNote(one)}));
+        const all = latency(traceOf(station.line).timeline.of(station.id));
+        text(figures, t('latency.figures', {count: all.count, mean: duration(all.total.mean), high: duration(all.total.high),
+            failed: all.count - all.answered}));
+        points.update();
+    };
+    const end = graph.watch(update);
+    return {node, update, stop: () => { end(); graph.stop(); points.stop(); }};
+}

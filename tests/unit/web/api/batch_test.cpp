@@ -1,0 +1,197 @@
+#include "http_rig.hpp"
+#include "panelgate/points/station_polls.hpp"
+
+namespace panelgate::web {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+/// press has a point oil (UW7, writable, 0 to 100).
+class ApiBatch : public HttpRig {
+  protected:
+    ApiBatch() {
+        points.resize(1);
+        points[0].name = "oil";
+        points[0].at = "UW7";
+        points[0].address = 7;
+        points[0].unit = "bar";
+        points[0].scale = 0.5;
+        points[0].writable = true;
+        points[0].max = 100;
+        shown = std::make_unique<points::StationPoints>(points, blocks, readings);
+        directory.stations[0].points = shown.get();
+    }
+    Reply read(const std::string& items) {
+        return ask("POST", "/api/v1/read", "{\"items\":[" + items + "]}");
+    }
+    Reply write(const std::string& items) {
+        return ask("POST", "/api/v1/write", "{\"items\":[" + items + "]}");
+    }
+    static boost::json::object result(const Reply& reply, std::size_t index) {
+        return reply.at("results").as_array().at(index).as_object();
+    }
+    std::vector<std::string> pdus() const {
+        std::vector<std::string> all;
+        for (const bus::Request& request : bus.requests)
+            all.push_back(to_hex(request.request.pdu()));
+        return all;
+    }
+
+    std::vector<points::Point> points;
+    std::vector<points::Poll> blocks;
+    std::vector<points::Reading> readings{1};
+    std::unique_ptr<points::StationPoints> shown;
+};
+
+constexpr const char* kUw = R"({"station":"press","device":"UW10","count":2})";
+constexpr const char* kOil = R"({"point":"press/oil"})";
+
+TEST_F(ApiBatch, ReadsNeighboursInOneRequestWithOneResultEach) {
+    const Reply reply = read(std::string(kUw) + "," + kOil);
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(reply.json(),
+              json_of(R"({"results":[{"status":200,"station":"press","table":"holding-registers",
+        "address":10,"notation":"UW10","values":[10,11],"age_ms":0,"source":"bus"},
+        {"status":200,"station":"press","name":"oil","value":3.5,"unit":"bar","quality":"good",
+         "age_ms":0,"source":"bus"}],"transactions":1})"));
+    EXPECT_EQ(last_pdu(), "03 00 07 00 05");
+}
+
+TEST_F(ApiBatch, TellsTypesAndRawItems) {
+    const Reply reply = read(
+        R"({"station":"press","table":"holding-registers","address":1,"type":"u32",
+            "order":"CDAB","raw":true},{"point":"press/oil","raw":true})");
+    EXPECT_EQ(result(reply, 0).at("values"), json_of("[131073]"));
+    EXPECT_EQ(result(reply, 0).at("raw"), json_of("[1,2]"));
+    EXPECT_EQ(result(reply, 1).at("raw"), json_of("[7]"));
+}
+
+TEST_F(ApiBatch, WhatCannotBeReadIsToldInItsPlace) {
+    const Reply reply = read(std::string(R"({"point":"press/none"},{"station":"nobody",
+        "device":"UW1"},{"station":"press","device":"UW5000"},)") +
+                             kUw);
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(result(reply, 0).at("status"), 404);
+    EXPECT_EQ(result(reply, 0).at("detail"), "station 'press' has no point 'none'");
+    EXPECT_EQ(result(reply, 1).at("status"), 404);
+    EXPECT_EQ(result(reply, 2).at("status"), 422);
+    EXPECT_EQ(result(reply, 3).at("values"), json_of("[10,11]"));
+}
+
+TEST_F(ApiBatch, WhatAPanelRefusesFailsNobodyElse) {
+    bus.script = [](const bus::Request& request) {
+        const auto span = *request.request.span();
+        const bool missing = span.first <= 11 && span.end() > 11;
+        if (missing) return test::FakeBus::reply({0x83, 2});
+        return answer_from_addresses(request);
+    };
+    const Reply reply = read(
+        R"({"station":"press","device":"UW10"},{"station":"press","device":"UW11"},
+           {"station":"press","device":"UW12"})");
+    EXPECT_EQ(result(reply, 0).at("values"), json_of("[10]"));
+    EXPECT_EQ(result(reply, 1).at("status"), 422);
+    EXPECT_EQ(result(reply, 1).at("modbus_exception"), 2);
+    EXPECT_EQ(result(reply, 2).at("values"), json_of("[12]"));
+}
+
+TEST_F(ApiBatch, CutsWhatIsLargerThanThePanelsFrame) {
+    const Reply reply = read(R"({"station":"press","device":"UW0","count":70})");
+    EXPECT_EQ(result(reply, 0).at("transactions"), 3);
+    const auto values = result(reply, 0).at("values").as_array();
+    ASSERT_EQ(values.size(), 70u);
+    for (unsigned i = 0; i < 70; ++i) EXPECT_EQ(values[i], i);
+}
+
+TEST_F(ApiBatch, P2AMistakeAnywhereAndNothingIsDone) {
+    const Reply reply = write(R"({"station":"press","device":"UW1","values":[1]},
+                                 {"station":"press","device":"UW2","valeus":[1]})");
+    EXPECT_EQ(reply.status(), 400u);
+    EXPECT_EQ(reply.at("detail"), "items[1]: unknown member 'valeus'; did you mean 'values'?");
+    for (const char* wrong :
+         {"{}", "7", R"({"point":"oil"})", R"({"point":7})", R"({"point":"press/oil","count":2})",
+          R"({"station":"press","table":"words","address":1})",
+          R"({"station":"press","device":"UW1","count":0})"}) {
+        EXPECT_EQ(read(wrong).status(), 400u) << wrong;
+    }
+    EXPECT_EQ(ask("POST", "/api/v1/read", R"({"items":[]})").status(), 400u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiBatch, IsAsLongAsTheSettingsSay) {
+    std::string items = kOil;
+    for (int i = 0; i < 256; ++i) items += std::string(",") + kOil;
+    const Reply reply = read(items);
+    EXPECT_EQ(reply.status(), 422u);
+    EXPECT_EQ(reply.at("detail"), "at most 256 entries in one list");
+    const std::string large = R"({"station":"floor1:9","table":"coils","address":0,"count":32000})";
+    EXPECT_EQ(read(large).status(), 200u);
+    bus.requests.clear();
+    EXPECT_EQ(read(large + "," + large).at("detail"),
+              "at most 32768 registers and bits in one list");
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiBatch, WritesInOrderWithOneResultEach) {
+    add_meter();
+    const Reply reply = write(R"({"point":"press/oil","value":3.5},
+        {"station":"meter","table":"coils","address":1,"values":[1]},
+        {"station":"press","device":"UW1","values":[1,2]},{"point":"press/oil","value":300})");
+    EXPECT_EQ(reply.status(), 200u);
+    EXPECT_EQ(result(reply, 0),
+              json_of(R"({"status":200,"transmitted":true,"confirmed":true,"value":3.5})"));
+    EXPECT_EQ(result(reply, 1).at("status"), 403);
+    EXPECT_EQ(result(reply, 2).at("confirmed"), true);
+    EXPECT_EQ(result(reply, 3).at("status"), 422);
+    EXPECT_THAT(pdus(), ElementsAre("06 00 07 00 07", "10 00 01 00 02 04 00 01 00 02"));
+}
+
+TEST_F(ApiBatch, AWriteThatFailsStopsNoOther) {
+    bus.script = [](const bus::Request& request) {
+        if (request.request.pdu()[2] == 1) return test::FakeBus::fault(Fault::timeout, true);
+        return answer_from_addresses(request);
+    };
+    const Reply reply = write(R"({"station":"press","device":"UW1","values":[1]},
+                                 {"station":"press","device":"UW2","values":[2]})");
+    EXPECT_EQ(result(reply, 0).at("status"), 504);
+    EXPECT_EQ(result(reply, 0).at("transmitted"), true);
+    EXPECT_EQ(result(reply, 1).at("status"), 200);
+}
+
+TEST_F(ApiBatch, LinesAreAskedAtOnce) {
+    test::FakeBus other(io.get_executor());
+    directory.lines[1].bus = &other;
+    StationEntry far = directory.stations[0];
+    far.name = "far";
+    far.line = "floor2";
+    far.bus = &other;
+    directory.stations.push_back(far);
+    other.script = [&](const bus::Request& request) {
+        EXPECT_EQ(bus.open(), 1u);  // press has not answered yet
+        bus.release(answer_from_addresses(bus.requests.back()));
+        return answer_from_addresses(request);
+    };
+    bus.script = [](const bus::Request&) { return std::nullopt; };
+    const Reply reply = read(std::string(kUw) + R"(,{"station":"far","device":"UW3"})");
+    EXPECT_EQ(result(reply, 0).at("values"), json_of("[10,11]"));
+    EXPECT_EQ(result(reply, 1).at("values"), json_of("[3]"));
+    EXPECT_EQ(reply.at("transactions"), 2);
+    server.reset();
+    io.poll();
+}
+
+TEST_F(ApiBatch, P2WhoeverLeavesTakesWhatWaitsAlong) {
+    bus.script = [](const bus::Request&) { return std::nullopt; };
+    {
+        Client client = connect();
+        client.send(
+            "POST /api/v1/read HTTP/1.1\r\nHost: x\r\nContent-Length: 40\r\n\r\n"
+            R"({"items":[{"point":"press/oil"}]}       )");
+        while (bus.requests.empty()) io.run_one();
+    }
+    while (bus.cancelled.empty()) io.run_one();
+    EXPECT_EQ(bus.cancelled, std::vector<bus::ClientId>{bus.requests[0].client});
+}
+
+}  // namespace
+}  // namespace panelgate::web
