@@ -12,6 +12,8 @@ import harness
 from harness import ROOT
 
 SERVICE = ROOT / "deploy/systemd/panelgate.service"
+ALERTS = ROOT / "deploy/prometheus/rules/alerts.yml"
+ALERT = re.compile(r"- alert: (\w+)")
 SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "tests/run.sh", ".ci/run")
 
 
@@ -53,6 +55,20 @@ class Deploy(unittest.TestCase):
     def test_prometheus_takes_the_scrape_configuration(self):
         checked = run("promtool", "check", "config", str(ROOT / "deploy/prometheus/prometheus.yml"))
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
+    def test_each_alert_fires_when_it_should_and_not_when_it_should_not(self):
+        tests = sorted(str(file) for file in (ROOT / "tests/prometheus").glob("*_test.yml"))
+        tested = run("promtool", "test", "rules", *tests)
+        self.assertEqual(tested.returncode, 0, tested.stdout + tested.stderr)
+        played = "".join(pathlib.Path(file).read_text() for file in tests)
+        for alert in ALERT.findall(ALERTS.read_text()):
+            self.assertRegex(played, rf'labels: \'{{alertname="{alert}"', alert)
+
+    def test_each_alert_says_what_to_do(self):
+        for alert in ALERTS.read_text().split("- alert: ")[1:]:
+            for key in ("severity", "summary", "description", "runbook"):
+                self.assertRegex(alert, rf"\b{key}: \S", alert)
 
     def test_the_scripts_parse_and_may_be_executed(self):
         for script in SCRIPTS:
