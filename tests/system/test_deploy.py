@@ -14,7 +14,8 @@ from harness import ROOT
 SERVICE = ROOT / "deploy/systemd/panelgate.service"
 ALERTS = ROOT / "deploy/prometheus/rules/alerts.yml"
 ALERT = re.compile(r"- alert: (\w+)")
-SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "tests/run.sh", ".ci/run")
+SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "deploy/sbom.sh", "tests/run.sh",
+           "tests/image.sh", ".ci/run")
 
 
 def run(*command):
