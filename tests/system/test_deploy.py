@@ -7,7 +7,9 @@ import shutil
 import subprocess
 import tempfile
 import unittest
+import urllib.request
 
+import config
 import harness
 from harness import ROOT
 
@@ -51,6 +53,26 @@ class Deploy(unittest.TestCase):
         allowed = set(re.findall(r"(?m)^DeviceAllow=char-(\S+) rw$", SERVICE.read_text()))
         self.assertLessEqual({"ttyS", "ttyUSB", "ttyACM", "ttyAMA", "ttymxc", "ttyO", "ttySC", "ttyTHS",
                               "ttyXRUSB", "pts", "ptmx"}, allowed)
+
+    def test_a_token_of_the_service_is_taken(self):
+        text = SERVICE.read_text()
+        self.assertIn("\nConfigurationDirectory=panelgate\n", text)
+        written = re.search(r"`file: (\S+/panelgate-operator)`", text)[1]
+        self.assertIn(f"\nLoadCredential={pathlib.Path(written).name}\n", text)
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "panelgate-operator"
+            token.write_text("a-token-of-the-service\n")
+            token.chmod(0o400)
+            tokens = f'[{{name: ops, role: operator, file: "{written}"}}]'
+            http = f"{config.FREE_PORT}, anonymous: none, tokens: {tokens}"
+            with harness.configured(config.gateway(config.line(), http=http),
+                                    env={**os.environ, "CREDENTIALS_DIRECTORY": folder}) as program:
+                asked = urllib.request.Request(
+                    program.url("/api/v1/lines"),
+                    headers={"Authorization": "Bearer a-token-of-the-service"})
+                with urllib.request.urlopen(asked, timeout=harness.PATIENCE) as answer:
+                    self.assertEqual(answer.status, 200)
+                self.assertEqual(program.get("/api/v1/lines")[0], 401)
 
     @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
     def test_prometheus_takes_the_scrape_configuration(self):
