@@ -17,7 +17,7 @@ SERVICE = ROOT / "deploy/systemd/panelgate.service"
 ALERTS = ROOT / "deploy/prometheus/rules/alerts.yml"
 ALERT = re.compile(r"- alert: (\w+)")
 SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "deploy/sbom.sh", "tests/run.sh",
-           "tests/image.sh", ".ci/run")
+           "tests/image.sh", "deploy/kubernetes/rules.sh", ".ci/run")
 
 
 def run(*command):
