@@ -1,5 +1,5 @@
-"""A real Prometheus with the configuration and the rules of deploy/prometheus, in which a minute is
-a second and an hour a minute."""
+"""A real Prometheus with the configuration and the rules of deploy/prometheus; for tests with a clock
+in which a minute is a second and an hour a minute."""
 import json
 import pathlib
 import re
@@ -27,17 +27,19 @@ def sooner(rules):
 class Prometheus(harness.Helper):
     """Runs with the block, on a free port, with its storage in a folder of its own."""
 
-    def __init__(self, targets):
+    def __init__(self, targets, quick=True):
         self.folder = tempfile.TemporaryDirectory()
-        config = (DEPLOYED / "prometheus.yml").read_text()
-        for slow, quick in {**QUICK, '["panelgate:8080"]': json.dumps(targets)}.items():
-            assert slow in config, slow
-            config = config.replace(slow, quick)
         place = pathlib.Path(self.folder.name)
+        changed = {'["panelgate:8080"]': json.dumps(targets), **(QUICK if quick else {})}
+        config = (DEPLOYED / "prometheus.yml").read_text()
+        for deployed, own in changed.items():
+            assert deployed in config, deployed
+            config = config.replace(deployed, own)
         (place / "prometheus.yml").write_text(config)
         (place / "rules").mkdir()
-        for rules in (DEPLOYED / "rules").glob("*.yml"):
-            (place / "rules" / rules.name).write_text(sooner(rules.read_text()))
+        for file in (DEPLOYED / "rules").glob("*.yml"):
+            rules = file.read_text()
+            (place / "rules" / file.name).write_text(sooner(rules) if quick else rules)
         super().__init__(["prometheus", f"--config.file={place}/prometheus.yml",
                           f"--storage.tsdb.path={place}/data", "--web.listen-address=127.0.0.1:0"],
                          stderr=subprocess.STDOUT)
