@@ -38,7 +38,7 @@ def own_metrics(prometheus):
     url = f"http://127.0.0.1:{prometheus.port}/metrics"
     with urllib.request.urlopen(url, timeout=harness.PATIENCE) as response:
         text = response.read().decode()
-    return {name: float(value) for name, value in re.findall(r"(?m)^(\w+) (\S+)$", text)}
+    return {name: float(value) for name, value in re.findall(r'(?m)^(\w+)(?:\{type="float"\})? (\S+)$', text)}
 
 
 def sizes(program):
@@ -56,7 +56,6 @@ def observe(programs, prometheus, seconds):
     spent = time.monotonic() - start
     after = own_metrics(prometheus)
     shares = [100 * (cpu_seconds(pid) - then) / spent for pid, then in zip(pids, used)]
-    appended = "prometheus_tsdb_head_samples_appended_total"
     both = {name: (after[name] - before[name]) / spent
             for name in after.keys() & before.keys()}
     count = len(programs)
@@ -65,7 +64,7 @@ def observe(programs, prometheus, seconds):
         "its share of it (Pss), kB": sum(kilobytes(p, "Pss") for p in pids) / count,
         "processor of a gateway with its panels, % of a core": sum(shares) / count,
         "series in Prometheus": after["prometheus_tsdb_head_series"],
-        "samples a second": both.get(appended, 0.0),
+        "samples a second": both["prometheus_tsdb_head_samples_appended_total"],
         "memory of Prometheus, MB": after["process_resident_memory_bytes"] / 1e6,
         "processor of Prometheus, % of a core": 100 * both["process_cpu_seconds_total"],
     }

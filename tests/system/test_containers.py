@@ -101,6 +101,24 @@ class Compose(unittest.TestCase):
             self.assertEqual(taken.returncode, 0, taken.stderr)
 
 
+class Operations(unittest.TestCase):
+    text = (DEPLOY / "operations.md").read_text()
+
+    def test_files_that_it_names_exist(self):
+        named = re.findall(r"`((?:kubernetes|prometheus|systemd|udev|tests)/[\w./-]+|compose\.yaml)`",
+                           self.text)
+        self.assertGreater(len(named), 5)
+        for path in named:
+            self.assertTrue((DEPLOY / path).exists() or (ROOT / path).exists(), path)
+
+    def test_one_cause_is_one_message(self):
+        [block] = re.findall(r"(?ms)^```yaml\n(.*?)^```$", self.text)
+        rules = (DEPLOY / "prometheus/rules/alerts.yml").read_text()
+        for inhibition in yaml.safe_load(block)["inhibit_rules"]:
+            [source] = inhibition["source_matchers"]
+            self.assertIn(f"- alert: {source.removeprefix('alertname = ')}\n", rules)
+
+
 class Image(unittest.TestCase):
     def test_it_is_pinned_labelled_and_runs_without_rights(self):
         self.assertRegex(DOCKERFILE, r"(?m)^ARG DEBIAN=bookworm-\d{8}-slim$")
