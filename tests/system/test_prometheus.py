@@ -20,20 +20,21 @@ DASHBOARD = ROOT / "deploy/grafana/dashboards/panelgate.json"
 # A simulated line has no UART, and what a driver does not count is absent.
 ONLY_OF_UARTS = re.compile("panelgate_(framing_errors|parity_errors|overruns|breaks)_total")
 DEMO_FAULTS = {"filler": {"dead": True},       # StationOffline, RelayFails
-               "mixer": {"duplicate": 0.5},    # AddressDoubled
-               "press": {"late": 0.3, "late_by_ms": 600}}  # LateRepliesRise
+               "mixer": {"duplicate": 0.5}}    # AddressDoubled
 BOX_FAULTS = {"shaken": {"truncate": 0.5},     # Errors
+              "tardy": {"late": 0.3, "late_by_ms": 600},  # LateRepliesRise
               "sluggish": {"slow_ms": 700}}    # LineOverloaded, LatencyBurnsFast and -Slowly
 
 
 def box(adapter):
-    """A gateway with a real tty, a line with bad cables and one with a slow panel."""
+    """A gateway with a real tty, a line with bad cables, and two with panels that take their time."""
     def polled(station, name):
         return (f"{{id: {station}, name: {name}, profile: generic, "
                 'points: [{name: value, at: "400001", every: 200ms}]}')
     return config.gateway(
         config.line("remote", adapter, polled(7, "pump")),
         config.line("cable", "sim", polled(1, "shaken") + ", " + polled(2, "sound")),
+        config.line("late", "sim", polled(4, "tardy")),
         config.line("slow", "sim", polled(3, "sluggish"), timing="{response_timeout: 2s}",
                     queue="{deadline: 10s}"),
         http=config.OPERATOR, log="{level: trace}")
