@@ -64,11 +64,11 @@ class Prometheus(harness.Helper):
         found = [(s["metric"], float(s["value"][1])) for s in answer["result"]]
         return [(labels, value) for labels, value in found if value == value]
 
-    def until(self, condition, meanwhile=lambda: None):
+    def until(self, condition, meanwhile=lambda: None, told=lambda: "that never was"):
         """What condition() gives as soon as it is true; `meanwhile` is done between two looks."""
         end = time.monotonic() + PATIENCE
         while not (found := condition()):
-            assert time.monotonic() < end, self.api("alerts")
+            assert time.monotonic() < end, told()
             meanwhile()
             time.sleep(0.1)  # a look is a query: no more than ten a second
         return found

@@ -19,24 +19,29 @@ from unread import Unread
 DASHBOARD = ROOT / "deploy/grafana/dashboards/panelgate.json"
 # A simulated line has no UART, and what a driver does not count is absent.
 ONLY_OF_UARTS = re.compile("panelgate_(framing_errors|parity_errors|overruns|breaks)_total")
+MANY = 60  # requests at once: the gateway takes 80 of a client before it answers
 DEMO_FAULTS = {"filler": {"dead": True},       # StationOffline, RelayFails
                "mixer": {"duplicate": 0.5}}    # AddressDoubled
 BOX_FAULTS = {"shaken": {"truncate": 0.5},     # Errors
-              "tardy": {"late": 0.3, "late_by_ms": 600},  # LateRepliesRise
+              # Given up after 100 ms and here before the next poll: LateRepliesRise
+              "tardy": {"late": 0.3, "late_by_ms": 200},
               "sluggish": {"slow_ms": 700}}    # LineOverloaded, LatencyBurnsFast and -Slowly
 
 
 def box(adapter):
-    """A gateway with a real tty, a line with bad cables, and two with panels that take their time."""
-    def polled(station, name):
+    """A gateway with a real tty, a line with bad cables, two with panels that take their time, and
+    one that fills its log."""
+    def polled(station, name, every="200ms"):
         return (f"{{id: {station}, name: {name}, profile: generic, "
-                'points: [{name: value, at: "400001", every: 200ms}]}')
+                f'points: [{{name: value, at: "400001", every: {every}}}]}}')
     return config.gateway(
         config.line("remote", adapter, polled(7, "pump")),
         config.line("cable", "sim", polled(1, "shaken") + ", " + polled(2, "sound")),
-        config.line("late", "sim", polled(4, "tardy")),
-        config.line("slow", "sim", polled(3, "sluggish"), timing="{response_timeout: 2s}",
+        config.line("late", "sim", polled(4, "tardy", "300ms"), retries=0,
+                    timing="{response_timeout: 100ms}"),
+        config.line("slow", "sim", polled(3, "sluggish", "10ms"), timing="{response_timeout: 2s}",
                     queue="{deadline: 10s}"),
+        config.line("quick", "sim", polled(5, "loud"), baud=1000000),
         http=config.OPERATOR, log="{level: trace}")
 
 
@@ -89,13 +94,13 @@ class Plant:
         return [f"127.0.0.1:{self.demo.http_port()}", f"127.0.0.1:{self.box.ports[1]}"]
 
     def traffic(self):
-        """Two panels of the demo, REST, and the box's own registers, which fill its log."""
+        """Two panels of the demo, REST, and what fills the box's log."""
         for station in (31, 5):
             self.client.ask(station, read_registers(0))
         self.demo.get("/api/v1/stations/press/points")
-        for _ in range(100):
-            self.box_client.send(255, read_registers(0))
-        for _ in range(100):
+        for _ in range(MANY):
+            self.box_client.send(5, read_registers(0))
+        for _ in range(MANY):
             self.box_client.receive()
 
     def hold_box(self, prometheus):
@@ -144,7 +149,7 @@ class Scraped(unittest.TestCase):
                 if alert["state"] == "firing":
                     texts[alert["labels"]["alertname"]] = alert["annotations"]
             return texts.keys() >= expected
-        prometheus.until(all_fired, meanwhile)
+        prometheus.until(all_fired, meanwhile, lambda: f"silent: {expected - texts.keys()}")
         for name, annotations in texts.items():
             self.assertEqual(set(annotations), {"summary", "description", "runbook"}, name)
             self.assertNotRegex(" ".join(annotations.values()), "<no value>|error", name)
