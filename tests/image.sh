@@ -2,7 +2,7 @@
 # tests/image.sh [--program FILE]
 # Builds the image without Docker and runs it as deploy/compose.yaml does, cut off from all
 # networks: health check, rights, read-only root, what it lists of itself, a clean end. Needs root and
-# Debian's mmdebstrap, buildah, podman and runc; ends with 77 where one is missing.
+# what deploy/install_packages.sh image brings; ends with 77 where something is missing.
 # --program FILE puts this program into the image instead of building one there (some minutes).
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
