@@ -112,5 +112,6 @@ memory=$(inside cat /proc/1/status | awk '/^VmRSS/ { print $2 }')
 podman "${store[@]}" stop -t 30 $box >/dev/null
 [ "$(inspect '{{.State.ExitCode}}' $box)" = 0 ] || fail "it ended with $(inspect '{{.State.ExitCode}}' $box)"
 size=$(podman "${store[@]}" save $image | gzip -6 | wc -c)
-echo "image.sh: fine; $((size / 1000)) kB packed (podman save | gzip), $memory kB resident, " \
-    "$(grep -c '"name"' "$work/sbom.json") packages listed"
+below=$(gzip -6 <"$work/slim.tar" | wc -c)
+echo "image.sh: fine; $((size / 1000)) kB packed (podman save | gzip), $((below / 1000)) kB of it Debian;" \
+    "$memory kB resident; $(grep -c '"type"' "$work/sbom.json") packages listed"
