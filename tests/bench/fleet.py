@@ -97,7 +97,7 @@ def main():
           f"{options.points} points each, polled every second")
     for what, value in measure(options.gateways, options.stations, options.points,
                                options.seconds).items():
-        print(f"{what:<55}{value:>12,.1f}", flush=True)
+        print(f"{what:<55}{value:>12,.2f}", flush=True)
 
 
 if __name__ == "__main__":
