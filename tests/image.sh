@@ -19,7 +19,7 @@ done
 [ "$(id -u)" = 0 ] || { echo "image.sh: skipped, it needs root"; exit 77; }
 
 work=$(mktemp -d)
-store=(--root "$work/store" --runroot "$work/run" --storage-driver overlay)
+store=(--root "$work/store" --runroot "$work/run" --storage-driver overlay --log-level fatal)
 box=panelgate-image-test-$$
 image=localhost/panelgate:test
 clean_up() {
