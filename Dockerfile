@@ -43,8 +43,7 @@ LABEL org.opencontainers.image.title="panelgate" \
 EXPOSE 502 8080
 USER 10001:10001
 STOPSIGNAL SIGTERM
-# For `http: {listen: ...:8080}`; with another port say `healthcheck` anew. Needs no HTTP client.
-HEALTHCHECK --interval=10s --timeout=3s --start-period=5s --retries=3 CMD ["bash", "-c", \
-    "exec 3<>/dev/tcp/127.0.0.1/8080 && printf 'GET /readyz HTTP/1.0\\r\\n\\r\\n' >&3 && read -r _ code _ <&3 && [ \"$code\" = 200 ]"]
+# Asks where /etc/panelgate/panelgate.yaml says, or on 8080. Needs no shell.
+HEALTHCHECK --interval=10s --timeout=3s --start-period=5s --retries=3 CMD ["panelgate", "health"]
 ENTRYPOINT ["panelgate"]
 CMD ["run"]

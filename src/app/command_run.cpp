@@ -18,6 +18,7 @@
 #include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/punctual.hpp"
+#include "reachable.hpp"
 #include "run_loop.hpp"
 
 namespace panelgate::app {
@@ -67,10 +68,6 @@ ExitCode serve(config::Config config, bool simulate,
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
-    const auto reachable = [](const std::string& address) -> std::string {
-        if (address == "::") return "::1";
-        return address == "0.0.0.0" ? "127.0.0.1" : address;
-    };
     const std::string url =
         "http://" + endpoint_text(reachable(config.http->address), gateway.http_port());
     const std::string host = reachable(config.modbus_tcp[0].address);

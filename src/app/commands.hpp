@@ -14,6 +14,9 @@ ExitCode run(const std::string& file, bool simulate);
 /// `http` and `modbus` replace the demo's addresses when not empty: "ADDR:PORT".
 ExitCode demo(const std::string& http, const std::string& modbus);
 ExitCode check(const std::string& file, bool json);
+/// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
+/// default where there is none that can be read.
+ExitCode health(const std::string& file, const std::string& http);
 /// `links`: "NAME=PTY-LINK" or "NAME=tcp://ADDR:PORT" a line; no entry: its pty alone. `http`:
 /// "ADDR:PORT" of the REST that sets faults, or empty.
 ExitCode simulate(const std::string& file, const std::vector<std::string>& links,

@@ -5,7 +5,8 @@ namespace panelgate::app {
 /// Exit codes (README, Configuration), after sysexits(3).
 enum ExitCode : int {
     kFine = 0,
-    kCut = 1,  ///< told twice to end: what was in flight is not answered
+    kCut = 1,       ///< told twice to end: what was in flight is not answered
+    kNotReady = 1,  ///< health: /readyz is not 200
     kUsage = 64,
     kNoInput = 66,
     kUnavailable = 69,

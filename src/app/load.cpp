@@ -18,10 +18,12 @@ std::optional<std::string> environment(const std::string& name) {
     return value;
 }
 
+std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdin" : typed; }
+
 }  // namespace
 
 Loaded load_file(const std::string& typed) {
-    const std::string path = typed == "-" ? "/dev/stdin" : typed;
+    const std::string path = path_of(typed);
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
         const std::string why =
@@ -43,6 +45,14 @@ Loaded load_text(std::string_view text, const std::string& name) {
         loaded.problems = problems.list();
     }
     return loaded;
+}
+
+std::optional<config::Config> read_quietly(const std::string& typed) {
+    const std::string path = path_of(typed);
+    const auto text = config::RealFiles::read_any(path);
+    if (!text) return std::nullopt;
+    yaml::Problems problems(path);
+    return config::load(*text, config::RealFiles(), problems, environment);
 }
 
 void print_warnings(const config::Config& config) {

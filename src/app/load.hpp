@@ -24,6 +24,8 @@ struct Loaded {
 Loaded load_file(const std::string& typed);
 /// The same for text; `name` stands in messages.
 Loaded load_text(std::string_view text, const std::string& name);
+/// What a file holds; nothing, and nothing told, when it cannot be read or has faults.
+std::optional<config::Config> read_quietly(const std::string& typed);
 /// To stderr, a line each: of commands that keep no log.
 void print_warnings(const config::Config& config);
 

@@ -37,6 +37,7 @@ class CommandLine {
         add_scan();
         add_address();
         add_profiles();
+        add_health();
         add_help();
     }
 
@@ -211,6 +212,18 @@ class CommandLine {
         command->add_option("NAME", name_);
         add_profiles_dir(command, profiles_dir_);
         command->callback([this] { code_ = profiles(name_, profiles_dir_); });
+    }
+
+    void add_health() {
+        CLI::App* command =
+            cli_.add_subcommand("health", "ask a running gateway whether it is ready (/readyz)");
+        add_file(command);
+        command->add_option("--http", http_,
+                            "ADDR:PORT of its REST API; without: what the configuration file says, "
+                            "or 127.0.0.1:8080");
+        command->footer(
+            "Exit codes: 0 it is ready; 1 it is not, or says nothing for 2 s; 64 usage.");
+        command->callback([this] { code_ = health(file_, http_); });
     }
 
     CLI::App cli_{kAbout, "panelgate"};

@@ -28,13 +28,15 @@ class CommandLine(unittest.TestCase):
     def test_version_and_help_end_with_0(self):
         self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n$")
         text = self.expect(0, "--help").stdout
-        for command in ("run", "demo", "check", "simulate", "address", "profiles"):
+        for command in ("run", "demo", "check", "simulate", "address", "profiles",
+                        "health"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
             self.assertIn("Usage", self.expect(0, command, "--help").stdout)
 
     def test_wrong_usage_ends_with_64_and_says_why(self):
         for arguments in ([], ["fly"], ["run", "--fly"], ["check", "--format", "xml"], ["address"],
-                          ["address", "autonics-gplp-s"], ["demo", "--http", "nowhere"],
+                          ["health", "--http", "nowhere"], ["health", "--http", "127.0.0.1:0"],
+                          ["health", "now"], ["address", "autonics-gplp-s"], ["demo", "--http", "nowhere"],
                           ["profiles", "autonics-gplp"], ["address", "nobody", "UB1"],
                           ["address", "autonics-gplp-s", "XY12"]):
             with self.subTest(arguments=arguments):
