@@ -1,10 +1,14 @@
 #include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
+#include <cstddef>
 #include <iostream>
+#include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
+#include "capacity.hpp"
 #include "commands.hpp"
 #include "inventory.hpp"
 #include "load.hpp"
@@ -16,11 +20,13 @@ namespace {
 
 namespace json = boost::json;
 
-void print_text(const std::string& file, const config::Config& config) {
+void print_text(const std::string& file, const config::Config& config,
+                const std::vector<Capacity>& lines) {
     std::cout << file << " is valid: " << config.lines.size() << " line(s), "
               << config.modbus_tcp.size() << " Modbus/TCP listener(s), "
               << (config.http ? "HTTP on " + config.http->name() : "no HTTP") << '\n'
               << inventory_text(config);
+    for (const Capacity& line : lines) std::cout << plan_text(line);
 }
 
 /// As a person reads them: the file itself first, from top to bottom.
@@ -42,31 +48,64 @@ json::array errors_json(const std::string& file, std::vector<yaml::Problem> prob
     return errors;
 }
 
+/// What is said of the lines' loads.
+struct Judged {
+    std::vector<Capacity> lines;
+    std::vector<std::string> errors;
+    std::vector<std::string> warnings;
+};
+
+Judged judge(const config::Config& config, bool allow_overload) {
+    Judged judged{capacities(config), {}, {}};
+    for (const Capacity& capacity : judged.lines) {
+        const plan::Verdict verdict = plan::verdict(capacity.plan);
+        if (verdict == plan::Verdict::fine) continue;
+        const bool error = verdict == plan::Verdict::overload && !allow_overload;
+        (error ? judged.errors : judged.warnings).push_back(overload_text(capacity));
+    }
+    return judged;
+}
+
 /// Of a file with faults `lines` and its like are not there.
-void print_json(const std::string& file, const Loaded& loaded) {
-    json::object all{{"valid", loaded.config.has_value()}};
+void print_json(const std::string& file, const Loaded& loaded, const Judged& judged) {
+    json::object all{{"valid", loaded.config && judged.errors.empty()}};
     json::array warnings;
     if (loaded.config) {
         all = inventory_json(*loaded.config);
-        all["valid"] = true;
+        all["valid"] = judged.errors.empty();
+        json::array& lines = all["lines"].as_array();
+        for (std::size_t i = 0; i < judged.lines.size(); ++i)
+            add_plan(lines[i].as_object(), judged.lines[i]);
         for (const std::string& warning : loaded.config->warnings) warnings.emplace_back(warning);
     }
-    all["errors"] = errors_json(file, loaded.problems);
+    for (const std::string& warning : judged.warnings) warnings.emplace_back(warning);
+    json::array errors = errors_json(file, loaded.problems);
+    for (const std::string& error : judged.errors)
+        errors.push_back(json::object{{"file", file}, {"message", error}});
+    all["errors"] = std::move(errors);
     all["warnings"] = std::move(warnings);
     std::cout << as_utf8(web::json_text(all)) << '\n';  // the names of files may be any bytes
 }
 
 }  // namespace
 
-ExitCode check(const std::string& file, bool json) {
+ExitCode check(const std::string& file, bool json, bool allow_overload) {
     const Loaded loaded = load_file(file);
-    if (loaded.config) print_warnings(*loaded.config);
-    if (json) {
-        print_json(file, loaded);
-    } else if (loaded.config) {
-        print_text(file, *loaded.config);
+    Judged judged;
+    if (loaded.config) {
+        judged = judge(*loaded.config, allow_overload);
+        print_warnings(*loaded.config);
+        for (const std::string& told : judged.warnings)
+            std::cerr << file << ": warning: " << told << '\n';
+        for (const std::string& told : judged.errors)
+            std::cerr << file << ": " << told << " (--allow-overload takes it)\n";
     }
-    return loaded.code;
+    if (json) {
+        print_json(file, loaded, judged);
+    } else if (loaded.config) {
+        print_text(file, *loaded.config, judged.lines);
+    }
+    return loaded.config && !judged.errors.empty() ? kBadConfig : loaded.code;
 }
 
 }  // namespace panelgate::app

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "capacity.hpp"
 #include "commands.hpp"
 #include "connection_limits.hpp"
 #include "gateway.hpp"
@@ -45,6 +46,10 @@ ExitCode serve(config::Config config, bool simulate,
     rt::set_up_log(config.log);
     for (const std::string& warning : config.warnings)
         rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
+    for (const Capacity& line : capacities(config)) {
+        if (plan::verdict(line.plan) != plan::Verdict::fine)
+            rt::log(rt::LogLevel::warn, "planned load", {{"warning", overload_text(line)}});
+    }
     for (const std::string& refused : rt::be_punctual(config.realtime))
         rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
     fit_to_descriptors(config);

@@ -13,7 +13,8 @@ inline constexpr const char* kDefaultConfig = "/etc/panelgate/panelgate.yaml";
 ExitCode run(const std::string& file, bool simulate);
 /// `http` and `modbus` replace the demo's addresses when not empty: "ADDR:PORT".
 ExitCode demo(const std::string& http, const std::string& modbus);
-ExitCode check(const std::string& file, bool json);
+/// `allow_overload`: a line that has more to carry than its time is a warning, not kBadConfig.
+ExitCode check(const std::string& file, bool json, bool allow_overload);
 /// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
 /// default where there is none that can be read.
 ExitCode health(const std::string& file, const std::string& http);

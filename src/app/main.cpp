@@ -159,11 +159,15 @@ class CommandLine {
     }
 
     void add_check() {
-        CLI::App* command = cli_.add_subcommand("check", "validate a configuration");
+        CLI::App* command = cli_.add_subcommand(
+            "check", "validate a configuration, and plan the load of its lines");
         add_file(command);
         command->add_option("--format", format_, "text or json")
             ->check(CLI::IsMember({"text", "json"}));
-        command->callback([this] { code_ = check(file_, format_ == "json"); });
+        command->add_flag("--allow-overload", allow_overload_,
+                          "a line that is planned to be busy for more than 100 % of its time is a "
+                          "warning, not an error");
+        command->callback([this] { code_ = check(file_, format_ == "json", allow_overload_); });
     }
 
     void add_simulate() {
@@ -233,6 +237,7 @@ class CommandLine {
     std::string http_;
     std::string modbus_;
     std::string format_ = "text";
+    bool allow_overload_ = false;
     std::vector<std::string> links_;
     ScanOptions scan_;
     std::string profile_;

@@ -101,16 +101,20 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         entry.wants = points::wants_of(station.points, station.polls);
         entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
                                                 frame_gap(line, station.id));
+        entry.limits.think_time = station.think_time;
         entry.memory = memory_of(*station.profile);
     }
     return polled;
 }
 
+bool takes_multiple(const profile::PanelProfile& panel, modbus::Table table) {
+    return panel.has_function(modbus::is_bit_table(table) ? modbus::kWriteMultipleCoils
+                                                          : modbus::kWriteMultipleRegisters);
+}
+
 points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
     const Station& from = *plant.find(relay.from.station);
     const Station& to = *plant.find(relay.to.station);
-    const auto multiple = modbus::is_bit_table(relay.to.table) ? modbus::kWriteMultipleCoils
-                                                               : modbus::kWriteMultipleRegisters;
     points::RelayRoute route;
     route.relay = relay;
     route.from = from.bus;
@@ -119,7 +123,7 @@ points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
     route.to_station = to.id;
     route.to_line = to.line;
     route.to_memory = memory_of(*to.configured->profile);
-    route.to_has_multiple = to.configured->profile->has_function(multiple);
+    route.to_has_multiple = takes_multiple(*to.configured->profile, relay.to.table);
     return route;
 }
 

@@ -11,6 +11,7 @@ namespace panelgate::config {
 struct Timing {
     arbiter::StationSettings settings;
     std::optional<Duration> frame_gap;
+    Duration think_time = 1ms;
 };
 
 /// A line while its stations are read.
@@ -23,9 +24,10 @@ struct LineInWork {
 
 /// `timing` of a line.
 void load_line_timing(Loading& loading, yaml::MapReader& in, LineInWork& work);
-/// `timing` of a station, over its line's; the frame gap resolved with its profile.
+/// `timing` of a station, over its line's; the frame gap resolved with its profile, the think time
+/// given to the station.
 arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& in,
-                                             const LineInWork& work, const Station& station);
+                                             const LineInWork& work, Station& station);
 
 /// Reads a line's `timing`, `retries` and `stations` and resolves the timing of every station. The
 /// line's serial format has been read already.

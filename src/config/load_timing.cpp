@@ -146,7 +146,7 @@ void load_common(Loading& loading, MapReader& in, const LineInWork& work, Timing
     load_response_timeout(in, timing.settings);
     load_frame_gap(in, work, timing);
     load_late_window(loading, in, timing.settings);
-    in.duration("think_time", 0ms, 10s);  // what the plan assumes of a panel; nothing waits for it
+    timing.think_time = in.duration("think_time", 0ms, 10s).value_or(timing.think_time);
 }
 
 }  // namespace
@@ -172,7 +172,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
 }
 
 StationSettings load_station_timing(Loading& loading, MapReader& in, const LineInWork& work,
-                                    const Station& station) {
+                                    Station& station) {
     Timing timing = work.timing;
     std::optional<yaml::Mark> own_gap;
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
@@ -187,6 +187,7 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineI
         refuse("reply_hole", "the adapter or the network makes the holes, not a panel");
         own.finish();
     }
+    station.think_time = timing.think_time;
     check_gap(loading, work, station, timing, own_gap, in.mark("timing"));
     const SerialFormat& serial = work.line.device.serial;
     const Duration automatic =

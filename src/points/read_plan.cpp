@@ -314,11 +314,30 @@ PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFo
     return limits;
 }
 
+namespace {
+
+std::size_t data_size(modbus::Table table, std::uint32_t count) {
+    return modbus::is_bit_table(table) ? (std::size_t{count} + 7) / 8 : std::size_t{count} * 2;
+}
+
+/// A panel knows the request by the silence behind it, whatever gap it is given besides.
+Duration exchange_time(const PlanLimits& limits, std::size_t request, std::size_t reply) {
+    return frame_time(limits.serial, request) + silent_interval(limits.serial) + limits.think_time +
+           frame_time(limits.serial, reply) + limits.gap;
+}
+
+}  // namespace
+
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count) {
-    const std::size_t data =
-        modbus::is_bit_table(table) ? (std::size_t{count} + 7) / 8 : std::size_t{count} * 2;
-    return frame_time(limits.serial, modbus::kReadRequestAdu) + limits.gap + limits.think_time +
-           frame_time(limits.serial, modbus::kReadReplyOverhead + data) + limits.gap;
+    const std::size_t data = data_size(table, count);
+    return exchange_time(limits, modbus::kReadRequestAdu, modbus::kReadReplyOverhead + data);
+}
+
+Duration write_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count,
+                    bool single) {
+    const std::size_t data = data_size(table, count);
+    const std::size_t request = modbus::kReadRequestAdu + (single ? 0 : 1 + data);
+    return exchange_time(limits, request, modbus::kReadRequestAdu);  // its reply has two words, too
 }
 
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits) {

@@ -211,8 +211,9 @@ class Files(unittest.TestCase):
             self.assertIn(shown, text)
         plan = json.loads(run("check", "-c", str(self.file), "--format", "json").stdout)
         [line] = plan["lines"]
-        self.assertEqual(line["polls"], [{"station": "press", "read": "UW0", "count": 32,
-                                          "every_ms": 5000}])
+        self.assertEqual([[poll[key] for key in ("station", "read", "count", "every_ms")]
+                          for poll in line["polls"]],
+                         [["press", "UW0", 32, 5000], ["press", "UW100", 1, 1000]])
         clients = line["clients"]
         self.assertEqual((clients["answered_within_ms"], clients["within_500_ms"]["deadline_ms"]),
                          (2000, 450))

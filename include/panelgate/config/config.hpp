@@ -25,10 +25,11 @@ struct Station {
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
     const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
     bool read_only = false;
-    bool listens = false;      ///< its line is only listened to
-    bool guard = false;        ///< what the profile rules out is refused without using the bus
-    bool translate = true;     ///< what its panel lacks goes out as what does the same
-    sim::Misbehaviour faults;  ///< of the simulated panel
+    bool listens = false;       ///< its line is only listened to
+    bool guard = false;         ///< what the profile rules out is refused without using the bus
+    Duration think_time = 1ms;  ///< what a plan assumes of its panel; nothing waits for it
+    bool translate = true;      ///< what its panel lacks goes out as what does the same
+    sim::Misbehaviour faults;   ///< of the simulated panel
     std::vector<points::Point> points;
     std::vector<points::Poll> polls;
 };

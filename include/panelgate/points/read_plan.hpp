@@ -31,7 +31,7 @@ struct TableLimits {
 /// What bounds the reads of one station, and what they cost.
 struct PlanLimits {
     SerialFormat serial;
-    Duration gap = 1750us;      ///< silence before the request and after the reply
+    Duration gap = 1750us;      ///< silence after the reply
     Duration think_time = 1ms;  ///< of the panel, after the silence that ends the request
     std::array<TableLimits, modbus::kTables.size()> tables;  ///< by modbus::Table
     /// Learned from exceptions 02 and 03: no read may contain one of these whole. The caller bounds
@@ -59,9 +59,12 @@ struct PlannedRead {
     bool refused = false;
 };
 
-/// How long a read of `count` items keeps the line from everybody else: request, gap, think time,
-/// reply, gap.
+/// How long a read of `count` items keeps the line from everybody else: request, the silence that
+/// ends it, think time, reply, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
+/// The same of a write by 15 or 16; `single`: by 05 or 06.
+Duration write_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count,
+                    bool single);
 
 /// Few reads that serve every want, sorted by table and address. Where all intervals are the same
 /// this is the least wire time that is possible; where they differ it is the better of two plans

@@ -39,11 +39,28 @@ TEST(ReadPlan, CountsWhatNobodyElseCanUseAsTheCostOfARead) {
     limits.serial = {.baud = 9600, .data_bits = 8, .parity = Parity::none, .stop_bits = 1};
     limits.gap = 4ms;
     limits.think_time = 3ms;
+    const Duration silence = 7ms + silent_interval(limits.serial);  // the panel's, and the gap
     // 8 characters, 5 + 20 characters of 10 bits at 9600 bit/s.
     EXPECT_EQ(read_cost(limits, kRegisters, 10),
-              wire_time(limits.serial, 8) + wire_time(limits.serial, 25) + 11ms);
+              wire_time(limits.serial, 8) + wire_time(limits.serial, 25) + silence);
     EXPECT_EQ(read_cost(limits, Table::coils, 9),
-              wire_time(limits.serial, 8) + wire_time(limits.serial, 7) + 11ms);
+              wire_time(limits.serial, 8) + wire_time(limits.serial, 7) + silence);
+}
+
+TEST(ReadPlan, AWriteCostsItsFramesAndTheSameSilences) {
+    PlanLimits limits = limits_of(125);
+    limits.gap = 4ms;
+    limits.think_time = 3ms;
+    const Duration silence = 7ms + silent_interval(limits.serial);
+    const auto frames = [&](std::size_t bytes) {
+        return wire_time(limits.serial, bytes) + silence;
+    };
+    EXPECT_NEAR(to_seconds(write_cost(limits, kRegisters, 10, false)),
+                to_seconds(frames(9 + 20 + 8)), 1e-8);
+    EXPECT_NEAR(to_seconds(write_cost(limits, Table::coils, 9, false)),
+                to_seconds(frames(9 + 2 + 8)), 1e-8);
+    EXPECT_NEAR(to_seconds(write_cost(limits, kRegisters, 1, true)), to_seconds(frames(8 + 8)),
+                1e-8);
 }
 
 TEST(ReadPlan, ReadsNeighboursTogether) {

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/modbus/span.hpp"
+#include "panelgate/points/read_plan.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+
+namespace panelgate::plan {
+
+/// A point or a poll block, as the configuration has it.
+struct Asked {
+    points::Want want;
+    std::string notation;  ///< as typed
+};
+
+struct Station {
+    std::string name;
+    const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
+    Duration response_timeout = 500ms;
+    Duration think_time = 1ms;
+    Duration gap = 1750us;  ///< silence behind its replies
+    std::vector<Asked> asked;
+};
+
+/// What a relay does on one line. `from` and `to`: its ends that are on this line, one at least.
+struct Relay {
+    struct End {
+        std::size_t station = 0;  ///< index into Line::stations
+        modbus::Span span;
+    };
+    std::string name;
+    Duration every = 1s;         ///< it reads, and writes what has changed; above 0
+    Duration writes_every = 1s;  ///< … and writes at least, changed or not; above 0
+    std::optional<End> from;
+    std::optional<End> to;
+    bool single = false;  ///< it writes by 05 or 06
+
+    /// On this line it can be told whether `other` goes on where this one ends.
+    bool continues_in(const Relay& other) const;
+};
+
+/// What is known of a line before anything runs.
+struct Line {
+    std::string name;
+    SerialFormat serial;
+    std::vector<Station> stations;
+    std::vector<Relay> relays;
+};
+
+/// What bounds a station's reads, and what they cost, on this line.
+points::PlanLimits limits_of(const Line& line, const Station& station);
+/// The same line at another rate. Gaps that come of the characters follow.
+Line at_rate(const Line& line, int baud);
+
+}  // namespace panelgate::plan

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "panelgate/base/time.hpp"
+#include "panelgate/plan/line.hpp"
+
+namespace panelgate::plan {
+
+// Loads are shares of the wire's time: 0.8 is 80 %; more than 1 is more than there is.
+
+inline constexpr double kHigh = 0.8;         ///< above: clients wait long, and a fault is felt
+inline constexpr double kFull = 1;           ///< above: polls are late for ever
+inline constexpr double kProbes = 0.05;      ///< what all dead stations together may cost (P4)
+inline constexpr unsigned kClientRead = 10;  ///< registers of the read that headroom is counted in
+
+/// A request that goes out again and again.
+struct Poll {
+    std::string station;
+    std::string read;  ///< the first item in the panel's notation
+    std::uint32_t count = 1;
+    Duration every{};
+    Duration wire{};  ///< request, both gaps, think time, reply
+    double load = 0;
+};
+
+/// One side of a relay, on this line.
+struct RelayLoad {
+    std::string relay;
+    std::string station;
+    bool writes = false;
+    Duration every{};  ///< of a write that waits for changes: its refresh
+    Duration wire{};
+    double load = 0;
+    double most = 0;  ///< when the values change at every turn
+};
+
+/// The station whose silence leaves the others least.
+struct OneDead {
+    std::string station;
+    double load = 0;   ///< of the others, and of all probes
+    Duration holds{};  ///< the others wait so long, once, whoever falls silent
+};
+
+struct LinePlan {
+    std::string line;
+    std::vector<Poll> polls;
+    std::vector<RelayLoad> relays;
+    double load = 0;
+    double most = 0;              ///< when all values change that relays wait for
+    std::optional<OneDead> dead;  ///< nothing without stations
+    Duration once{};              ///< everything, one after the other
+    Duration client_read = 1ms;   ///< of kClientRead registers, of the slowest station
+
+    /// So many times as often everything could be asked, up to kHigh; nothing of an idle line.
+    std::optional<double> times_as_often() const;
+    /// Reads of kClientRead registers a second that the wire has time for besides.
+    double free_reads() const;
+};
+
+enum class Verdict : std::uint8_t { fine, high, overload };
+/// Of the load that is certain; what relays may add makes it `high` at most.
+Verdict verdict(const LinePlan& plan);
+
+LinePlan make_plan(const Line& line);
+
+}  // namespace panelgate::plan

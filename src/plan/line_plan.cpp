@@ -1,0 +1,137 @@
+#include "panelgate/plan/line_plan.hpp"
+
+#include <algorithm>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/profile/notation.hpp"
+
+namespace panelgate::plan {
+namespace {
+
+double share(Duration wire, Duration every) { return to_seconds(wire) / to_seconds(every); }
+
+/// As whoever wrote the configuration calls the first item.
+std::string notation_of(const Station& station, const points::PlannedRead& read) {
+    for (const std::size_t index : read.wants) {
+        const Asked& asked = station.asked[index];
+        if (asked.want.span.first == read.span.first) return asked.notation;
+    }
+    return profile::format_notation(*station.profile, read.span.table,
+                                    static_cast<std::uint16_t>(read.span.first));
+}
+
+void add_polls(const Line& line, const Station& station, std::vector<Poll>& polls) {
+    const points::PlanLimits limits = limits_of(line, station);
+    std::vector<points::Want> wants;
+    for (const Asked& asked : station.asked) wants.push_back(asked.want);
+    for (const points::PlannedRead& read : points::plan_reads(wants, limits)) {
+        Poll& poll = polls.emplace_back();
+        poll.station = station.name;
+        poll.read = notation_of(station, read);
+        poll.count = read.span.count;
+        poll.every = read.every;
+        poll.wire = points::read_cost(limits, read.span.table, read.span.count);
+        poll.load = share(poll.wire, poll.every);
+    }
+}
+
+RelayLoad read_of(const Line& line, const Relay& relay) {
+    const Station& station = line.stations[relay.from->station];
+    RelayLoad made{relay.name, station.name, false, relay.every, {}, 0, 0};
+    const modbus::Span& span = relay.from->span;
+    made.wire = points::read_cost(limits_of(line, station), span.table, span.count);
+    made.load = made.most = share(made.wire, made.every);
+    return made;
+}
+
+RelayLoad write_of(const Line& line, const Relay& relay) {
+    const Station& station = line.stations[relay.to->station];
+    RelayLoad made{relay.name, station.name, true, relay.writes_every, {}, 0, 0};
+    const modbus::Span& span = relay.to->span;
+    const points::PlanLimits limits = limits_of(line, station);
+    made.wire = points::write_cost(limits, span.table, span.count, relay.single);
+    made.load = share(made.wire, made.every);
+    made.most = share(made.wire, relay.every);
+    return made;
+}
+
+/// Of the polls and relays of one station.
+double load_of(const LinePlan& plan, const std::string& station) {
+    double load = 0;
+    for (const Poll& poll : plan.polls) load += poll.station == station ? poll.load : 0;
+    for (const RelayLoad& relay : plan.relays) load += relay.station == station ? relay.load : 0;
+    return load;
+}
+
+/// The first silence costs a response timeout (P4), with the request and the gap around it.
+Duration silence_of(const Line& line, const Station& station) {
+    return frame_time(line.serial, modbus::kReadRequestAdu) + station.response_timeout +
+           station.gap;
+}
+
+std::optional<OneDead> worst_case(const Line& line, const LinePlan& plan) {
+    std::optional<OneDead> worst;
+    Duration holds{};
+    for (const Station& station : line.stations) {
+        const double load = plan.load - load_of(plan, station.name) + kProbes;
+        holds = std::max(holds, silence_of(line, station));
+        if (!worst || load > worst->load) worst = OneDead{station.name, load, {}};
+    }
+    if (worst) worst->holds = holds;
+    return worst;
+}
+
+Duration client_read(const Line& line) {
+    Duration longest{};
+    for (const Station& station : line.stations) {
+        longest =
+            std::max(longest, points::read_cost(limits_of(line, station),
+                                                modbus::Table::holding_registers, kClientRead));
+    }
+    if (longest > Duration::zero()) return longest;
+    points::PlanLimits unlisted;
+    unlisted.serial = line.serial;
+    unlisted.gap = silent_interval(line.serial);
+    return points::read_cost(unlisted, modbus::Table::holding_registers, kClientRead);
+}
+
+}  // namespace
+
+std::optional<double> LinePlan::times_as_often() const {
+    if (load <= 0) return std::nullopt;
+    return kHigh / load;
+}
+
+double LinePlan::free_reads() const {
+    return std::max(0.0, kFull - load) / to_seconds(client_read);
+}
+
+Verdict verdict(const LinePlan& plan) {
+    if (plan.load > kFull) return Verdict::overload;
+    return plan.load > kHigh || plan.most > kFull ? Verdict::high : Verdict::fine;
+}
+
+LinePlan make_plan(const Line& line) {
+    LinePlan plan;
+    plan.line = line.name;
+    for (const Station& station : line.stations) add_polls(line, station, plan.polls);
+    for (const Relay& relay : line.relays) {
+        if (relay.from) plan.relays.push_back(read_of(line, relay));
+        if (relay.to) plan.relays.push_back(write_of(line, relay));
+    }
+    for (const Poll& poll : plan.polls) {
+        plan.load += poll.load;
+        plan.once += poll.wire;
+    }
+    plan.most = plan.load;
+    for (const RelayLoad& relay : plan.relays) {
+        plan.load += relay.load;
+        plan.most += relay.most;
+        plan.once += relay.wire;
+    }
+    plan.dead = worst_case(line, plan);
+    plan.client_read = client_read(line);
+    return plan;
+}
+
+}  // namespace panelgate::plan

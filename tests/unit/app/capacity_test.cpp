@@ -1,0 +1,83 @@
+#include "capacity.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "panelgate/config/real_files.hpp"
+#include "panelgate/yaml/document.hpp"
+
+namespace panelgate::app {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::SizeIs;
+
+config::Config load(const std::string& text) {
+    yaml::Problems problems("plan.yaml");
+    auto config = config::load(text, config::RealFiles(), problems);
+    EXPECT_TRUE(config) << problems.text();
+    return std::move(config).value();
+}
+
+constexpr const char* kTwoLines = R"(lines:
+  - name: a
+    device: sim
+    serial: {baud: 9600, data_bits: 8, parity: none, stop_bits: 1}
+    timing: {think_time: 5ms}
+    stations:
+      - id: 1
+        name: press
+        profile: autonics-gplp-s
+        poll: [{read: UW0, count: 32, every: 1s}]
+        points: [{name: level, at: UB180, every: 5s}]
+      - {id: 2, name: quick, profile: autonics-gplp-s, timing: {think_time: 2ms}}
+  - name: b
+    device: sim
+    stations: [{id: 3, name: meter, profile: autonics-arm}]
+relays:
+  - {from: press/UW100, count: 2, to: quick/UW200, every: 2s, on_change: true, refresh: 20s}
+  - {from: meter/300201, to: quick/UW300, every: 4s}
+http: {listen: "127.0.0.1:8080"}
+)";
+
+TEST(Capacity, TakesFromAConfigurationWhatLoadsEachLine) {
+    const config::Config config = load(kTwoLines);
+    const std::vector<Capacity> all = capacities(config);
+    ASSERT_THAT(all, SizeIs(2));
+    const plan::LinePlan& a = all[0].plan;
+    ASSERT_THAT(a.polls, SizeIs(2));
+    EXPECT_EQ(all[0].line.stations[0].think_time, Duration(5ms)) << "the line's";
+    EXPECT_EQ(all[0].line.stations[1].think_time, Duration(2ms)) << "its own";
+    ASSERT_THAT(a.relays, SizeIs(3));
+    EXPECT_EQ(a.relays[1].every, Duration(20s));
+    EXPECT_EQ(a.relays[2].station, "quick");
+    ASSERT_THAT(all[1].plan.relays, SizeIs(1));
+    EXPECT_EQ(all[1].plan.relays[0].station, "meter");
+}
+
+TEST(Capacity, ALineThatIsOnlyListenedToCarriesNothingOfOurs) {
+    const config::Config config = load(
+        "lines:\n  - name: a\n    device: /dev/ttyUSB0\n    mode: listen\n    stations: [{id: 1, "
+        "name: x, profile: autonics-gplp-s, points: [{name: p, at: UW1}]}]\n"
+        "http: {listen: \"127.0.0.1:8080\"}\n");
+    EXPECT_EQ(capacities(config).at(0).plan.load, 0);
+}
+
+TEST(Capacity, TellsWhatIsTooMuchAndWhatWouldHelp) {
+    std::string text = kTwoLines;
+    text.replace(text.find("every: 1s"), 9, "every: 100ms");
+    const config::Config config = load(text);
+    const std::vector<Capacity> all = capacities(config);
+    const Capacity& a = all[0];
+    EXPECT_EQ(plan::verdict(a.plan), plan::Verdict::high);
+    EXPECT_THAT(overload_text(a), HasSubstr("line a is planned to be busy for "));
+    EXPECT_THAT(overload_text(a), HasSubstr("serial: {baud: 19200}"));
+    EXPECT_THAT(plan_text(a), HasSubstr("  advice: serial: {baud: 19200}"));
+    EXPECT_THAT(plan_text(all[1]), Not(HasSubstr("advice")));
+}
+
+}  // namespace
+}  // namespace panelgate::app

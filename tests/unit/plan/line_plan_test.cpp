@@ -1,0 +1,142 @@
+#include "panelgate/plan/line_plan.hpp"
+
+#include <gmock/gmock.h>
+
+#include "plant_line.hpp"
+
+namespace panelgate::plan {
+namespace {
+
+using test::kRegisters;
+using testing::DoubleNear;
+using testing::SizeIs;
+
+class LinePlanTest : public testing::Test, protected test::PlantLine {};
+
+TEST_F(LinePlanTest, APollCostsItsFramesItsSilencesAndTheThinkTime) {
+    Station& press = add("press");
+    press.think_time = 3ms;
+    ask(press, 100, 10, 500ms);
+    const LinePlan plan = make_plan(line);
+    ASSERT_THAT(plan.polls, SizeIs(1));
+    const Poll& poll = plan.polls[0];
+    EXPECT_EQ(poll.station, "press");
+    EXPECT_EQ(poll.read, "R100");
+    EXPECT_EQ(poll.count, 10u);
+    // 8 + 25 characters of 10 bits at 9600 bit/s: 34.375 ms; twice 3.5 of them; 3 ms
+    EXPECT_NEAR(to_seconds(poll.wire), 0.034375 + 2 * 0.003645833 + 0.003, 1e-7);
+    EXPECT_NEAR(plan.load, to_seconds(poll.wire) / 0.5, 1e-9);
+    EXPECT_EQ(plan.once, poll.wire);
+}
+
+TEST_F(LinePlanTest, ALongerGapIsKeptBehindTheReplyOnly) {
+    ask(add("press"), 0, 10, 1s);
+    const Duration usual = make_plan(line).once;
+    line.stations[0].gap += 20ms;
+    EXPECT_EQ(make_plan(line).once, usual + 20ms);
+}
+
+TEST_F(LinePlanTest, NeighboursAreOnePollAsTheyWillBe) {
+    Station& press = add("press");
+    ask(press, 12, 2, 1s);
+    ask(press, 10, 2, 1s);
+    const LinePlan plan = make_plan(line);
+    ASSERT_THAT(plan.polls, SizeIs(1));
+    EXPECT_EQ(plan.polls[0].read, "R10");
+    EXPECT_EQ(plan.polls[0].count, 4u);
+}
+
+TEST_F(LinePlanTest, ARelayLoadsTheLinesOfItsEnds) {
+    add("from");
+    add("to");
+    copy(0, 4, 1s);
+    const LinePlan both = make_plan(line);
+    ASSERT_THAT(both.relays, SizeIs(2));
+    EXPECT_FALSE(both.relays[0].writes);
+    EXPECT_EQ(both.relays[0].station, "from");
+    EXPECT_TRUE(both.relays[1].writes);
+    EXPECT_EQ(both.relays[1].station, "to");
+    EXPECT_EQ(both.load, both.relays[0].load + both.relays[1].load);
+    line.relays[0].to.reset();  // on another line
+    EXPECT_THAT(make_plan(line).relays, SizeIs(1));
+    EXPECT_NEAR(make_plan(line).load, both.relays[0].load, 1e-12);
+}
+
+TEST_F(LinePlanTest, AWriteThatWaitsForChangesIsCertainOnlyOnceARefresh) {
+    add("from");
+    add("to");
+    copy(0, 4, 1s).writes_every = 60s;
+    const LinePlan plan = make_plan(line);
+    const RelayLoad& write = plan.relays[1];
+    EXPECT_EQ(write.every, 60s);
+    EXPECT_NEAR(write.most, 60 * write.load, 1e-9);
+    EXPECT_NEAR(plan.most - plan.load, write.most - write.load, 1e-9);
+}
+
+TEST_F(LinePlanTest, P4TheWorstDeadStationIsTheOneThatWasAskedLeast) {
+    ask(add("press"), 0, 100, 500ms);
+    ask(add("mixer"), 0, 1, 10s);
+    line.stations[0].response_timeout = 700ms;
+    const LinePlan plan = make_plan(line);
+    ASSERT_TRUE(plan.dead);
+    EXPECT_EQ(plan.dead->station, "mixer");
+    EXPECT_THAT(plan.dead->load, DoubleNear(plan.polls[0].load + 0.05, 1e-9));
+    EXPECT_NEAR(to_seconds(plan.dead->holds), 0.7 + 0.008333333 + 0.003645833, 1e-7)
+        << "press may fall silent as well";
+}
+
+TEST_F(LinePlanTest, WhatIsLeftIsForClients) {
+    Station& press = add("press");
+    const LinePlan idle = make_plan(line);
+    EXPECT_FALSE(idle.times_as_often());
+    EXPECT_NEAR(idle.free_reads(), 1 / to_seconds(idle.client_read), 1e-9);
+    ask(press, 0, 10, 2 * idle.client_read);
+    const LinePlan half = make_plan(line);
+    EXPECT_NEAR(half.load, 0.5, 1e-6);
+    EXPECT_NEAR(half.free_reads(), idle.free_reads() / 2, 1e-3);
+    EXPECT_NEAR(half.times_as_often().value(), 1.6, 1e-5);
+}
+
+TEST_F(LinePlanTest, WhatIsTooMuchIsTold) {
+    Station& press = add("press");
+    const Duration wire = make_plan(line).client_read;
+    const auto verdict_at = [&](Duration every) {
+        press.asked.clear();
+        ask(press, 0, 10, every);
+        return verdict(make_plan(line));
+    };
+    EXPECT_EQ(verdict_at(wire * 100 / 79), Verdict::fine);
+    EXPECT_EQ(verdict_at(wire * 100 / 81), Verdict::high);
+    EXPECT_EQ(verdict_at(wire * 100 / 101), Verdict::overload);
+}
+
+TEST_F(LinePlanTest, ChangesAloneAreNoOverload) {
+    add("from");
+    add("to");
+    copy(0, 50, 150ms).writes_every = 60s;
+    const LinePlan plan = make_plan(line);
+    EXPECT_GT(plan.most, 1);
+    EXPECT_LT(plan.load, 1);
+    EXPECT_EQ(verdict(plan), Verdict::high);
+}
+
+TEST_F(LinePlanTest, ALineWithoutStationsIsIdle) {
+    const LinePlan plan = make_plan(line);
+    EXPECT_EQ(plan.load, 0);
+    EXPECT_FALSE(plan.dead);
+    EXPECT_GT(plan.free_reads(), 10);
+}
+
+TEST_F(LinePlanTest, AnotherRateTakesTheGapsOfCharactersAlong) {
+    add("standard");
+    add("panasonic").gap = wire_time(line.serial, 4);
+    add("slow").gap = 20ms;
+    const Line quick = at_rate(line, 19200);
+    EXPECT_EQ(quick.stations[0].gap, silent_interval(quick.serial));
+    EXPECT_NEAR(to_seconds(quick.stations[1].gap), 4 * 10.0 / 19200, 1e-7);
+    EXPECT_EQ(quick.stations[2].gap, 20ms);
+    EXPECT_EQ(at_rate(line, 115200).stations[1].gap, 1750us);
+}
+
+}  // namespace
+}  // namespace panelgate::plan

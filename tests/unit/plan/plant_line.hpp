@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+
+#include "panelgate/plan/line.hpp"
+#include "panelgate/profile/load_profile.hpp"
+
+namespace panelgate::plan::test {
+
+inline constexpr modbus::Table kRegisters = modbus::Table::holding_registers;
+
+/// A line of 9600 8N1 on which nothing is asked yet. Its panels take every rate.
+class PlantLine {
+  public:
+    PlantLine() {
+        line.name = "floor1";
+        line.serial = {.baud = 9600, .parity = Parity::none};
+    }
+
+    Station& add(const std::string& name, const std::string& profile = "generic") {
+        Station& station = line.stations.emplace_back();
+        station.name = name;
+        station.profile = shipped.find(profile);
+        station.gap = silent_interval(line.serial);
+        return station;
+    }
+
+    static void ask(Station& station, std::uint32_t first, std::uint32_t count, Duration every) {
+        station.asked.push_back({{{kRegisters, first, count}, every}, "R" + std::to_string(first)});
+    }
+
+    /// From the first to the second station; both are there.
+    Relay& copy(std::uint32_t first, std::uint32_t count, Duration every) {
+        Relay& relay = line.relays.emplace_back();
+        relay.name = "copy" + std::to_string(first);
+        relay.every = relay.writes_every = every;
+        relay.from = Relay::End{0, {kRegisters, first, count}};
+        relay.to = Relay::End{1, {kRegisters, first + 500, count}};
+        return relay;
+    }
+
+    profile::Catalogue shipped = profile::Catalogue::shipped();
+    Line line;
+};
+
+}  // namespace panelgate::plan::test
