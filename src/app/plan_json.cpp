@@ -26,7 +26,7 @@ json::object poll_json(const plan::Poll& poll) {
 json::object relay_json(const plan::RelayLoad& relay) {
     return {{"relay", relay.relay},
             {"station", relay.station},
-            {"request", relay.writes ? "write" : "read"},
+            {"request", plan::label(relay.request)},
             {"every_ms", milliseconds(relay.every)},
             {"wire_ms", milliseconds(relay.wire)},
             {"load_percent", percent(relay.load)},

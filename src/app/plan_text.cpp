@@ -21,8 +21,8 @@ std::string text_of(const plan::Poll& poll) {
 }
 
 std::string text_of(const plan::RelayLoad& relay) {
-    std::string text = "  relay " + relay.relay + (relay.writes ? " writes " : " reads ") +
-                       relay.station + " every " + format_duration(relay.every) + ": " +
+    std::string text = "  relay " + relay.relay + ": " + std::string(label(relay.request)) +
+                       " of " + relay.station + " every " + format_duration(relay.every) + ": " +
                        milliseconds(relay.wire) + ", " + percent(relay.load);
     if (relay.most > relay.load) text += ", " + percent(relay.most) + " while values change";
     return text + '\n';

@@ -56,16 +56,6 @@ std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
     return functions;
 }
 
-/// The profile outlives it.
-points::SharedMemory memory_of(const profile::PanelProfile& panel) {
-    points::SharedMemory memory;
-    memory.shown_as = [&panel](const modbus::Span& written) {
-        return profile::shown_as(panel, written);
-    };
-    memory.known = panel.name != "generic";  // which says what anybody could
-    return memory;
-}
-
 Duration frame_gap(const config::Line& line, std::uint8_t station) {
     std::optional<Duration> gap = line.arbiter.unlisted.frame_gap;
     for (const arbiter::StationSettings& settings : line.arbiter.stations) {
@@ -105,6 +95,15 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         entry.memory = memory_of(*station.profile);
     }
     return polled;
+}
+
+points::SharedMemory memory_of(const profile::PanelProfile& panel) {
+    points::SharedMemory memory;
+    memory.shown_as = [&panel](const modbus::Span& written) {
+        return profile::shown_as(panel, written);
+    };
+    memory.known = panel.name != "generic";  // which says what anybody could
+    return memory;
 }
 
 bool takes_multiple(const profile::PanelProfile& panel, modbus::Table table) {

@@ -1,8 +1,11 @@
 #include "panelgate/plan/line_plan.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/points/poll_schedule.hpp"
 #include "panelgate/profile/notation.hpp"
 
 namespace panelgate::plan {
@@ -20,24 +23,35 @@ std::string notation_of(const Station& station, const points::PlannedRead& read)
                                     static_cast<std::uint16_t>(read.span.first));
 }
 
-void add_polls(const Line& line, const Station& station, std::vector<Poll>& polls) {
-    const points::PlanLimits limits = limits_of(line, station);
+/// What the poller will make of a station.
+struct Planned {
+    points::PlanLimits limits;
+    std::vector<points::PlannedRead> reads;
+};
+
+Planned planned(const Line& line, const Station& station) {
     std::vector<points::Want> wants;
     for (const Asked& asked : station.asked) wants.push_back(asked.want);
-    for (const points::PlannedRead& read : points::plan_reads(wants, limits)) {
+    Planned made{limits_of(line, station), {}};
+    made.reads = points::plan_reads(wants, made.limits);
+    return made;
+}
+
+void add_polls(const Station& station, const Planned& planned, std::vector<Poll>& polls) {
+    for (const points::PlannedRead& read : planned.reads) {
         Poll& poll = polls.emplace_back();
         poll.station = station.name;
         poll.read = notation_of(station, read);
         poll.count = read.span.count;
         poll.every = read.every;
-        poll.wire = points::read_cost(limits, read.span.table, read.span.count);
+        poll.wire = points::read_cost(planned.limits, read.span.table, read.span.count);
         poll.load = share(poll.wire, poll.every);
     }
 }
 
 RelayLoad read_of(const Line& line, const Relay& relay) {
     const Station& station = line.stations[relay.from->station];
-    RelayLoad made{relay.name, station.name, false, relay.every, {}, 0, 0};
+    RelayLoad made{relay.name, station.name, RelayLoad::Request::read, relay.every, {}, 0, 0};
     const modbus::Span& span = relay.from->span;
     made.wire = points::read_cost(limits_of(line, station), span.table, span.count);
     made.load = made.most = share(made.wire, made.every);
@@ -46,12 +60,36 @@ RelayLoad read_of(const Line& line, const Relay& relay) {
 
 RelayLoad write_of(const Line& line, const Relay& relay) {
     const Station& station = line.stations[relay.to->station];
-    RelayLoad made{relay.name, station.name, true, relay.writes_every, {}, 0, 0};
+    RelayLoad made{relay.name, station.name, RelayLoad::Request::write, relay.writes_every, {}, 0,
+                   0};
     const modbus::Span& span = relay.to->span;
     const points::PlanLimits limits = limits_of(line, station);
     made.wire = points::write_cost(limits, span.table, span.count, relay.single);
     made.load = share(made.wire, made.every);
     made.most = share(made.wire, relay.every);
+    return made;
+}
+
+/// At this interval all of it goes out, unless that is more than a station's extra turns.
+double share_of_extra(Duration wire, std::size_t reads, Duration every) {
+    const Duration least = static_cast<int>(reads) * points::PollSchedule::Settings().extra_every;
+    return share(wire, std::max(every, least));
+}
+
+/// Nothing where no poll of the target shows what is written.
+std::optional<RelayLoad> rereads_of(const Station& station, const Planned& planned,
+                                    const Relay& relay) {
+    RelayLoad made{relay.name, station.name, RelayLoad::Request::reread, relay.writes_every, {}, 0,
+                   0};
+    std::size_t reads = 0;
+    for (const points::PlannedRead& read : planned.reads) {
+        if (points::spares(station.memory, relay.to->span, read.span)) continue;
+        made.wire += points::read_cost(planned.limits, read.span.table, read.span.count);
+        ++reads;
+    }
+    if (reads == 0) return std::nullopt;
+    made.load = share_of_extra(made.wire, reads, relay.writes_every);
+    made.most = share_of_extra(made.wire, reads, relay.every);
     return made;
 }
 
@@ -106,6 +144,18 @@ double LinePlan::free_reads() const {
     return std::max(0.0, kFull - load) / to_seconds(client_read);
 }
 
+std::string_view label(RelayLoad::Request request) {
+    switch (request) {
+        case RelayLoad::Request::read:
+            return "read";
+        case RelayLoad::Request::write:
+            return "write";
+        case RelayLoad::Request::reread:
+            return "reread";
+    }
+    std::abort();
+}
+
 Verdict verdict(const LinePlan& plan) {
     if (plan.load > kFull) return Verdict::overload;
     return plan.load > kHigh || plan.most > kFull ? Verdict::high : Verdict::fine;
@@ -114,10 +164,18 @@ Verdict verdict(const LinePlan& plan) {
 LinePlan make_plan(const Line& line) {
     LinePlan plan;
     plan.line = line.name;
-    for (const Station& station : line.stations) add_polls(line, station, plan.polls);
+    std::vector<Planned> stations;
+    for (const Station& station : line.stations) {
+        stations.push_back(planned(line, station));
+        add_polls(station, stations.back(), plan.polls);
+    }
     for (const Relay& relay : line.relays) {
         if (relay.from) plan.relays.push_back(read_of(line, relay));
-        if (relay.to) plan.relays.push_back(write_of(line, relay));
+        if (!relay.to) continue;
+        plan.relays.push_back(write_of(line, relay));
+        const std::size_t to = relay.to->station;
+        auto rereads = rereads_of(line.stations[to], stations[to], relay);
+        if (rereads) plan.relays.push_back(*std::move(rereads));
     }
     for (const Poll& poll : plan.polls) {
         plan.load += poll.load;
@@ -127,7 +185,7 @@ LinePlan make_plan(const Line& line) {
     for (const RelayLoad& relay : plan.relays) {
         plan.load += relay.load;
         plan.most += relay.most;
-        plan.once += relay.wire;
+        if (relay.request != RelayLoad::Request::reread) plan.once += relay.wire;
     }
     plan.dead = worst_case(line, plan);
     plan.client_read = client_read(line);

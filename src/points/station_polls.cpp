@@ -123,7 +123,7 @@ void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& 
         for (std::size_t i = 0; i < plan_.size(); ++i) {
             const modbus::Span& span = plan_[i].span;
             const bool direct = items && items->overlaps(span);
-            if (direct != themselves || spares(items, span)) continue;
+            if (direct != themselves || spares(memory_, items, span)) continue;
             if (is_outdated(plan_[i]) || !may_change(memory_, items, span))
                 schedule_.hasten(i, now);
         }
@@ -136,10 +136,9 @@ bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& w
     return known ? *known : modbus::may_change(written, items);
 }
 
-bool StationPolls::spares(const std::optional<modbus::Span>& written,
-                          const modbus::Span& items) const {
-    return memory_.known ? !may_change(memory_, written, items)
-                         : !modbus::may_change(written, items);
+bool spares(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+            const modbus::Span& items) {
+    return memory.known ? !may_change(memory, written, items) : !modbus::may_change(written, items);
 }
 
 bool StationPolls::is_outdated(const PlannedRead& read) const {

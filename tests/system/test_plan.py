@@ -124,11 +124,10 @@ class Measured(unittest.TestCase):
         *(config.line(f"at{baud}", baud=baud,
                       stations=press(f"a{baud}", 1, "200ms") + ", " +
                       f"{{id: 2, name: b{baud}, profile: generic, points: ["
-                      f"{{name: p, at: 400101, every: 400ms}}, {{name: q, at: '000181', every: 400ms}}]}}, "
-                      f"{{id: 3, name: c{baud}, profile: generic}}")
+                      f"{{name: p, at: 400101, every: 400ms}}, {{name: q, at: '000181', every: 400ms}}]}}")
           for baud in (9600, 38400)),
         modbus=None,
-        relays="[" + ", ".join(f"{{from: a{baud}/400051, count: 4, to: c{baud}/400201, every: 400ms}}"
+        relays="[" + ", ".join(f"{{from: a{baud}/400051, count: 4, to: b{baud}/400201, every: 400ms}}"
                                for baud in (9600, 38400)) + "]")
 
     def busy(self, program):

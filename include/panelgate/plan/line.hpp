@@ -10,6 +10,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/span.hpp"
 #include "panelgate/points/read_plan.hpp"
+#include "panelgate/points/station_polls.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::plan {
@@ -27,6 +28,7 @@ struct Station {
     Duration think_time = 1ms;
     Duration gap = 1750us;  ///< silence behind its replies
     std::vector<Asked> asked;
+    points::SharedMemory memory{};  ///< what is read again behind a write
 };
 
 /// What a relay does on one line. `from` and `to`: its ends that are on this line, one at least.

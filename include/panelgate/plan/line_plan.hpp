@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "panelgate/base/time.hpp"
@@ -27,11 +28,16 @@ struct Poll {
     double load = 0;
 };
 
-/// One side of a relay, on this line.
+/// What a relay asks on this line.
 struct RelayLoad {
+    enum class Request : std::uint8_t {
+        read,
+        write,
+        reread  ///< polls of the target that each write makes old: all of them in one figure
+    };
     std::string relay;
     std::string station;
-    bool writes = false;
+    Request request = Request::read;
     Duration every{};  ///< of a write that waits for changes: its refresh
     Duration wire{};
     double load = 0;
@@ -62,6 +68,7 @@ struct LinePlan {
 };
 
 enum class Verdict : std::uint8_t { fine, high, overload };
+std::string_view label(RelayLoad::Request request);
 /// Of the load that is certain; what relays may add makes it `high` at most.
 Verdict verdict(const LinePlan& plan);
 

@@ -54,6 +54,10 @@ struct SharedMemory {
 bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& written,
                 const modbus::Span& items);
 
+/// Surely not; else they are read again behind the write.
+bool spares(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+            const modbus::Span& items);
+
 /// Polls of one station: what to read when, from what is wanted, and what came of it. Pure.
 class StationPolls {
   public:
@@ -93,8 +97,6 @@ class StationPolls {
     void fail(const PlannedRead& read, std::optional<std::uint8_t> exception);
     bool split(TimePoint now, std::size_t read);
     bool is_outdated(const PlannedRead& read) const;
-    /// Surely nothing of these items is written.
-    bool spares(const std::optional<modbus::Span>& written, const modbus::Span& items) const;
 
     std::vector<Want> wants_;
     std::vector<Reading> readings_;

@@ -30,16 +30,16 @@ constexpr const char* kTwoLines = R"(lines:
     stations:
       - id: 1
         name: press
-        profile: autonics-gplp-s
-        poll: [{read: UW0, count: 32, every: 1s}]
-        points: [{name: level, at: UB180, every: 5s}]
-      - {id: 2, name: quick, profile: autonics-gplp-s, timing: {think_time: 2ms}}
+        profile: generic
+        poll: [{read: 400001, count: 32, every: 1s}]
+        points: [{name: level, at: "000181", every: 5s}]
+      - {id: 2, name: quick, profile: generic, timing: {think_time: 2ms}}
   - name: b
     device: sim
     stations: [{id: 3, name: meter, profile: autonics-arm}]
 relays:
-  - {from: press/UW100, count: 2, to: quick/UW200, every: 2s, on_change: true, refresh: 20s}
-  - {from: meter/300201, to: quick/UW300, every: 4s}
+  - {from: press/400101, count: 2, to: quick/400201, every: 2s, on_change: true, refresh: 20s}
+  - {from: meter/300201, to: quick/400301, every: 4s}
 http: {listen: "127.0.0.1:8080"}
 )";
 
@@ -61,7 +61,7 @@ TEST(Capacity, TakesFromAConfigurationWhatLoadsEachLine) {
 TEST(Capacity, ALineThatIsOnlyListenedToCarriesNothingOfOurs) {
     const config::Config config = load(
         "lines:\n  - name: a\n    device: /dev/ttyUSB0\n    mode: listen\n    stations: [{id: 1, "
-        "name: x, profile: autonics-gplp-s, points: [{name: p, at: UW1}]}]\n"
+        "name: x, profile: generic, points: [{name: p, at: 400001}]}]\n"
         "http: {listen: \"127.0.0.1:8080\"}\n");
     EXPECT_EQ(capacities(config).at(0).plan.load, 0);
 }

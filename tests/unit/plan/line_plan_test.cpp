@@ -52,9 +52,9 @@ TEST_F(LinePlanTest, ARelayLoadsTheLinesOfItsEnds) {
     copy(0, 4, 1s);
     const LinePlan both = make_plan(line);
     ASSERT_THAT(both.relays, SizeIs(2));
-    EXPECT_FALSE(both.relays[0].writes);
+    EXPECT_EQ(both.relays[0].request, RelayLoad::Request::read);
     EXPECT_EQ(both.relays[0].station, "from");
-    EXPECT_TRUE(both.relays[1].writes);
+    EXPECT_EQ(both.relays[1].request, RelayLoad::Request::write);
     EXPECT_EQ(both.relays[1].station, "to");
     EXPECT_EQ(both.load, both.relays[0].load + both.relays[1].load);
     line.relays[0].to.reset();  // on another line
@@ -71,6 +71,25 @@ TEST_F(LinePlanTest, AWriteThatWaitsForChangesIsCertainOnlyOnceARefresh) {
     EXPECT_EQ(write.every, 60s);
     EXPECT_NEAR(write.most, 60 * write.load, 1e-9);
     EXPECT_NEAR(plan.most - plan.load, write.most - write.load, 1e-9);
+}
+
+TEST_F(LinePlanTest, PollsThatAWriteMakesOldAreReadAgain) {
+    add("from");
+    Station& to = add("to");
+    to.memory.shown_as = [](const modbus::Span& written) { return std::vector{written}; };
+    ask(to, 0, 4, 10s);
+    ask(to, 500, 4, 10s);
+    copy(0, 4, 1s).writes_every = 20s;
+    const LinePlan plan = make_plan(line);
+    ASSERT_THAT(plan.relays, SizeIs(3));
+    const RelayLoad& again = plan.relays[2];
+    EXPECT_EQ(again.request, RelayLoad::Request::reread);
+    EXPECT_EQ(again.wire, plan.polls[1].wire) << "one of the two";
+    EXPECT_NEAR(again.load, to_seconds(again.wire) / 20, 1e-9);
+    EXPECT_NEAR(again.most, to_seconds(again.wire), 1e-9);
+    line.relays[0].every = line.relays[0].writes_every = 50ms;
+    EXPECT_NEAR(make_plan(line).relays[2].load, to_seconds(again.wire) * 4, 1e-9)
+        << "four a second at most";
 }
 
 TEST_F(LinePlanTest, P4TheWorstDeadStationIsTheOneThatWasAskedLeast) {
