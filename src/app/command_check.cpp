@@ -96,9 +96,9 @@ ExitCode check(const std::string& file, bool json, bool allow_overload) {
         judged = judge(*loaded.config, allow_overload);
         print_warnings(*loaded.config);
         for (const std::string& told : judged.warnings)
-            std::cerr << file << ": warning: " << told << '\n';
+            std::cerr << path_of(file) << ": warning: " << told << '\n';
         for (const std::string& told : judged.errors)
-            std::cerr << file << ": " << told << " (--allow-overload takes it)\n";
+            std::cerr << path_of(file) << ": " << told << " (--allow-overload takes it)\n";
     }
     if (json) {
         print_json(file, loaded, judged);

@@ -18,9 +18,9 @@ std::optional<std::string> environment(const std::string& name) {
     return value;
 }
 
-std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdin" : typed; }
-
 }  // namespace
+
+std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdin" : typed; }
 
 Loaded load_file(const std::string& typed) {
     const std::string path = path_of(typed);

@@ -20,6 +20,8 @@ struct Loaded {
     std::vector<yaml::Problem> problems;
 };
 
+/// What is read: `-` is standard input.
+std::string path_of(const std::string& typed);
 /// Reads and checks a file, `-` for standard input. Its warnings are told by whoever uses it.
 Loaded load_file(const std::string& typed);
 /// The same for text; `name` stands in messages.

@@ -27,7 +27,7 @@ std::optional<Advice> rate(const Line& line) {
     std::optional<Advice> found;
     for (const int baud : kRates) {
         if (baud <= line.serial.baud || !all_have(line, baud)) continue;
-        found = Advice{"serial: {baud: " + std::to_string(baud) + "}, set in all panels too",
+        found = Advice{"serial: {baud: " + std::to_string(baud) + "} (of all panels, too)",
                        make_plan(at_rate(line, baud)).load};
         if (found->load <= kHigh) break;
     }
