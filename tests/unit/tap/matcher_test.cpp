@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
 #include <string_view>
 #include <utility>
 #include <variant>
@@ -275,6 +276,45 @@ TEST(Matcher, IsSureAgainWhenRepliesKeepTheUsualTime) {
     EXPECT_THAT(line.told(),
                 ElementsAre("31: 0300c80001 -> 030200c8 ?", "31: 0300640001 -> 03020064",
                             "31: 0300c80001 -> 030200c8"));
+}
+
+TEST(Matcher, AMasterThatALateReplyDisturbsHasNotGivenUpByTime) {
+    Line line;
+    for (int i = 0; i < 4; ++i) {
+        line.say(10ms, 31, "0300640001");
+        line.say(5ms, 31, "03020064");
+        line.say(10ms, 31, "0300640001");
+        line.say(500ms, 31, "0300C80002");  // its timeout
+        line.say(50ms, 31, "03020065");     // late, and no answer to that: it is an error at once
+        line.say(80ms, 5, "0300640001");
+        line.say(5ms, 5, "03020064");
+    }
+    line.wait(6s);
+    line.told();
+    for (const Duration think : {150ms, 170ms, 200ms, 160ms}) {
+        line.say(10ms, 31, "0300640001");
+        line.say(think, 31, "03020064");
+    }
+    const std::string good = "31: 0300640001 -> 03020064";
+    EXPECT_THAT(line.told(), ElementsAre(good, good, good, good));
+}
+
+TEST(Matcher, FollowsAMasterThatWaitsLongerThanItDid) {
+    Line line;
+    for (int i = 0; i < 10; ++i) {
+        line.say(10ms, 31, "0300640001");
+        line.say(140ms, 5, "0300640001");  // given up
+        line.say(5ms, 5, "03020064");
+    }
+    line.wait(6s);
+    line.told();
+    for (int i = 0; i < 8; ++i) {
+        line.say(10ms, 31, "0300640001");
+        line.say(150ms + 10ms * (i % 3), 31, "03020064");
+    }
+    const std::string good = "31: 0300640001 -> 03020064";
+    EXPECT_THAT(line.told(),
+                ElementsAre(good + " ?", good + " ?", good + " ?", good, good, good, good, good));
 }
 
 TEST(Matcher, TellsALateReplyAndACopyFromOthers) {
