@@ -1,5 +1,6 @@
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "loopback.hpp"
 #include "panelgate/modbus/ascii_frame.hpp"
@@ -284,6 +285,22 @@ TEST_P(OnATcpListener, AnotherFramingIsClosedBeforeAnythingReachesTheBus) {
     EXPECT_EQ(listener->counters().protocol_errors, 3U);
     const std::string word(modbus::label(GetParam()));
     EXPECT_GE(log.count("needs a listener with framing: " + word), 1U);
+}
+
+class AnyListener : public Loopback, public ::testing::WithParamInterface<Framing> {};
+INSTANTIATE_TEST_SUITE_P(Framings, AnyListener,
+                         ::testing::Values(Framing::tcp, Framing::rtu, Framing::ascii),
+                         [](const auto& one) { return std::string(modbus::label(one.param)); });
+
+TEST_P(AnyListener, WhoSpeaksHttpIsClosedAndNamed) {
+    constexpr std::string_view kRequest = "GET /api/v1/lines HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+    settings.framing = GetParam();
+    start();
+    Client client = connect();
+    client.send(Bytes(kRequest.begin(), kRequest.end()));
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(log.count("it speaks HTTP and needs the listener of 'http'"), 1U);
+    EXPECT_TRUE(bus1.seen.empty());
 }
 
 }  // namespace
