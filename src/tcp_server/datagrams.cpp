@@ -89,7 +89,7 @@ void Datagrams::take(const Received& received) {
     if (!adu) return drop(received);
     Peer* sender = peer(from);
     if (sender == nullptr || !sender->pipeline->has_room()) {
-        if (sender != nullptr && sender->pipeline->repeats(*adu)) return;  // has its answer
+        if (sender != nullptr && sender->pipeline->joins(*adu)) return;
         return refuse({from, received.to, adu->transaction, adu->unit, adu->pdu[0]});
     }
     sender->heard = shared_->clock.now();

@@ -184,6 +184,27 @@ TEST_F(SessionRtu, AStrayByteStallsNobody) {
     EXPECT_EQ(listener->counters().protocol_errors, 256U);
 }
 
+TEST_F(SessionRtu, P2AWriteInsideADamagedOneDoesNotReachTheBusAndTheNextOneDoes) {
+    const Bytes pdu = "06 0000 BEEF"_hex;
+    const Bytes inside = modbus::encode_adu(1, pdu);
+    Bytes damaged = modbus::encode_adu(1, "10 0000 0005 0A 0007"_hex + inside);
+    damaged.back() ^= 0x01;
+    bus1.instant = pdu;
+    start();
+    Client client = connect();
+    client.send(damaged);
+    ASSERT_TRUE(run_until([&] { return listener->counters().protocol_errors > 0; }));
+    clock.advance(settings.rtu_silence);
+    EXPECT_TRUE(bus1.seen.empty());
+    client.send(inside);
+    ASSERT_TRUE(run_until([&] {
+        if (clock.armed() != 0) clock.advance(settings.rtu_silence);
+        return client.has_bytes(inside.size());
+    }));
+    EXPECT_EQ(client.receive_bytes(inside.size()), inside);
+    EXPECT_EQ(bus1.seen.size(), 1U);
+}
+
 TEST_F(SessionRtu, AVendorsFunctionEndsByASilence) {
     bus1.instant = "41 07"_hex;
     start();
