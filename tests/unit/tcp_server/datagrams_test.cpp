@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "loopback.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
