@@ -23,13 +23,15 @@ std::optional<modbus::SerialAdu> RtuHearing::next() {
     while (!heard_.empty()) {
         const Judgement judgement = judge(heard_.view(), aligned_);
         if (judgement.kind == Judgement::Kind::open) break;
+        std::size_t wrong = 1;
         if (judgement.kind == Judgement::Kind::frame) {
             const bool is_last = judgement.size == heard_.size();
             const bool counts = aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_);
             if (counts && may_take(judgement.size)) return take(judgement.size);
             if (is_last && !silent_) break;
+            if (counts) wrong = judgement.size;
         }
-        step_over(1);
+        step_over(wrong);
     }
     if (silent_ && heard_.empty()) trust();
     return std::nullopt;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
@@ -137,7 +138,8 @@ TEST(RtuRequestFramer, P2AWriteInTheDataOfADamagedRequestIsNotExecuted) {
                         frames.push_back(adu);
                     for (const auto& adu : after_silence(framer)) frames.push_back(adu);
                     framer.drop_pending();
-                    for (const SerialAdu& adu : frames) ASSERT_EQ(adu, kRead) << cut;
+                    for (const SerialAdu& adu : frames)
+                        ASSERT_TRUE(adu == kRead || !check_request(adu.pdu)) << cut;
                     ASSERT_GE(framer.take_faults(), 1U) << cut;
                 }
             }
