@@ -64,7 +64,7 @@ class Trouble {
 
     void go_on() {
         for (int i = 0; i < 120; ++i) {
-            const Exchange& asked = kExchanges[random_() % 3];
+            const Exchange& asked = next();
             line_.say(1ms * (5 + random_() % 60), 31, asked.request);
             let_answer(asked.reply);
             hear(asked.reply, line_.now() + 500ms);
@@ -75,7 +75,7 @@ class Trouble {
     /// Each reply comes late, and in time.
     void calm_down(int exchanges) {
         for (int i = 0; i < exchanges; ++i) {
-            const Exchange& asked = kExchanges[random_() % 3];
+            const Exchange& asked = next();
             line_.say(20ms, 31, asked.request);
             line_.say(1ms * (150 + random_() % 50), 31, asked.reply);
         }
@@ -89,11 +89,13 @@ class Trouble {
     static constexpr std::array<Exchange, 3> kExchanges{
         {{"0300640001", "03020064"}, {"0300C80002", "030400C800C9"}, {"03012C0001", "0302012C"}}};
 
+    /// Not what was asked last: a late reply is another request's.
+    const Exchange& next() { return kExchanges[last_ = (last_ + 1 + random_() % 2) % 3]; }
     void let_answer(std::string_view reply) {
         const unsigned fate = random_() % 10;
         if (fate < 2) return;
         const Duration think =
-            fate < 6 ? 1ms * (5 + random_() % 60) : 1ms * (400 + random_() % 500);
+            fate < 6 ? 1ms * (5 + random_() % 60) : 1ms * (500 + random_() % 400);
         coming_.emplace(line_.now() + think, reply);
     }
     void hear(std::string_view expected, TimePoint until) {
@@ -108,6 +110,7 @@ class Trouble {
 
     Line& line_;
     std::mt19937 random_;
+    std::size_t last_ = 0;
     std::multimap<TimePoint, std::string_view> coming_;
 };
 
