@@ -28,6 +28,9 @@ std::size_t known_frame(ByteView b) {
     return is_frame(b.first(length.length)) ? length.length : 0;
 }
 
+/// 08/0000 with one word of data, whose CRC has not come.
+bool may_be_usual(ByteView b) { return b[1] == kDiagnostics && b.size() < kReadRequestAdu; }
+
 /// A function of somebody's own, whose data may begin behind it.
 bool may_hide_at_once(ByteView b) {
     if (b.size() < 2 || b[1] == 0 || (b[1] & kExceptionBit) != 0) return false;
@@ -107,7 +110,7 @@ RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
     const RequestLength length = usual_request_length(start);
     if (length.kind == Kind::need_more) return {Judgement::Kind::open};
     if (length.kind == Kind::by_silence) {
-        const bool may_be = trusted_ && start.size() <= kMaxRtuAdu;
+        const bool may_be = (trusted_ && start.size() <= kMaxRtuAdu) || may_be_usual(start);
         return {may_be ? Judgement::Kind::open : Judgement::Kind::nothing};
     }
     if (length.length > kMaxRtuAdu) return {};
