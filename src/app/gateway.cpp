@@ -1,8 +1,11 @@
 #include "gateway.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/ip/host_name.hpp>
+#include <charconv>
 #include <memory>
+#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -32,10 +35,22 @@ boost::system::error_code error_of(tcp_server::Listener& listener) {
     return {};
 }
 
+/// Of the ids of events: another one in each life of the program.
+std::string new_epoch() {
+    constexpr int kHex = 16;
+    std::array<char, 8> text{};
+    const auto [end, wrong] =
+        std::to_chars(text.data(), text.data() + text.size(), std::random_device()(), kHex);
+    return std::string(text.data(), end);
+}
+
 }  // namespace
 
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
-    : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
+    : executor_(std::move(executor)),
+      clock_(executor_),
+      config_(std::move(config)),
+      events_(new_epoch()) {
     separate_families(config_);
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();

@@ -38,16 +38,22 @@ struct Publisher {
     const std::string& line;
 
     void operator()(const bus::LineEvent& event) const {
-        hub.publish("line", web::line_event(line, event.up ? "up" : "down", event.why));
+        if (!hub.announce("line")) return;
+        hub.publish({"line", line, {}, {}},
+                    web::line_event(line, event.up ? "up" : "down", event.why));
     }
     void operator()(const arbiter::StationEvent& event) const {
+        if (!hub.announce("station")) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish("station", web::station_event(line, station, label(event.kind)));
+        hub.publish({"station", line, station, {}},
+                    web::station_event(line, station, label(event.kind)));
     }
     void operator()(const bus::TransactionEvent& event) const {
+        if (!hub.announce("transaction")) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish("transaction", web::transaction_event(line, station, event.function,
-                                                          label(event.outcome), event.took));
+        hub.publish({"transaction", line, station, {}},
+                    web::transaction_event(line, station, event.function, label(event.outcome),
+                                           event.took));
     }
     void operator()(const bus::WriteEvent&) const {}   // the points it touches are told
     void operator()(const tap::Transaction&) const {}  // as are these
@@ -93,16 +99,17 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
 
 void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
              const bus::BusEvent& event) {
-    if (!hub.is_idle()) std::visit(Publisher{hub, plant, line}, event);
+    std::visit(Publisher{hub, plant, line}, event);
 }
 
 void publish_points(web::EventHub& hub, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now) {
-    if (hub.is_idle() || !station.points) return;
+    if (!station.points) return;
     for (const std::size_t want : wants) {
         const points::Point* point = station.points->point_of(want);
-        if (point == nullptr) continue;  // a poll block
-        hub.publish("point", web::point_event(station, *point, station.points->read(*point, now)));
+        if (point == nullptr || !hub.announce("point")) continue;  // a poll block
+        hub.publish({"point", station.line, station.name, point->name},
+                    web::point_event(station, *point, station.points->read(*point, now)));
     }
 }
 

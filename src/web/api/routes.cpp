@@ -48,7 +48,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/stations/{}", get_station, kSee, kTagged},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
-    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types"},
+    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types line station point"},
     {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},

@@ -236,7 +236,6 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
 /// forgetting the connection, and notices a client that has gone.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
-    constexpr const char* kComment = ": \n\n";
     ++shared_->counters.requests[200];
     sending_ = true;
     bool asked = false;
@@ -262,8 +261,8 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         ErrorCode rung;
         bell.expires_after(kHeartbeat);
         co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
-        text = rung ? listener->take() : kComment;
-        if (text.empty() && std::exchange(asked, false)) text = kComment;
+        text = rung ? listener->take() : listener->heartbeat();
+        if (text.empty() && std::exchange(asked, false)) text = listener->heartbeat();
     }
     departure_.ask_by(nullptr);
     listener->wake = nullptr;
