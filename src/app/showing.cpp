@@ -4,6 +4,7 @@
 #include <utility>
 #include <variant>
 
+#include "panelgate/points/station_history.hpp"
 #include "panelgate/points/value.hpp"
 #include "panelgate/web/api/event_text.hpp"
 #include "simulated_line.hpp"
@@ -18,6 +19,7 @@ web::StationEntry entry_of(const Station& station) {
     entry.read_only = station.configured->read_only;
     entry.unit = station.unit;
     entry.points = station.points ? &*station.points : nullptr;
+    entry.history = station.history ? &*station.history : nullptr;
     entry.simulated = simulated_panel(station.simulated, station.id);
     return entry;
 }
@@ -100,6 +102,15 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
 void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
              const bus::BusEvent& event) {
     std::visit(Publisher{hub, plant, line}, event);
+}
+
+void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now) {
+    if (!station.points || !station.history) return;
+    for (const std::size_t want : wants) {
+        const points::Point* point = station.points->point_of(want);
+        if (point != nullptr)
+            station.history->record(now, *point, station.points->read(*point, now));
+    }
 }
 
 void publish_points(web::EventHub& hub, const Station& station,

@@ -29,6 +29,7 @@ Handling get_metrics(HttpRequest request, const Api* api);
 Handling get_lines(HttpRequest request, const Api* api);
 Handling get_line(HttpRequest request, const Api* api);
 Handling get_trace(HttpRequest request, const Api* api);
+Handling get_line_history(HttpRequest request, const Api* api);
 Handling post_broadcast(HttpRequest request, const Api* api);
 Handling post_raw(HttpRequest request, const Api* api);
 
@@ -42,6 +43,7 @@ Handling put_table(HttpRequest request, const Api* api);
 Handling get_points(HttpRequest request, const Api* api);
 Handling get_point(HttpRequest request, const Api* api);
 Handling put_point(HttpRequest request, const Api* api);
+Handling get_point_history(HttpRequest request, const Api* api);
 Handling get_table_plan(HttpRequest request, const Api* api);
 Handling get_device_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);

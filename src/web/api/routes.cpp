@@ -40,6 +40,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
     {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
     {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
+    {"GET", "/api/v1/lines/{}/history", get_line_history, kSee},
     {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange, kWrites},
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange, kWrites},
     {"POST", "/api/v1/read", post_read, kSee, kAsks},
@@ -53,6 +54,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
+    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},
     // Before the tables: "devices" is none of them.
     {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kTagged, "count values"},

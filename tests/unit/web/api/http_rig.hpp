@@ -127,6 +127,7 @@ class HttpRig : public ::testing::Test {
         providers.missing = [this] { return missing; };
         providers.version = "1.2.3";
         providers.now = [this] { return now; };
+        providers.wall = [this] { return wall; };
         providers.relays = [this] { return relays; };
         providers.events = &events;
         providers.configuration = configuration;
@@ -174,6 +175,7 @@ class HttpRig : public ::testing::Test {
     Directory directory;
     Settings settings;
     TimePoint now{1h};
+    WallTime wall{std::chrono::seconds(1'790'000'000)};  ///< 2026-09-21T14:13:20Z
     std::vector<points::RelayStatus> relays;
     EventHub events;
     SharedText configuration;
