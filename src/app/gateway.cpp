@@ -214,6 +214,8 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.configuration =
         std::make_shared<const std::string>(web::json_text(inventory_json(config_)));
     providers.wall = rt::wall_now;
+    discoveries_ = std::make_unique<Discoveries>(clock_, plant_, *config_.profiles, events_);
+    providers.discovery = discoveries_.get();
     keep_histories();
     directory_ = directory_of(plant_, *config_.profiles->find("generic"));
     for (std::size_t i = 0; i < buses_.size(); ++i)
@@ -257,6 +259,7 @@ Duration Gateway::longest_answer() const {
 void Gateway::stop_accepting() {
     ready_ = false;
     openings_.stop();
+    if (discoveries_) discoveries_->stop_all();
     events_.end();
     open_listeners_ = listeners_.size();
     for (const auto& listener : listeners_) {

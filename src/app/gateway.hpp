@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "discoveries.hpp"
 #include "line_histories.hpp"
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
@@ -90,6 +91,7 @@ class Gateway {
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::LineBus>> buses_;  ///< by the order of config_.lines
+    std::unique_ptr<Discoveries> discoveries_;          ///< null without `http:`
     std::unique_ptr<LineHistories> line_histories_;     ///< null without `http:`
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     /// Of lines that are only listened to, by their name and the station's id.

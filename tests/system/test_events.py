@@ -32,28 +32,36 @@ class Cutter:
         self._port = port
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
-        self._open = []
+        self._sockets = []
+        self._threads = []
         self._lock = threading.Lock()
         self.is_cut = False
-        threading.Thread(target=self._accept, daemon=True).start()
+        self._start(self._accept)
 
     def __enter__(self):
         return self
 
     def __exit__(self, *_):
         self.cut()
-        self._listener.close()
+        self._listener.shutdown(socket.SHUT_RDWR)
+        for thread in self._threads:
+            thread.join(harness.PATIENCE)
+        for one in [self._listener, *self._sockets]:
+            one.close()
 
     def cut(self):
         with self._lock:
             self.is_cut = True
-            for one in self._open:
+            for one in self._sockets:
                 with contextlib.suppress(OSError):
                     one.shutdown(socket.SHUT_RDWR)
-            self._open.clear()
 
     def mend(self):
         self.is_cut = False
+
+    def _start(self, work, *arguments):
+        self._threads.append(threading.Thread(target=work, args=arguments, daemon=True))
+        self._threads[-1].start()
 
     def _accept(self):
         with contextlib.suppress(OSError):
@@ -64,9 +72,9 @@ class Cutter:
                         near.close()
                         continue
                     far = socket.create_connection(("127.0.0.1", self._port))
-                    self._open += [near, far]
+                    self._sockets += [near, far]
                 for pair in ((near, far), (far, near)):
-                    threading.Thread(target=self._pass_on, args=pair, daemon=True).start()
+                    self._start(self._pass_on, *pair)
 
     @staticmethod
     def _pass_on(source, sink):

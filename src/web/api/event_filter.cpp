@@ -20,9 +20,10 @@ struct Kind {
 constexpr Kind kKinds[] = {{"point", true, true},
                            {"station", true, false},
                            {"line", false, false},
-                           {"transaction", true, false}};
+                           {"transaction", true, false},
+                           {"discovery", false, false}};
 
-/// "point, station, line and transaction"
+/// "point, station, line, transaction and discovery"
 std::string known_types() {
     std::string text;
     for (const Kind& kind : kKinds) {

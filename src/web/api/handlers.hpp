@@ -31,6 +31,9 @@ Handling get_line(HttpRequest request, const Api* api);
 Handling get_trace(HttpRequest request, const Api* api);
 Handling get_line_history(HttpRequest request, const Api* api);
 Handling post_broadcast(HttpRequest request, const Api* api);
+Handling get_discovery(HttpRequest request, const Api* api);
+Handling post_discover(HttpRequest request, const Api* api);
+Handling delete_discovery(HttpRequest request, const Api* api);
 Handling post_raw(HttpRequest request, const Api* api);
 
 Handling post_read(HttpRequest request, const Api* api);

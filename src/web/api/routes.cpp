@@ -18,6 +18,7 @@ constexpr std::string_view kReading = "count type order length raw";
 constexpr Manner kPlain{};
 constexpr Manner kTagged{.tagged = true};
 constexpr Manner kAsks{.asks = true};
+constexpr Manner kOnce{.once = true};
 constexpr Manner kWrites{.asks = true, .once = true};
 
 struct Row {
@@ -43,6 +44,9 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/lines/{}/history", get_line_history, kSee},
     {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange, kWrites},
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange, kWrites},
+    {"GET", "/api/v1/lines/{}/discover", get_discovery, kSee},
+    {"POST", "/api/v1/lines/{}/discover", post_discover, kChange, kOnce},
+    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kChange, kOnce},
     {"POST", "/api/v1/read", post_read, kSee, kAsks},
     {"POST", "/api/v1/write", post_write, kChange, kWrites},
     {"GET", "/api/v1/stations", get_stations, kSee, kTagged},

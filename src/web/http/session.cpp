@@ -32,6 +32,9 @@ constexpr std::size_t kReadSize = 4096;
 /// What a client whose request was refused may still send before it is cut off.
 constexpr std::size_t kDrainLimit = 1024 * 1024;
 constexpr Duration kDrainTime = 2s;
+/// Bytes of events that the kernel holds for a client, so that one which is slow is told in time
+/// what it has lost: by itself it takes megabytes.
+constexpr int kHeldEvents = 128 * 1024;
 constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 Problem no_place() {
@@ -239,6 +242,8 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     ++shared_->counters.requests[200];
     sending_ = true;
     bool asked = false;
+    ErrorCode ignored;
+    stream_.socket().set_option(asio::socket_base::send_buffer_size(kHeldEvents), ignored);
     asio::steady_timer bell(stream_.get_executor());
     listener->wake = [&bell] { bell.cancel(); };
     departure_.ask_by([&] {
@@ -255,9 +260,10 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         stream_.expires_after(time_to_read_);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
-        if (error || listener->ended() || stopping_) break;
+        if (error) break;
         text = listener->take();
         if (!text.empty()) continue;
+        if (listener->ended() || stopping_) break;
         ErrorCode rung;
         bell.expires_after(kHeartbeat);
         co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));

@@ -22,6 +22,7 @@
 
 namespace panelgate::web {
 
+class DiscoverySource;
 class HttpListener;
 class KeyBook;
 
@@ -35,8 +36,9 @@ struct Providers {
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
     std::function<WallTime()> wall;  ///< what the clock on the wall shows
     std::function<std::vector<points::RelayStatus>()> relays;
-    EventHub* events = nullptr;  ///< never null; outlives the server
-    SharedText configuration;    ///< in force, a JSON object without secrets; null: not shown
+    EventHub* events = nullptr;            ///< never null; outlives the server
+    DiscoverySource* discovery = nullptr;  ///< null only where there are no lines; outlives it
+    SharedText configuration;  ///< in force, a JSON object without secrets; null: not shown
     ApiSettings settings{};
 };
 

@@ -104,8 +104,8 @@ TEST_F(ApiEvents, StreamTheTypesThatWereAskedFor) {
 TEST_F(ApiEvents, AreOfKnownTypes) {
     const Reply reply = get("/api/v1/events?types=line,bus");
     EXPECT_EQ(reply.status(), 400u);
-    EXPECT_THAT(reply.body(), HasSubstr("there is no event 'bus'; types are point, station, line "
-                                        "and transaction"));
+    EXPECT_THAT(reply.body(), HasSubstr("there is no event 'bus'; types are point, station, "
+                                        "line, transaction and discovery"));
 }
 
 TEST_F(ApiEvents, HaveRoomForSomeListenersOnly) {
