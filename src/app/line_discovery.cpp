@@ -13,6 +13,9 @@ namespace {
 
 constexpr const char* kName = "discovery";
 constexpr int kHundred = 100;
+/// As a scan has at first: most panels think for less. Whoever needs longer speaks into the next
+/// transaction, and may be heard there or not.
+constexpr Duration kPatience = 100ms;
 
 using Reply = scan::Discovery::Reply;
 
@@ -74,7 +77,8 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
         .station = request.station(),
         .request = *modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide),
         .client = client_,
-        .poll = true};
+        .poll = true,
+        .patience = kPatience};
     asked_ = clock_.now();
     paid_ = used();
     bus_.transact(std::move(wanted), [self = weak_from_this()](const bus::Answer& answer) {

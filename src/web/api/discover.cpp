@@ -3,11 +3,13 @@
 #include <cstdlib>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "answer.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
+#include "panelgate/base/fault.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/web/api/discovery_source.hpp"
 #include "refusal.hpp"

@@ -1,6 +1,7 @@
 #include "event_filter.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <sstream>
 #include <string>
 #include <string_view>
