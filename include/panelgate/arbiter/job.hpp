@@ -27,6 +27,9 @@ struct Job {
     /// The function that was asked for, where the request has another one instead; 0: its own.
     std::uint8_t asked_function = 0;
     Duration within = Duration::max();  ///< its deadline, where the queue's is not sooner
+    /// Its reply is waited for at least so long (within the response timeout), also of a station
+    /// that nobody knows.
+    Duration patience{};
     TimePoint arrived{};
     TimePoint deadline{};
     TimePoint start_by{};  ///< the last moment at which starting it makes sense

@@ -39,6 +39,9 @@ struct Request {
     bool poll = false;  ///< of the lowest class: clients' own requests go first
     /// Its client waits no longer: its deadline, where that of the line's queue is not sooner.
     Duration within = Duration::max();
+    /// The reply is waited for at least so long (within the response timeout): a station that
+    /// nobody knows is otherwise not waited for longer than the line's others need.
+    Duration patience{};
 };
 
 enum class Source : std::uint8_t { bus, cache };
