@@ -66,7 +66,7 @@ void Arbiter::settle(TimePoint now) {
     const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
-    const TimePoint proved = station.surely_answered(attempt.timing().started);
+    const TimePoint proved = station.surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_back();
