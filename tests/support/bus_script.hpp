@@ -180,6 +180,7 @@ class BusScript {
     std::vector<arbiter::Decision> decisions;
     std::vector<arbiter::Written> written;
     int resets = 0;  ///< that the arbiter asked for
+    std::vector<arbiter::Exchange> exchanges;
     /// What a driver tells that is asked at the end of a request (Arbiter::confirm_ends).
     std::function<Duration()> unsent = [] { return Duration::zero(); };
 
@@ -207,6 +208,7 @@ class BusScript {
     void act(const arbiter::Decision& decision) { decisions.push_back(decision); }
     void act(const arbiter::StationEvent& event) { events.push_back(event); }
     void act(const arbiter::Reset&) { ++resets; }
+    void act(const arbiter::Exchange& exchange) { exchanges.push_back(exchange); }
     void act(const arbiter::Written& one) { written.push_back(one); }
 
     arbiter::Settings settings_;
