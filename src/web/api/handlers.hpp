@@ -29,6 +29,9 @@ Handling get_metrics(HttpRequest request, const Api* api);
 Handling get_lines(HttpRequest request, const Api* api);
 Handling get_line(HttpRequest request, const Api* api);
 Handling get_trace(HttpRequest request, const Api* api);
+Handling get_trace_pcapng(HttpRequest request, const Api* api);
+Handling get_incidents(HttpRequest request, const Api* api);
+Handling get_incident(HttpRequest request, const Api* api);
 Handling post_broadcast(HttpRequest request, const Api* api);
 Handling post_raw(HttpRequest request, const Api* api);
 
