@@ -41,6 +41,7 @@ class BusScript {
         TimePoint at;
         Result<Bytes> pdu = Fault::cancelled;
         bool transmitted = false;
+        std::vector<arbiter::Transaction> transactions{};
     };
 
     arbiter::Ticket submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
@@ -199,7 +200,10 @@ class BusScript {
     }
     void act(const arbiter::Finish& finish) {
         EXPECT_EQ(answers.count(finish.ticket), 0u) << "answered twice";
-        answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
+        Answer& answer = answers[finish.ticket];
+        answer = {now_, finish.pdu, finish.transmitted};
+        finish.transactions.for_each(
+            [&](arbiter::Transaction number) { answer.transactions.push_back(number); });
     }
     void act(const arbiter::Note& note) {
         notes.push_back(note);
