@@ -338,7 +338,9 @@ std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 
-std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->book.store().frames(last); }
+std::vector<TraceFrame> Bus::trace(std::size_t last) const {
+    return state_->book.store().frames(last);
+}
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
     return state_->book.store().decisions(last);

@@ -7,6 +7,7 @@
 #include "account.hpp"
 #include "heard_stations.hpp"
 #include "line_doctor.hpp"
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"

@@ -23,34 +23,31 @@ bool begins(FrameKind kind) {
 }  // namespace
 
 TraceBook::TraceBook(const Settings& settings, Wall& wall)
-    : settings_(settings),
-      wall_(wall),
-      store_(settings.trace),
-      incidents_(settings.incidents) {}
+    : settings_(settings), wall_(wall), store_(settings.trace), incidents_(settings.incidents) {}
 
 void TraceBook::note(arbiter::Note note) {
     log_frame(settings_.name, note);
-    const std::uint64_t sequence = ++happened_;
-    if (begins(note.kind)) begin(note, sequence);
     RecordedFrame frame;
-    frame.sequence = sequence;
+    frame.sequence = ++happened_;
     frame.at = note.at;
     frame.time = wall_.at(note.at);
+    if (begins(note.kind)) begin(note, frame);
     frame.transaction = current_;
     frame.kind = note.kind;
     frame.why = std::move(note.why);
+    const WallTime time = frame.time;
     incidents_.add(frame, note.bytes);
     store_.add(std::move(frame), note.bytes);
     if (note.kind != FrameKind::late || note.bytes.empty()) return;
-    incidents_.on_trouble({note.at, wall_.at(note.at), note.bytes.front(), "late"}, store_);
+    incidents_.on_trouble({note.at, time, note.bytes.front(), "late"}, store_);
 }
 
-void TraceBook::begin(const arbiter::Note& note, std::uint64_t sequence) {
+void TraceBook::begin(const arbiter::Note& note, const RecordedFrame& request) {
     current_ = note.transaction == 0 ? current_ + 1 : note.transaction;
     RecordedTransaction begun;
     begun.id = current_;
-    begun.first = sequence;
-    begun.time = wall_.at(note.at);
+    begun.first = request.sequence;
+    begun.time = request.time;
     begun.granted = begun.first_bit_out = begun.last_bit_out = note.at;
     if (!note.bytes.empty()) begun.station = note.bytes.front();
     incidents_.begin(begun);

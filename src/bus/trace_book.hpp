@@ -33,12 +33,12 @@ class TraceBook {
     IncidentBook& incidents() { return incidents_; }
 
   private:
-    void begin(const arbiter::Note& note, std::uint64_t sequence);
+    void begin(const arbiter::Note& note, const RecordedFrame& request);
     void judge(const RecordedTransaction& transaction, TimePoint at);
 
     const Settings& settings_;
     Wall& wall_;
-    std::uint64_t happened_ = 0;         ///< the last sequence number
+    std::uint64_t happened_ = 0;        ///< the last sequence number
     arbiter::Transaction current_ = 0;  ///< the last that was begun
     TraceStore store_;
     IncidentBook incidents_;

@@ -37,8 +37,8 @@ std::size_t TraceStore::memory(const TraceSettings& settings) {
 }
 
 void TraceStore::add(RecordedFrame frame, ByteView bytes) {
-    frame.size = static_cast<std::uint16_t>(std::min<std::size_t>(
-        {bytes.size(), bytes_.size(), std::size_t{UINT16_MAX}}));
+    frame.size = static_cast<std::uint16_t>(
+        std::min<std::size_t>({bytes.size(), bytes_.size(), std::size_t{UINT16_MAX}}));
     frame.place = bytes_.add(bytes.first(frame.size));
     frames_.add(std::move(frame));
     forget_torn();
@@ -117,35 +117,35 @@ TraceDecision TraceStore::told(const RecordedDecision& decision) const {
 }
 
 TraceTransaction TraceStore::told(const RecordedTransaction& one) const {
-    TraceTransaction told;
-    told.id = one.id;
-    told.first = one.first;
-    told.sequence = one.sequence;
-    told.station = one.station;
-    told.end = one.end;
-    told.time = one.time;
-    told.arrived = one.arrived;
-    told.granted = one.granted;
-    told.first_bit_out = one.first_bit_out;
-    told.last_bit_out = one.last_bit_out;
-    told.first_byte_in = one.first_byte_in;
-    told.last_byte_in = one.last_byte_in;
-    told.answered = one.answered;
+    TraceTransaction made;
+    made.id = one.id;
+    made.first = one.first;
+    made.sequence = one.sequence;
+    made.station = one.station;
+    made.end = one.end;
+    made.time = one.time;
+    made.arrived = one.arrived;
+    made.granted = one.granted;
+    made.first_bit_out = one.first_bit_out;
+    made.last_bit_out = one.last_bit_out;
+    made.first_byte_in = one.first_byte_in;
+    made.last_byte_in = one.last_byte_in;
+    made.answered = one.answered;
     for (std::size_t i = frames_.place_behind(one.first - 1); i < frames_.size(); ++i) {
         const RecordedFrame& frame = frames_.at(i);
         if (frame.transaction != one.id) break;
         if (frame.sequence == one.first) {
-            told.kind = frame.kind;
-            told.reason = reason_of(frame);
-            if (frame.why.client) told.client = *frame.why.client;
-            told.request = bytes_.at(frame.place, frame.size);
+            made.kind = frame.kind;
+            made.reason = reason_of(frame);
+            if (frame.why.client) made.client = *frame.why.client;
+            made.request = bytes_.at(frame.place, frame.size);
         } else if (frame.kind == FrameKind::reply) {
-            told.reply = bytes_.at(frame.place, frame.size);
+            made.reply = bytes_.at(frame.place, frame.size);
         } else {
-            told.discarded.push_back(this->told(frame));
+            made.discarded.push_back(told(frame));
         }
     }
-    return told;
+    return made;
 }
 
 template <class Told, class Recorded>
@@ -176,8 +176,7 @@ std::vector<TraceDecision> TraceStore::decisions_since(std::uint64_t sequence,
 /// Only the newest may still be open.
 std::size_t TraceStore::ended() const {
     const std::size_t size = transactions_.size();
-    const bool open =
-        size > 0 && transactions_.at(size - 1).sequence == RecordedTransaction::kOpen;
+    const bool open = size > 0 && transactions_.at(size - 1).sequence == RecordedTransaction::kOpen;
     return size - (open ? 1 : 0);
 }
 

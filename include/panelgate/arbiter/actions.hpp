@@ -37,7 +37,7 @@ struct Note {
     TimePoint at;  ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
-    Reason why{};  ///< of a sent frame, with Settings::explain: why this one now
+    Reason why{};                 ///< of a sent frame, with Settings::explain: why this one now
     Transaction transaction = 0;  ///< that a sent frame begins
 };
 /// With Settings::explain: a transaction is over. Said behind the frame that ends it, before the
@@ -87,7 +87,7 @@ struct Written {
 struct Reset {
     std::string_view why;  ///< a literal, for people
 };
-using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset,
-                            Exchange>;
+using Action =
+    std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset, Exchange>;
 
 }  // namespace panelgate::arbiter

@@ -41,7 +41,7 @@ class Attempt {
         Duration end_of_frame{};  ///< silence that ends what has no known length
         Duration hole{};          ///< the longest silence inside a reply of known length
         Duration longest_reply{};
-        Duration pause{};  ///< the silence before this attempt
+        Duration pause{};    ///< the silence before this attempt
         Duration leaving{};  ///< from the first bit of the request to its last
         /// A reply cannot begin more than this before `sent`; nothing: the line is no real UART.
         std::optional<Duration> tolerance;

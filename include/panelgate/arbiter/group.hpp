@@ -22,7 +22,7 @@ struct Group {
     std::optional<modbus::Span> span{};  ///< of a read that can be shared
     int attempts = 0;
     Transaction transaction = 0;  ///< of the last attempt
-    TimePoint started{};      ///< the first attempt: what answers was not read before
+    TimePoint started{};          ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
     Duration
         cut_after{};  ///< the attempt before, whose reply broke off, took so long; 0: it did not

@@ -54,8 +54,8 @@ struct TraceDecision {
 
 /// One request on the wire that is over, and what came of it.
 struct TraceTransaction {
-    std::uint64_t id = 0;     ///< counts a line's transactions, from 1
-    std::uint64_t first = 0;  ///< sequence of its request
+    std::uint64_t id = 0;        ///< counts a line's transactions, from 1
+    std::uint64_t first = 0;     ///< sequence of its request
     std::uint64_t sequence = 0;  ///< of its end: one count with frames and decisions
     std::uint8_t station = 0;    ///< 0: a broadcast
     FrameKind kind = FrameKind::request;
@@ -84,8 +84,8 @@ struct TracePart {
 
 /// Something went wrong, and what happened around it is kept.
 struct IncidentHead {
-    std::uint64_t id = 0;  ///< counts a line's incidents, from 1
-    WallTime time{};       ///< of its first error
+    std::uint64_t id = 0;                 ///< counts a line's incidents, from 1
+    WallTime time{};                      ///< of its first error
     std::optional<std::uint8_t> station;  ///< of that; nothing: the whole line
     std::string cause;                    ///< "timeout", "damaged", "wrong", "late", "line_down"
     std::uint64_t errors = 0;

@@ -54,8 +54,8 @@ Handling get_incident(HttpRequest request, const Api* api) {
     const auto wanted = wanted_of(request.arguments[1]);
     const auto found = wanted ? (*line)->bus->incident(wanted->id) : std::nullopt;
     if (!found)
-        co_return to_response(problem(404, "line '" + name + "' keeps no incident '" +
-                                               request.arguments[1] + "'"));
+        co_return to_response(
+            problem(404, "line '" + name + "' keeps no incident '" + request.arguments[1] + "'"));
     if (wanted->capture) {
         TracePcapng file(api->providers.version, name);
         file.add(found->part);

@@ -1,6 +1,5 @@
 #include "pcapng.hpp"
 
-
 namespace panelgate::web {
 namespace {
 

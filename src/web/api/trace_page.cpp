@@ -13,8 +13,7 @@ std::uint64_t last_of(const std::vector<Entry>& entries) {
 }
 
 std::uint64_t last_number(const bus::TracePart& part) {
-    return std::max(
-        {last_of(part.frames), last_of(part.decisions), last_of(part.transactions)});
+    return std::max({last_of(part.frames), last_of(part.decisions), last_of(part.transactions)});
 }
 
 template <class Entry>

@@ -23,9 +23,9 @@ enum class Tag : std::uint16_t {
     source_port = 25,
     destination_port = 26,
 };
-constexpr std::uint32_t kTcp = 2;                 ///< EXP_PDU_PT_TCP
-constexpr std::uint32_t kMaster = 0x7F'00'00'01;  ///< 127.0.0.1
-constexpr std::uint32_t kStation = 0x7F'00'01'00; ///< 127.0.1.ID
+constexpr std::uint32_t kTcp = 2;                  ///< EXP_PDU_PT_TCP
+constexpr std::uint32_t kMaster = 0x7F'00'00'01;   ///< 127.0.0.1
+constexpr std::uint32_t kStation = 0x7F'00'01'00;  ///< 127.0.1.ID
 /// The dissector takes what goes to port 0, where it has none configured, for a request.
 constexpr std::uint32_t kMastersPort = 1;
 constexpr std::uint32_t kStationsPort = 0;
@@ -87,8 +87,8 @@ Pcapng::Packet packet_of(const bus::TraceFrame& frame) {
     if (!frame.bytes.empty()) how.station = frame.bytes.front();
     Pcapng::Packet packet;
     packet.time = frame.time;
-    packet.way = direction_of(frame.kind) == FrameDirection::sent ? Pcapng::Way::out
-                                                                  : Pcapng::Way::in;
+    packet.way =
+        direction_of(frame.kind) == FrameDirection::sent ? Pcapng::Way::out : Pcapng::Way::in;
     packet.bytes = wrapped(how, frame.bytes);
     packet.comments = comments_on(frame);
     return packet;

@@ -60,8 +60,9 @@ std::string row(const bus::TraceTransaction& one) {
     std::string text = rfc3339(one.time) + ' ' + right(std::to_string(one.id), 8) + ' ' +
                        right(std::to_string(one.station), 7) + ' ' + left(one.reason, 11) + ' ' +
                        left(std::string(label(one.end)), 9);
-    const std::optional<TimePoint> end =
-        one.answered ? one.answered : one.last_byte_in ? one.last_byte_in : one.last_bit_out;
+    const std::optional<TimePoint> end = one.answered       ? one.answered
+                                         : one.last_byte_in ? one.last_byte_in
+                                                            : one.last_bit_out;
     for (const std::string& figure :
          {ms(one.arrived, one.granted), ms(one.first_bit_out, one.last_bit_out),
           ms(one.last_bit_out, one.first_byte_in), ms(one.first_byte_in, one.last_byte_in),
@@ -75,7 +76,9 @@ std::string row(const bus::TraceTransaction& one) {
     return text;
 }
 
-std::string row(const bus::TraceDecision& one) { return rfc3339(one.time) + "  " + one.text + '\n'; }
+std::string row(const bus::TraceDecision& one) {
+    return rfc3339(one.time) + "  " + one.text + '\n';
+}
 
 /// Of a frame whose transaction is not in the part.
 std::string row(const bus::TraceFrame& one) {

@@ -44,9 +44,8 @@ class BusTrace : public testing::Test {
     }
     Answer ask(const Bytes& pdu = kRead, bool poll = false) {
         std::optional<Answer> got;
-        bus->transact(
-            {.station = 17, .request = test::request_of(pdu), .client = 1, .poll = poll},
-            [&](Answer answer) { got = std::move(answer); });
+        bus->transact({.station = 17, .request = test::request_of(pdu), .client = 1, .poll = poll},
+                      [&](Answer answer) { got = std::move(answer); });
         EXPECT_TRUE(test::run_until(io, clock, [&] { return got.has_value(); }));
         return got.value_or(Answer{});
     }

@@ -174,12 +174,12 @@ TEST(TracePcapng, WrapsAFrameForTheDissectorOfModbusRtu) {
     EXPECT_EQ(all[0].way, "out");
     EXPECT_EQ(all[0].wrapping,
               "000c0008"
-              "6d62727475000000"   // "mbrtu"
-              "001400047f000001"   // from 127.0.0.1
-              "001500047f00011f"   // to 127.0.1.31
-              "0018000400000002"   // TCP
-              "0019000400000001"   // from port 1
-              "001a000400000000"   // to port 0
+              "6d62727475000000"  // "mbrtu"
+              "001400047f000001"  // from 127.0.0.1
+              "001500047f00011f"  // to 127.0.1.31
+              "0018000400000002"  // TCP
+              "0019000400000001"  // from port 1
+              "001a000400000000"  // to port 0
               "00000000");
     EXPECT_EQ(all[1].bytes, reply);
     EXPECT_EQ(all[1].way, "in");
@@ -195,12 +195,12 @@ TEST(TracePcapng, SaysInCommentsWhatWasThrownAwayAndDecided) {
                    frame(5, FrameKind::damaged, "FF 00 FF"_hex),
                    frame(6, FrameKind::late, "1F 03 02 00 07 00 00"_hex)};
     part.frames[0].why = "next in turn";
-    part.decisions = {{1, {}, "one", {}}, {3, {}, "two", {}}, {4, {}, "three", {}},
-                      {9, {}, "four", {}}};
+    part.decisions = {
+        {1, {}, "one", {}}, {3, {}, "two", {}}, {4, {}, "three", {}}, {9, {}, "four", {}}};
     const auto all = shown(part);
     ASSERT_EQ(all.size(), 3u);
-    EXPECT_EQ(all[0].comments, (std::vector<std::string>{"request, transaction 7", "next in turn",
-                                                         "decided: one"}));
+    EXPECT_EQ(all[0].comments,
+              (std::vector<std::string>{"request, transaction 7", "next in turn", "decided: one"}));
     EXPECT_EQ(all[1].comments, (std::vector<std::string>{"discarded: damaged, transaction 7",
                                                          "decided: two", "decided: three"}));
     EXPECT_EQ(all[1].wrapping.substr(0, 16), "000c000464617461") << "data";

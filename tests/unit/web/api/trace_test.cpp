@@ -99,17 +99,16 @@ TEST_F(ApiTrace, IsAlignedTextForPeople) {
     const Reply reply = text();
     EXPECT_EQ(reply.header("Content-Type"), "text/plain; charset=utf-8");
     EXPECT_EQ(reply.header("Vary"), "Accept");
-    EXPECT_EQ(
-        reply.body(),
-        "TIME                              ID STATION REASON      OUTCOME      QUEUE     OUT"
-        "   THINK      IN   TOTAL  CLIENT\n"
-        "1970-01-01T00:00:02.500000Z       17      31 read        ok             2.0     2.0"
-        "     5.0     2.0    13.0  http 10.0.0.9\n"
-        "                               > 1F 03 00 64\n"
-        "                               < 1F 03 02 00 07\n"
-        "                               x FF  damaged\n"
-        "1970-01-01T00:00:02.501000Z  station 5 is refused\n"
-        "1970-01-01T00:00:00.000000Z    > 1F 03 00 64  request\n");
+    EXPECT_EQ(reply.body(),
+              "TIME                              ID STATION REASON      OUTCOME      QUEUE     OUT"
+              "   THINK      IN   TOTAL  CLIENT\n"
+              "1970-01-01T00:00:02.500000Z       17      31 read        ok             2.0     2.0"
+              "     5.0     2.0    13.0  http 10.0.0.9\n"
+              "                               > 1F 03 00 64\n"
+              "                               < 1F 03 02 00 07\n"
+              "                               x FF  damaged\n"
+              "1970-01-01T00:00:02.501000Z  station 5 is refused\n"
+              "1970-01-01T00:00:00.000000Z    > 1F 03 00 64  request\n");
 }
 
 TEST_F(ApiTrace, TextSaysWithADashWhatDidNotHappen) {
@@ -165,8 +164,8 @@ TEST_F(ApiTrace, ListsIncidentsTheOldestFirst) {
 }
 
 TEST_F(ApiTrace, GivesAnIncidentAndRemembersThatItWasRead) {
-    bus.kept.push_back({{3, WallTime(2s), 31, "timeout", 2, true, false},
-                        {bus.frames, bus.made, bus.exchanges}});
+    bus.kept.push_back(
+        {{3, WallTime(2s), 31, "timeout", 2, true, false}, {bus.frames, bus.made, bus.exchanges}});
     const Reply one = get(std::string(kIncidents) + "/3");
     EXPECT_EQ(one.at("cause"), "timeout");
     EXPECT_EQ(one.at("frames").as_array().size(), 3u);
@@ -200,9 +199,9 @@ TEST_F(ApiCosts, AnAnswerNamesTheTransactionsThatItCost) {
     attempts = 2;
     EXPECT_EQ(named(get("/api/v1/stations/press/holding-registers/1")), "18, 19");
     attempts = 1;
-    EXPECT_EQ(named(ask("POST", "/api/v1/lines/floor1/raw",
-                        R"({"station":31,"pdu":"0300640001"})")),
-              "20");
+    EXPECT_EQ(
+        named(ask("POST", "/api/v1/lines/floor1/raw", R"({"station":31,"pdu":"0300640001"})")),
+        "20");
     EXPECT_EQ(named(get("/api/v1/stations/floor1:9/holding-registers/0?count=300")), "21, 22, 23");
 }
 
