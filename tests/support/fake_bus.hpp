@@ -96,11 +96,11 @@ class FakeBus : public bus::BusClient {
     }
     std::vector<bus::IncidentHead> incidents() const override {
         std::vector<bus::IncidentHead> heads;
-        for (const bus::Incident& one : kept) heads.push_back(one.head);
+        for (const bus::Incident& one : frozen) heads.push_back(one.head);
         return heads;
     }
     std::optional<bus::Incident> incident(std::uint64_t id) override {
-        for (bus::Incident& one : kept) {
+        for (bus::Incident& one : frozen) {
             if (one.head.id != id) continue;
             one.head.read = true;
             return one;
@@ -132,7 +132,7 @@ class FakeBus : public bus::BusClient {
     std::vector<bus::TraceFrame> frames;
     std::vector<bus::TraceDecision> made;  ///< decisions
     std::vector<bus::TraceTransaction> exchanges;
-    std::vector<bus::Incident> kept;
+    std::vector<bus::Incident> frozen;
 
   private:
     template <class Entry>

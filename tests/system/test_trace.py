@@ -14,9 +14,10 @@ import config
 import harness
 
 TSHARK = shutil.which("tshark")
-FIELDS = ["frame.comment", "frame.time_epoch", "_ws.col.Protocol", "mbrtu.unit_id", "modbus.func_code",
+FIELDS = ["frame.comment", "frame.time_epoch", "_ws.col.Protocol", "mbrtu.unit_id", "mbtcp.unit_id", "modbus.func_code",
           "modbus.reference_num", "modbus.word_cnt", "modbus.bit_cnt", "modbus.byte_cnt",
-          "modbus.regval_uint16", "modbus.bitval", "modbus.exception_code", "_ws.malformed"]
+          "modbus.regval_uint16", "modbus.bitval", "modbus.exception_code",
+          "modbus.data", "_ws.malformed"]
 COLUMN, ITEM = "\x1f", "\x1e"
 REGISTERS, BITS = (3, 4), (1, 2)
 
@@ -103,7 +104,8 @@ class Captures(unittest.TestCase):
     def check_frame(self, frame, shown, asked):
         """What tshark shows is what the frame says; `asked`: the last request to that station."""
         adu, station = bytes_of(frame), frame["station"]
-        self.assertEqual(numbers(shown["mbrtu.unit_id"]), [station], frame)
+        units = numbers(shown["mbrtu.unit_id"] or shown["mbtcp.unit_id"])
+        self.assertEqual(units, [station], frame)
         self.assertEqual(numbers(shown["modbus.func_code"]), [adu[1] & 0x7F], frame)
         self.assertEqual(shown["_ws.malformed"], [])
         function, data = adu[1], adu[2:-2]
@@ -114,6 +116,9 @@ class Captures(unittest.TestCase):
                 self.assertEqual(numbers(shown["modbus.word_cnt"]), [count], frame)
             if function in BITS + (15,):
                 self.assertEqual(numbers(shown["modbus.bit_cnt"]), [count], frame)
+            if function in (5, 6):
+                self.assertEqual(shown["modbus.data"][0].replace(":", ""), adu[4:6].hex(), frame)
+            self.assertEqual(bool(shown["mbrtu.unit_id"]), function not in (5, 6) and station != 0, frame)
         elif function & 0x80:
             self.assertEqual(numbers(shown["modbus.exception_code"]), [data[0]], frame)
         if function in REGISTERS and frame["direction"] == "received":
@@ -132,6 +137,7 @@ class Captures(unittest.TestCase):
             program.rest("GET", "/api/v1/stations/" + path)
         program.rest("PUT", "/api/v1/stations/press/devices/UW120", {"values": [7, 8]})
         program.rest("PUT", "/api/v1/stations/io/devices/400001", {"values": [3]})
+        program.rest("POST", "/api/v1/lines/floor1/broadcast", {"table": "holding-registers", "address": 3, "values": [5, 6]})
         before = program.get("/api/v1/lines/floor1/trace?since=0&last=500")[1]["frames"]
         headers, capture = fetch(program, "/api/v1/lines/floor1/trace.pcapng")
         self.assertEqual(headers["Content-Type"], "application/x-pcapng")

@@ -6,15 +6,15 @@
 #include <string_view>
 #include <vector>
 
+#include "exported_pdu.hpp"
 #include "panelgate/bus/trace.hpp"
 #include "pcapng.hpp"
 
 namespace panelgate::web {
 
-/// A line's trace for Wireshark, which shows its frames as Modbus RTU with no preference set: each
-/// is wrapped as an exported PDU that names its dissector, with addresses and ports that tell a
-/// request from its reply. Who sent it and why, what was thrown away and what was decided stand as
-/// comments. Pure.
+/// A line's trace for Wireshark, which shows its frames as Modbus RTU with no preference set, and
+/// in the words of Modbus/TCP what it would not understand as RTU (05, 06, broadcasts). Who sent
+/// each and why, what was thrown away and what was decided stand as comments. Pure.
 class TracePcapng {
   public:
     TracePcapng(std::string_view version, std::string_view line);
@@ -27,9 +27,12 @@ class TracePcapng {
 
   private:
     void add(Pcapng::Packet packet);
+    Pcapng::Packet packet_of(const bus::TraceFrame& frame);
+    ExportedFrame exported(const bus::TraceFrame& frame);
 
     Pcapng file_;
     std::optional<Pcapng::Packet> last_;
+    bool as_tcp_ = false;               ///< the last request
     std::vector<std::string> decided_;  ///< and no frame has followed yet
 };
 

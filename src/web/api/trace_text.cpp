@@ -17,7 +17,7 @@ namespace panelgate::web {
 namespace {
 
 constexpr const char* kHead =
-    "TIME                              ID STATION REASON      OUTCOME      QUEUE     OUT   THINK"
+    "TIME                              ID STATION REASON      OUTCOME     QUEUE     OUT   THINK"
     "      IN   TOTAL  CLIENT\n";
 constexpr std::string_view kIndent = "                               ";
 

@@ -71,6 +71,7 @@ TEST_F(ExchangeTest, EachAttemptIsATransactionAndTheAnswerNamesThemAll) {
     EXPECT_FALSE(bus.exchanges[0].first_byte_in);
     const Ticket other = bus.submit(18, kRead);
     bus.run_to_end_of_request();
+    bus.run_for(5ms);
     bus.hear_reply(18, "83 02"_hex);
     bus.run_for(20ms);
     EXPECT_EQ(bus.answer(other).transactions, std::vector<Transaction>{3});
@@ -83,9 +84,11 @@ TEST_F(ExchangeTest, ReadsThatShareATransactionNameTheSame) {
     const Ticket one = bus.submit(17, kRead, 1);
     const Ticket two = bus.submit(17, kRead, 2);
     bus.run_to_end_of_request();
+    bus.run_for(5ms);
     bus.hear_reply(18, kReply);
     ASSERT_TRUE(bus.next_sent());
     bus.run_to_end_of_request();
+    bus.run_for(5ms);
     bus.hear_reply(17, kReply);
     bus.run_for(20ms);
     EXPECT_EQ(bus.answer(one).transactions, std::vector<Transaction>{2});
@@ -97,10 +100,12 @@ TEST_F(ExchangeTest, SaysWhatWasDamagedWrongBroadcastOrLost) {
     BusScript bus{settings};
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
+    bus.run_for(5ms);
     bus.hear("11 03 06 02 2B 00 00 00 64 C8 BB"_hex);
     bus.run_for(2s);
     bus.submit(18, kRead);
     bus.run_to_end_of_request();
+    bus.run_for(5ms);
     bus.hear_reply(18, "84 01"_hex);
     bus.run_for(2s);
     bus.submit(0, kWrite);

@@ -3,13 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "exported_pdu.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/bus/trace.hpp"
@@ -179,14 +180,55 @@ TEST(TracePcapng, WrapsAFrameForTheDissectorOfModbusRtu) {
               "001500047f00011f"  // to 127.0.1.31
               "0018000400000002"  // TCP
               "0019000400000001"  // from port 1
-              "001a000400000000"  // to port 0
+              "001a0004000001f6"  // to port 502
               "00000000");
     EXPECT_EQ(all[1].bytes, reply);
     EXPECT_EQ(all[1].way, "in");
     EXPECT_EQ(all[1].wrapping,
               "000c00086d62727475000000001400047f00011f001500047f0000010018000400000002"
-              "0019000400000000001a00040000000100000000");
+              "00190004000001f6001a00040000000100000000");
     EXPECT_EQ(all[0].comments, std::vector<std::string>{"request, transaction 7"});
+}
+
+TEST(TracePcapng, SaysAsModbusTcpWhatTheDissectorOfRtuWouldNotTell) {
+    const Bytes request = "1F 06 00 64 00 07 8A 69"_hex;
+    const auto all = shown(
+        {{frame(1, FrameKind::request, request), frame(2, FrameKind::reply, request)}, {}, {}});
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_EQ(all[0].wrapping.substr(0, 24), "000c00086d62746370000000") << "mbtcp";
+    EXPECT_EQ(all[0].bytes, "00 00 00 00 00 06 1F 06 00 64 00 07"_hex);
+    EXPECT_EQ(all[0].comments.back(), "on the wire, as RTU: 1F 06 00 64 00 07 8A 69");
+    EXPECT_EQ(all[1].bytes, all[0].bytes);
+    EXPECT_NE(all[1].wrapping, all[0].wrapping) << "the other way";
+}
+
+TEST(TracePcapng, AReplyHasTheFormOfItsRequest) {
+    const Bytes odd = "1F 01 03 20 00 08 00 00"_hex;  // 800 looks like a reply of three bytes
+    const Bytes plain = "1F 01 00 20 00 08 00 00"_hex;
+    const Bytes reply = "1F 01 01 55 00 00"_hex;
+    const auto all =
+        shown({{frame(1, FrameKind::request, odd), frame(2, FrameKind::reply, reply),
+                frame(3, FrameKind::request, plain), frame(4, FrameKind::reply, reply)},
+               {},
+               {}});
+    std::string forms;
+    for (const Shown& one : all) forms += one.wrapping.substr(12, 4) == "7274" ? 'r' : 't';
+    EXPECT_EQ(forms, "ttrr");
+}
+
+TEST(ExportedPdu, KnowsWhatTheDissectorOfRtuSees) {
+    const auto seen = [](const Bytes& adu, bool request) { return is_seen_by_rtu(adu, request); };
+    EXPECT_TRUE(seen("1F 03 00 64 00 01 00 00"_hex, true));
+    EXPECT_TRUE(seen("1F 03 02 00 07 00 00"_hex, false));
+    EXPECT_TRUE(seen("1F 83 02 00 00"_hex, false));
+    EXPECT_TRUE(seen("1F 10 00 64 00 01 02 00 07 00 00"_hex, true));
+    EXPECT_TRUE(seen("1F 10 00 64 00 01 00 00"_hex, false));
+    EXPECT_TRUE(seen("1F 02 03 01 02 03 00 00"_hex, false));
+    EXPECT_FALSE(seen("1F 02 03 00 00 08 00 00"_hex, true));
+    EXPECT_FALSE(seen("00 10 00 64 00 01 02 00 07 00 00"_hex, true)) << "a broadcast";
+    EXPECT_FALSE(seen("1F 05 00 64 FF 00 00 00"_hex, false));
+    EXPECT_FALSE(seen("1F 07 00 00"_hex, true));
+    EXPECT_FALSE(seen("1F 2B 0E 01 00 00 00"_hex, true));
 }
 
 TEST(TracePcapng, SaysInCommentsWhatWasThrownAwayAndDecided) {

@@ -100,9 +100,9 @@ TEST_F(ApiTrace, IsAlignedTextForPeople) {
     EXPECT_EQ(reply.header("Content-Type"), "text/plain; charset=utf-8");
     EXPECT_EQ(reply.header("Vary"), "Accept");
     EXPECT_EQ(reply.body(),
-              "TIME                              ID STATION REASON      OUTCOME      QUEUE     OUT"
+              "TIME                              ID STATION REASON      OUTCOME     QUEUE     OUT"
               "   THINK      IN   TOTAL  CLIENT\n"
-              "1970-01-01T00:00:02.500000Z       17      31 read        ok             2.0     2.0"
+              "1970-01-01T00:00:02.500000Z       17      31 read        ok            2.0     2.0"
               "     5.0     2.0    13.0  http 10.0.0.9\n"
               "                               > 1F 03 00 64\n"
               "                               < 1F 03 02 00 07\n"
@@ -114,7 +114,7 @@ TEST_F(ApiTrace, IsAlignedTextForPeople) {
 TEST_F(ApiTrace, TextSaysWithADashWhatDidNotHappen) {
     bus.exchanges[0].end = TransactionEnd::timeout;
     bus.exchanges[0].first_byte_in = bus.exchanges[0].last_byte_in = std::nullopt;
-    EXPECT_THAT(text().body(), HasSubstr("timeout        2.0     2.0       -       -    13.0"));
+    EXPECT_THAT(text().body(), HasSubstr("timeout       2.0     2.0       -       -    13.0"));
 }
 
 TEST(Accept, NamesAType) {
@@ -154,8 +154,8 @@ TEST_F(ApiTrace, ALongCaptureHasEveryFrameAndLetsOthersHaveTheirTurn) {
 
 TEST_F(ApiTrace, ListsIncidentsTheOldestFirst) {
     EXPECT_EQ(get(kIncidents).json(), json_of(R"({"incidents":[]})"));
-    bus.kept.push_back({{3, WallTime(2s), 31, "timeout", 2, true, false}, {}});
-    bus.kept.push_back({{4, WallTime(3s), std::nullopt, "line_down", 1, false, false}, {}});
+    bus.frozen.push_back({{3, WallTime(2s), 31, "timeout", 2, true, false}, {}});
+    bus.frozen.push_back({{4, WallTime(3s), std::nullopt, "line_down", 1, false, false}, {}});
     EXPECT_EQ(get(kIncidents).json(), json_of(R"({"incidents":[
         {"id":3,"time":"1970-01-01T00:00:02.000000Z","station":31,"cause":"timeout","errors":2,
          "complete":true,"read":false},
@@ -164,14 +164,14 @@ TEST_F(ApiTrace, ListsIncidentsTheOldestFirst) {
 }
 
 TEST_F(ApiTrace, GivesAnIncidentAndRemembersThatItWasRead) {
-    bus.kept.push_back(
+    bus.frozen.push_back(
         {{3, WallTime(2s), 31, "timeout", 2, true, false}, {bus.frames, bus.made, bus.exchanges}});
     const Reply one = get(std::string(kIncidents) + "/3");
     EXPECT_EQ(one.at("cause"), "timeout");
     EXPECT_EQ(one.at("frames").as_array().size(), 3u);
     EXPECT_EQ(one.at("decisions").as_array().size(), 1u);
     EXPECT_EQ(one.at("transactions").as_array().at(0).at("id"), 17);
-    EXPECT_TRUE(bus.kept[0].head.read);
+    EXPECT_TRUE(bus.frozen[0].head.read);
     const Reply file = get(std::string(kIncidents) + "/3.pcapng");
     EXPECT_EQ(file.header("Content-Disposition"), "attachment; filename=\"floor1-3.pcapng\"");
     EXPECT_THAT(file.body(), HasSubstr("mbrtu"));
