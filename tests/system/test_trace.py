@@ -37,7 +37,7 @@ def decoded(capture):
             [TSHARK, "-n", "-r", str(file), "-T", "fields", *fields, "-E", f"separator={COLUMN}",
              "-E", f"aggregator={ITEM}", "-E", "occurrence=a"],
             capture_output=True, timeout=120, check=True, env={"HOME": folder, "PATH": "/usr/bin:/bin", "LC_ALL": "C.UTF-8"})
-    rows = [row.split(COLUMN) for row in done.stdout.decode().splitlines()]
+    rows = [row.split(COLUMN) for row in done.stdout.decode().split("\n") if row]
     return [{name: cell.split(ITEM) if cell else [] for name, cell in zip(FIELDS, row)} for row in rows]
 
 

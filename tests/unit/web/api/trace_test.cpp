@@ -46,7 +46,8 @@ bus::TraceFrame frame(std::uint64_t sequence, FrameKind kind, std::uint64_t of) 
     bus::TraceFrame made;
     made.sequence = sequence;
     made.kind = kind;
-    made.bytes = "1F 03 00 64"_hex;
+    made.bytes =
+        kind == FrameKind::reply ? "1F 03 02 00 07 00 00"_hex : "1F 03 00 64 00 01 C6 6B"_hex;
     made.transaction = of;
     return made;
 }
@@ -108,7 +109,7 @@ TEST_F(ApiTrace, IsAlignedTextForPeople) {
               "                               < 1F 03 02 00 07\n"
               "                               x FF  damaged\n"
               "1970-01-01T00:00:02.501000Z  station 5 is refused\n"
-              "1970-01-01T00:00:00.000000Z    > 1F 03 00 64  request\n");
+              "1970-01-01T00:00:00.000000Z    > 1F 03 00 64 00 01 C6 6B  request\n");
 }
 
 TEST_F(ApiTrace, TextSaysWithADashWhatDidNotHappen) {
