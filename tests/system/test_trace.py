@@ -157,6 +157,8 @@ class Captures(unittest.TestCase):
         for direction, function in itertools.product(("sent", "received"), (1, 3, 4, 16)):
             self.assertIn((direction, function), functions)
         self.assertIn(("received", 0x83), functions)
+        self.assertTrue({("sent", 5), ("sent", 6)} & functions, functions)
+        self.assertTrue(any(frame["note"] == "broadcast" for frame in before))
 
     def test_damaged_and_late_replies_and_decisions_are_comments(self):
         line = config.line(retries=0, timing="{response_timeout: 60ms}",
