@@ -86,11 +86,12 @@ void Arbiter::settle(TimePoint now) {
     const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
+    const TimePoint proved = station.surely_answered(attempt.timing().started);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_back();
-    if (settings_.may_stall) stations_.on_proved(now, attempt.timing().started);
-    proved_ = std::max(proved_, attempt.timing().started);
+    if (settings_.may_stall) stations_.on_proved(now, proved);
+    proved_ = std::max(proved_, proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
     strays_.on_replied(group.station);

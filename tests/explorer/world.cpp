@@ -122,6 +122,10 @@ void World::deliver(Verb verb, std::uint8_t station) {
     pass_on(was.asked);
     const Judge::Opens before = judge_.open();
     const bool must_do = is_the_answer(was) && verb != Verb::damaged && verb != Verb::cut;
+    if (must_do) {
+        const Duration needed = std::max(known_[station].needed, now_ - was.asked);
+        known_[station] = {.needed = needed};
+    }
     if (verb == Verb::hole) {
         reply.passed = kFirstBytes;
     } else {
@@ -153,7 +157,13 @@ bool World::is_the_answer(const Reply& reply) const {
     const bool last = reply.adu == last_sent_ && reply.asked == judge_.sent_until();
     if (!alone || !last || reply.probe) return false;
     if (reply.passed > 0) return is_in_hole();
-    return clean_ && now_ < reply.asked + kTimeout;
+    return clean_ && now_ < reply.asked + patience(reply);
+}
+
+/// The first silence costs a timeout, each further one no more than the panel has ever needed (P4).
+Duration World::patience(const Reply& reply) const {
+    const Known& known = known_[reply.adu[0]];
+    return known.silent && known.needed > Duration::zero() ? known.needed : kTimeout;
 }
 
 /// Somebody must have got it. While nobody knows whether the line hears itself, what may be the
@@ -273,6 +283,8 @@ void World::act(const arbiter::Transmit& transmit) {
     begun_ = false;
     const std::uint8_t station = transmit.adu[0];
     if (station >= replies_.size() || replies_[station].full()) return;
+    Known& known = known_[station];
+    known.silent = std::exchange(known.unanswered, true);
     replies_[station].push_back({.adu = last_sent_, .asked = end, .probe = probe});
 }
 

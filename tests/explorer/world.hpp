@@ -50,6 +50,12 @@ class World {
         bool probe = false;
     };
     using Replies = Few<Reply, 2>;
+    /// What may be expected of the patience with a panel (P4).
+    struct Known {
+        Duration needed{};  ///< the longest of its replies took so long to begin; 0: none came
+        bool unanswered = false;  ///< what was sent to it last
+        bool silent = false;      ///< what was sent before that
+    };
 
     Bytes bytes_of(const Reply& reply) const;
     TimePoint ready(const Reply& reply) const;
@@ -69,6 +75,7 @@ class World {
     static bool is_asked(const Judge::Open& open, const Reply& reply);
     void pass_on(TimePoint asked);
     bool is_the_answer(const Reply& reply) const;
+    Duration patience(const Reply& reply) const;
     /// Its reply has begun, and the silence since then is no longer than a hole may be.
     bool is_in_hole() const { return begun_ && now_ < begun_at_ + rules_->settings.reply_hole; }
     void noise(Verb verb);
@@ -95,6 +102,7 @@ class World {
     Judge judge_;
     TimePoint now_{1h};
     std::array<Replies, 3> replies_;  ///< by station
+    std::array<Known, 3> known_;      ///< by station
     TimePoint last_start_{};          ///< of the request sent last
     std::array<std::uint8_t, 6> last_sent_{};
     bool clean_ = false;     ///< nothing was heard since then, and the line stayed

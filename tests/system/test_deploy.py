@@ -7,12 +7,17 @@ import shutil
 import subprocess
 import tempfile
 import unittest
+import urllib.request
 
+import config
 import harness
 from harness import ROOT
 
 SERVICE = ROOT / "deploy/systemd/panelgate.service"
-SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "tests/run.sh", ".ci/run")
+ALERTS = ROOT / "deploy/prometheus/rules/alerts.yml"
+ALERT = re.compile(r"- alert: (\w+)")
+SCRIPTS = ("deploy/demo.sh", "deploy/install_packages.sh", "deploy/sbom.sh", "tests/run.sh",
+           "tests/image.sh", "deploy/kubernetes/rules.sh", ".ci/run")
 
 
 def run(*command):
@@ -49,10 +54,44 @@ class Deploy(unittest.TestCase):
         self.assertLessEqual({"ttyS", "ttyUSB", "ttyACM", "ttyAMA", "ttymxc", "ttyO", "ttySC", "ttyTHS",
                               "ttyXRUSB", "pts", "ptmx"}, allowed)
 
+    def test_a_token_of_the_service_is_taken(self):
+        text = SERVICE.read_text()
+        self.assertIn("\nConfigurationDirectory=panelgate\n", text)
+        written = re.search(r"`file: (\S+/panelgate-operator)`", text)[1]
+        self.assertIn(f"\nLoadCredential={pathlib.Path(written).name}\n", text)
+        with tempfile.TemporaryDirectory() as folder:
+            token = pathlib.Path(folder) / "panelgate-operator"
+            token.write_text("a-token-of-the-service\n")
+            token.chmod(0o400)
+            tokens = f'[{{name: ops, role: operator, file: "{written}"}}]'
+            http = f"{config.FREE_PORT}, anonymous: none, tokens: {tokens}"
+            with harness.configured(config.gateway(config.line(), http=http),
+                                    env={**os.environ, "CREDENTIALS_DIRECTORY": folder}) as program:
+                asked = urllib.request.Request(
+                    program.url("/api/v1/lines"),
+                    headers={"Authorization": "Bearer a-token-of-the-service"})
+                with urllib.request.urlopen(asked, timeout=harness.PATIENCE) as answer:
+                    self.assertEqual(answer.status, 200)
+                self.assertEqual(program.get("/api/v1/lines")[0], 401)
+
     @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
     def test_prometheus_takes_the_scrape_configuration(self):
         checked = run("promtool", "check", "config", str(ROOT / "deploy/prometheus/prometheus.yml"))
         self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+
+    @unittest.skipUnless(shutil.which("promtool"), "no promtool here")
+    def test_each_alert_fires_when_it_should_and_not_when_it_should_not(self):
+        tests = sorted(str(file) for file in (ROOT / "tests/prometheus").glob("*_test.yml"))
+        tested = run("promtool", "test", "rules", *tests)
+        self.assertEqual(tested.returncode, 0, tested.stdout + tested.stderr)
+        played = "".join(pathlib.Path(file).read_text() for file in tests)
+        for alert in ALERT.findall(ALERTS.read_text()):
+            self.assertRegex(played, rf'labels: \'{{alertname="{alert}"', alert)
+
+    def test_each_alert_says_what_to_do(self):
+        for alert in ALERTS.read_text().split("- alert: ")[1:]:
+            for key in ("severity", "summary", "description", "runbook"):
+                self.assertRegex(alert, rf"\b{key}: \S", alert)
 
     def test_the_scripts_parse_and_may_be_executed(self):
         for script in SCRIPTS:

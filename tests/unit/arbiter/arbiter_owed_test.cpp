@@ -204,5 +204,23 @@ TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
     EXPECT_EQ(bus.sent.back().adu[0], 17);
 }
 
+TEST_F(ArbiterTest, P1WhereALineStallsAReplyThatMayBeAnOlderOnesProvesNoMoreThanThat) {
+    settings.may_stall = true;
+    settings.quarantine = Quarantine::station;
+    BusScript script{settings};
+    const Ticket first = script.submit(17, kRead, 1);
+    script.submit(18, kRead, 2);
+    while (!script.answered(first)) ASSERT_TRUE(script.next_sent());
+    ASSERT_EQ(script.sent.back().adu[0], 18);
+    ASSERT_GT(script.sent.size(), 3u) << "both were asked twice";
+    script.run_to_end_of_request();
+    script.hear_reply(18, kReply);  // perhaps of its first request: the second of 17 may come yet
+    const std::size_t sent = script.sent.size();
+    script.submit(17, kRead, 1);
+    script.run_for(900ms);
+    EXPECT_EQ(script.sent.size(), sent);
+    EXPECT_GT(script.resets, 0);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter
