@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/priority.hpp"
@@ -36,6 +37,7 @@ struct Job {
     int attempts = 0;      ///< transmissions so far
     bool alone = false;    ///< a shared transaction for it was refused: ask for just this
     bool gone = false;     ///< its client has left while it was on the wire: no further attempt
+    TransactionNumbers transactions{};  ///< one for each attempt
 };
 using Jobs = PoolVector<Job>;
 
