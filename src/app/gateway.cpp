@@ -1,8 +1,11 @@
 #include "gateway.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/ip/host_name.hpp>
+#include <charconv>
 #include <memory>
+#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -32,10 +35,22 @@ boost::system::error_code error_of(tcp_server::Listener& listener) {
     return {};
 }
 
+/// Of the ids of events: another one in each life of the program.
+std::string new_epoch() {
+    constexpr int kHex = 16;
+    std::array<char, 8> text{};
+    const auto [end, wrong] =
+        std::to_chars(text.data(), text.data() + text.size(), std::random_device()(), kHex);
+    return std::string(text.data(), end);
+}
+
 }  // namespace
 
 Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
-    : executor_(std::move(executor)), clock_(executor_), config_(std::move(config)) {
+    : executor_(std::move(executor)),
+      clock_(executor_),
+      config_(std::move(config)),
+      events_(new_epoch()) {
     separate_families(config_);
     for (const config::Line& line : config_.lines) add_line(line, simulate);
     add_relays();
@@ -107,9 +122,30 @@ void Gateway::hear(const std::string& line, const tap::Transaction& heard) {
     for (auto& [place, values] : heard_) {
         if (place.first != line || (heard.station != 0 && heard.station != place.second)) continue;
         const auto wants = values.on_heard(heard);
-        if (!wants.empty())
-            publish_points(events_, plant_.at(line, place.second), wants, clock_.now());
+        if (!wants.empty()) on_points(line, place.second, wants);
     }
+}
+
+void Gateway::on_points(const std::string& line, std::uint8_t id,
+                        const std::vector<std::size_t>& wants) {
+    Station& station = plant_.at(line, id);
+    remember(station, wants, clock_.now());
+    publish_points(events_, station, wants, clock_.now());
+}
+
+/// Who serves nobody keeps nothing.
+void Gateway::keep_histories() {
+    std::size_t points = 0;
+    for (const Station& station : plant_.stations())
+        points += station.points ? station.points->points().size() : 0;
+    const Duration width = points::StationHistory::width_for(points);
+    for (const Station& station : plant_.stations()) {
+        if (!station.points) continue;
+        plant_.at(station.line, station.id).history.emplace(station.points->points(), width);
+    }
+    std::vector<const bus::LineBus*> lines;
+    for (const auto& bus : buses_) lines.push_back(bus.get());
+    line_histories_ = std::make_unique<LineHistories>(clock_, std::move(lines));
 }
 
 /// One a line. What it reads answers clients too, where a station's max_age allows it.
@@ -124,7 +160,7 @@ void Gateway::add_poller(const config::Line& line, std::vector<points::PolledSta
     }
     write_listeners_[line.name] = poller.write_listener();
     poller.on_update([this, name = line.name](std::uint8_t id, const auto& wants) {
-        publish_points(events_, plant_.at(name, id), wants, clock_.now());
+        on_points(name, id, wants);
     });
 }
 
@@ -177,7 +213,13 @@ void Gateway::add_http(const web::Settings& settings) {
     providers.relays = [this] { return relays_->status(); };
     providers.configuration =
         std::make_shared<const std::string>(web::json_text(inventory_json(config_)));
+    providers.wall = rt::wall_now;
+    discoveries_ = std::make_unique<Discoveries>(clock_, plant_, *config_.profiles, events_);
+    providers.discovery = discoveries_.get();
+    keep_histories();
     directory_ = directory_of(plant_, *config_.profiles->find("generic"));
+    for (std::size_t i = 0; i < buses_.size(); ++i)
+        directory_.lines[i].history = &line_histories_->at(i);
     http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
 }
 
@@ -200,6 +242,7 @@ void Gateway::start() {
     for (const auto& bus : buses_) bus->start();
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
+    if (line_histories_) line_histories_->start();
     for (const auto& master : serial_masters_) master->start();
     add_doors();
     openings_.start();
@@ -216,6 +259,7 @@ Duration Gateway::longest_answer() const {
 void Gateway::stop_accepting() {
     ready_ = false;
     openings_.stop();
+    if (discoveries_) discoveries_->stop_all();
     events_.end();
     open_listeners_ = listeners_.size();
     for (const auto& listener : listeners_) {
@@ -243,6 +287,7 @@ void Gateway::stop() {
     for (const auto& listener : listeners_) listener->close_now();
     for (const auto& master : serial_masters_) master->stop();
     http_.reset();
+    if (line_histories_) line_histories_->stop();
     relays_->stop();
     for (const auto& poller : pollers_) poller->stop();
     for (const auto& bus : buses_) bus->stop();

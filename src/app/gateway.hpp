@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "discoveries.hpp"
+#include "line_histories.hpp"
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -68,6 +70,9 @@ class Gateway {
                     bus::LineBus& bus);
     void add_heard(const config::Line& line, const std::vector<points::PolledStation>& polled);
     void hear(const std::string& line, const tap::Transaction& heard);
+    void on_points(const std::string& line, std::uint8_t station,
+                   const std::vector<std::size_t>& wants);
+    void keep_histories();
     void add_relays();
     void add_listener(tcp_server::Settings settings);
     void add_serial_master(const serial_server::Settings& settings);
@@ -86,6 +91,8 @@ class Gateway {
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
     std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
     std::vector<std::unique_ptr<bus::LineBus>> buses_;  ///< by the order of config_.lines
+    std::unique_ptr<Discoveries> discoveries_;          ///< null without `http:`
+    std::unique_ptr<LineHistories> line_histories_;     ///< null without `http:`
     std::vector<std::unique_ptr<points::Poller>> pollers_;
     /// Of lines that are only listened to, by their name and the station's id.
     std::map<std::pair<std::string, std::uint8_t>, points::HeardValues> heard_;

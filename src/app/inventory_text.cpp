@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "inventory.hpp"
+#include "panelgate/config/broadcasts.hpp"
 #include "panelgate/config/client_timeout.hpp"
 #include "panelgate/profile/translate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -118,13 +119,15 @@ std::string text_of(const std::map<std::uint8_t, tcp_server::UnitTarget>& units)
     return text;
 }
 
-std::string broadcasts_of(const tcp_server::Settings& listener) {
+std::string broadcasts_of(const config::Config& config, const tcp_server::Settings& listener) {
     using Mode = tcp_server::BroadcastMode;
     if (listener.read_only || listener.broadcast == Mode::deny) return "refused";
+    if (const config::Station* forbids = config::forbids_broadcasts(config, listener))
+        return "refused: " + forbids->name + " is read-only";
     return listener.broadcast == Mode::silent ? "sent, and not answered" : "sent and answered";
 }
 
-std::string text_of(const tcp_server::Settings& listener) {
+std::string text_of(const config::Config& config, const tcp_server::Settings& listener) {
     std::string text = "modbus_tcp " + listener.name() + ':';
     for (const std::string& line : listener.lines) text += ' ' + line;
     if (listener.framing != modbus::Framing::tcp)
@@ -134,7 +137,7 @@ std::string text_of(const tcp_server::Settings& listener) {
     text += text_of(listener.units);
     if (listener.diagnostics_unit)
         text += "  unit " + std::to_string(*listener.diagnostics_unit) + " is the gateway itself\n";
-    return text + "  broadcasts are " + broadcasts_of(listener) + '\n';
+    return text + "  broadcasts are " + broadcasts_of(config, listener) + '\n';
 }
 
 std::string text_of(const serial_server::Settings& master) {
@@ -177,7 +180,8 @@ std::string inventory_text(const config::Config& config) {
     std::string text;
     for (const config::Line& line : config.lines) text += text_of(line);
     for (const points::Relay& relay : config.relays) text += text_of(relay);
-    for (const tcp_server::Settings& listener : config.modbus_tcp) text += text_of(listener);
+    for (const tcp_server::Settings& listener : config.modbus_tcp)
+        text += text_of(config, listener);
     for (const serial_server::Settings& master : config.serial_masters) text += text_of(master);
     if (config.http) text += text_of(*config.http);
     return text;

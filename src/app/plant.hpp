@@ -9,6 +9,7 @@
 
 #include "panelgate/bus/station_ref.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/points/station_history.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -31,9 +32,10 @@ struct Line {
 
 /// A station that the configuration lists. What it refers to outlives the plant.
 struct Station : bus::StationRef {
-    const config::Station* configured = nullptr;  ///< never null
-    sim::SimulatedBus* simulated = nullptr;       ///< where its panel is played; null: a real one
-    std::optional<points::StationPoints> points;  ///< what its polls bring, when it has any
+    const config::Station* configured = nullptr;    ///< never null
+    sim::SimulatedBus* simulated = nullptr;         ///< where its panel is played; null: a real one
+    std::optional<points::StationPoints> points;    ///< what its polls bring, when it has any
+    std::optional<points::StationHistory> history;  ///< ... and have brought; where REST is served
     /// The id by which Modbus/TCP clients reach it: of the first listener that has one.
     std::optional<int> unit;
 };

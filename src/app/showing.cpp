@@ -4,6 +4,7 @@
 #include <utility>
 #include <variant>
 
+#include "panelgate/points/station_history.hpp"
 #include "panelgate/points/value.hpp"
 #include "panelgate/web/api/event_text.hpp"
 #include "simulated_line.hpp"
@@ -18,6 +19,7 @@ web::StationEntry entry_of(const Station& station) {
     entry.read_only = station.configured->read_only;
     entry.unit = station.unit;
     entry.points = station.points ? &*station.points : nullptr;
+    entry.history = station.history ? &*station.history : nullptr;
     entry.simulated = simulated_panel(station.simulated, station.id);
     return entry;
 }
@@ -38,16 +40,22 @@ struct Publisher {
     const std::string& line;
 
     void operator()(const bus::LineEvent& event) const {
-        hub.publish("line", web::line_event(line, event.up ? "up" : "down", event.why));
+        if (!hub.announce("line")) return;
+        hub.publish({"line", line, {}, {}},
+                    web::line_event(line, event.up ? "up" : "down", event.why));
     }
     void operator()(const arbiter::StationEvent& event) const {
+        if (!hub.announce("station")) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish("station", web::station_event(line, station, label(event.kind)));
+        hub.publish({"station", line, station, {}},
+                    web::station_event(line, station, label(event.kind)));
     }
     void operator()(const bus::TransactionEvent& event) const {
+        if (!hub.announce("transaction")) return;
         const std::string station = plant.name_of(line, event.station);
-        hub.publish("transaction", web::transaction_event(line, station, event.function,
-                                                          label(event.outcome), event.took));
+        hub.publish({"transaction", line, station, {}},
+                    web::transaction_event(line, station, event.function, label(event.outcome),
+                                           event.took));
     }
     void operator()(const bus::WriteEvent&) const {}   // the points it touches are told
     void operator()(const tap::Transaction&) const {}  // as are these
@@ -93,16 +101,26 @@ std::vector<points::RelaySample> relay_samples(const std::vector<points::RelaySt
 
 void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
              const bus::BusEvent& event) {
-    if (!hub.is_idle()) std::visit(Publisher{hub, plant, line}, event);
+    std::visit(Publisher{hub, plant, line}, event);
+}
+
+void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now) {
+    if (!station.points || !station.history) return;
+    for (const std::size_t want : wants) {
+        const points::Point* point = station.points->point_of(want);
+        if (point != nullptr)
+            station.history->record(now, *point, station.points->read(*point, now));
+    }
 }
 
 void publish_points(web::EventHub& hub, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now) {
-    if (hub.is_idle() || !station.points) return;
+    if (!station.points) return;
     for (const std::size_t want : wants) {
         const points::Point* point = station.points->point_of(want);
-        if (point == nullptr) continue;  // a poll block
-        hub.publish("point", web::point_event(station, *point, station.points->read(*point, now)));
+        if (point == nullptr || !hub.announce("point")) continue;  // a poll block
+        hub.publish({"point", station.line, station.name, point->name},
+                    web::point_event(station, *point, station.points->read(*point, now)));
     }
 }
 

@@ -45,4 +45,7 @@ void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
 void publish_points(web::EventHub& hub, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now);
 
+/// Keeps what has become of the points among them, where the station has a history.
+void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now);
+
 }  // namespace panelgate::app

@@ -48,6 +48,7 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     const Ticket ticket = job.ticket;
     if (active_ && !waits && active_->takes_along(now, job)) {
         job.attempts = 1;
+        job.transactions.add(active_->group().transaction);
         ledger_.on_started(now, job);
         active_->group().jobs.push_back(std::move(job));
         return ticket;
@@ -103,6 +104,7 @@ void Arbiter::on_line_down(TimePoint now) {
         } else {
             stations_.of(group.station).owe(now, group.request.pdu(), attempt.timing().sent);
         }
+        ledger_.tell(attempt, TransactionEnd::line_down);
         for (const Job& job : group.jobs) ledger_.finish(job, Fault::line_lost);
     }
     for (const Job& job : schedule_.backlog().clear())
@@ -227,7 +229,9 @@ bool Arbiter::start_next(TimePoint now) {
 void Arbiter::start(TimePoint now, Group group) {
     Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
     if (++group.attempts == 1) group.started = now;
+    group.transaction = ++transactions_;
     for (Job& job : group.jobs) {
+        job.transactions.add(group.transaction);
         if (job.attempts++ == 0) ledger_.on_started(now, job);
     }
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;

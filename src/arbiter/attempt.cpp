@@ -16,7 +16,8 @@ using modbus::Unused;
 Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::size_t size,
                                    Duration lead) {
     Timing timing;
-    const Duration leaving = lead + frame_time(line.serial, size);
+    timing.leaving = frame_time(line.serial, size);
+    const Duration leaving = lead + timing.leaving;
     timing.started = now;
     timing.sent = now + leaving;
     timing.end_of_frame = line.end_of_frame;
@@ -298,6 +299,11 @@ Duration Attempt::waited(TimePoint now) const {
     if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
+}
+
+TimePoint Attempt::first_byte() const {
+    if (!reply_ || !timing_.steady) return first_byte_;
+    return std::min(first_byte_, timing_.sent + waited(last_byte_));
 }
 
 bool Attempt::said_damaged_before() const {

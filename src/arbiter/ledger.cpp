@@ -63,12 +63,14 @@ void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wi
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
-    actions_.push_back(Note{now, kind_of(group), std::move(adu), std::move(why)});
+    actions_.push_back(
+        Note{now, kind_of(group), std::move(adu), std::move(why), group.transaction});
     actions_.push_back(Transmit{std::move(wire)});
 }
 
 void Ledger::finish(const Job& job, Result<Bytes> pdu, bool shared) {
-    actions_.push_back(Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}});
+    actions_.push_back(
+        Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}, job.transactions});
 }
 
 void Ledger::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
@@ -77,6 +79,25 @@ void Ledger::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
     answer.pdu = std::move(pdu);
     answer.age = age;
     actions_.push_back(std::move(answer));
+}
+
+void Ledger::tell(const Attempt& attempt, TransactionEnd end) {
+    if (!explain_) return;
+    const Group& group = attempt.group();
+    const Attempt::Timing& timing = attempt.timing();
+    Exchange told;
+    told.transaction = group.transaction;
+    told.end = end;
+    told.station = group.station;
+    if (!group.jobs.empty()) told.arrived = group.jobs.front().arrived;
+    told.granted = timing.started;
+    told.first_bit_out = timing.sent - timing.leaving;
+    told.last_bit_out = timing.sent;
+    if (attempt.heard()) {
+        told.first_byte_in = attempt.first_byte();
+        told.last_byte_in = attempt.last_byte();
+    }
+    actions_.push_back(told);
 }
 
 void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {

@@ -50,6 +50,11 @@ void Station::take_one(TimePoint now, TimePoint sent) {
     rest_for_owed(now);
 }
 
+TimePoint Station::surely_answered(TimePoint started, ByteView reply) const {
+    const bool open = owes() && modbus::answers(owed_pdu_, reply);
+    return open ? std::min(owed_.front(), started) : started;
+}
+
 void Station::on_proved(TimePoint now, TimePoint sent) {
     if (!owes() || proved_ || owed_.back() >= sent) return;
     proved_ = true;

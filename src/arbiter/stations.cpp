@@ -44,7 +44,10 @@ Duration Stations::patience(TimePoint now, const Group& group) {
     const Station& station = of(group.station);
     const bool poor = station.in_debt(now) && has_company(now, station);
     const bool hurry = now < hurry_until_ || poor;
-    return station.patience(group, slowest(), hurry, spent(now, station));
+    Duration wait = station.patience(group, slowest(), hurry, spent(now, station));
+    const Duration whole = settings(group.station).response_timeout;
+    for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));
+    return wait;
 }
 
 bool Stations::has_company(TimePoint now, const Station& station) const {

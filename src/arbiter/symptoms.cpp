@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "panelgate/arbiter/ledger.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -88,6 +89,7 @@ void Ledger::count_damaged(const Attempt& attempt) {
     }
     // A good frame, but for the order of the CRC's bytes.
     if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
+    if (modbus::ends_in_lower_case(bytes)) ++symptoms.lower_case;
     if (head) ++symptoms.damaged_heads;
     if (expected.value_or(bytes.size()) >= Symptoms::kLongReply) ++symptoms.long_damaged;
     symptoms.damaged_bytes += bytes.size();

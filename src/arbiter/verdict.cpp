@@ -1,6 +1,7 @@
 // What comes of an attempt: its jobs are answered, or it goes again, and its station is judged.
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "explain.hpp"
@@ -13,6 +14,24 @@ namespace panelgate::arbiter {
 using Kind = StationEvent::Kind;
 
 namespace {
+
+TransactionEnd end_of(Verdict verdict) {
+    switch (verdict) {
+        case Verdict::open:
+            return TransactionEnd::open;
+        case Verdict::replied:
+            return TransactionEnd::ok;
+        case Verdict::silent:
+            return TransactionEnd::timeout;
+        case Verdict::damaged:
+            return TransactionEnd::damaged;
+        case Verdict::wrong:
+            return TransactionEnd::wrong;
+        case Verdict::doubtful:
+            return TransactionEnd::doubtful;
+    }
+    std::abort();
+}
 
 /// Somebody could still be answered by another attempt.
 bool in_time(TimePoint now, const Group& group) {
@@ -39,6 +58,7 @@ void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
     schedule_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
+    ledger_.tell(attempt, TransactionEnd::ok);
     for (const Job& job : attempt.group().jobs) {
         if (job.deadline <= now) {  // nobody looked at the clock in between
             ledger_.finish(job, Fault::timeout);
@@ -66,7 +86,7 @@ void Arbiter::settle(TimePoint now) {
     const Duration waited = attempt.waited(now);
     const Duration think = std::max(waited - silent_interval(settings_.serial), Duration::zero());
     const Duration needed = attempt.first_sign(now);
-    const TimePoint proved = station.surely_answered(attempt.timing().started);
+    const TimePoint proved = station.surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_back();
@@ -78,7 +98,9 @@ void Arbiter::settle(TimePoint now) {
     quiet_.rest_until(station.trail_until());
     ledger_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
-    if (modbus::exception_of(reply)) {
+    const bool refused = modbus::exception_of(reply).has_value();
+    ledger_.tell(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
+    if (refused) {
         give_back(group);
     } else {
         reception_.on_read(group, reply, station.settings().max_age);
@@ -91,6 +113,7 @@ void Arbiter::settle(TimePoint now) {
 void Arbiter::ask_again(TimePoint now) {
     active_->remember_doubt();
     Attempt attempt = take_active(now);
+    ledger_.tell(attempt, end_of(Verdict::doubtful));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     station.owe(now, group.request.pdu(), attempt.timing().sent);
@@ -106,6 +129,7 @@ void Arbiter::ask_again(TimePoint now) {
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
     ledger_.on_failed(attempt, verdict);
+    ledger_.tell(attempt, end_of(verdict));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     const TimePoint sent = attempt.timing().sent;

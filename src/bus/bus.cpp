@@ -72,9 +72,8 @@ struct Bus::State final : public line::Line::Events {
         arbiter.set_latency(line->latency());
     }
     void act(arbiter::Finish& finish);
-    void act(arbiter::Note& note) {
-        book.note(note.at, note.kind, std::move(note.bytes), std::move(note.why));
-    }
+    void act(arbiter::Note& note) { book.note(std::move(note)); }
+    void act(const arbiter::Exchange& exchange) { book.end(exchange); }
     void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
     void act(arbiter::StationEvent& event);
     void act(const arbiter::Written& written) {
@@ -140,11 +139,12 @@ void Bus::State::on_up() {
 }
 
 void Bus::State::on_down(const std::string& why) {
-    up = false;
+    const bool was_up = std::exchange(up, false);
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
     observe(settings, LineEvent{false, why});
     drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
+    if (was_up) book.on_line_down(clock.now());
 }
 
 void Bus::State::on_bytes(ByteView bytes) {
@@ -180,7 +180,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .host = request.host,
                      .priority = priority,
                      .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
-                     .within = request.within};
+                     .within = request.within,
+                     .patience = request.patience};
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());
@@ -209,6 +210,8 @@ void Bus::State::act(arbiter::Finish& finish) {
     }
     result.transmitted = finish.transmitted;
     result.shared = finish.shared;
+    if (finish.transmitted) book.answered(finish.transactions.last(), clock.now());
+    result.transactions = std::move(finish.transactions);
     if (finish.age) {
         result.source = Source::cache;
         result.age = *finish.age;
@@ -336,18 +339,35 @@ std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 
-std::vector<TraceFrame> Bus::trace(std::size_t last) const { return state_->book.frames(last); }
+std::vector<TraceFrame> Bus::trace(std::size_t last) const {
+    return state_->book.store().frames(last);
+}
 
 std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
-    return state_->book.decisions().last(last);
+    return state_->book.store().decisions(last);
 }
 
 std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.frames_since(sequence, most);
+    return state_->book.store().frames_since(sequence, most);
 }
 
 std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.decisions().since(sequence, most);
+    return state_->book.store().decisions_since(sequence, most);
+}
+
+std::vector<TraceTransaction> Bus::transactions(std::size_t last) const {
+    return state_->book.store().transactions(last);
+}
+
+std::vector<TraceTransaction> Bus::transactions_since(std::uint64_t sequence,
+                                                      std::size_t most) const {
+    return state_->book.store().transactions_since(sequence, most);
+}
+
+std::vector<IncidentHead> Bus::incidents() const { return state_->book.incidents().heads(); }
+
+std::optional<Incident> Bus::incident(std::uint64_t id) {
+    return state_->book.incidents().fetch(id);
 }
 
 bool Bus::idle() const { return state_->arbiter.idle(); }

@@ -1,11 +1,13 @@
 #include "panelgate/bus/listening_bus.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "account.hpp"
 #include "heard_stations.hpp"
 #include "line_doctor.hpp"
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/bus/load_meter.hpp"
 #include "panelgate/line/drive.hpp"
@@ -37,6 +39,36 @@ std::string words_of_doubt(const tap::Transaction& made) {
                " may be to another request: its values are not taken";
     return "the request of function " + function + " to station " + station +
            " may be a reply whose request was not heard: it is not counted";
+}
+
+TransactionEnd end_of(const tap::Transaction& made) {
+    if (made.doubtful) return TransactionEnd::doubtful;
+    switch (made.end) {
+        case tap::End::answered:
+            return modbus::exception_of(made.reply) ? TransactionEnd::exception
+                                                    : TransactionEnd::ok;
+        case tap::End::unasked:
+            return TransactionEnd::ok;
+        case tap::End::silent:
+            return TransactionEnd::timeout;
+        case tap::End::damaged:
+            return TransactionEnd::damaged;
+    }
+    std::abort();
+}
+
+/// Of the request that was heard last.
+arbiter::Exchange exchange_of(const tap::Transaction& made) {
+    arbiter::Exchange told;
+    told.end = end_of(made);
+    told.station = made.station;
+    told.granted = told.first_bit_out = made.asked;
+    told.last_bit_out = made.sent;
+    if (made.end == tap::End::answered) {
+        told.first_byte_in = made.replied;
+        told.last_byte_in = made.ended;
+    }
+    return told;
 }
 
 }  // namespace
@@ -100,21 +132,23 @@ void ListeningBus::State::on_up() {
 }
 
 void ListeningBus::State::on_down(const std::string& why) {
-    up = false;
+    const bool was_up = std::exchange(up, false);
     why_down = why;
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
     observe(settings, LineEvent{false, why});
     drive.hear([this](TimePoint now) { matcher.on_line_down(now); });
+    if (was_up) book.on_line_down(clock.now());
 }
 
 void ListeningBus::State::act(tap::Frame& frame) {
     heard.count(frame);
-    book.note(frame.at, frame.kind, std::move(frame.bytes));
+    book.note({frame.at, frame.kind, std::move(frame.bytes)});
 }
 
 /// What is perhaps no request at all is no request of the line's.
 void ListeningBus::State::act(const tap::Transaction& made) {
     heard.count(made);
+    book.end(exchange_of(made));
     if (made.doubtful) book.decide(made.ended, words_of_doubt(made));
     if (made.end == tap::End::answered || !made.doubtful) {
         const Outcome outcome = outcome_of(made);
@@ -166,12 +200,12 @@ void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId cli
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
 
 std::vector<TraceDecision> ListeningBus::decisions(std::size_t last) const {
-    return state_->book.decisions().last(last);
+    return state_->book.store().decisions(last);
 }
 
 std::vector<TraceDecision> ListeningBus::decisions_since(std::uint64_t sequence,
                                                          std::size_t most) const {
-    return state_->book.decisions().since(sequence, most);
+    return state_->book.store().decisions_since(sequence, most);
 }
 
 void ListeningBus::name_client(ClientId client, std::string name) {
@@ -200,11 +234,28 @@ std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) cons
 }
 
 std::vector<TraceFrame> ListeningBus::trace(std::size_t last) const {
-    return state_->book.frames(last);
+    return state_->book.store().frames(last);
 }
 
 std::vector<TraceFrame> ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.frames_since(sequence, most);
+    return state_->book.store().frames_since(sequence, most);
+}
+
+std::vector<TraceTransaction> ListeningBus::transactions(std::size_t last) const {
+    return state_->book.store().transactions(last);
+}
+
+std::vector<TraceTransaction> ListeningBus::transactions_since(std::uint64_t sequence,
+                                                               std::size_t most) const {
+    return state_->book.store().transactions_since(sequence, most);
+}
+
+std::vector<IncidentHead> ListeningBus::incidents() const {
+    return state_->book.incidents().heads();
+}
+
+std::optional<Incident> ListeningBus::incident(std::uint64_t id) {
+    return state_->book.incidents().fetch(id);
 }
 
 LineReport ListeningBus::report() const {

@@ -1,41 +1,48 @@
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <cstdint>
 #include <string>
-#include <vector>
 
-#include "panelgate/arbiter/reason.hpp"
-#include "panelgate/base/bytes.hpp"
-#include "panelgate/base/frame_kind.hpp"
+#include "incident_book.hpp"
+#include "panelgate/arbiter/actions.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/transaction_end.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/flight_recorder.hpp"
+#include "trace_store.hpp"
 #include "wall.hpp"
 
 namespace panelgate::bus {
 
-/// What happened on a line, frames and decisions in one sequence: kept for those who ask, and told
-/// in the log at trace level. `settings` and `wall` outlive it.
+/// What happened on a line, frames, decisions and ends of transactions in one sequence: kept for
+/// those who ask, and told in the log at trace level. `settings` and `wall` outlive it.
 class TraceBook {
   public:
     TraceBook(const Settings& settings, Wall& wall);
 
-    void note(TimePoint at, FrameKind kind, Bytes bytes, arbiter::Reason why = {});
-    void decide(TimePoint at, std::string text);
+    /// A frame that was sent, or a master's request that was heard, begins a transaction.
+    void note(arbiter::Note note);
+    void decide(TimePoint at, const std::string& text);
+    /// The transaction with this number is over; 0: the one that was begun last.
+    void end(const arbiter::Exchange& exchange);
+    /// Somebody is answered by this transaction; the first counts.
+    void answered(arbiter::Transaction transaction, TimePoint at);
+    void on_line_down(TimePoint at);
 
-    std::vector<TraceFrame> frames(std::size_t last) const { return in_words(frames_.last(last)); }
-    std::vector<TraceFrame> frames_since(std::uint64_t sequence, std::size_t most) const {
-        return in_words(frames_.since(sequence, most));
-    }
-    const DecisionRecorder& decisions() const { return decisions_; }
+    const TraceStore& store() const { return store_; }
+    IncidentBook& incidents() { return incidents_; }
 
   private:
+    void begin(const arbiter::Note& note, const RecordedFrame& request);
+    void judge(const RecordedTransaction& transaction, TimePoint at);
+
     const Settings& settings_;
     Wall& wall_;
-    std::uint64_t happened_ = 0;  ///< the last sequence number
-    FlightRecorder frames_;
-    DecisionRecorder decisions_;
+    std::uint64_t happened_ = 0;        ///< the last sequence number
+    arbiter::Transaction current_ = 0;  ///< the last that was begun
+    TraceStore store_;
+    IncidentBook incidents_;
+    std::array<TransactionEnd, 256> ends_{};  ///< of each station's last transaction
 };
 
 }  // namespace panelgate::bus

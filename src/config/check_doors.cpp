@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/config/broadcasts.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/settings.hpp"
 
@@ -99,6 +100,19 @@ void warn_of_open_listener(Loading& loading, const Node& node,
                      std::to_string(listener.port));
 }
 
+/// One station forbids them for all; where nothing can be written anyway, nobody wonders.
+void warn_of_broadcasts(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
+    const bool sends = listener.broadcast != tcp_server::BroadcastMode::deny;
+    if (!sends || !can_write(loading.config, listener)) return;
+    const Station* forbids = forbids_broadcasts(loading.config, listener);
+    if (forbids == nullptr) return;
+    loading.warn(mark_of(node, "listen"),
+                 "every broadcast through " + listener.name() +
+                     " is refused (01): it would reach '" + forbids->name +
+                     "', which is read_only; say broadcast: deny if that is meant, or serve its "
+                     "line by another listener");
+}
+
 /// A unit that is not the station of this id, and what is to be known of both.
 void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings& listener,
                   std::uint8_t unit, const UnitTarget& target) {
@@ -176,6 +190,7 @@ void warn_of_doors(Loading& loading, const Node& tree) {
         doors.push_back(
             {mark_of(node, "listen"), listener.address, listener.port, listener.name()});
         warn_of_open_listener(loading, node, listener);
+        warn_of_broadcasts(loading, node, listener);
         for (const auto& [unit, target] : listener.units)
             warn_of_unit(loading, node, listener, unit, target);
     }

@@ -14,8 +14,8 @@ using tcp_server::BroadcastMode;
 using tcp_server::Retransmissions;
 using yaml::MapReader;
 
-constexpr std::array<std::pair<std::string_view, Framing>, 3> kFramings{
-    {{"tcp", Framing::tcp}, {"rtu", Framing::rtu}, {"ascii", Framing::ascii}}};
+constexpr std::array<std::string_view, 3> kFramingWords{"tcp", "rtu", "ascii"};
+constexpr std::array kFramings{Framing::tcp, Framing::rtu, Framing::ascii};
 constexpr std::array<std::pair<std::string_view, HexDigits>, 2> kLowerCase{
     {{"refuse", HexDigits::upper_only}, {"take", HexDigits::any_case}}};
 constexpr std::array<std::pair<std::string_view, BroadcastMode>, 3> kBroadcasts{
@@ -24,6 +24,10 @@ constexpr std::array<std::pair<std::string_view, BroadcastMode>, 3> kBroadcasts{
      {"deny", BroadcastMode::deny}}};
 constexpr std::array<std::pair<std::string_view, Retransmissions>, 2> kRetransmissions{
     {{"join", Retransmissions::join}, {"pass", Retransmissions::pass}}};
+
+std::string framing_hint(std::string_view typed) {
+    return typed == "udp" ? "; datagrams have framing: tcp, write udp: true" : "";
+}
 
 std::string framing_is(Framing framing) {
     return "framing: " + std::string(modbus::label(framing));
@@ -46,7 +50,8 @@ void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings)
 }  // namespace
 
 void load_framing(MapReader& in, tcp_server::Settings& settings) {
-    settings.framing = in.choice<Framing>("framing", kFramings).value_or(settings.framing);
+    if (const auto chosen = in.choice_index("framing", kFramingWords, framing_hint))
+        settings.framing = kFramings[*chosen];
     settings.udp = in.boolean("udp").value_or(settings.udp);
     settings.ascii_digits =
         in.choice<HexDigits>("ascii_lower_case", kLowerCase).value_or(settings.ascii_digits);

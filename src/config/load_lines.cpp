@@ -239,6 +239,15 @@ constexpr std::array<yaml::Elsewhere, 30> kElsewhere{
      {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
      {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}}};
 
+/// What only who asks has a use for.
+void warn_of_idle_keys(Loading& loading, MapReader& in, const Line& line) {
+    if (line.device.rs485.mode != line::Rs485::Mode::off) warn_of_idle_key(loading, in, "rs485");
+    for (const std::string_view key :
+         {"echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
+        if (in.has(key)) warn_of_idle_key(loading, in, key);
+    }
+}
+
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
     in.elsewhere(kElsewhere);
@@ -267,6 +276,7 @@ Line load_line(Loading& loading, const Node& node) {
     }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
+    if (line.listens) warn_of_idle_keys(loading, in, line);
     if (serial_known && !line.listens) warn_of_deadline(loading, node, line);
     return line;
 }

@@ -30,10 +30,11 @@ void load_data_bits(MapReader& in, SerialFormat& format) {
 /// is none, the mode stands elsewhere.
 void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* digits) {
     if (digits == nullptr) {
-        if (in.has("mode"))
-            in.problem("mode",
-                       "a serial master's mode is its framing; write framing: ascii beside "
-                       "serial, or leave it out for RTU");
+        if (!in.has("mode")) return;
+        in.problem("mode",
+                   "a serial master's mode is its framing; write framing: ascii beside "
+                   "serial, or leave it out for RTU");
+        format.mode = SerialMode::ascii;  // which goes with any data bits
         return;
     }
     constexpr std::array<std::pair<std::string_view, modbus::HexDigits>, 2> kLowerCase{

@@ -50,9 +50,9 @@ void check_name(Loading& loading, MapReader& in, const Settings& settings) {
         in.problem("name", "there are two serial masters '" + settings.name + '\'');
 }
 
-/// Two users of one device would take each other's bytes.
+/// Two users of one device would take each other's bytes. What is none has been told.
 void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
-    if (port.device.empty()) return;
+    if (!port.device.starts_with('/')) return;
     for (const Line& line : loading.config.lines) {
         if (line.device.device != port.device) continue;
         in.problem("device", "line '" + line.name +
@@ -136,12 +136,18 @@ void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
 SerialMode mode_of(const Node& master) {
     const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
     const bool ascii =
-        framing != master.entries.end() && framing->value.scalar == modbus::label(Framing::ascii);
+        framing != master.entries.end() && framing->value.scalar != modbus::label(Framing::rtu);
     return ascii ? SerialMode::ascii : SerialMode::rtu;
 }
 
+/// Keys that people write where a line has them.
+constexpr std::array<yaml::Elsewhere, 2> kElsewhere{
+    {{"mode", {}, {}, "its mode is its framing: write framing: ascii, or leave it out for RTU"},
+     {"baud", "serial", {}}}};
+
 Settings load_master(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a serial master", kExample);
+    in.elsewhere(kElsewhere);
     Settings settings;
     settings.access.diagnostics_unit.reset();
     settings.name = load_name(in, true).value_or("");

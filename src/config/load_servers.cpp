@@ -53,6 +53,12 @@ const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name
     return nullptr;
 }
 
+void warn_of_refusals(Loading& loading, yaml::Mark mark, const Line& line) {
+    loading.warn(mark, "line '" + line.name +
+                           "' is only listened to (mode: listen): every request to it is refused "
+                           "(0A); leave it out");
+}
+
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
     if (list == nullptr) {
@@ -66,7 +72,9 @@ void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& 
             loading.problems.add(item.mark, "lines lists the names of lines, such as [floor1]");
             continue;
         }
-        if (find_line(loading, item.mark, item.scalar) == nullptr) continue;
+        const Line* line = find_line(loading, item.mark, item.scalar);
+        if (line == nullptr) continue;
+        if (line->listens) warn_of_refusals(loading, item.mark, *line);
         if (std::ranges::find(settings.lines, item.scalar) != settings.lines.end()) {
             loading.problems.add(item.mark, "line '" + item.scalar + "' is listed twice");
         } else {
@@ -86,6 +94,15 @@ std::optional<std::uint8_t> find_station(const Line& line, const std::string& te
     const bool passes = id && *id >= 0 && *id <= modbus::kMaxStation;
     if (!passes || (*id != 0 && line.refuse_unlisted)) return std::nullopt;
     return static_cast<std::uint8_t>(*id);
+}
+
+/// A line with a list has all that is there, as a rule; without one nobody lists anything.
+void warn_of_unlisted(Loading& loading, yaml::Mark mark, const Line& line, std::uint8_t station) {
+    const bool listed = std::ranges::count(line.stations, station, &Station::id) > 0;
+    if (listed || line.stations.empty()) return;
+    loading.warn(mark, "line '" + line.name + "' does not list station " + std::to_string(station) +
+                           ": requests to it are passed on, and nothing is known of it; add it to "
+                           "'stations', or correct the number");
 }
 
 /// The line of a station that was named alone.
@@ -112,7 +129,9 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
     const std::string text = node.scalar.substr(slash + 1);
     const Line* line = find_line(loading, node.mark, name);
     if (line == nullptr) return std::nullopt;
+    if (line->listens) warn_of_refusals(loading, node.mark, *line);
     const auto station = find_station(*line, text);
+    if (station && *station != 0) warn_of_unlisted(loading, node.mark, *line, *station);
     if (station) return tcp_server::UnitTarget{name, *station};
     std::vector<std::string_view> names;
     names.reserve(line->stations.size());

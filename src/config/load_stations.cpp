@@ -142,6 +142,19 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
                          std::to_string(id) + " (" + profile.manual + ')');
 }
 
+/// What only requests of ours have.
+void warn_of_idle_keys(Loading& loading, MapReader& in, const StationSettings& settings,
+                       const Station& station) {
+    const auto warn = [&](std::string_view key, bool is_set) {
+        if (is_set && in.has(key)) warn_of_idle_key(loading, in, key);
+    };
+    warn("retries", true);
+    warn("retry_writes", settings.retry_writes);
+    warn("max_age", settings.max_age > Duration::zero());
+    warn("guard", station.guard);
+    warn("translate", !station.translate);
+}
+
 /// What a template may give: all but id, name and profile, which `station` has.
 StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& work,
                           Station& station) {
@@ -158,6 +171,11 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
         settings.crc_order = modbus::CrcOrder::low_first;
         if (in.has("crc_order"))
             in.problem("crc_order", "ASCII has no CRC, and one order of its LRC; leave it out");
+        if (station.profile->crc_order != modbus::CrcOrder::low_first)
+            loading.warn(in.mark("profile"),
+                         "profile " + station.profile->name +
+                             " differs in the order of the CRC's bytes, and ASCII has no CRC: take "
+                             "the profile of the newer panel");
     }
     using namespace modbus;
     settings.max_registers =
@@ -171,6 +189,7 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
+    if (station.listens) warn_of_idle_keys(loading, in, settings, station);
     return settings;
 }
 
@@ -254,6 +273,12 @@ void warn_of_broadcasts(Loading& loading, MapReader& in, const Line& line) {
 }
 
 }  // namespace
+
+void warn_of_idle_key(Loading& loading, MapReader& in, std::string_view key) {
+    loading.warn(in.mark(key), std::string(key) +
+                                   " does nothing on a line that is only listened to (mode: "
+                                   "listen): nothing is sent there; leave it out");
+}
 
 void judge_template(Loading& loading, const Node& body) {
     const bool named = std::ranges::count(body.entries, "profile", &yaml::Entry::key) > 0;

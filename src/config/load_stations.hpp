@@ -33,6 +33,9 @@ arbiter::StationSettings load_station_timing(Loading& loading, yaml::MapReader& 
 /// line's serial format has been read already.
 void load_stations(Loading& loading, yaml::MapReader& in, LineInWork work);
 
+/// Of a line that is only listened to: a key that only requests of ours would need.
+void warn_of_idle_key(Loading& loading, yaml::MapReader& in, std::string_view key);
+
 /// A template that no station names, as the body of a station of any line: what is wrong with it
 /// would be found by whoever uses it. One without a profile is held against the profile that it
 /// fits best.

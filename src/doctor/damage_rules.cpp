@@ -23,7 +23,7 @@ Symptoms unexplained(const Case& c) {
     Sample rest;
     for (const auto& [id, symptoms] : c.window.stations) {
         const bool explained = c.has(Cause::duplicate_address, id) ||
-                               c.has(Cause::wrong_parity, id) || c.has(Cause::wrong_crc_order, id);
+                               c.has(Cause::wrong_parity, id) || is_told_by_its_frames(c, id);
         if (explained) continue;
         Symptoms& own = rest.stations[id] = symptoms;
         if (c.has_of_line(Cause::trailing_bytes) || c.has(Cause::trailing_bytes, id))
@@ -103,6 +103,18 @@ void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
           share_text(s.crc_swapped, s.damaged(), "damaged replies") +
               " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
               " replies were right");
+}
+
+void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::ascii_lower_case, named(station)};
+    if (c.facts.serial.mode != SerialMode::ascii) return;
+    if (s.lower_case < bar.enough(3) || s.lower_case * 2 <= s.damaged()) return;
+    c.add(Cause::ascii_lower_case, named(station),
+          "The replies of " + station_text(station) + " have lower-case hex digits.",
+          "Set `serial: {ascii_lower_case: take}` of the line; the standard has upper case only.",
+          share_text(s.lower_case, s.damaged(), "damaged replies") +
+              " are written in lower case; " + std::to_string(s.answered) +
+              " replies were right, as those without A to F are");
 }
 
 void find_all_damaged(Case& c) {

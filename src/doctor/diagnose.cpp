@@ -16,6 +16,7 @@ std::vector<Finding> diagnose(const LineFacts& facts, const Sample& window,
     find_collision(c);
     find_overrun(c);
     for (const auto& [id, symptoms] : window.stations) find_crc_order(c, id, symptoms);
+    for (const auto& [id, symptoms] : window.stations) find_lower_case(c, id, symptoms);
     find_all_damaged(c);
     find_trailing_bytes(c);
     for (const auto& [id, symptoms] : window.stations) {

@@ -7,12 +7,27 @@ namespace panelgate::doctor {
 namespace {
 
 /// In the order of Cause.
-constexpr std::array<std::string_view, 19> kCodes{
-    "echo",          "no-answer-at-all",   "wrong-baud",        "wrong-parity",
-    "other-master",  "collision",          "overrun",           "noise",
-    "tcp-framing",   "trailing-bytes",     "wrong-crc-order",   "wrong-exception",
-    "wrong-reply",   "answers-broadcasts", "duplicate-address", "timeout-too-short",
-    "gap-too-short", "unasked-frames",     "station-silent",
+constexpr std::array<std::string_view, 20> kCodes{
+    "echo",
+    "no-answer-at-all",
+    "wrong-baud",
+    "wrong-parity",
+    "other-master",
+    "collision",
+    "overrun",
+    "noise",
+    "tcp-framing",
+    "trailing-bytes",
+    "wrong-crc-order",
+    "ascii-lower-case",
+    "wrong-exception",
+    "wrong-reply",
+    "answers-broadcasts",
+    "duplicate-address",
+    "timeout-too-short",
+    "gap-too-short",
+    "unasked-frames",
+    "station-silent",
 };
 constexpr std::size_t place(Cause cause) { return static_cast<std::size_t>(cause); }
 static_assert(place(Cause::station_silent) + 1 == kCodes.size());

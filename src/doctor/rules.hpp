@@ -58,6 +58,11 @@ struct Bar {
     bool low = false;
 };
 
+/// Its damage is explained: the frames are right, and written in another way.
+inline bool is_told_by_its_frames(const Case& c, std::uint8_t station) {
+    return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station);
+}
+
 /// What only bytes that are all damaged can tell: Cause::wrong_parity, wrong_baud or noise.
 Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 
@@ -69,6 +74,7 @@ void find_collision(Case& c);
 void find_overrun(Case& c);
 void find_trailing_bytes(Case& c);
 void find_crc_order(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
+void find_lower_case(Case& c, std::uint8_t station, const arbiter::Symptoms& symptoms);
 void find_all_damaged(Case& c);
 void find_noise(Case& c);
 void find_tcp_framing(Case& c);

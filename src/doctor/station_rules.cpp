@@ -57,7 +57,7 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     // Another master that reads what we read makes replies come twice.
     const bool masters =
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
-    if (station == 0 || line || masters || c.has(Cause::wrong_crc_order, station)) return;
+    if (station == 0 || line || masters || is_told_by_its_frames(c, station)) return;
     const Bar bar{c, Cause::duplicate_address, station};
     const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_hit_more(c, s);
     if (s.doubled >= bar.enough(3) || mixed) return add_duplicate(c, station, s);

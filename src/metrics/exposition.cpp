@@ -251,15 +251,19 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
         make_counter("panelgate_tcp_connections_total", "Modbus/TCP connections accepted.");
     Family errors = make_counter("panelgate_tcp_protocol_errors_total",
                                  "Modbus/TCP frames that broke the protocol.");
+    Family joined = make_counter("panelgate_tcp_retransmissions_joined_total",
+                                 "Requests that were sent again before their answer, and got it.");
     for (const tcp_server::Counters& listener : snapshot.listeners) {
         const Labels labels{{"listener", listener.listener}};
         open.gauge(labels, static_cast<double>(listener.connections));
         total.counter(labels, listener.connections_total);
         errors.counter(labels, listener.protocol_errors);
+        joined.counter(labels, listener.joined);
     }
     out.push_back(open.take());
     out.push_back(total.take());
     out.push_back(errors.take());
+    out.push_back(joined.take());
 }
 
 void add_loop(Families& out, const Snapshot& snapshot) {

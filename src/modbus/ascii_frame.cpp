@@ -45,6 +45,16 @@ Bytes encode_ascii(std::uint8_t station, ByteView pdu) {
     return out.take();
 }
 
+bool ends_in_lower_case(ByteView damaged) {
+    const std::size_t size = damaged.size();
+    if (size < 3 || damaged[size - 2] != kCarriageReturn || damaged[size - 1] != kLineFeed)
+        return false;
+    bool lower = false;
+    for (std::size_t i = size - 2; i > 0 && value_of(damaged[i - 1], HexDigits::any_case); --i)
+        lower = lower || damaged[i - 1] >= 'a';
+    return lower;
+}
+
 AsciiReader::Step AsciiReader::take(std::uint8_t character) {
     if (character == kBegin) {
         state_ = State::digits;

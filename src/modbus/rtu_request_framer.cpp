@@ -1,8 +1,10 @@
 #include "panelgate/modbus/rtu_request_framer.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::modbus {
@@ -24,6 +26,15 @@ std::size_t known_frame(ByteView b) {
     const RequestLength length = request_length(b);
     if (length.kind != Kind::known || length.length > b.size()) return 0;
     return is_frame(b.first(length.length)) ? length.length : 0;
+}
+
+/// 08/0000 with one word of data, whose CRC has not come.
+bool may_be_usual(ByteView b) { return b[1] == kDiagnostics && b.size() < kReadRequestAdu; }
+
+/// A function of somebody's own, whose data may begin behind it.
+bool may_hide_at_once(ByteView b) {
+    if (b.size() < 2 || b[1] == 0 || (b[1] & kExceptionBit) != 0) return false;
+    return request_length(b).kind == Kind::by_silence;
 }
 
 }  // namespace
@@ -83,9 +94,14 @@ std::optional<SerialAdu> RtuRequestFramer::next() {
     if (ended_by_silence_ != 0) return take(std::exchange(ended_by_silence_, 0));
     while (!heard_.empty()) {
         const Judgement judgement = judge(heard_.view());
-        if (judgement.kind == Judgement::Kind::frame) return take(judgement.size);
         if (judgement.kind == Judgement::Kind::open) break;
-        step_over(1);
+        if (judgement.kind == Judgement::Kind::nothing) {
+            step_over(1);
+        } else if (sure() || is_pure_read(pdu_of(heard_.view().first(judgement.size)))) {
+            return take(judgement.size);
+        } else {
+            refuse(judgement.size);
+        }
     }
     return std::nullopt;
 }
@@ -94,7 +110,7 @@ RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
     const RequestLength length = usual_request_length(start);
     if (length.kind == Kind::need_more) return {Judgement::Kind::open};
     if (length.kind == Kind::by_silence) {
-        const bool may_be = aligned_ && start.size() <= kMaxRtuAdu;
+        const bool may_be = (trusted_ && start.size() <= kMaxRtuAdu) || may_be_usual(start);
         return {may_be ? Judgement::Kind::open : Judgement::Kind::nothing};
     }
     if (length.length > kMaxRtuAdu) return {};
@@ -104,19 +120,25 @@ RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
 }
 
 void RtuRequestFramer::on_silence() {
-    if (heard_.empty()) aligned_ = true;
+    const bool was_lost = !trusted_;
+    if (heard_.empty()) trust();
     ended_by_silence_ = size_by_silence();
     if (ended_by_silence_ != 0) return;
     for (std::size_t start = 1; start < heard_.size(); ++start) {
-        if (known_frame(heard_.view().subspan(start)) != 0) return step_over(start);
+        if (known_frame(heard_.view().subspan(start)) == 0) continue;
+        step_over(start);
+        break;
     }
+    // What waits is left of something damaged, and what comes next begins by itself; not so if it
+    // was a request that is half there, whose rest may come behind the pause.
+    if (was_lost && !trusted_ && silence_behind_ == 0) silence_behind_ = heard_.size();
 }
 
 /// Size of the frame at the front that nothing but a silence tells: it ends with what has come, or
 /// where a frame of a known length begins. 0: there is none.
 std::size_t RtuRequestFramer::size_by_silence() const {
     const ByteView all = heard_.view();
-    if (!aligned_) return 0;
+    if (!trusted_) return 0;
     if (is_frame(all)) return all.size();
     if (request_length(all).kind != Kind::by_silence) return 0;
     for (std::size_t end = all.size(); end >= kMinAdu; --end) {
@@ -127,22 +149,57 @@ std::size_t RtuRequestFramer::size_by_silence() const {
 
 SerialAdu RtuRequestFramer::take(std::size_t size) {
     SerialAdu adu = serial_adu_of(heard_.view().first(size));
-    heard_.take(size);
+    if (sure()) trust();
     discarded_ = 0;
     aligned_ = true;
+    go_on_in_row(size);
     return adu;
+}
+
+/// A good frame that may be data.
+void RtuRequestFramer::refuse(std::size_t size) {
+    ++faults_;
+    discarded_ += size;
+    go_on_in_row(size);
 }
 
 void RtuRequestFramer::step_over(std::size_t count) {
     if (std::exchange(aligned_, false)) ++faults_;
+    if (trusted_) lose_trust();
     discarded_ += count;
+    in_row_ = 0;
+    consume(count);
+}
+
+void RtuRequestFramer::lose_trust() {
+    constexpr std::size_t kGlitch = 3;  // of a transceiver that is switched
+    trusted_ = false;
+    since_lost_ = 0;
+    in_row_ = 0;
+    silence_behind_ = 0;
+    glitch_limit_ = may_hide_at_once(heard_.view()) ? 1 : kGlitch;
+}
+
+void RtuRequestFramer::trust() { aligned_ = trusted_ = true; }
+
+void RtuRequestFramer::go_on_in_row(std::size_t size) {
+    consume(size);
+    in_row_ += size;
+    if (in_row_ > kMaxRtuAdu) trust();
+}
+
+void RtuRequestFramer::consume(std::size_t count) {
     heard_.take(count);
+    since_lost_ += count;
+    if (silence_behind_ == 0) return;
+    if (silence_behind_ == count) trust();
+    silence_behind_ -= std::min(silence_behind_, count);
 }
 
 void RtuRequestFramer::drop_pending() {
     ended_by_silence_ = 0;
     if (!heard_.empty()) step_over(heard_.size());
-    aligned_ = true;
+    trust();
 }
 
 std::size_t RtuRequestFramer::take_faults() { return std::exchange(faults_, 0); }

@@ -53,10 +53,12 @@ std::optional<bool> SharedMemory::changes(const modbus::Span& written,
                                [&](const modbus::Span& shown) { return shown.overlaps(items); });
 }
 
+Duration bad_after(Duration every) { return std::max<Duration>(10 * every, 10s); }
+
 Quality quality_of(const Reading& reading, Duration every, TimePoint now) {
     if (!reading.sampled) return Quality::bad;
     const Duration age = now - *reading.sampled;
-    if (age > std::max<Duration>(10 * every, 10s)) return Quality::bad;
+    if (age > bad_after(every)) return Quality::bad;
     return reading.failing || reading.outdated() || age > 2 * every + 1s ? Quality::stale
                                                                          : Quality::good;
 }

@@ -74,18 +74,21 @@ std::optional<std::string> parse_parity(std::string_view text, Settings& setting
     return std::nullopt;
 }
 
-std::optional<std::string> parse_stations(std::string_view text, Settings& settings) {
+std::optional<std::vector<std::uint8_t>> station_list(std::string_view text) {
     std::set<std::uint8_t> stations;
     for (const std::string_view part : split(text)) {
         const auto range = parse_range(part);
-        if (!range) {
-            return "--stations " + quoted(text) +
-                   " is not a list of addresses from 1 to 247 such as 1-31 or 5,17,20-31";
-        }
+        if (!range) return std::nullopt;
         for (int station = range->first; station <= range->second; ++station)
             stations.insert(static_cast<std::uint8_t>(station));
     }
-    settings.stations.assign(stations.begin(), stations.end());
+    return std::vector<std::uint8_t>(stations.begin(), stations.end());
+}
+
+std::optional<std::string> parse_stations(std::string_view text, Settings& settings) {
+    auto stations = station_list(text);
+    if (!stations) return "--stations " + quoted(text) + " is not " + kStationListForm;
+    settings.stations = std::move(*stations);
     return std::nullopt;
 }
 

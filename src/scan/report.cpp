@@ -58,7 +58,9 @@ std::string profile_of(const StationFinding& finding) {
     return text.empty() ? "?" : text;
 }
 
-std::string evidence_of(const StationFinding& finding) {
+}  // namespace
+
+std::string evidence_text(const StationFinding& finding) {
     std::string odd = oddities(finding);
     if (finding.crc_order == modbus::CrcOrder::high_first)
         odd += std::string(odd.empty() ? "" : "; ") + "the CRC's high byte comes first";
@@ -66,6 +68,8 @@ std::string evidence_of(const StationFinding& finding) {
     const std::string& why = finding.candidates.front().why;
     return odd.empty() ? why : odd + "; " + why;
 }
+
+namespace {
 
 std::string padded(std::string text, std::size_t width) {
     text.resize(std::max(text.size(), width), ' ');
@@ -118,14 +122,15 @@ std::string yaml_serial(const Result& result) {
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
 }
 
-std::string yaml_station(const StationFinding& finding) {
+/// `prefix`: of its name, before the address.
+std::string yaml_station(const StationFinding& finding, const std::string& prefix = "station") {
     std::string text;
     if (const std::string odd = oddities(finding); !odd.empty()) text += "      # " + odd + "\n";
     if (finding.duplicate) text += "      # (give one of them another address)\n";
     const std::string profile =
         finding.candidates.empty() ? kUnknown : finding.candidates.front().profile;
     text += was_read(finding) ? "      - " : "      # - ";
-    text += "{id: " + address(finding) + ", name: station-" + address(finding) +
+    text += "{id: " + address(finding) + ", name: " + prefix + '-' + address(finding) +
             ", profile: " + profile;
     if (finding.crc_order == modbus::CrcOrder::high_first)
         text += ", crc_order: " + std::string(label(finding.crc_order));
@@ -175,7 +180,7 @@ std::string report_text(const std::string& device, const Result& result,
     text += padded(std::string(kAddress), 0) + padded("PROFILE", width) + "EVIDENCE\n";
     for (const StationFinding& finding : result.stations) {
         text += padded(address(finding), kAddress.size()) + padded(profile_of(finding), width) +
-                evidence_of(finding) + '\n';
+                evidence_text(finding) + '\n';
     }
     return text;
 }
@@ -191,6 +196,12 @@ std::string report_yaml(const std::string& device, const Result& result,
             yaml_serial(result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);
     return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // nothing runs without a server
+}
+
+std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations) {
+    std::string text;
+    for (const StationFinding& finding : stations) text += yaml_station(finding, line);
+    return text;
 }
 
 std::vector<std::string> advice(const std::string& device, const Result& result) {

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_request_framer.hpp"
 
@@ -22,15 +23,24 @@ std::optional<modbus::SerialAdu> RtuHearing::next() {
     while (!heard_.empty()) {
         const Judgement judgement = judge(heard_.view(), aligned_);
         if (judgement.kind == Judgement::Kind::open) break;
+        std::size_t wrong = 1;
         if (judgement.kind == Judgement::Kind::frame) {
             const bool is_last = judgement.size == heard_.size();
-            if (aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_))
-                return take(judgement.size);
-            if (is_last) break;
+            const bool counts = aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_);
+            if (counts && may_take(judgement.size)) return take(judgement.size);
+            if (is_last && !silent_) break;
+            if (counts) wrong = judgement.size;
         }
-        step_over(1);
+        step_over(wrong);
     }
+    if (silent_ && heard_.empty()) trust();
     return std::nullopt;
+}
+
+/// Of a good frame at the front.
+bool RtuHearing::may_take(std::size_t size) const {
+    const ByteView frame = heard_.view().first(size);
+    return sure() || !concerns_us(frame[0]) || modbus::is_pure_read(modbus::pdu_of(frame));
 }
 
 RtuHearing::Judgement RtuHearing::judge(ByteView start, bool aligned) const {
@@ -56,7 +66,7 @@ RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool alig
 }
 
 void RtuHearing::on_silence() {
-    if (heard_.empty()) aligned_ = true;
+    if (heard_.empty()) trust();
     if (std::exchange(silent_, true) || heard_.empty()) return;
     if (!knows_rest()) step_to_last();
 }
@@ -89,21 +99,28 @@ bool RtuHearing::step_to_last() {
 
 modbus::SerialAdu RtuHearing::take(std::size_t size) {
     modbus::SerialAdu adu = modbus::serial_adu_of(heard_.view().first(size));
-    heard_.take(size);
+    trusted_ = sure();
     aligned_ = true;
+    consume(size);
     return adu;
 }
 
 void RtuHearing::step_over(std::size_t count) {
     if (std::exchange(aligned_, false)) ++faults_;
+    if (std::exchange(trusted_, false)) since_lost_ = 0;
+    consume(count);
+}
+
+void RtuHearing::consume(std::size_t count) {
     heard_.take(count);
+    since_lost_ += count;
 }
 
 void RtuHearing::drop_pending() {
     silent_ = true;
     if (step_to_last()) return;
     step_over(heard_.size());
-    aligned_ = true;
+    trust();
 }
 
 std::size_t RtuHearing::take_faults() { return std::exchange(faults_, 0); }

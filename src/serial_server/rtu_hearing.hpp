@@ -16,7 +16,9 @@ namespace panelgate::serial_server {
 /// says may be a request to it or its reply, whichever is good, so that nobody's data is searched
 /// for requests. Behind noise, a request that is served here, or a broadcast, counts only if a
 /// silence follows: its master waits for the reply, while what looks like one inside of other
-/// bytes is followed by more of them. Holds 260 bytes at most.
+/// bytes is followed by more of them. What is no pure read counts there only behind up to three
+/// bytes, a glitch: it may end the data of a damaged write, and a master says it again. Holds 260
+/// bytes at most.
 class RtuHearing final : public Hearing {
   public:
     explicit RtuHearing(const Units& served) : served_(served) {}
@@ -36,16 +38,23 @@ class RtuHearing final : public Hearing {
         std::size_t size = 0;  ///< of a frame
     };
     bool concerns_us(std::uint8_t station) const { return station == 0 || served_[station]; }
+    bool sure() const { return trusted_ || since_lost_ <= kGlitch; }
+    bool may_take(std::size_t size) const;
     Judgement judge(ByteView start, bool aligned) const;
     Judgement weigh(modbus::ReplyLength length, ByteView start, bool aligned) const;
     bool step_to_last();
     modbus::SerialAdu take(std::size_t size);
     void step_over(std::size_t count);
+    void consume(std::size_t count);
+    void trust() { aligned_ = trusted_ = true; }
 
+    static constexpr std::size_t kGlitch = 3;  ///< shorter than any frame's head
     Units served_;
     ByteQueue heard_;
-    bool aligned_ = true;  ///< a frame begins at the front, if it is one
-    bool silent_ = false;  ///< nothing has followed what was heard
+    bool aligned_ = true;         ///< a frame begins at the front, if it is one
+    bool trusted_ = true;         ///< ... and no damaged one can be around it
+    std::size_t since_lost_ = 0;  ///< bytes, since that is not so
+    bool silent_ = false;         ///< nothing has followed what was heard
     std::size_t faults_ = 0;
 };
 

@@ -9,6 +9,16 @@ namespace panelgate::tap {
 void GiveUp::seen(Duration interval) {
     seen_.push_back(interval);
     if (seen_.size() > kKept) seen_.pop_front();
+    outwaited_.clear();
+}
+
+void GiveUp::outwaited(Duration interval) {
+    outwaited_.push_back(interval);
+    if (outwaited_.size() < kNeeded) return;
+    const Duration waited = *std::ranges::min_element(outwaited_);
+    std::erase_if(seen_, [&](Duration given_up) { return given_up <= waited; });
+    outwaited_.clear();
+    refuted_ = true;
 }
 
 std::optional<Duration> GiveUp::least() const {

@@ -143,7 +143,7 @@ Duration Matcher::quick(const Habits& habits) const {
 /// A master waits no longer than this.
 Duration Matcher::patience(const Habits& habits) const {
     auto least = habits.give_up.least();
-    if (!least) least = give_up_.least();
+    if (!least && !habits.give_up.is_another()) least = give_up_.least();
     return least ? *least - *least / 16 : settings_.usual_give_up;
 }
 
@@ -172,7 +172,9 @@ void Matcher::answer(Piece piece, bool in_doubt) {
     // Of a function without a length rule: frames between may be lost where an adapter joins them.
     const bool unruled =
         !modbus::is_known(request[0]) && (think > kQuickest || std::ranges::equal(reply, request));
-    made.doubtful = in_doubt || unruled || late || copied || unheard || overdue;
+    const bool doubted = in_doubt || unruled || late || copied || unheard;
+    if (overdue && !doubted) habits.give_up.outwaited(piece.begin - asked.end);
+    made.doubtful = doubted || overdue;
     made.asked = asked.begin;
     made.sent = asked.end;
     made.replied = piece.begin;
@@ -219,7 +221,8 @@ void Matcher::give_up_for(const Piece& request) {
     Habits& habits = of(asked_->question.station);
     const Duration waited = request.begin - asked_->end;
     const Duration usual = habits.longest_think().value_or(Duration::zero());
-    if (!asked_->damaged && !asked_->wrong && !asked_->doubtful && waited >= 2 * usual + 10ms) {
+    const bool undisturbed = !asked_->damaged && !asked_->disturbed && !asked_->doubtful;
+    if (undisturbed && waited >= 2 * usual + 10ms) {
         habits.give_up.seen(waited);
         give_up_.seen(waited);
     }
@@ -269,6 +272,7 @@ void Matcher::on_reply(Piece piece) {
     const std::uint8_t station = piece.bytes.front();
     Habits& habits = of(station);
     const bool unheard = asked_ ? asked_->damaged : noise_;  // a request, perhaps
+    if (asked_) asked_->disturbed = true;
     if (!unheard && piece.bytes == habits.last_reply) {
         habits.repeated = piece.end;
         return note(FrameKind::copy, station, piece);

@@ -9,8 +9,11 @@
 #include <utility>
 #include <variant>
 
+#include "first_bytes.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/framing.hpp"
 #include "panelgate/tcp_server/caller.hpp"
 
 namespace panelgate::tcp_server {
@@ -80,19 +83,67 @@ void Datagrams::on_readable() {
 
 void Datagrams::take(const Received& received) {
     const Endpoint& from = received.from;
-    if (!allowed_.allows(from.address())) {
-        return shared_->log(rt::LogLevel::info, "datagram refused",
-                            {{"client", endpoint_text(from.address().to_string(), from.port())},
-                             {"reason", "not in the allow list"}});
-    }
+    if (!allowed_.allows(from.address()))
+        return log_refused(from, rt::LogLevel::info, "not in the allow list");
     auto adu = adu_of(ByteView(input_).first(received.size));
-    if (!adu) return drop();
+    if (!adu) return drop(received);
     Peer* sender = peer(from);
-    if (sender == nullptr || !sender->pipeline->has_room()) return drop();
+    if (sender == nullptr || !sender->pipeline->has_room()) {
+        if (sender != nullptr && sender->pipeline->joins(*adu)) return;
+        return refuse({from, received.to, adu->transaction, adu->unit, adu->pdu[0]});
+    }
     sender->heard = shared_->clock.now();
     sender->asked = received.to;
     sender->pipeline->take(std::move(*adu));
     answer(from);
+}
+
+void Datagrams::drop(const Received& received) {
+    ++shared_->counters.protocol_errors;
+    const auto spoken =
+        modbus::other_framing(modbus::Framing::tcp, ByteView(input_).first(received.size));
+    if (!spoken) return;
+    log_refused(received.from, rt::LogLevel::warn,
+                "it speaks " + std::string(name_of(*spoken)) +
+                    ", and datagrams are for Modbus/TCP; it needs a connection to a listener with "
+                    "framing: " +
+                    std::string(modbus::label(*spoken)));
+}
+
+/// Paced like all that the gateway answers by itself.
+void Datagrams::refuse(const Busy& busy) {
+    if (shared_->own_answers->may_give()) {
+        tell_busy(busy);
+    } else if (busy_ < shared_->settings.udp_busy_answers) {
+        ++busy_;
+        shared_->own_answers->wait([weak = weak_from_this(), busy] {
+            const auto self = weak.lock();
+            if (!self) return false;
+            --self->busy_;
+            return self->tell_busy(busy);
+        });
+    } else {
+        log_refused(busy.to, rt::LogLevel::debug, "too many without room");
+    }
+}
+
+/// False: it is too late.
+bool Datagrams::tell_busy(const Busy& busy) {
+    if (!socket_.is_open()) return false;
+    ++shared_->counters.requests;
+    ++shared_->counters.exceptions;
+    ++shared_->counters.busy;
+    const Bytes pdu =
+        modbus::encode_exception(busy.function, modbus::ExceptionCode::server_device_busy);
+    send_datagram(socket_, modbus::encode_mbap(busy.transaction, busy.unit, pdu), busy.to,
+                  busy.from);
+    return true;
+}
+
+void Datagrams::log_refused(const Endpoint& from, rt::LogLevel level, std::string reason) const {
+    shared_->log(level, "datagram refused",
+                 {{"client", endpoint_text(from.address().to_string(), from.port())},
+                  {"reason", std::move(reason)}});
 }
 
 Datagrams::Peer* Datagrams::peer(const Endpoint& from) {

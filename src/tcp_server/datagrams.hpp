@@ -9,6 +9,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 
 #include "datagram_io.hpp"
 #include "panelgate/base/time.hpp"
@@ -20,8 +21,9 @@
 namespace panelgate::tcp_server {
 
 /// Modbus/TCP's ADUs in datagrams, one in each; answers go to the sender. Whoever sends (address
-/// and port) has a pipeline like a connection, until it has been idle for a while. What is no ADU,
-/// or comes without room, is dropped and counted: the sender asks again. One thread; held by a
+/// and port) has a pipeline like a connection, until it has been idle for a while. What comes
+/// without room is answered 06, which keeps nothing but its place among the own answers. What is no
+/// ADU is dropped and counted; another framing is told in the log. One thread; held by a
 /// shared_ptr.
 class Datagrams : public std::enable_shared_from_this<Datagrams> {
   public:
@@ -48,6 +50,15 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     };
     using Peers = std::map<Endpoint, Peer>;
 
+    /// What is needed to answer 06.
+    struct Busy {
+        Endpoint to;
+        OwnAddress from;
+        std::uint16_t transaction = 0;
+        std::uint8_t unit = 0;
+        std::uint8_t function = 0;
+    };
+
     void receive();
     void on_readable();
     void take(const Received& received);
@@ -56,7 +67,10 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     void forget_idle(TimePoint now);
     bool forget_longest_idle(const boost::asio::ip::address* address);
     void answer(const Endpoint& to);
-    void drop() { ++shared_->counters.protocol_errors; }
+    void drop(const Received& received);
+    void refuse(const Busy& busy);
+    bool tell_busy(const Busy& busy);
+    void log_refused(const Endpoint& from, rt::LogLevel level, std::string reason) const;
 
     boost::asio::ip::udp::socket socket_;
     std::shared_ptr<Shared> shared_;
@@ -64,6 +78,7 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     std::function<void()> on_idle_;
     Peers peers_;
     std::array<std::uint8_t, modbus::kMaxTcpAdu + 1> input_{};  ///< one more: it is too long
+    std::size_t busy_ = 0;  ///< answers 06 that wait for their turn
     bool finishing_ = false;
 };
 

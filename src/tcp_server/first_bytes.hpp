@@ -1,6 +1,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/framing.hpp"
@@ -8,8 +10,12 @@
 
 namespace panelgate::tcp_server {
 
-/// Watches the first bytes of a connection for a client that speaks in another framing, until its
-/// first request has been understood. Keeps no more of them than the longest ADU has. Pure.
+/// "Modbus RTU"
+std::string_view name_of(modbus::Framing framing);
+
+/// Watches the first bytes of a connection for a client that speaks in another framing, or HTTP,
+/// until its first request has been understood. Keeps no more of them than the longest ADU has.
+/// Pure.
 class FirstBytes {
   public:
     explicit FirstBytes(modbus::Framing expected) : expected_(expected) {}
@@ -23,7 +29,7 @@ class FirstBytes {
     modbus::Framing expected_;
     bool watching_ = true;
     Bytes bytes_;
-    std::optional<modbus::Framing> spoken_;
+    std::optional<std::string> objection_;
 };
 
 }  // namespace panelgate::tcp_server

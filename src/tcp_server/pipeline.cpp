@@ -10,6 +10,7 @@
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/may_change.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 
@@ -33,6 +34,15 @@ Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
         return exception_reply(function, Fault::malformed);
     }
     return std::move(*pdu);
+}
+
+/// Could it change what the read gives? Units may be aliases, so they tell nothing.
+bool makes_old(ByteView request, ByteView read) {
+    if (request.empty() || !modbus::is_pure_read(read) || modbus::is_pure_read(request))
+        return false;
+    if (!modbus::check_request(request)) return false;  // refused
+    const auto span = modbus::read_span(read);
+    return !span || modbus::may_change(modbus::access_of(request).write, *span);
 }
 
 /// Gathers what the lines say of one broadcast.
@@ -90,13 +100,14 @@ bool Pipeline::may_join(ByteView pdu) const {
 }
 
 /// Only with the last one of its transaction id: clients that give all the same id mean on, off,
-/// on.
+/// on. A read behind a write wants what is there then.
 bool Pipeline::is_joined(const modbus::Adu& adu) const {
     if (!may_join(adu.pdu)) return false;
     for (std::size_t i = waiting_.size(); i-- > 0;) {
         if (waiting_[i].transaction == adu.transaction) return waiting_[i] == adu;
+        if (makes_old(waiting_[i].pdu, adu.pdu)) return false;
     }
-    return replies_.newest_is(adu.transaction, adu.unit, adu.pdu).value_or(false);
+    return replies_.newest_is(adu.transaction, adu.unit, adu.pdu, makes_old).value_or(false);
 }
 
 /// One that goes to the bus.
@@ -108,6 +119,7 @@ ReplyQueue::Ticket Pipeline::open(const modbus::Adu& adu) {
 void Pipeline::take(modbus::Adu adu) {
     if (is_joined(adu)) {
         ++joined_;
+        ++shared_->counters.joined;
         shared_->log(rt::LogLevel::debug, "retransmission joined", {{"client", client()}});
         return;
     }
@@ -115,6 +127,12 @@ void Pipeline::take(modbus::Adu adu) {
     if (!modbus::is_answered(shared_->settings.framing, adu.unit)) ++shared_->counters.unanswered;
     waiting_.push_back(std::move(adu));
     admit();
+}
+
+bool Pipeline::joins(const modbus::Adu& adu) {
+    const bool joined = is_joined(adu);
+    if (joined) ++shared_->counters.joined;
+    return joined;
 }
 
 void Pipeline::pop() {

@@ -40,6 +40,8 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     /// A retransmission of one that is not answered yet has no answer of its own
     /// (settings.retransmissions).
     void take(modbus::Adu adu);
+    /// Without room: whether it is such a retransmission, which needs none; it is counted then.
+    bool joins(const modbus::Adu& adu);
     /// The next reply ADU whose turn has come, null when there is none; valid until pop().
     const Bytes* front() const { return replies_.front(); }
     /// front() has been taken: there is room for another request.

@@ -32,11 +32,12 @@ void ReplyQueue::close(Slot& slot) {
 }
 
 std::optional<bool> ReplyQueue::newest_is(std::uint16_t transaction, std::uint8_t unit,
-                                          ByteView pdu) const {
+                                          ByteView pdu, MakesOld makes_old) const {
     for (std::size_t i = slots_.size(); i-- > 0;) {
         const Slot& slot = slots_[i];
         if (slot.transaction == transaction)
             return slot.unit == unit && std::ranges::equal(slot.request, pdu);
+        if (makes_old(slot.request, pdu)) return false;
     }
     return std::nullopt;
 }

@@ -37,8 +37,11 @@ class ReplyQueue {
     void pop();
 
     /// Whether the last request with this transaction id, of those whose replies have not left, is
-    /// this one and was opened with its PDU; nothing: there is none.
-    std::optional<bool> newest_is(std::uint16_t transaction, std::uint8_t unit, ByteView pdu) const;
+    /// this one and was opened with its PDU, and none was opened since whose PDU makes its answer
+    /// old; nothing: there is none.
+    using MakesOld = bool (*)(ByteView since, ByteView pdu);
+    std::optional<bool> newest_is(std::uint16_t transaction, std::uint8_t unit, ByteView pdu,
+                                  MakesOld makes_old) const;
     bool empty() const { return slots_.empty(); }
     /// Requests whose replies have not left.
     std::size_t size() const { return slots_.size(); }

@@ -29,7 +29,8 @@ RtuReader::RtuReader(const Settings& settings)
       partial_timeout_(settings.partial_adu_timeout) {}
 
 void RtuReader::feed(TimePoint now, ByteView bytes) {
-    if (now - heard_ >= silence_ && !was_silent_) framer_.on_silence();
+    const bool unread = std::exchange(unread_, false);
+    if (now - heard_ >= silence_ && !was_silent_ && !unread) framer_.on_silence();
     heard_ = now;
     was_silent_ = false;
     look_at(bytes);

@@ -43,7 +43,10 @@ class RtuReader : public SerialReader {
     std::optional<TimePoint> due() const override;
     void on_due(TimePoint now) override;
     void on_end() override { framer_.on_silence(); }
-    void pause() override { begun_.reset(); }
+    void pause() override {
+        begun_.reset();
+        unread_ = true;
+    }
 
   private:
     Duration silence_;
@@ -51,6 +54,7 @@ class RtuReader : public SerialReader {
     modbus::RtuRequestFramer framer_;
     TimePoint heard_{};        ///< last byte
     bool was_silent_ = false;  ///< since, and that has been looked at
+    bool unread_ = false;      ///< for a while: whether there was a silence nobody knows
     std::optional<TimePoint> begun_;
 };
 

@@ -24,7 +24,7 @@ Settings settings() {
     Settings settings;
     settings.name = "floor1";
     settings.device = "memory";
-    settings.trace_frames = 200;
+    settings.trace.frames = 200;
     settings.doctor.step = 24h;  // what it thinks every few seconds is not of a transaction
     settings.arbiter.serial = {38400, 8, Parity::none, 1};
     settings.arbiter.stations.resize(2);

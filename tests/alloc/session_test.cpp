@@ -60,7 +60,7 @@ class SessionAllocations : public testing::TestWithParam<std::size_t> {
         bus_settings.arbiter.stations.resize(1);
         bus_settings.arbiter.stations[0].frame_gap = 0us;
         bus_settings.arbiter.share_reads = false;
-        bus_settings.trace_frames = 200;
+        bus_settings.trace.frames = 200;
         bus_settings.stations[1].name = "panel";
         auto line = std::make_unique<test::AnsweringLine>(clock, 0ms);
         const test::AnsweringLine& seen = *line;

@@ -19,7 +19,7 @@ import traceback
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 from measures import (counts, crowd, dead, figures, growth, latency, lines, master, memory,  # noqa: E402
-                      micro, plot, report, rig, rivals, saturated, scrape)
+                      micro, plot, readers, report, rig, rivals, saturated, scrape)
 
 Run = collections.namedtuple("Run", "tools gateways rivals quick rates left_out")
 Run.__doc__ = """`gateways`: builds of ours, the judged one first; `rivals`: programs of others; `left_out`:
@@ -31,6 +31,7 @@ TOPICS = {
     "tcp": saturated.measure_tcp,
     "busy": saturated.measure_busy,
     "beside": saturated.measure_beside,
+    "readers": readers.measure,
     "latency": latency.measure,
     "crowd": crowd.measure,
     "master": master.measure,
@@ -46,7 +47,7 @@ TOPICS = {
     "micro": micro.measure,
 }
 BROKEN = "broken off:"
-BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape)
+BARS = [bar for topic in (saturated, latency, crowd, master, lines, memory, counts, scrape, readers)
         for bar in topic.BARS]
 
 

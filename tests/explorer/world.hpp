@@ -89,6 +89,7 @@ class World {
     void act(const arbiter::Finish& finish);
     void act(const arbiter::Note& note);
     void act(const arbiter::Reset&) { reset_ = true; }
+    void act(const arbiter::Exchange&) {}
     void act(const arbiter::Written&) {}
     void act(const arbiter::Decision&) {}
     void act(const arbiter::StationEvent&) {}

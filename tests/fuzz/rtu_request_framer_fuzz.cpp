@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_request_framer.hpp"
 
@@ -20,6 +21,23 @@ void expect_in_order(ByteView stream, const std::vector<SerialAdu>& frames) {
         const auto found = std::search(at, stream.end(), bytes.begin(), bytes.end());
         if (found == stream.end()) std::abort();
         at = found + static_cast<std::ptrdiff_t>(bytes.size());
+    }
+}
+
+/// Nothing that writes is found in the data of a damaged write.
+void expect_no_write_inside(ByteView data) {
+    Bytes pdu{kWriteMultipleRegisters, 0, 0, 0, 0, 0};
+    pdu.insert(pdu.end(), data.begin(), data.end());
+    pdu[4] = pdu[5] = static_cast<std::uint8_t>(data.size());
+    Bytes damaged = encode_adu(1, pdu);
+    damaged.back() ^= 0x01;
+    RtuRequestFramer framer;
+    framer.feed(damaged);
+    for (const bool silence : {false, true}) {
+        if (silence) framer.on_silence();
+        while (const auto frame = framer.next()) {
+            if (!is_pure_read(frame->pdu)) std::abort();
+        }
     }
 }
 
@@ -50,5 +68,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::size_t before = pauses.discarded();
     pauses.drop_pending();
     if (pauses.partial() || pauses.discarded() - before > kMaxRtuAdu) std::abort();
+    expect_no_write_inside(stream.first(std::min<std::size_t>(stream.size(), 246)));
     return 0;
 }

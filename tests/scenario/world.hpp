@@ -43,6 +43,7 @@ class World {
     void act(const arbiter::Note& note);
     void act(const arbiter::Decision&) {}
     void act(const arbiter::Reset&);
+    void act(const arbiter::Exchange&) {}
     void act(const arbiter::Written&) {}
     void act(const arbiter::StationEvent&) {}
 

@@ -41,6 +41,7 @@ class BusScript {
         TimePoint at;
         Result<Bytes> pdu = Fault::cancelled;
         bool transmitted = false;
+        std::vector<arbiter::Transaction> transactions{};
     };
 
     arbiter::Ticket submit(std::uint8_t station, Bytes pdu, arbiter::Client client = 1,
@@ -180,6 +181,7 @@ class BusScript {
     std::vector<arbiter::Decision> decisions;
     std::vector<arbiter::Written> written;
     int resets = 0;  ///< that the arbiter asked for
+    std::vector<arbiter::Exchange> exchanges;
     /// What a driver tells that is asked at the end of a request (Arbiter::confirm_ends).
     std::function<Duration()> unsent = [] { return Duration::zero(); };
 
@@ -198,7 +200,10 @@ class BusScript {
     }
     void act(const arbiter::Finish& finish) {
         EXPECT_EQ(answers.count(finish.ticket), 0u) << "answered twice";
-        answers[finish.ticket] = {now_, finish.pdu, finish.transmitted};
+        Answer& answer = answers[finish.ticket];
+        answer = {now_, finish.pdu, finish.transmitted};
+        finish.transactions.for_each(
+            [&](arbiter::Transaction number) { answer.transactions.push_back(number); });
     }
     void act(const arbiter::Note& note) {
         notes.push_back(note);
@@ -207,6 +212,7 @@ class BusScript {
     void act(const arbiter::Decision& decision) { decisions.push_back(decision); }
     void act(const arbiter::StationEvent& event) { events.push_back(event); }
     void act(const arbiter::Reset&) { ++resets; }
+    void act(const arbiter::Exchange& exchange) { exchanges.push_back(exchange); }
     void act(const arbiter::Written& one) { written.push_back(one); }
 
     arbiter::Settings settings_;

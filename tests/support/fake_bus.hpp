@@ -86,6 +86,27 @@ class FakeBus : public bus::BusClient {
         return since(made, sequence, most);
     }
 
+    std::vector<bus::TraceTransaction> transactions(std::size_t last) const override {
+        const auto skip = exchanges.size() - std::min(last, exchanges.size());
+        return {exchanges.begin() + static_cast<std::ptrdiff_t>(skip), exchanges.end()};
+    }
+    std::vector<bus::TraceTransaction> transactions_since(std::uint64_t sequence,
+                                                          std::size_t most) const override {
+        return since(exchanges, sequence, most);
+    }
+    std::vector<bus::IncidentHead> incidents() const override {
+        std::vector<bus::IncidentHead> heads;
+        for (const bus::Incident& one : frozen) heads.push_back(one.head);
+        return heads;
+    }
+    std::optional<bus::Incident> incident(std::uint64_t id) override {
+        for (bus::Incident& one : frozen) {
+            if (one.head.id != id) continue;
+            one.head.read = true;
+            return one;
+        }
+        return std::nullopt;
+    }
     std::vector<bus::ClientShare> clients() const override { return shares; }
     void name_client(bus::ClientId client, std::string name) override {
         names[client] = std::move(name);
@@ -110,6 +131,8 @@ class FakeBus : public bus::BusClient {
     std::map<std::uint8_t, bus::StationStatus> stations;
     std::vector<bus::TraceFrame> frames;
     std::vector<bus::TraceDecision> made;  ///< decisions
+    std::vector<bus::TraceTransaction> exchanges;
+    std::vector<bus::Incident> frozen;
 
   private:
     template <class Entry>

@@ -29,10 +29,11 @@ def known(address):
 
 
 class ForeignSlave:
-    """pymodbus as an ASCII slave on a device."""
+    """pymodbus as a slave on a device."""
 
-    def __init__(self, device):
+    def __init__(self, device, framer=ModbusAsciiFramer):
         self._device = device
+        self._framer = framer
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -51,7 +52,7 @@ class ForeignSlave:
         # Addresses of pymodbus begin at 1, those on the wire at 0.
         block = ModbusSequentialDataBlock(0, [known(a - 1) for a in range(500)])
         context = ModbusServerContext({UNIT: ModbusSlaveContext(hr=block, ir=block)}, single=False)
-        server = ModbusSerialServer(context, framer=ModbusAsciiFramer, port=self._device,
+        server = ModbusSerialServer(context, framer=self._framer, port=self._device,
                                     baudrate=38400, parity="N", ignore_missing_slaves=True)
         self._loop.run_until_complete(server.start())
         self._ready.set()

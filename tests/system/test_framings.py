@@ -123,6 +123,10 @@ class Framings(unittest.TestCase):
         return [bytes.fromhex(frame["bytes"]) for frame in body["frames"]
                 if frame["direction"] == "sent"]
 
+    def protocol_errors(self):
+        name = "panelgate_tcp_protocol_errors_total"
+        return [line for line in self.program.get("/metrics")[1].splitlines() if line.startswith(name)]
+
     def writes_since(self, place):
         return [frame for frame in self.sent_since(place) if frame[1] in (5, 6, 15, 16)]
 
@@ -180,6 +184,33 @@ class Framings(unittest.TestCase):
                     client.send(b"\x10\xff" + wrap(1, harness.read_registers(400 + i)))
                     reply = wrap(1, struct.pack(">BBH", 3, 2, 1000 * listener + i))
                     self.assertEqual(client.exactly(len(reply)), reply)
+
+    def test_p2_nothing_that_stands_in_a_damaged_write_is_written(self):
+        with Raw(self.port(RTU)) as client:
+            before = self.sent_so_far()
+            inside = harness.rtu(1, harness.write_register(700, 48879))
+            data = b"\0\x07" + inside
+            pdu = struct.pack(">BHHB", 16, 710, len(data) // 2, len(data)) + data
+            damaged = bytearray(harness.rtu(1, pdu))
+            damaged[-1] ^= 1
+            client.send(damaged)
+            client.send(harness.rtu(1, harness.read_registers(700)))
+            reply = harness.rtu(1, b"\x03\x02\0\0")
+            self.assertEqual(client.exactly(len(reply)), reply)
+            self.assertEqual(self.writes_since(before), [])
+
+    def test_p9_each_of_many_datagrams_is_answered_and_none_is_an_error(self):
+        errors = self.protocol_errors()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+            client.settimeout(harness.PATIENCE)
+            client.connect(("127.0.0.1", self.port(TCP)))
+            for i in range(150):
+                client.send(harness.adu(i, 1, harness.read_registers(i)))
+            answers = [client.recv(300) for _ in range(150)]
+        self.assertEqual(sorted(struct.unpack_from(">H", one)[0] for one in answers),
+                         list(range(150)))
+        self.assertTrue(all(one[7:] == b"\x83\x06" or one[7:9] == b"\x03\x02" for one in answers))
+        self.assertEqual(self.protocol_errors(), errors)
 
     def test_nobody_answers_a_broadcast(self):
         for listener, wrap in ((RTU, harness.rtu), (ASCII, ascii_frame)):

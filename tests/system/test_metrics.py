@@ -105,9 +105,10 @@ class Trace(unittest.TestCase):
             numbers, following = [], 0
             while True:
                 page = program.get(f"{path}?since={following}&last=20")[1]
-                entries = page["frames"] + page["decisions"]
+                entries = [entry["sequence"] for entry in page["frames"] + page["decisions"]]
+                entries += [made["ended"] for made in page["transactions"]]
                 self.assertLessEqual(len(entries), 20)
-                numbers += sorted(entry["sequence"] for entry in entries)
+                numbers += sorted(entries)
                 following = page["next"]
                 if not entries or len(numbers) >= 100:
                     break

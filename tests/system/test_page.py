@@ -224,6 +224,17 @@ class Points(Browser):
         self.wait(lambda: "41.5" in self.text(self.ROW))
         self.assertEqual(self.complaints(), [])
 
+    def test_a_plot_begins_with_what_the_gateway_remembers(self):
+        history = "/api/v1/stations/press/points/setpoint/history"
+        self.program.rest("PUT", "/api/v1/stations/press/points/setpoint", {"value": 40})
+        self.wait(lambda: len(self.program.get(history)[1]["samples"]) > 3)
+        self.open("points")
+        self.requested()
+        self.wait(lambda: self.all(self.ROW + " td button"))
+        self.find(self.ROW + " td button").click()
+        self.wait(lambda: self.all(".plot canvas"))  # one value would be no plot
+        self.assertTrue(any(url.endswith(history) for url in self.requested()))
+
     def test_a_point_whose_panel_is_dead_is_stale_and_never_zero(self):
         row = 'tr[data-point="oven/temperature"]'
         self.open("points")
@@ -234,6 +245,27 @@ class Points(Browser):
             self.assertNotRegex(self.text(row + " .strong"), r"^0")
         finally:
             self.program.rest("PUT", "/api/v1/simulator/oven", {})
+
+
+class Discovery(Browser):
+    def look(self, stations):
+        self.open("discovery")
+        self.script("document.querySelector('#stations').value = arguments[0];"
+                    "document.querySelector('#share').value = 50", stations)
+        self.find("button.primary").click()
+
+    def test_it_looks_beside_everybody_else_and_says_how_far_it_is(self):
+        self.look("20-24")
+        self.wait(lambda: "4 of 4" in self.text('[role="status"].muted'))  # 20 is listed
+        self.wait(lambda: self.text(".empty") == "No unlisted station has answered.")
+        self.open("discovery")
+        self.wait(lambda: self.text(".empty") == "No unlisted station has answered.")
+        self.assertEqual(self.complaints(), [])
+
+    def test_a_list_that_is_none_is_told_in_words(self):
+        self.look("300")
+        self.wait(lambda: "1 to 247" in self.text(".refusal"))
+        self.complaints()  # a 400 is written to the console, too
 
 
 class Roles(Browser):

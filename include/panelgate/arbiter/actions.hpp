@@ -8,10 +8,12 @@
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/reason.hpp"
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/transaction_end.hpp"
 #include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
@@ -28,13 +30,28 @@ struct Finish {
     bool shared = false;       ///< another job's transaction answered it too
     /// Of a value that was read before and answers from memory (max_age).
     std::optional<Duration> age;
+    TransactionNumbers transactions{};  ///< that were made for it
 };
 /// Something was seen on the wire, for the trace. Frames stand there as RTU says them.
 struct Note {
     TimePoint at;  ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
-    Reason why{};  ///< of a sent frame, with Settings::explain: why this one now
+    Reason why{};                 ///< of a sent frame, with Settings::explain: why this one now
+    Transaction transaction = 0;  ///< that a sent frame begins
+};
+/// With Settings::explain: a transaction is over. Said behind the frame that ends it, before the
+/// Finish of those that it answers.
+struct Exchange {
+    Transaction transaction = 0;
+    TransactionEnd end = TransactionEnd::open;
+    std::uint8_t station = 0;
+    std::optional<TimePoint> arrived;  ///< the request that leads; nothing: nobody waits for it
+    TimePoint granted;                 ///< it is its turn
+    TimePoint first_bit_out;           ///< by the line's rate, as what follows
+    TimePoint last_bit_out;
+    std::optional<TimePoint> first_byte_in;  ///< of what was taken for its reply
+    std::optional<TimePoint> last_byte_in;
 };
 /// With Settings::explain: why something is not done now, or not at all. One line.
 struct Decision {
@@ -70,6 +87,7 @@ struct Written {
 struct Reset {
     std::string_view why;  ///< a literal, for people
 };
-using Action = std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset>;
+using Action =
+    std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset, Exchange>;
 
 }  // namespace panelgate::arbiter

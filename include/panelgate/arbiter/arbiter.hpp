@@ -23,6 +23,7 @@
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/arbiter/strays.hpp"
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/ascii_transcript.hpp"
@@ -160,6 +161,7 @@ class Arbiter {
     TimePoint proved_{};  ///< what was sent before has passed: a later one was answered
     bool up_ = false;
     bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent
+    Transaction transactions_ = 0;
     Duration latency_{};
     Duration lead_{};
     bool confirm_ends_ = false;

@@ -34,14 +34,15 @@ enum class Verdict : std::uint8_t {
 class Attempt {
   public:
     struct Timing {
-        TimePoint started;        ///< first bit out
+        TimePoint started;        ///< handed over, to leave at once or after the line's lead
         TimePoint sent;           ///< last bit out, computed
         Duration patience{};      ///< from `sent` on: no sign of a reply until then is a timeout
         Duration usual{};         ///< what the station has ever needed, at most `patience`
         Duration end_of_frame{};  ///< silence that ends what has no known length
         Duration hole{};          ///< the longest silence inside a reply of known length
         Duration longest_reply{};
-        Duration pause{};  ///< the silence before this attempt
+        Duration pause{};    ///< the silence before this attempt
+        Duration leaving{};  ///< from the first bit of the request to its last
         /// A reply cannot begin more than this before `sent`; nothing: the line is no real UART.
         std::optional<Duration> tolerance;
         SerialFormat serial;
@@ -155,6 +156,9 @@ class Attempt {
     /// Bytes were heard that came before a reply could.
     bool disturbed() const { return disturbed_; }
     TimePoint last_byte() const { return last_byte_; }
+    /// When what was taken for a reply began: by the line's rate where it keeps that, because bytes
+    /// are looked at late. heard() or replied.
+    TimePoint first_byte() const;
     /// Bytes that came before the request had left: on a real UART they are old. Since the last
     /// call.
     Bytes take_stale() { return std::exchange(stale_, {}); }

@@ -38,6 +38,7 @@ struct Symptoms {
     std::uint64_t echoes = 0;             ///< the request came back as it was sent
     std::uint64_t requests = 0;           ///< another master's: good requests that are not ours
     std::uint64_t crc_swapped = 0;        ///< damaged only in that the CRC's high byte came first
+    std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
     std::uint64_t trailed = 0;            ///< replies with something behind them: bytes, or a copy
 
     /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.

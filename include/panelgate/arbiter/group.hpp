@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
@@ -20,7 +21,8 @@ struct Group {
     modbus::Request request;
     std::optional<modbus::Span> span{};  ///< of a read that can be shared
     int attempts = 0;
-    TimePoint started{};      ///< the first attempt: what answers was not read before
+    Transaction transaction = 0;  ///< of the last attempt
+    TimePoint started{};          ///< the first attempt: what answers was not read before
     Duration silent_after{};  ///< how long the attempt before was waited for in vain; 0: it was not
     Duration
         cut_after{};  ///< the attempt before, whose reply broke off, took so long; 0: it did not

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/priority.hpp"
@@ -27,12 +28,16 @@ struct Job {
     /// The function that was asked for, where the request has another one instead; 0: its own.
     std::uint8_t asked_function = 0;
     Duration within = Duration::max();  ///< its deadline, where the queue's is not sooner
+    /// Its reply is waited for at least so long (within the response timeout), also of a station
+    /// that nobody knows.
+    Duration patience{};
     TimePoint arrived{};
     TimePoint deadline{};
     TimePoint start_by{};  ///< the last moment at which starting it makes sense
     int attempts = 0;      ///< transmissions so far
     bool alone = false;    ///< a shared transaction for it was refused: ask for just this
     bool gone = false;     ///< its client has left while it was on the wire: no further attempt
+    TransactionNumbers transactions{};  ///< one for each attempt
 };
 using Jobs = PoolVector<Job>;
 

@@ -27,6 +27,8 @@ class Ledger {
     void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
+    /// With Settings::explain.
+    void tell(const Attempt& attempt, TransactionEnd end);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
     /// Says so of a group that may change something.
     void written(const Group& group, bool ended);

@@ -65,11 +65,9 @@ class Station {
     /// It owes a reply to a request that nothing proves to have passed: none that was sent later
     /// than `proved` has been answered since.
     bool doubtful(TimePoint proved) const { return owes() && owed_.back() >= proved; }
-    /// No reply to an attempt that was started then proves more than that this request has reached
-    /// it: where it owes others, the first of them may be what was answered.
-    TimePoint surely_answered(TimePoint started) const {
-        return owes() ? std::min(owed_.front(), started) : started;
-    }
+    /// What this reply to an attempt that was started then proves: that a request of that moment
+    /// has reached the station. Where others are owed that it fits as well, the first of them.
+    TimePoint surely_answered(TimePoint started, ByteView reply) const;
     /// The way to the wire was proved free now, by a request that left at `sent`: what was owed
     /// from before may only now have reached the station.
     void on_proved(TimePoint now, TimePoint sent);

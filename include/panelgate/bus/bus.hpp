@@ -13,6 +13,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/line_bus.hpp"
 #include "panelgate/bus/station_settings.hpp"
+#include "panelgate/bus/trace.hpp"
 #include "panelgate/bus/write_event.hpp"
 #include "panelgate/doctor/settings.hpp"
 #include "panelgate/line/line.hpp"
@@ -43,8 +44,8 @@ struct Settings {
     arbiter::Settings arbiter;
     Stations stations;                             ///< those that the configuration lists
     std::function<void(const BusEvent&)> observe;  ///< may be empty; called from inside the bus
-    std::size_t trace_frames = 2000;
-    std::size_t trace_decisions = 500;
+    TraceSettings trace;
+    IncidentSettings incidents;
     doctor::Settings doctor;
 };
 
@@ -74,6 +75,11 @@ class Bus final : public LineBus {
     std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
                                                std::size_t most) const override;
+    std::vector<TraceTransaction> transactions(std::size_t last) const override;
+    std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
+                                                     std::size_t most) const override;
+    std::vector<IncidentHead> incidents() const override;
+    std::optional<Incident> incident(std::uint64_t id) override;
     void name_client(ClientId client, std::string name) override;
 
     LineReport report() const override;

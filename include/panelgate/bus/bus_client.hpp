@@ -7,17 +7,17 @@
 #include <vector>
 
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/fault.hpp"
-#include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/health.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/base/wall_time.hpp"
 #include "panelgate/bus/rights.hpp"
+#include "panelgate/bus/trace.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::bus {
@@ -39,6 +39,9 @@ struct Request {
     bool poll = false;  ///< of the lowest class: clients' own requests go first
     /// Its client waits no longer: its deadline, where that of the line's queue is not sooner.
     Duration within = Duration::max();
+    /// The reply is waited for at least so long (within the response timeout): a station that
+    /// nobody knows is otherwise not waited for longer than the line's others need.
+    Duration patience{};
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -54,26 +57,9 @@ struct Answer {
     /// It is refused here and never transmitted: `pdu` is Fault::denied, or a guard's exception.
     std::optional<Refusal> refusal{};
     std::string why{};  ///< of Fault::line_down: what is wrong with the line, as its state says
+    arbiter::TransactionNumbers transactions{};  ///< of the line, that were made for it
 };
 using AnswerHandler = InlineFunction<void(Answer), 48>;
-
-/// A frame on the wire, for traces.
-struct TraceFrame {
-    std::uint64_t sequence = 0;  ///< counts a line's frames and decisions, from 1
-    TimePoint at;                ///< first bit out; last byte in
-    FrameKind kind = FrameKind::request;
-    Bytes bytes;
-    std::string why;  ///< of a sent frame: why this one at this time
-    WallTime time{};  ///< `at`, by the clock on the wall
-};
-
-/// Why something was not done, or not at once; one line.
-struct TraceDecision {
-    std::uint64_t sequence = 0;  ///< one count with the frames
-    TimePoint at;
-    std::string text;
-    WallTime time{};  ///< `at`, by the clock on the wall
-};
 
 /// What one client has asked of a line, and used of its time (P9).
 struct ClientShare {
@@ -185,6 +171,24 @@ class BusClient {
         static_cast<void>(sequence);
         static_cast<void>(most);
         return {};
+    }
+    /// The same of the transactions that are over, each with its frames.
+    virtual std::vector<TraceTransaction> transactions(std::size_t last) const {
+        static_cast<void>(last);
+        return {};
+    }
+    virtual std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
+                                                             std::size_t most) const {
+        static_cast<void>(sequence);
+        static_cast<void>(most);
+        return {};
+    }
+    /// What has gone wrong and is kept, the oldest first: at most IncidentSettings::incidents.
+    virtual std::vector<IncidentHead> incidents() const { return {}; }
+    /// One of them, which has been read then; nothing: it is not kept.
+    virtual std::optional<Incident> incident(std::uint64_t id) {
+        static_cast<void>(id);
+        return std::nullopt;
     }
     /// What a client is to be called in clients() and in the trace, until cancel(). The last name
     /// counts.

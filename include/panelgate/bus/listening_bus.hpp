@@ -40,6 +40,11 @@ class ListeningBus final : public LineBus {
     std::vector<TraceDecision> decisions(std::size_t last) const override;
     std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
                                                std::size_t most) const override;
+    std::vector<TraceTransaction> transactions(std::size_t last) const override;
+    std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
+                                                     std::size_t most) const override;
+    std::vector<IncidentHead> incidents() const override;
+    std::optional<Incident> incident(std::uint64_t id) override;
     void name_client(ClientId client, std::string name) override;
     LineReport report() const override;
 

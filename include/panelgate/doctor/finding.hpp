@@ -20,6 +20,7 @@ enum class Cause : std::uint8_t {
     tcp_framing,         ///< the same over TCP, where no wire of ours can be the reason
     trailing_bytes,      ///< something follows the replies
     wrong_crc_order,     ///< a panel sends the CRC's bytes in the other order than configured
+    ascii_lower_case,    ///< a panel writes ASCII in lower-case digits, which are refused
     wrong_exception,     ///< a panel refuses with the number of a function that was not asked
     wrong_reply,         ///< a panel's good frames do not answer what was asked
     answers_broadcasts,  ///< a panel answers what nobody may answer

@@ -26,6 +26,10 @@ Bytes encode_ascii(std::uint8_t station, ByteView pdu);
 /// The standard has upper-case digits only (V1.02, 2.5.2).
 enum class HexDigits : std::uint8_t { upper_only, any_case };
 
+/// The end of what is damaged is a line of hex digits with lower-case ones among them, which is
+/// what a frame leaves where only upper case is taken.
+bool ends_in_lower_case(ByteView damaged);
+
 /// Tells frames by their characters, one by one. A ':' always begins a frame. Pure; knows no time.
 class AsciiReader {
   public:

@@ -38,6 +38,8 @@ std::string_view label(Quality quality);
 /// read, or not for ten intervals and ten seconds. Stale: in between; the value is shown with its
 /// age.
 Quality quality_of(const Reading& reading, Duration every, TimePoint now);
+/// The age at which a value that is to be read so often is bad.
+Duration bad_after(Duration every);
 
 /// What is known of memory that a panel shows in several tables.
 struct SharedMemory {

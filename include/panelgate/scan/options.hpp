@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "panelgate/scan/settings.hpp"
 
@@ -13,5 +15,11 @@ namespace panelgate::scan {
 std::optional<std::string> parse_baud(std::string_view text, Settings& settings);
 std::optional<std::string> parse_parity(std::string_view text, Settings& settings);
 std::optional<std::string> parse_stations(std::string_view text, Settings& settings);
+
+/// "5,17,20-31" as addresses, upwards, each once; nothing when it is none.
+std::optional<std::vector<std::uint8_t>> station_list(std::string_view text);
+/// What is missing then, behind "is not".
+inline constexpr const char* kStationListForm =
+    "a list of addresses from 1 to 247 such as 1-31 or 5,17,20-31";
 
 }  // namespace panelgate::scan

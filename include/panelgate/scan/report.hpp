@@ -17,6 +17,12 @@ std::string report_text(const std::string& device, const Result& result,
 std::string report_yaml(const std::string& device, const Result& result,
                         const std::string& profiles_dir = {});
 
+/// The entries of these stations alone, for below the `stations:` of a line of that name.
+std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations);
+
+/// What a station was taken for what it is by, and what is odd about it.
+std::string evidence_text(const StationFinding& finding);
+
 /// What a person should know or do besides: one sentence each.
 std::vector<std::string> advice(const std::string& device, const Result& result);
 

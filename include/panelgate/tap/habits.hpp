@@ -11,16 +11,24 @@
 namespace panelgate::tap {
 
 /// After how long without an answer the line's master goes on: learned from requests that were
-/// surely not answered. The least of the last ones; nothing before there were three.
+/// surely not answered. The least of the last ones; nothing before there were three. A master may
+/// be given another timeout, so what was learned holds until replies later than that were waited
+/// for three times, and nothing was given up between.
 class GiveUp {
   public:
     void seen(Duration interval);
+    /// So long behind its request a reply came, and the master had not gone on.
+    void outwaited(Duration interval);
     std::optional<Duration> least() const;
+    /// What others have shown of the master does not hold here.
+    bool is_another() const { return refuted_; }
 
   private:
     static constexpr std::size_t kNeeded = 3;
     static constexpr std::size_t kKept = 8;
     std::deque<Duration> seen_;
+    std::deque<Duration> outwaited_;  ///< since the last one seen
+    bool refuted_ = false;            ///< by them
 };
 
 /// How one station answers, as far as that helps to tell whose a reply is.

@@ -38,7 +38,8 @@ class Matcher {
         TimePoint end;
         bool damaged = false;  ///< bytes that are no frame were heard behind it
         std::size_t damaged_bytes = 0;
-        bool wrong = false;  ///< its station said something else
+        bool wrong = false;      ///< its station said something else
+        bool disturbed = false;  ///< somebody did: its master may have given it up at once
         bool doubtful = false;
     };
     enum class Reading : std::uint8_t { answer, request, open };

@@ -11,6 +11,7 @@ struct Counters {
     std::uint64_t connections_total = 0;
     std::uint64_t protocol_errors = 0;
     std::uint64_t requests = 0;    ///< taken
+    std::uint64_t joined = 0;      ///< retransmissions that get the answer of the first
     std::uint64_t exceptions = 0;  ///< answered, the panels' own included
     std::uint64_t busy = 0;        ///< exceptions 06
     std::uint64_t unanswered = 0;  ///< requests that get no answer: unit 0 where nobody is answered

@@ -43,6 +43,8 @@ struct Settings {
     bool udp = false;
     std::size_t udp_peers_per_address = 16;  ///< ports that may wait for answers
     Duration udp_idle = 1min;                ///< then a sender of datagrams is forgotten
+    /// Datagrams without room that wait to be answered 06 (own_answers); more are dropped.
+    std::size_t udp_busy_answers = 256;
     std::optional<std::uint8_t> diagnostics_unit = 255;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all

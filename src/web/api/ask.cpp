@@ -7,6 +7,7 @@
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/system/system_error.hpp>
+#include <cstdint>
 #include <utility>
 
 #include "answer.hpp"
@@ -60,6 +61,8 @@ asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient*
         if (!caller->address().empty()) request.host = bus::host_of(caller->address());
         asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
         bus::Answer answer = co_await std::move(pending);
+        answer.transactions.for_each(
+            [&](std::uint64_t number) { caller->add_cost({bus, number}); });
         if (answer.transmitted && changes) caller->take_effect();
         if (!caller->has_left()) co_return answer;
     }

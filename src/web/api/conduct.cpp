@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "costs.hpp"
 #include "keyed.hpp"
 #include "long_answer.hpp"
 #include "panelgate/web/http/gzip.hpp"
@@ -69,6 +70,12 @@ boost::asio::awaitable<std::string> packed(std::string body) {
     co_return gzip.finish();
 }
 
+Handling handled(HttpRequest request, const Api* api, Handler handler, Manner manner) {
+    if (manner.once) return keyed(std::move(request), api, handler);
+    if (manner.asks) return costed(std::move(request), api, handler);
+    return handler(std::move(request), api);
+}
+
 }  // namespace
 
 std::string tag_of(std::string_view body) {
@@ -106,8 +113,7 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, Manner ma
     const bool takes_gzip = accepts_gzip(header(request, "accept-encoding"));
     const std::string if_none_match = header(request, "if-none-match");
     const auto wait = manner.asks ? wait_of(request) : std::nullopt;
-    Handling work =
-        manner.once ? keyed(std::move(request), api, handler) : handler(std::move(request), api);
+    Handling work = handled(std::move(request), api, handler, manner);
     HttpResponse response = co_await std::move(work);
     if (caller->has_left()) co_return response;
     if (wait) {

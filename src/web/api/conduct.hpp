@@ -11,7 +11,8 @@ namespace panelgate::web {
 
 /// What a route's answers have besides what its handler says.
 struct Manner {
-    bool asks = false;    ///< lines: it understands "Prefer: wait=N"
+    /// Lines: it understands "Prefer: wait=N", and the answer names its transactions.
+    bool asks = false;
     bool once = false;    ///< a write: it understands Idempotency-Key
     bool tagged = false;  ///< status: it has an ETag
 };

@@ -58,10 +58,7 @@ Parsed<void> check_members(const json::object& entry, Members of_points, Members
 Parsed<PointOfStation> point_of(const json::object& entry, const Directory& directory) {
     const auto name = string_member(entry, "point");
     if (!name) return name.error();
-    const auto slash = name->rfind('/');
-    if (slash == name->npos)
-        return problem(400, "a point is named STATION/POINT, not '" + *name + '\'');
-    return find_point(directory, name->substr(0, slash), name->substr(slash + 1));
+    return find_point(directory, *name);
 }
 
 Parsed<Items> item_of(const json::object& entry, const Directory& directory) {

@@ -24,6 +24,12 @@ std::string station_event(std::string_view line, std::string_view station, std::
     return json_text(json::object{{"line", line}, {"station", station}, {"event", what}});
 }
 
+std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
+                            std::size_t of, std::size_t found) {
+    return json_text(json::object{
+        {"line", line}, {"state", state}, {"asked", asked}, {"of", of}, {"found", found}});
+}
+
 std::string transaction_event(std::string_view line, std::string_view station,
                               std::uint8_t function, std::string_view outcome, Duration took) {
     json::object object{{"line", line},

@@ -5,6 +5,12 @@
 namespace panelgate::web {
 namespace {
 
+std::size_t size_of(const HttpResponse& answer) {
+    std::size_t size = answer.body.size();
+    for (const auto& [name, value] : answer.headers) size += name.size() + value.size();
+    return size;
+}
+
 Problem full() {
     Problem made = problem(503,
                            "too many writes with an Idempotency-Key are remembered; send this "
@@ -47,7 +53,7 @@ void KeyBook::end(TimePoint now, const Key& key, const HttpResponse& answer) {
     if (entry == entries_.end()) return;
     entry->second.worker.reset();
     entry->second.answer = answer;
-    bytes_ += answer.body.size();
+    bytes_ += size_of(answer);
     over_.emplace_back(now, key);
 }
 
@@ -71,7 +77,7 @@ void KeyBook::forget_old(TimePoint now) {
 }
 
 void KeyBook::erase(std::map<Key, Entry>::iterator entry) {
-    bytes_ -= entry->second.answer.body.size();
+    bytes_ -= size_of(entry->second.answer);
     const auto count = of_client_.find(entry->first.first);
     if (--count->second == 0) of_client_.erase(count);
     entries_.erase(entry);

@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "costs.hpp"
 #include "key_book.hpp"
 #include "panelgate/web/http/problem.hpp"
 
@@ -80,7 +81,7 @@ HttpResponse again(HttpResponse first) {
 Handling keyed(HttpRequest request, const Api* api, Handler handler) {
     const auto header = request.headers.find("idempotency-key");
     if (header == request.headers.end()) {
-        Handling plain = handler(std::move(request), api);
+        Handling plain = costed(std::move(request), api, handler);
         co_return co_await std::move(plain);
     }
     const auto text = key_of(header->second, api->providers.settings.max_key);
@@ -96,7 +97,7 @@ Handling keyed(HttpRequest request, const Api* api, Handler handler) {
     request.caller = worker;
     HttpResponse answer;
     try {
-        Handling work = handler(std::move(request), api);
+        Handling work = costed(std::move(request), api, handler);
         answer = co_await std::move(work);
     } catch (...) {
         if (worker->has_left() || !worker->has_effect()) {

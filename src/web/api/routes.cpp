@@ -18,6 +18,7 @@ constexpr std::string_view kReading = "count type order length raw";
 constexpr Manner kPlain{};
 constexpr Manner kTagged{.tagged = true};
 constexpr Manner kAsks{.asks = true};
+constexpr Manner kOnce{.once = true};
 constexpr Manner kWrites{.asks = true, .once = true};
 
 struct Row {
@@ -40,19 +41,27 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
     {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
     {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
+    {"GET", "/api/v1/lines/{}/history", get_line_history, kSee},
+    {"GET", "/api/v1/lines/{}/trace.pcapng", get_trace_pcapng, kSee},
+    {"GET", "/api/v1/lines/{}/incidents", get_incidents, kSee, kTagged},
+    {"GET", "/api/v1/lines/{}/incidents/{}", get_incident, kSee},
     {"POST", "/api/v1/lines/{}/broadcast", post_broadcast, kChange, kWrites},
     {"POST", "/api/v1/lines/{}/raw", post_raw, kChange, kWrites},
+    {"GET", "/api/v1/lines/{}/discover", get_discovery, kSee},
+    {"POST", "/api/v1/lines/{}/discover", post_discover, kChange, kOnce},
+    {"DELETE", "/api/v1/lines/{}/discover", delete_discovery, kChange, kOnce},
     {"POST", "/api/v1/read", post_read, kSee, kAsks},
     {"POST", "/api/v1/write", post_write, kChange, kWrites},
     {"GET", "/api/v1/stations", get_stations, kSee, kTagged},
     {"GET", "/api/v1/stations/{}", get_station, kSee, kTagged},
     {"GET", "/api/v1/simulator/{}", get_simulated, kSee},
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
-    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types"},
+    {"GET", "/api/v1/events", get_events, kSee, kPlain, "types line station point"},
     {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
+    {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},
     // Before the tables: "devices" is none of them.
     {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kTagged, "count values"},

@@ -61,6 +61,13 @@ Parsed<PointOfStation> find_point(const Directory& directory, const std::string&
     return PointOfStation{std::move(*station), point};
 }
 
+Parsed<PointOfStation> find_point(const Directory& directory, const std::string& name) {
+    const auto slash = name.rfind('/');
+    if (slash == name.npos)
+        return problem(400, "a point is named STATION/POINT, not '" + name + '\'');
+    return find_point(directory, name.substr(0, slash), name.substr(slash + 1));
+}
+
 Parsed<Items> item_of_table(StationEntry station, modbus::Table table, std::uint16_t address) {
     Items items;
     items.station = std::move(station);

@@ -35,6 +35,8 @@ struct PointOfStation {
 };
 Parsed<PointOfStation> find_point(const Directory& directory, const std::string& station,
                                   const std::string& point);
+/// The same by "press/temperature".
+Parsed<PointOfStation> find_point(const Directory& directory, const std::string& name);
 
 /// One item of a table, or of the memory that a notation names; its table is the area's own.
 Parsed<Items> item_of_table(StationEntry station, modbus::Table table, std::uint16_t address);

@@ -1,15 +1,57 @@
 #include "panelgate/web/http/event_hub.hpp"
 
-#include <utility>
+#include <algorithm>
+#include <charconv>
+#include <system_error>
 
 namespace panelgate::web {
+namespace {
+
+template <class Set, class Key>
+bool allows(const Set& set, const Key& key) {
+    return set.empty() || set.contains(key);
+}
+
+/// `how`: members of JSON.
+std::string loss(const std::string& how) { return "event: lost\ndata: {" + how + "}\n\n"; }
+
+constexpr const char* kComment = ": \n\n";
+
+}  // namespace
+
+bool EventFilter::passes(const EventTopic& topic) const {
+    if (!allows(types, topic.type) || !allows(lines, topic.line)) return false;
+    if (!stations.empty() && !stations.contains({topic.line, topic.station})) return false;
+    return points.empty() || points.contains({topic.station, topic.point});
+}
 
 std::string EventHub::Listener::take() {
-    std::string text;
+    std::string text = std::exchange(opening_, {});
+    if (hub_ == nullptr) return text;
     if (const std::uint64_t lost = std::exchange(lost_, 0); lost > 0)
-        text += "event: lost\ndata: {\"events\":" + std::to_string(lost) + "}\n\n";
-    for (const std::string& event : std::exchange(waiting_, {})) text += event;
-    return text;
+        text += loss("\"events\":" + std::to_string(lost) + ",\"exact\":true");
+    for (std::size_t looked_at = 0; text.size() < kTaken; ++looked_at) {
+        const Event* event = hub_->next(*this);
+        if (event == nullptr) return text;
+        if (looked_at == kLookedAt) break;
+        place_ = event->number;
+        if (filter_.passes(event->topic)) text += event->text;
+    }
+    return text.empty() ? kComment : text;  // there is more
+}
+
+std::string EventHub::Listener::heartbeat() {
+    std::string text = take();
+    if (!text.empty()) return text;
+    if (hub_ == nullptr) return kComment;
+    place_ = hub_->last_;
+    return ": \nid: " + hub_->id_of(place_) + "\n\n";
+}
+
+EventHub::~EventHub() {
+    for (const auto& weak : listeners_) {
+        if (const auto listener = weak.lock()) listener->hub_ = nullptr;
+    }
 }
 
 bool EventHub::is_idle() {
@@ -17,34 +59,112 @@ bool EventHub::is_idle() {
     return listeners_.empty();
 }
 
-std::shared_ptr<EventHub::Listener> EventHub::listen(std::set<std::string> types) {
+std::optional<std::uint64_t> EventHub::number_of(std::string_view id) const {
+    if (!id.starts_with(epoch_ + '-')) return std::nullopt;
+    id.remove_prefix(epoch_.size() + 1);
+    std::uint64_t number = 0;
+    const auto [end, wrong] = std::from_chars(id.data(), id.data() + id.size(), number);
+    if (wrong != std::errc() || end != id.data() + id.size() || number > last_) return std::nullopt;
+    return number;
+}
+
+/// The first behind its place, of the types that it wants.
+const EventHub::Event* EventHub::next(const Listener& listener) const {
+    const Event* first = nullptr;
+    for (const auto& [type, ring] : rings_) {
+        if (!allows(listener.filter_.types, type)) continue;
+        const auto at = std::ranges::upper_bound(ring.events, listener.place_, {}, &Event::number);
+        if (at != ring.events.end() && (first == nullptr || at->number < first->number))
+            first = &*at;
+    }
+    return first;
+}
+
+/// How many may have gone that it would have been given: those of other filters and types between
+/// them are counted, too, because nobody knows any more what they were.
+std::uint64_t EventHub::missed(const Listener& listener) const {
+    std::uint64_t gone = 0;
+    for (const auto& [type, ring] : rings_) {
+        if (allows(listener.filter_.types, type)) gone = std::max(gone, ring.gone);
+    }
+    return gone > listener.place_ ? gone - listener.place_ : 0;
+}
+
+std::shared_ptr<EventHub::Listener> EventHub::listen(EventFilter filter, std::string_view last_id) {
     if (!is_idle() && listeners_.size() >= kListeners) return nullptr;
     auto listener = std::make_shared<Listener>();
-    listener->types_ = std::move(types);
+    listener->hub_ = this;
+    listener->filter_ = std::move(filter);
+    listener->opening_ = "retry: " + std::to_string(kRetryMs) + "\n";
+    if (last_id.empty()) {
+        listener->place_ = last_;
+        listener->opening_ += "id: " + id_of(last_) + "\n\n";
+    } else if (const auto number = number_of(last_id)) {
+        listener->place_ = *number;
+        listener->opening_ += '\n';
+        if (const std::uint64_t lost = missed(*listener); lost > 0)
+            listener->opening_ += loss("\"events\":" + std::to_string(lost) + ",\"exact\":false");
+    } else {  // of another life: whatever this one has to tell is new
+        listener->opening_ += "\n" + loss(R"("events":null,"exact":false)");
+    }
     listeners_.push_back(listener);
+    was_heard_ = true;
+    for (auto& [type, ring] : rings_) ring.unheard = 0;
     return listener;
 }
 
-void EventHub::publish(std::string_view type, std::string_view json) {
-    if (is_idle()) return;
-    const std::string text = "id: " + std::to_string(++last_id_) + "\nevent: " + std::string(type) +
-                             "\ndata: " + std::string(json) + "\n\n";
+bool EventHub::announce(std::string_view type) {
+    const bool heard = !is_idle();
+    if (!heard && !was_heard_) return false;
+    auto found = rings_.find(type);
+    if (found == rings_.end()) found = rings_.try_emplace(std::string(type)).first;
+    Ring& ring = found->second;
+    if (heard || ring.unheard < kKept) return true;
+    ring.gone = ++last_;
+    ring.events.clear();
+    ring.bytes = 0;
+    return false;
+}
+
+/// The oldest of a ring gives way. Who has not got it yet has lost it.
+void EventHub::forget(Ring& ring) {
+    const Event& oldest = ring.events.front();
+    for (const auto& weak : listeners_) {
+        const auto listener = weak.lock();
+        if (!listener || listener->place_ >= oldest.number) continue;
+        if (listener->filter_.passes(oldest.topic)) ++listener->lost_;
+    }
+    ring.gone = oldest.number;
+    ring.bytes -= oldest.text.size();
+    ring.events.pop_front();
+}
+
+void EventHub::publish(EventTopic topic, std::string_view json) {
+    Event event{++last_, std::move(topic), {}};
+    event.text = "id: " + id_of(last_) + "\nevent: " + event.topic.type +
+                 "\ndata: " + std::string(json) + "\n\n";
+    Ring& ring = rings_[event.topic.type];
+    ring.unheard = is_idle() ? ring.unheard + 1 : 0;
+    ring.bytes += event.text.size();
+    ring.events.push_back(std::move(event));
+    while (ring.events.size() > kKept || (ring.bytes > kKeptBytes && ring.events.size() > 1))
+        forget(ring);
+    const EventTopic& wanted = ring.events.back().topic;
     const auto listeners = listeners_;  // waking one may end another
     for (const auto& weak : listeners) {
         const auto listener = weak.lock();
         if (!listener || listener->ended_) continue;
-        if (!listener->types_.empty() && !listener->types_.contains(std::string(type))) continue;
-        if (listener->waiting_.size() >= kWaiting) {
-            listener->waiting_.pop_front();
-            ++listener->lost_;
+        if (listener->filter_.passes(wanted)) {
+            if (listener->wake) listener->wake();
+        } else if (listener->place_ + 1 == last_) {
+            listener->place_ = last_;
         }
-        listener->waiting_.push_back(text);
-        if (listener->wake) listener->wake();
     }
 }
 
 void EventHub::end() {
-    for (const auto& weak : std::exchange(listeners_, {})) {
+    const auto listeners = listeners_;
+    for (const auto& weak : listeners) {
         const auto listener = weak.lock();
         if (!listener) continue;
         listener->ended_ = true;

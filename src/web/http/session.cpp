@@ -4,6 +4,7 @@
 #include <array>
 #include <boost/asio/error.hpp>
 #include <boost/asio/redirect_error.hpp>
+#include <boost/asio/socket_base.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/asio/write.hpp>
@@ -32,6 +33,9 @@ constexpr std::size_t kReadSize = 4096;
 /// What a client whose request was refused may still send before it is cut off.
 constexpr std::size_t kDrainLimit = 1024 * 1024;
 constexpr Duration kDrainTime = 2s;
+/// Bytes of events that the kernel holds for a client, so that one which is slow is told in time
+/// what it has lost: by itself it takes megabytes.
+constexpr int kHeldEvents = 128 * 1024;
 constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 Problem no_place() {
@@ -236,10 +240,11 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
 /// forgetting the connection, and notices a client that has gone.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
-    constexpr const char* kComment = ": \n\n";
     ++shared_->counters.requests[200];
     sending_ = true;
     bool asked = false;
+    ErrorCode ignored;
+    stream_.socket().set_option(asio::socket_base::send_buffer_size(kHeldEvents), ignored);
     asio::steady_timer bell(stream_.get_executor());
     listener->wake = [&bell] { bell.cancel(); };
     departure_.ask_by([&] {
@@ -256,14 +261,15 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         stream_.expires_after(time_to_read_);
         co_await asio::async_write(stream_, asio::buffer(text),
                                    asio::redirect_error(asio::use_awaitable, error));
-        if (error || listener->ended() || stopping_) break;
+        if (error) break;
         text = listener->take();
         if (!text.empty()) continue;
+        if (listener->ended() || stopping_) break;
         ErrorCode rung;
         bell.expires_after(kHeartbeat);
         co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
-        text = rung ? listener->take() : kComment;
-        if (text.empty() && std::exchange(asked, false)) text = kComment;
+        text = rung ? listener->take() : listener->heartbeat();
+        if (text.empty() && std::exchange(asked, false)) text = listener->heartbeat();
     }
     departure_.ask_by(nullptr);
     listener->wake = nullptr;

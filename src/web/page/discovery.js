@@ -16,12 +16,19 @@ class Discovery {
         this.said = h('p', {class: 'muted', role: 'status'});
         this.result = h('div');
         this.node = h('div', null, h('section', {class: 'card'}, h('p', {class: 'muted'}, t('discovery.hint')), this.#form(), this.progress, this.said), this.result);
-        this.told = ({detail}) => detail.line === line && this.#goes(detail);
+        this.told = ({detail}) => {
+            if (detail.line !== line) return;
+            this.#goes(detail);
+            if (detail.state !== 'running') this.#ask();
+        };
         live.addEventListener('discovery', this.told);
-        get(path('lines', line, 'discover')).then((report) => this.#show(report), () => {});
+        this.#ask();
     }
 
     stop() { live.removeEventListener('discovery', this.told); }
+
+    /** How far it is, and what was found, also where others have begun it. */
+    #ask() { get(path('lines', this.line, 'discover')).then((report) => this.#show(report), () => {}); }
 
     #form() {
         if (!mayWrite()) {

@@ -48,7 +48,7 @@ class Live extends EventTarget {
         const types = ['station', 'line', 'transaction', 'point', ...discovers ? ['discovery'] : []];
         this.#source = new EventSource(path('events') + `?types=${types}`);
         this.#source.addEventListener('discovery', (event) => this.#tell('discovery', JSON.parse(event.data)));
-        for (const type of ['station', 'line']) this.#source.addEventListener(type, () => this.#soon());
+        for (const type of ['station', 'line', 'lost']) this.#source.addEventListener(type, () => this.#soon());
         this.#source.addEventListener('transaction', (event) => {
             const told = JSON.parse(event.data);
             const now = this.stations.find((s) => s.line === told.line && s.name === told.station);

@@ -59,7 +59,7 @@ async function recall(line, history) {
     if (!offers('GET /api/v1/lines/{}/history')) return;
     try {
         const {samples} = await get(path('lines', line, 'history'));
-        history.unshift(...samples.map((one) => one.load_percent ?? 0).slice(-HISTORY));
+        history.unshift(...samples.map((one) => one.load_percent).filter((load) => load !== null).slice(-HISTORY));
     } catch { /* it begins now */ }
 }
 

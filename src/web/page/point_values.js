@@ -40,7 +40,7 @@ export async function recall(station, name) {
         const {samples} = await get(path('stations', station, 'points', name, 'history'));
         const seen = histories.get(key) ?? [];
         const from = seen[0]?.[0] ?? Infinity;
-        const before = samples.filter((one) => one.value !== null).map((one) => [Date.parse(one.time), one.value]).filter(([at]) => at < from);
+        const before = samples.filter((one) => one.value !== null).map((one) => [Date.parse(one.time), Number(one.value)]).filter(([at]) => at < from);
         histories.set(key, [...before, ...seen].slice(-kept()));
     } catch { /* the plot begins now */ }
 }

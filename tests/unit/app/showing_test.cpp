@@ -11,7 +11,9 @@
 namespace panelgate::app {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// press 31 has one point and one poll block, meter 5 may only be read.
 class ShowingTest : public testing::Test {
@@ -148,8 +150,31 @@ TEST_F(ShowingTest, TellsOfStationsByTheirNames) {
     EXPECT_THAT(told, HasSubstr(R"("station":"9")"));
 }
 
+TEST_F(ShowingTest, TellsEachEventOnlyToThoseWhoWantWhatItIsAbout) {
+    web::EventFilter press;
+    press.stations = {{"floor1", "press"}};
+    web::EventFilter temperature;
+    temperature.points = {{"press", "temperature"}};
+    web::EventFilter elsewhere;
+    elsewhere.lines = {"floor2"};
+    const auto of_press = hub.listen(press);
+    const auto of_point = hub.listen(temperature);
+    const auto of_line = hub.listen(elsewhere);
+    for (const auto& listener : {of_press, of_point, of_line}) listener->take();
+    poll();
+    publish_points(hub, *plant.find("press"), {0}, now);
+    publish(hub, plant, "floor1", bus::TransactionEvent{31, 3, Outcome::ok, 5ms});
+    publish(hub, plant, "floor1", bus::TransactionEvent{5, 3, Outcome::ok, 5ms});
+    publish(hub, plant, "floor1", bus::LineEvent{true, {}});
+    EXPECT_THAT(of_press->take(), AllOf(HasSubstr("event: point"), HasSubstr("event: transaction"),
+                                        Not(HasSubstr("meter")), Not(HasSubstr("event: line"))));
+    EXPECT_THAT(of_point->take(), AllOf(HasSubstr("event: point"), Not(HasSubstr("transaction"))));
+    EXPECT_EQ(of_line->take(), "");
+}
+
 TEST_F(ShowingTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
     const auto listener = hub.listen({});
+    listener->take();
     poll();
     publish_points(hub, *plant.find("press"), {1}, now);
     EXPECT_EQ(listener->take(), "");

@@ -1,6 +1,7 @@
 // A line whose panels speak ASCII: the same promises.
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <string>
 #include <string_view>
 
@@ -75,6 +76,16 @@ TEST_F(AsciiLine, CountsTheTimeoutFromTheEndOfItsLongerRequest) {
     script.run_until(end + 500ms);
     ASSERT_TRUE(script.answered(ticket));
     EXPECT_EQ(script.answer(ticket).pdu.error(), Fault::timeout);
+}
+
+TEST_F(AsciiLine, CountsDamageThatIsLowerCase) {
+    Bytes lower = modbus::encode_ascii(17, "03 06 02 2B 00 00 00 AE"_hex);
+    for (std::uint8_t& c : lower) c = static_cast<std::uint8_t>(std::tolower(c));
+    ask();
+    bus.hear_paced(lower);
+    bus.run_for(20ms);
+    EXPECT_EQ(counters().symptoms.damaged(), 1u);
+    EXPECT_EQ(counters().symptoms.lower_case, 1u);
 }
 
 TEST_F(AsciiLine, AWrongLrcIsDamageAndTheReadGoesAgainAtOnce) {

@@ -30,8 +30,9 @@ class LedgerTest : public testing::Test {
     Attempt answered(Group group) const {
         return test::answered(now - 30ms, now, std::move(group), kReply);
     }
-    static constexpr std::string_view kKinds = "TFNDSWR";
-    /// What it says: T transmit, F finish, N note, D decision, S station event, W written, R reset.
+    static constexpr std::string_view kKinds = "TFNDSWRE";
+    /// What it says: T transmit, F finish, N note, D decision, S station event, W written, R reset,
+    /// E exchange.
     std::string said() {
         std::string words;
         while (const auto action = ledger.poll()) words += kKinds[action->index()];

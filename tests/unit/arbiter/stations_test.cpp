@@ -106,5 +106,19 @@ TEST_F(StationsTest, P4StrangersDoNotUseUpWhatTheProbesOfOthersMayCost) {
     EXPECT_TRUE(stations_.may_spend(now_, 3)) << "which is not that of who is listed";
 }
 
+TEST_F(StationsTest, AStrangerIsWaitedForAsLongAsTheKnownNeedUnlessItsClientIsPatient) {
+    constexpr std::uint8_t kStranger = 9;
+    answer(1);
+    Group group = test::group_of(kStranger, kRead);
+    const Duration usual = stations_.patience(now_, group);
+    EXPECT_LT(usual, 100ms);
+    group.jobs[0].patience = 100ms;
+    EXPECT_EQ(stations_.patience(now_, group), 100ms);
+    group.jobs[0].patience = 1h;
+    EXPECT_EQ(stations_.patience(now_, group), stations_.response_timeout(kStranger));
+    group.jobs[0].patience = 1ms;
+    EXPECT_EQ(stations_.patience(now_, group), usual);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter

@@ -8,6 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "panelgate/bus/trace.hpp"
+#include "support/hex.hpp"
+
 namespace panelgate::bus {
 namespace {
 
@@ -17,6 +20,8 @@ TraceDecision decision(std::uint64_t sequence) {
     made.text = std::to_string(sequence);
     return made;
 }
+
+using DecisionRecorder = Recorder<TraceDecision>;
 
 DecisionRecorder with(std::size_t limit, std::size_t entries) {
     DecisionRecorder recorder(limit);
@@ -64,6 +69,43 @@ TEST(Recorder, GivesTheFirstOnesBehindANumber) {
     DecisionRecorder gaps(8);
     for (const std::uint64_t sequence : {2u, 5u, 9u}) gaps.add(decision(sequence));
     EXPECT_EQ(told(gaps.since(3, 8)), "5:5 9:9") << "others have numbers, too";
+}
+
+TEST(Recorder, TheOldestMayBeForgottenBeforeItIsFull) {
+    DecisionRecorder recorder = with(3, 4);
+    recorder.drop_oldest();
+    EXPECT_EQ(told(recorder.last(8)), "3:3 4:4");
+    recorder.add(decision(5));
+    recorder.add(decision(6));
+    EXPECT_EQ(told(recorder.last(8)), "4:4 5:5 6:6");
+    for (int i = 0; i < 5; ++i) recorder.drop_oldest();
+    EXPECT_TRUE(recorder.empty());
+    recorder.add(decision(7));
+    EXPECT_EQ(told(recorder.since(0, 8)), "7:7");
+    recorder.clear();
+    EXPECT_EQ(told(recorder.last(8)), "");
+    recorder.add(decision(8));
+    EXPECT_EQ(told(recorder.last(8)), "8:8");
+}
+
+TEST(ByteRing, GivesBackWhatWasNotOverwrittenAlsoAcrossItsEnd) {
+    ByteRing ring(8);
+    const auto first = ring.add("01 02 03 04 05"_hex);
+    const auto second = ring.add("0A 0B 0C 0D"_hex);
+    EXPECT_FALSE(ring.has(first)) << "its first byte is gone";
+    ASSERT_TRUE(ring.has(second));
+    EXPECT_EQ(ring.at(second, 4), "0A 0B 0C 0D"_hex);
+    EXPECT_EQ(ring.used_since(second), 4u);
+    const auto third = ring.add("21 22 23 24"_hex);
+    EXPECT_TRUE(ring.has(second)) << "both fit exactly";
+    EXPECT_EQ(ring.at(third, 4), "21 22 23 24"_hex);
+}
+
+TEST(ByteRing, KeepsTheBeginningOfWhatIsLongerThanIt) {
+    ByteRing ring(4);
+    const auto place = ring.add("01 02 03 04 05 06"_hex);
+    EXPECT_TRUE(ring.has(place));
+    EXPECT_EQ(ring.at(place, 4), "01 02 03 04"_hex);
 }
 
 TEST(Recorder, OneThatKeepsNothingStaysEmpty) { EXPECT_EQ(told(with(0, 5).last(8)), ""); }

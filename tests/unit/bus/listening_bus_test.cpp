@@ -144,5 +144,41 @@ TEST_F(ListeningBusTest, SaysThatTheLineIsDown) {
     EXPECT_TRUE(outcomes.empty()) << "nobody here knows what came of it";
 }
 
+TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
+    say(10ms, 17, kRead);
+    say(4ms, 17, kReply);
+    say(10ms, 17, "83 02"_hex);  // nobody asked
+    say(10ms, 18, kRead);
+    say(10ms, 18, "83 02"_hex);
+    const auto all = bus->transactions(9);
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_EQ(all[0].id, 1u);
+    EXPECT_EQ(all[0].reason, "heard request");
+    EXPECT_EQ(all[0].end, TransactionEnd::ok);
+    EXPECT_EQ(all[0].request, modbus::encode_adu(17, kRead));
+    EXPECT_EQ(all[0].reply, modbus::encode_adu(17, kReply));
+    EXPECT_NEAR(to_milliseconds(*all[0].first_byte_in - all[0].last_bit_out), 4, 0.001);
+    EXPECT_FALSE(all[0].arrived);
+    EXPECT_FALSE(all[0].answered);
+    EXPECT_EQ(all[0].discarded.size(), 1u);
+    EXPECT_EQ(all[1].end, TransactionEnd::exception);
+    EXPECT_EQ(bus->transactions_since(all[0].sequence, 9).size(), 1u);
+    EXPECT_TRUE(bus->incidents().empty());
+}
+
+TEST_F(ListeningBusTest, KeepsWhatHappenedAroundASilence) {
+    say(10ms, 17, kRead);
+    say(4ms, 17, kReply);
+    say(10ms, 17, kRead);
+    say(2s, 18, kRead);  // its master has gone on
+    say(4ms, 18, kReply);
+    const auto heads = bus->incidents();
+    ASSERT_EQ(heads.size(), 1u);
+    EXPECT_EQ(heads[0].cause, "timeout");
+    EXPECT_EQ(heads[0].station, 17);
+    EXPECT_EQ(bus->incident(1)->part.transactions.size(), 3u);
+    EXPECT_FALSE(bus->incident(2));
+}
+
 }  // namespace
 }  // namespace panelgate::bus

@@ -15,6 +15,21 @@ using ::testing::IsEmpty;
 /// Right but for the order of the CRC's bytes.
 Mix swapped(std::uint64_t n) { return Mix().damaged(n).with(&Symptoms::crc_swapped, n); }
 
+TEST_F(Diagnose, APanelThatWritesInLowerCaseIsToldWhatToSet) {
+    const Mix panel = Mix().answered(4).damaged(6).with(&Symptoms::lower_case, 6);
+    facts.serial.mode = SerialMode::ascii;
+    const auto found = findings({{7, panel}, {8, Mix().answered(20)}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].cause, Cause::ascii_lower_case);
+    EXPECT_EQ(found[0].station, 7);
+    EXPECT_THAT(found[0].advice, HasSubstr("serial: {ascii_lower_case: take}"));
+    EXPECT_THAT(causes({{7, Mix().damaged(6).with(&Symptoms::lower_case, 6)}}),
+                ElementsAre("ascii-lower-case 7"))
+        << "all of it is explained";
+    EXPECT_THAT(causes({{7, Mix().answered(4).damaged(6).with(&Symptoms::lower_case, 2)}}),
+                ElementsAre("noise"));
+}
+
 TEST_F(Diagnose, AFewLateRepliesAmongManyAreNoTimeoutTooShort) {
     EXPECT_THAT(causes({{1, Mix().answered(100).late(3, 300ms)}}), IsEmpty());
     EXPECT_THAT(causes({{1, Mix().answered(30).late(3, 300ms)}}),

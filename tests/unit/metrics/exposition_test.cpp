@@ -50,6 +50,7 @@ Snapshot filled() {
     Snapshot snapshot;
     snapshot.lines.push_back(line);
     snapshot.listeners.push_back({"127.0.0.1:1502", 3, 30, 1});
+    snapshot.listeners.back().joined = 4;
     snapshot.version = "1.2.3";
     snapshot.process = read_process_facts();
     return snapshot;
@@ -98,6 +99,7 @@ TEST(Exposition, GivesTheFiguresOfLinesListenersAndTheBuild) {
          R"(panelgate_tcp_connections{listener="127.0.0.1:1502"} 3)",
          R"(panelgate_tcp_connections_total{listener="127.0.0.1:1502"} 30)",
          R"(panelgate_tcp_protocol_errors_total{listener="127.0.0.1:1502"} 1)",
+         R"(panelgate_tcp_retransmissions_joined_total{listener="127.0.0.1:1502"} 4)",
          R"(panelgate_build_info{version="1.2.3"} 1)"});
 }
 

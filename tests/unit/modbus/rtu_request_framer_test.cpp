@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
@@ -78,10 +79,11 @@ TEST(RtuRequestFramer, StepsOverStrayBytesInFrontOfARequest) {
 TEST(RtuRequestFramer, ADamagedRequestIsSteppedOver) {
     Bytes damaged = frame(kRead);
     damaged[4] ^= 0x01;
+    const SerialAdu next{0x1F, "04 00 01 00 03"_hex};
     RtuRequestFramer framer;
-    std::vector<SerialAdu> frames = fed(framer, damaged + frame(kOther));
+    std::vector<SerialAdu> frames = fed(framer, damaged + frame(next));
     for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
-    EXPECT_EQ(frames, std::vector{kOther});
+    EXPECT_EQ(frames, std::vector{next});
     EXPECT_EQ(framer.take_faults(), 1U);
     EXPECT_EQ(framer.discarded(), 0U) << "a good frame was found since";
 }
@@ -93,6 +95,101 @@ TEST(RtuRequestFramer, P1DataOfAWriteIsNoRequest) {
     RtuRequestFramer framer;
     EXPECT_TRUE(fed(framer, ByteView(bytes).first(bytes.size() - 1)).empty());
     EXPECT_EQ(fed(framer, ByteView(bytes).last(1)), std::vector{write});
+}
+
+/// Requests with room for `inside` in their data; whole, but for a good CRC.
+std::vector<Bytes> damaged_around(const Bytes& inside) {
+    const auto size = static_cast<std::uint8_t>(inside.size());
+    const auto sized = [&](Bytes head) {
+        head.push_back(size);
+        return head;
+    };
+    std::vector<Bytes> all;
+    for (const Bytes& pdu :
+         {sized("10 0100 0010"_hex) + inside, sized("0F 0100 0080"_hex) + inside,
+          sized("17 0000 0001 0100 0010"_hex) + inside, "41"_hex + inside, "08 0000"_hex + inside,
+          "2B 0D"_hex + inside,
+          Bytes{0x15, static_cast<std::uint8_t>(size + 7)} + "06 0004 0007 0010"_hex + inside}) {
+        Bytes damaged = encode_adu(1, pdu);
+        damaged.back() ^= 0x5A;
+        all.push_back(std::move(damaged));
+    }
+    return all;
+}
+
+const std::vector<SerialAdu> kWrites = {
+    {1, "05 0000 FF00"_hex},         {1, "06 0000 BEEF"_hex},
+    {2, "0F 0000 0008 01 FF"_hex},   {0, "06 0000 BEEF"_hex},
+    {3, "10 0000 0001 02 BEEF"_hex}, {1, "16 0004 00F2 0025"_hex},
+    {1, "08 0001 0000"_hex},         {1, "17 0000 0001 0000 0001 02 BEEF"_hex}};
+
+TEST(RtuRequestFramer, P2AWriteInTheDataOfADamagedRequestIsNotExecuted) {
+    const Bytes read = frame(kRead);
+    for (const SerialAdu& write : kWrites) {
+        const Bytes inside = frame(write);
+        for (const Bytes& data : {inside, "00 0A"_hex + inside + "0102"_hex, read + inside,
+                                  inside + inside, "07 07 07"_hex + inside + read}) {
+            for (const Bytes& damaged : damaged_around(data)) {
+                for (std::size_t cut = 0; cut <= damaged.size(); ++cut) {
+                    RtuRequestFramer framer;
+                    std::vector<SerialAdu> frames = fed(framer, ByteView(damaged).first(cut));
+                    framer.on_silence();
+                    for (const auto& adu : fed(framer, ByteView(damaged).subspan(cut)))
+                        frames.push_back(adu);
+                    for (const auto& adu : after_silence(framer)) frames.push_back(adu);
+                    framer.drop_pending();
+                    for (const SerialAdu& adu : frames)
+                        ASSERT_TRUE(adu == kRead || !check_request(adu.pdu)) << cut;
+                    ASSERT_GE(framer.take_faults(), 1U) << cut;
+                }
+            }
+        }
+    }
+}
+
+TEST(RtuRequestFramer, AWriteRightBehindADamagedRequestIsToBeSentAgain) {
+    for (const Bytes& damaged : damaged_around("00 07 00 03 00 01"_hex)) {
+        if (request_length(damaged).kind != RequestLength::Kind::known) continue;
+        RtuRequestFramer framer;
+        EXPECT_TRUE(fed(framer, damaged + frame(kOther)).empty());
+        EXPECT_TRUE(after_silence(framer).empty());
+        std::vector<SerialAdu> again = fed(framer, frame(kOther));
+        for (SerialAdu& late : after_silence(framer)) again.push_back(std::move(late));
+        EXPECT_EQ(again, std::vector{kOther}) << damaged[1];
+    }
+}
+
+TEST(RtuRequestFramer, WhatIsLeftOfADamagedRequestCostsTheNextOneBehindASilenceNothing) {
+    Bytes damaged = frame({0x11, "10 0001 0002 04 000A 0102"_hex});
+    damaged.back() ^= 0x01;
+    RtuRequestFramer framer;
+    EXPECT_TRUE(fed(framer, damaged).empty());
+    EXPECT_TRUE(framer.partial()) << "its tail may be a beginning";
+    EXPECT_TRUE(after_silence(framer).empty());
+    std::vector<SerialAdu> frames = fed(framer, frame(kOther));
+    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
+    EXPECT_EQ(frames, std::vector{kOther});
+}
+
+TEST(RtuRequestFramer, AGlitchInFrontOfAWriteIsNoDamage) {
+    for (const Bytes& glitch : {"FF"_hex, "00"_hex, "00 FF"_hex, "FF FF FF"_hex}) {
+        RtuRequestFramer framer;
+        std::vector<SerialAdu> frames = fed(framer, glitch + frame(kOther));
+        for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
+        EXPECT_EQ(frames, std::vector{kOther}) << glitch.size();
+        EXPECT_EQ(fed(framer, frame(kOther)), std::vector{kOther}) << "it counts for itself";
+    }
+}
+
+TEST(RtuRequestFramer, MoreGoodFramesInARowThanOneCouldHoldAreWhatTheyAre) {
+    Bytes damaged = frame(kRead);
+    damaged[4] ^= 0x01;
+    Bytes stream = damaged;
+    for (int i = 0; i < 40; ++i) stream = stream + frame(kOther);
+    RtuRequestFramer framer;
+    std::vector<SerialAdu> frames = fed(framer, stream);
+    for (SerialAdu& late : after_silence(framer)) frames.push_back(std::move(late));
+    EXPECT_EQ(frames, std::vector(40 - 33, kOther)) << "33 of 8 bytes are more than 256";
 }
 
 TEST(RtuRequestFramer, SilenceGivesUpAStartThatHoldsUpAGoodFrame) {

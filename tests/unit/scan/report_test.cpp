@@ -56,6 +56,20 @@ TEST(ScanReport, IsATable) {
                 StartsWith("x: 38400 8N1, 4 stations, 1 address shared by two (interrupted)\n"));
 }
 
+TEST(ScanReport, GivesTheStationsAloneForALineThatIsThere) {
+    EXPECT_EQ(stations_yaml("floor1", five().stations),
+              "      - {id: 5, name: floor1-5, profile: autonics-gp-2005}\n"
+              "      # two stations seem to share address 7: 4 of 9 replies overlapped, 2 came "
+              "twice\n"
+              "      # (give one of them another address)\n"
+              "      - {id: 7, name: floor1-7, profile: autonics-gplp-s}\n"
+              "      # answers late\n"
+              "      - {id: 9, name: floor1-9, profile: panasonic-gt}  # or omron-cp2e\n"
+              "      # 18 of 18 replies were damaged\n"
+              "      # - {id: 20, name: floor1-20, profile: generic}\n");
+    EXPECT_EQ(stations_yaml("floor1", {}), "");
+}
+
 TEST(ScanReport, SaysWhichPanelHasTheOtherOrderOfTheCrc) {
     Result result = five();
     result.stations.resize(1);

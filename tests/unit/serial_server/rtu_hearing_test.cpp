@@ -12,8 +12,10 @@ namespace panelgate::serial_server::test {
 namespace {
 
 using modbus::encode_adu;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 
 const Bytes kRequest = encode_adu(kOurs, kReadOne);
@@ -98,6 +100,32 @@ TEST(RtuHearing, FindsNoRequestInDamagedDataThatGoesOn) {
     Bytes reply = reply_with(joined({kRequest, {1, 2}}));
     reply[2] = 2;
     EXPECT_THAT(heard(hearing, reply), IsEmpty());
+}
+
+TEST(RtuHearing, P2TakesNoWriteOutOfADamagedOne) {
+    const Bytes write = encode_adu(kOurs, Bytes{0x06, 0, 0, 0xBE, 0xEF});
+    const Bytes read = encode_adu(kOther, kReadOne);
+    for (const Bytes& data : {write, joined({{0, 7}, write}), joined({write, {0, 7}}),
+                              joined({read, write}), joined({write, write})}) {
+        const auto size = static_cast<std::uint8_t>(data.size());
+        Bytes damaged = joined({{kOurs, 0x10, 1, 0, 0, 8, size}, data});
+        for (const Bytes& crc : {Bytes{}, Bytes{0x12, 0x34}}) {
+            RtuHearing hearing(Talk::served());
+            EXPECT_THAT(heard(hearing, joined({damaged, crc})), Not(Contains(kOurs)));
+            hearing.drop_pending();
+            EXPECT_THAT(heard(hearing, {}), Not(Contains(kOurs)));
+            EXPECT_GE(hearing.take_faults(), 1u);
+            EXPECT_THAT(heard(hearing, write), ElementsAre(kOurs)) << "it is said again";
+        }
+    }
+}
+
+TEST(RtuHearing, TakesAWriteBehindAGlitch) {
+    const Bytes write = encode_adu(kOurs, Bytes{0x06, 0, 0, 0xBE, 0xEF});
+    for (const Bytes& glitch : {Bytes{0xFF}, Bytes{0, 0xFF}, Bytes{0xF0, 0xFF, 0xFF}}) {
+        RtuHearing hearing(Talk::served());
+        EXPECT_THAT(heard(hearing, joined({glitch, write})), ElementsAre(kOurs));
+    }
 }
 
 TEST(RtuHearing, HearsExceptionsAndRefusalsOfOthers) {

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "loopback.hpp"
+#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::tcp_server {
 namespace {
@@ -127,13 +129,14 @@ TEST_F(DatagramsTest, P2ADatagramThatComesTwiceHasOneAnswer) {
     EXPECT_FALSE(client.has_input());
 }
 
-TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsNotHeard) {
+TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsToldSo) {
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Sender client = sender();
     for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_dropped(3));
+    client.request(4, 1, read_pdu(4));  // waits already, and has one answer
+    for (std::uint16_t i = 5; i < 8; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
     for (std::uint16_t i = 0; i < 5; ++i) {
         ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
         ASSERT_LE(bus1.held.size(), 2U);
@@ -141,6 +144,41 @@ TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsNotHeard) {
         EXPECT_EQ(client.receive(), adu(i, 1, reply_to_read(i)));
     }
     EXPECT_EQ(bus1.seen.size(), 5U);
+    EXPECT_FALSE(client.has_input());
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+    EXPECT_EQ(listener->counters().busy, 3U);
+}
+
+TEST_F(DatagramsTest, P9WhoIsToldSoWaitsForItsTurnAmongOwnAnswers) {
+    settings.in_flight = 1;
+    settings.waiting = 0;
+    settings.own_answers = 2;
+    settings.udp_busy_answers = 3;
+    start();
+    Sender client = sender();
+    for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
+    for (std::uint16_t i = 1; i < 3; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
+    EXPECT_FALSE(client.has_input());
+    clock.advance(settings.own_answers_period);
+    for (std::uint16_t i = 3; i < 5; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
+    clock.advance(settings.own_answers_period);
+    EXPECT_EQ(client.receive(), adu(5, 1, "83 06"_hex));
+    clock.advance(settings.own_answers_period);
+    EXPECT_FALSE(client.has_input()) << "the others were dropped";
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
+}
+
+TEST_F(DatagramsTest, AnotherFramingIsNamedInTheLog) {
+    start();
+    Sender client = sender();
+    client.send(modbus::encode_adu(1, read_pdu(7)));
+    ASSERT_TRUE(run_until_dropped(1));
+    EXPECT_EQ(log.count("it speaks Modbus RTU, and datagrams are for Modbus/TCP"), 1);
+    Sender other = sender("127.0.0.2");
+    other.send(modbus::encode_ascii(1, read_pdu(7)));
+    ASSERT_TRUE(run_until_dropped(2));
+    EXPECT_EQ(log.count("with framing: ascii"), 1);
+    EXPECT_TRUE(bus1.seen.empty());
 }
 
 TEST_F(DatagramsTest, P9OneAddressHasAFewPlacesAndWhoWaitsForNothingGivesItsUp) {
@@ -154,7 +192,7 @@ TEST_F(DatagramsTest, P9OneAddressHasAFewPlacesAndWhoWaitsForNothingGivesItsUp) 
     second.request(1, 1, read_pdu(2));
     ASSERT_TRUE(run_until_held(2));
     third.request(1, 1, read_pdu(3));
-    ASSERT_TRUE(run_until_dropped(1)) << "both places are taken";
+    EXPECT_EQ(third.receive(), adu(1, 1, "83 06"_hex)) << "both places are taken";
     elsewhere.request(1, 1, read_pdu(4));
     ASSERT_TRUE(run_until_held(3));
     bus1.answer(0, reply_to_read(1));
@@ -171,8 +209,9 @@ TEST_F(DatagramsTest, P9AllOfThemTogetherAreBoundedToo) {
     for (const char* address : {"127.0.0.2", "127.0.0.3", "127.0.0.4"})
         senders.push_back(sender(address));
     for (Sender& one : senders) one.request(1, 1, read_pdu(1));
-    EXPECT_TRUE(run_until_dropped(1));
+    EXPECT_EQ(senders[2].receive(), adu(1, 1, "83 06"_hex));
     EXPECT_EQ(bus1.seen.size(), 2U);
+    EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
 TEST_F(DatagramsTest, WhoHasBeenIdleIsForgotten) {

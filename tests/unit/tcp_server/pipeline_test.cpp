@@ -102,9 +102,11 @@ class RepeatedRequests : public SmallPipeline {
         shared->settings.waiting = 8;
     }
     std::size_t answers() {
-        answer_all();
         std::size_t count = 0;
-        for (; pipeline->front() != nullptr; ++count) pipeline->pop();
+        do {
+            answer_all();
+            for (; pipeline->front() != nullptr; ++count) pipeline->pop();
+        } while (!bus.held.empty());
         EXPECT_TRUE(pipeline->empty());
         return count;
     }
@@ -165,6 +167,24 @@ TEST_F(RepeatedRequests, ReadsAreAnsweredEachUnlessTheyAreToBeJoined) {
     pipeline->take(read);
     pipeline->take(read);
     EXPECT_EQ(answers(), 1U);
+}
+
+TEST_F(RepeatedRequests, P6AReadThatIsRepeatedBehindAWriteOfItsItemsIsAskedAgain) {
+    shared->settings.retransmissions = Retransmissions::join;
+    for (const std::size_t places : {8u, 1u}) {  // on the bus, and waiting
+        shared->settings.in_flight = places;
+        for (const Bytes& over : {"06 0000 0002"_hex, "0F 0000 0001 01 01"_hex, "41 01"_hex}) {
+            pipeline->take(read);
+            pipeline->take({9, 1, over});
+            pipeline->take(read);
+            EXPECT_EQ(answers(), 3U) << over[0];
+        }
+        pipeline->take(read);
+        pipeline->take({9, 1, "06 0005 0002"_hex});
+        pipeline->take(read);
+        EXPECT_EQ(answers(), 2U) << "it has written something else";
+    }
+    EXPECT_EQ(shared->counters.joined, 2U);
 }
 
 TEST_F(RepeatedRequests, PassGivesEachATurnOfItsOwn) {

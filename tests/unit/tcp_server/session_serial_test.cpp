@@ -1,5 +1,6 @@
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "loopback.hpp"
 #include "panelgate/modbus/ascii_frame.hpp"
@@ -183,6 +184,27 @@ TEST_F(SessionRtu, AStrayByteStallsNobody) {
     EXPECT_EQ(listener->counters().protocol_errors, 256U);
 }
 
+TEST_F(SessionRtu, P2AWriteInsideADamagedOneDoesNotReachTheBusAndTheNextOneDoes) {
+    const Bytes pdu = "06 0000 BEEF"_hex;
+    const Bytes inside = modbus::encode_adu(1, pdu);
+    Bytes damaged = modbus::encode_adu(1, "10 0000 0005 0A 0007"_hex + inside);
+    damaged.back() ^= 0x01;
+    bus1.instant = pdu;
+    start();
+    Client client = connect();
+    client.send(damaged);
+    ASSERT_TRUE(run_until([&] { return listener->counters().protocol_errors > 0; }));
+    clock.advance(settings.rtu_silence);
+    EXPECT_TRUE(bus1.seen.empty());
+    client.send(inside);
+    ASSERT_TRUE(run_until([&] {
+        if (clock.armed() != 0) clock.advance(settings.rtu_silence);
+        return client.has_bytes(inside.size());
+    }));
+    EXPECT_EQ(client.receive_bytes(inside.size()), inside);
+    EXPECT_EQ(bus1.seen.size(), 1U);
+}
+
 TEST_F(SessionRtu, AVendorsFunctionEndsByASilence) {
     bus1.instant = "41 07"_hex;
     start();
@@ -284,6 +306,22 @@ TEST_P(OnATcpListener, AnotherFramingIsClosedBeforeAnythingReachesTheBus) {
     EXPECT_EQ(listener->counters().protocol_errors, 3U);
     const std::string word(modbus::label(GetParam()));
     EXPECT_GE(log.count("needs a listener with framing: " + word), 1U);
+}
+
+class AnyListener : public Loopback, public ::testing::WithParamInterface<Framing> {};
+INSTANTIATE_TEST_SUITE_P(Framings, AnyListener,
+                         ::testing::Values(Framing::tcp, Framing::rtu, Framing::ascii),
+                         [](const auto& one) { return std::string(modbus::label(one.param)); });
+
+TEST_P(AnyListener, WhoSpeaksHttpIsClosedAndNamed) {
+    constexpr std::string_view kRequest = "GET /api/v1/lines HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+    settings.framing = GetParam();
+    start();
+    Client client = connect();
+    client.send(Bytes(kRequest.begin(), kRequest.end()));
+    EXPECT_TRUE(client.sees_close());
+    EXPECT_EQ(log.count("it speaks HTTP and needs the listener of 'http'"), 1U);
+    EXPECT_TRUE(bus1.seen.empty());
 }
 
 }  // namespace

@@ -16,6 +16,13 @@
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
+namespace panelgate::bus {
+class LineHistory;
+}
+namespace panelgate::points {
+class StationHistory;
+}
+
 namespace panelgate::web {
 
 struct LineEntry {
@@ -23,8 +30,9 @@ struct LineEntry {
     std::string device;             ///< as configured
     bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
     bool pass_unlisted_stations = true;
-    Duration deadline = 2s;  ///< of a request, from its arrival to its answer
-    SerialFormat serial{};   ///< what a read costs follows from it
+    Duration deadline = 2s;                     ///< of a request, from its arrival to its answer
+    SerialFormat serial{};                      ///< what a read costs follows from it
+    const bus::LineHistory* history = nullptr;  ///< null: nothing is kept; outlives the directory
 };
 
 /// The faults of a simulated panel, in numbers by name.
@@ -41,6 +49,7 @@ struct StationEntry : bus::StationRef {
     bool read_only = false;
     std::optional<int> unit;  ///< the unit id that Modbus/TCP clients use, when there is one
     const points::StationPoints* points = nullptr;    ///< null without any; outlives the directory
+    const points::StationHistory* history = nullptr;  ///< of them; null where nothing is kept
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 

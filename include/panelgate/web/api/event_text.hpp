@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -16,6 +17,9 @@ std::string point_event(const bus::StationRef& station, const points::Point& poi
                         const points::PointReading& reading);
 std::string line_event(std::string_view line, std::string_view state, std::string_view why);
 std::string station_event(std::string_view line, std::string_view station, std::string_view what);
+/// How far a search for stations on a line is; "running", or how it has ended.
+std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
+                            std::size_t of, std::size_t found);
 /// `station` "" is a broadcast.
 std::string transaction_event(std::string_view line, std::string_view station,
                               std::uint8_t function, std::string_view outcome, Duration took);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/wall_time.hpp"
 #include "panelgate/points/relay_status.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/metrics_source.hpp"
@@ -21,6 +22,7 @@
 
 namespace panelgate::web {
 
+class DiscoverySource;
 class HttpListener;
 class KeyBook;
 
@@ -32,9 +34,11 @@ struct Providers {
     std::function<std::string()> missing;  ///< what does not stand yet, in words
     std::string version;
     std::function<TimePoint()> now;  ///< the machine's monotonic clock
+    std::function<WallTime()> wall;  ///< what the clock on the wall shows
     std::function<std::vector<points::RelayStatus>()> relays;
-    EventHub* events = nullptr;  ///< never null; outlives the server
-    SharedText configuration;    ///< in force, a JSON object without secrets; null: not shown
+    EventHub* events = nullptr;            ///< never null; outlives the server
+    DiscoverySource* discovery = nullptr;  ///< null only where there are no lines; outlives it
+    SharedText configuration;  ///< in force, a JSON object without secrets; null: not shown
     ApiSettings settings{};
 };
 

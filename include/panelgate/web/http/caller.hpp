@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace panelgate::web {
 
@@ -51,6 +53,19 @@ class Caller {
     /// Something came, or may have come, of what it asked for: asked again, it could come twice.
     void take_effect() { has_effect_ = true; }
     bool has_effect() const { return has_effect_; }
+    /// A transaction was made for its request of now, by this line. Bounded: the first kMostCosts
+    /// are known.
+    struct Cost {
+        const void* line = nullptr;
+        std::uint64_t transaction = 0;
+        friend bool operator==(const Cost&, const Cost&) = default;
+    };
+    static constexpr std::size_t kMostCosts = 1000;
+    void add_cost(const Cost& cost) {
+        if (costs_.size() < kMostCosts) costs_.push_back(cost);
+    }
+    /// Of its request of now, in their order; the next one begins with none.
+    std::vector<Cost> take_costs() { return std::exchange(costs_, {}); }
 
   private:
     std::uint64_t id_;
@@ -59,6 +74,7 @@ class Caller {
     bool left_ = false;
     bool hung_up_ = false;
     bool has_effect_ = false;
+    std::vector<Cost> costs_;
     std::map<const void*, std::function<void()>> farewells_;
 };
 

@@ -26,8 +26,8 @@ struct HttpRequest {
 };
 /// The request headers that anything here looks at; each may come once.
 inline constexpr const char* kHeadersRead[] = {
-    "authorization",  "origin",         "content-type",   "content-encoding",
-    "sec-fetch-site", "sec-fetch-mode", "sec-fetch-dest", "idempotency-key"};
+    "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
+    "sec-fetch-mode", "sec-fetch-dest", "idempotency-key", "last-event-id"};
 /// … and those that are lists: of several fields the values follow each other (RFC 9110 5.3).
 inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
                                              "prefer"};

@@ -41,5 +41,10 @@ TEST(EventText, NamesTheStationOfATransactionUnlessItIsABroadcast) {
               R"({"line":"floor1","station":"press","event":"offline"})");
 }
 
+TEST(EventText, TellsHowFarADiscoveryIs) {
+    EXPECT_EQ(discovery_event("floor1", "running", 3, 242, 1),
+              R"({"line":"floor1","state":"running","asked":3,"of":242,"found":1})");
+}
+
 }  // namespace
 }  // namespace panelgate::web

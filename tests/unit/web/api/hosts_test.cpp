@@ -68,7 +68,7 @@ TEST_F(Hosts, AreToldWhatTheyCanAsk) {
     EXPECT_EQ(path.header("Content-Length"), "");
     const Reply server = say("OPTIONS * HTTP/1.1\r\nHost: x\r\n");
     EXPECT_EQ(server.status(), 204u);
-    EXPECT_EQ(server.header("Allow"), "GET, HEAD, POST, PUT, OPTIONS");
+    EXPECT_EQ(server.header("Allow"), "GET, HEAD, POST, DELETE, PUT, OPTIONS");
     EXPECT_EQ(status("GET * HTTP/1.1\r\nHost: x\r\n"), 400u);
 }
 

@@ -14,6 +14,7 @@
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/load_profile.hpp"
+#include "panelgate/web/api/discovery_source.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "support/fake_bus.hpp"
 #include "support/http_client.hpp"
@@ -127,8 +128,10 @@ class HttpRig : public ::testing::Test {
         providers.missing = [this] { return missing; };
         providers.version = "1.2.3";
         providers.now = [this] { return now; };
+        providers.wall = [this] { return wall; };
         providers.relays = [this] { return relays; };
         providers.events = &events;
+        providers.discovery = discovery;
         providers.configuration = configuration;
         server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
         EXPECT_FALSE(server->start());
@@ -174,8 +177,10 @@ class HttpRig : public ::testing::Test {
     Directory directory;
     Settings settings;
     TimePoint now{1h};
+    WallTime wall{std::chrono::seconds(1'790'000'000)};  ///< 2026-09-21T14:13:20Z
     std::vector<points::RelayStatus> relays;
     EventHub events;
+    DiscoverySource* discovery = nullptr;
     SharedText configuration;
     FixedMetrics metrics{io.get_executor()};
     bool ready = true;

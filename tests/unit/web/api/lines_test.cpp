@@ -78,7 +78,7 @@ TEST_F(ApiLines, ShowsTheLastFramesOfALine) {
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=2").json(), json_of(R"({"frames":[
         {"sequence":2,"time":"1970-01-01T00:00:02.500000Z","at":2.5,"direction":"sent","station":31,"bytes":"1F 01 01 20 00 05 FF 81","note":"request","why":"next in turn"},
         {"sequence":3,"time":"1970-01-01T00:00:00.000000Z","at":3,"direction":"discarded","station":null,"bytes":"","note":"damaged"}],
-        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}],"next":7})"));
+        "decisions":[{"sequence":7,"time":"1970-01-01T00:00:00.000000Z","at":2,"text":"refused"}],"transactions":[],"next":7})"));
     EXPECT_EQ(get("/api/v1/lines/floor1/trace").at("frames").as_array().size(), 3u);
     EXPECT_EQ(get("/api/v1/lines/floor1/trace?last=0").status(), 400u);
 }

@@ -1,0 +1,118 @@
+#include "panelgate/scan/discovery.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "examination.hpp"
+#include "recogniser.hpp"
+
+namespace panelgate::scan {
+
+Discovery::Discovery(const profile::Catalogue& profiles, DiscoverySettings settings, TimePoint now)
+    : profiles_(profiles),
+      settings_(std::move(settings)),
+      waiting_(settings_.stations.begin(), settings_.stations.end()),
+      due_(now) {}
+
+Discovery::~Discovery() = default;
+
+bool Discovery::done() const { return gave_up() || (waiting_.empty() && recogniser_ == nullptr); }
+
+std::optional<ReadRequest> Discovery::question(TimePoint now) {
+    if (done() || now < due_) return std::nullopt;
+    if (recogniser_ == nullptr) return ReadRequest::make(waiting_.front(), first_question());
+    return ReadRequest::make(looked_at_.station, *probe_);
+}
+
+void Discovery::on_answer(TimePoint now, const Answer& answer) {
+    if (done()) return;
+    pay(now, answer.cost);
+    if (answer.reply == Reply::unsent) {
+        ++unsent_;
+        due_ = std::max(due_, now + kUnsentPause);
+        return;
+    }
+    unsent_ = 0;
+    if (recogniser_ == nullptr) {
+        on_first(answer);
+    } else {
+        on_probe(answer);
+    }
+}
+
+/// Each question is paid for in full, also where it began before its time had come.
+void Discovery::pay(TimePoint now, Duration cost) {
+    const std::chrono::duration<double> whole(to_seconds(cost) / settings_.share);
+    due_ = std::max(due_, now - cost) + std::chrono::round<Duration>(whole);
+}
+
+void Discovery::on_first(const Answer& answer) {
+    const std::uint8_t station = waiting_.front();
+    if (answer.reply == Reply::damaged && ++damaged_ < kDamagedTries) return;
+    waiting_.pop_front();
+    const bool again = asked_ == of();  // who was late
+    if (!again) ++asked_;
+    if (answer.reply == Reply::silent) {
+        damaged_ = 0;  // that was noise
+        if (!again) silent_.insert(station);
+        return;
+    }
+    looked_at_ = {};
+    looked_at_.station = station;
+    looked_at_.evidence.asked = damaged_ + (answer.reply == Reply::answered ? 1 : 0);
+    looked_at_.evidence.damaged = std::exchange(damaged_, 0);
+    looked_at_.evidence.late = again ? 1 : 0;
+    if (answer.reply != Reply::answered) {
+        found_.push_back(std::exchange(looked_at_, {}));
+        return;
+    }
+    looked_at_.evidence.good = 1;
+    recogniser_ = std::make_unique<Recogniser>(profiles_, station, settings_.format);
+    silent_probes_ = 0;
+    take_probe();
+}
+
+void Discovery::take_probe() {
+    while ((probe_ = recogniser_->next_probe())) {
+        if (ReadRequest::make(looked_at_.station, *probe_)) return;
+        recogniser_->skip(*probe_);
+    }
+    end_examination();
+}
+
+void Discovery::on_probe(const Answer& answer) {
+    ++looked_at_.evidence.asked;
+    if (answer.reply == Reply::damaged) {
+        ++looked_at_.evidence.damaged;
+        if (++damaged_ < kDamagedTries) return;
+        recogniser_->skip(*probe_);
+    } else if (answer.reply == Reply::answered) {
+        ++looked_at_.evidence.good;
+        recogniser_->on_reply(*probe_, answer.pdu);
+    } else {
+        recogniser_->on_reply(*probe_, std::nullopt);
+    }
+    damaged_ = 0;
+    silent_probes_ = answer.reply == Reply::silent ? silent_probes_ + 1 : 0;
+    if (silent_probes_ == kSilentProbes) return end_examination();
+    take_probe();
+}
+
+void Discovery::end_examination() {
+    looked_at_.candidates = recogniser_->candidates();
+    found_.push_back(std::exchange(looked_at_, {}));
+    recogniser_.reset();
+}
+
+void Discovery::ask_late(std::uint8_t station) {
+    if (silent_.erase(station) > 0 && !gave_up()) waiting_.push_back(station);
+}
+
+std::vector<StationFinding> Discovery::findings() const {
+    std::vector<StationFinding> all = found_;
+    if (recogniser_ != nullptr) all.push_back(looked_at_);
+    std::ranges::sort(all, {}, &StationFinding::station);
+    return all;
+}
+
+}  // namespace panelgate::scan

@@ -1,0 +1,141 @@
+"""Looking for unlisted stations on a line that runs."""
+import asyncio
+import json
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+from pymodbus.transaction import ModbusRtuFramer
+
+import config
+import harness
+from harness import read_registers
+from test_ascii import BUILT, UNIT, ForeignSlave
+from test_events import Events
+from test_points import until
+from zoo_line import Zoo, read_all
+
+BAUD = 38400
+PATH = "/api/v1/lines/{}/discover"
+SIMULATED = config.line(stations=config.PRESS)
+HEARD = config.line("heard", device="/dev/zero", mode="listen", stations="{id: 9, name: heard}")
+DOWN = config.line("down", device="/dev/null", stations="{id: 8, name: scale}")
+
+
+def state(program, line="floor1"):
+    return program.get(PATH.format(line))[1]
+
+
+def discover(program, line="floor1", patience=120, **wanted):
+    """Looks until it is done; the report."""
+    status, report = program.rest("POST", PATH.format(line), wanted)
+    assert status == 202, report
+    until(lambda: state(program, line)["state"] != "running", patience)
+    return state(program, line)
+
+
+class Rest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.program = cls.enterClassContext(
+            harness.configured(config.gateway(SIMULATED, HEARD, DOWN, http=config.OPERATOR)))
+
+    def tearDown(self):
+        self.program.rest("DELETE", PATH.format("floor1"))
+
+    def test_one_at_a_time_with_progress_and_an_end(self):
+        with Events(self.program, "?types=discovery&line=floor1") as events:
+            status, begun = self.program.rest("POST", PATH.format("floor1"), {"stations": "20-25,31"})
+            self.assertEqual((status, begun["state"], begun["of"]), (202, "running", 6))
+            status, second = self.program.rest("POST", PATH.format("floor1"), {})
+            self.assertEqual((status, "already" in second["detail"]), (409, True))
+            self.assertEqual(events.next("discovery", asked=1)["state"], "running")
+            ended = events.next("discovery", state="done")
+            self.assertEqual((ended["asked"], ended["of"], ended["found"]), (6, 6, 0))
+        report = state(self.program)
+        self.assertEqual((report["state"], report["stations"], report["yaml"]), ("done", [], ""))
+
+    def test_it_is_ended_by_whoever_may_begin_it(self):
+        self.program.rest("POST", PATH.format("floor1"), {"share_percent": 1})
+        status, report = self.program.rest("DELETE", PATH.format("floor1"))
+        self.assertEqual((status, report["state"]), (200, "stopped"))
+        self.assertEqual(self.program.rest("POST", PATH.format("floor1"), {"stations": "5"})[0], 202)
+
+    def test_not_where_somebody_else_is_master_and_not_without_a_line(self):
+        status, problem = self.program.rest("POST", PATH.format("heard"), {})
+        self.assertEqual((status, problem["rule"]), (409, "listen"))
+        self.assertEqual(self.program.rest("POST", PATH.format("down"), {})[0], 502)
+        self.assertEqual(self.program.rest("POST", PATH.format("attic"), {})[0], 404)
+        self.assertEqual(state(self.program, "down")["state"], "never")
+
+    def test_the_gateway_ends_while_it_looks(self):
+        with harness.configured(config.gateway(SIMULATED, http=config.OPERATOR)) as program:
+            self.assertEqual(program.rest("POST", PATH.format("floor1"), {"share_percent": 1})[0], 202)
+            until(lambda: state(program)["asked"] > 0)
+            self.assertEqual(program.stop(), 0)
+
+
+@unittest.skipUnless((BUILT / "serial_pair").exists(), "the paced pair is not built")
+class Foreign(unittest.TestCase):
+    def test_pymodbus_is_found_and_its_yaml_can_be_pasted(self):
+        with tempfile.TemporaryDirectory() as folder:
+            far, near = f"{folder}/far", f"{folder}/near"
+            listed = config.line(device=far, stations="{id: 3, name: absent}",
+                                 timing="{response_timeout: 60ms}")
+            with harness.Helper([BUILT / "serial_pair", str(BAUD), far, near]) as pair:
+                pair.out.wait_for("ready")
+                with ForeignSlave(near, ModbusRtuFramer), \
+                        harness.configured(config.gateway(listed, http=config.OPERATOR)) as program:
+                    program.log.wait_for("line up")
+                    report = discover(program, stations="10-20", share_percent=50)
+            self.assertEqual([one["id"] for one in report["stations"]], [UNIT])
+            self.assertIn(f"id: {UNIT}, name: floor1-{UNIT}", report["yaml"])
+            file = pathlib.Path(folder) / "with_it.yaml"
+            text = config.gateway(config.line(device=far, stations="").replace("stations: []", "stations:"))
+            file.write_text(text.replace("    stations:\n", "    stations:\n" + report["yaml"]))
+            checked = subprocess.run([harness.PANELGATE, "check", "-c", str(file)], text=True,
+                                     capture_output=True, timeout=harness.PATIENCE, check=False)
+            self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr + file.read_text())
+
+
+class Beside(unittest.TestCase):
+    """Strangers that are slow, late or damaged, while two listed panels are read without a pause."""
+
+    def test_P1_P4_strangers_cost_no_more_than_the_share_and_no_value_is_wrong(self):
+        with tempfile.TemporaryDirectory() as folder:
+            zoo = ["--baud", BAUD, "--bus", f"{folder}/tty=1,2,7,9,11,12", "--set", "9=think-700ms",
+                   "--set", "11=crcbad", "--set", "12=think-80ms"]
+            with Zoo(*zoo) as panels:
+                line = config.line("zoo", panels.names[0], baud=BAUD, stations=config.station_ids([1, 2]))
+                with harness.configured(config.gateway(line, http=config.OPERATOR)) as program:
+                    program.log.wait_for("line up")
+                    self.look_beside(program)
+
+    def look_beside(self, program):
+        def read(seconds):
+            readers = asyncio.run(read_all(program.modbus_port(), [1, 2], seconds))
+            return [reader.summary() for reader in readers.values()]
+        alone = read(4)
+        self.assertEqual(program.rest("POST", PATH.format("zoo"), {"stations": "3-20"})[0], 202)
+        beside = read(8)
+        during = state(program, "zoo")
+        until(lambda: state(program, "zoo")["state"] != "running", 120)
+        report = state(program, "zoo")
+        share = during["bus_ms"] / during["took_ms"]
+        rates = sum(s.good for s in alone) / 4, sum(s.good for s in beside) / 8
+        print(f"\n  {during['asked']} of {during['of']} addresses in {during['took_ms'] / 1000:.1f} s took "
+              f"{100 * share:.1f} % of the line; {rates[0]:.0f} reads/s alone, {rates[1]:.0f} beside; found "
+              f"{json.dumps([(s['id'], s['evidence']) for s in report['stations']])}", end="")
+        self.assertEqual([s.wrong for s in alone + beside], [0] * 4)
+        self.assertEqual([s.refused for s in beside], [{}] * 2)
+        self.assertLess(share, 0.15)  # one long question at the end of the time is not yet paid for
+        self.assertGreater(rates[1], 0.8 * rates[0])
+        found = {one["id"]: one for one in report["stations"]}
+        self.assertLessEqual({7, 11, 12}, set(found))
+        self.assertEqual(found[11]["profiles"], [])
+        self.assertLessEqual(set(found), {7, 9, 11, 12})
+
+
+if __name__ == "__main__":
+    unittest.main()
