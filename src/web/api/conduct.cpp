@@ -44,7 +44,7 @@ bool is_packable(const HttpResponse& response, std::size_t from) {
 void add_vary(HttpResponse& response, const std::string& name) {
     for (auto& [header, value] : response.headers) {
         if (header != "Vary") continue;
-        value += ", " + name;
+        if (value.find(name) == std::string::npos) value += ", " + name;
         return;
     }
     response.headers.emplace_back("Vary", name);

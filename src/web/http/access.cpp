@@ -56,8 +56,10 @@ bool is_json(std::string_view content_type) {
     return to_lower(type) == "application/json";
 }
 
+/// What a form of any site could send. DELETE is no method of forms, and has no body.
 bool is_foreign_form(const HttpRequest& request) {
-    if (request.method == "GET" || request.method == "HEAD") return false;
+    if (request.method == "GET" || request.method == "HEAD" || request.method == "DELETE")
+        return false;
     return !header(request, "origin").empty() && !is_json(header(request, "content-type"));
 }
 

@@ -42,6 +42,7 @@ TEST_F(Page, IsSentPackedToWhoTakesIt) {
     const Reply packed = ask("GET", "/page/app.js", "", kGzip);
     EXPECT_EQ(packed.header("Content-Encoding"), "gzip");
     EXPECT_EQ(packed.header("Vary"), "Accept-Encoding");
+    EXPECT_EQ(plain.header("Vary"), "Accept-Encoding");
     EXPECT_LT(packed.body().size(), plain.body().size() / 2);
     EXPECT_EQ(unpacked(packed.body()), plain.body());
 }

@@ -100,6 +100,12 @@ TEST(Access, SaysHowToAskAgain) {
     EXPECT_EQ(refused->headers[0].second, "Bearer realm=\"panelgate\"");
 }
 
+TEST(Access, WantsNoTypeOfWhatHasNoBody) {
+    HttpRequest request = asking("", "DELETE");
+    request.headers["origin"] = "http://gateway";
+    EXPECT_EQ(refusal(request, Role::operator_, Role::operator_), 0u);
+}
+
 TEST(Access, TakesNoFormFromAForeignPage) {
     HttpRequest request = asking("", "POST");
     request.headers["origin"] = "http://evil.example";

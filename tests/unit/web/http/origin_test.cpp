@@ -42,15 +42,15 @@ TEST_F(Origin, IsRefusedUnderAForeignName) {
     EXPECT_EQ(refusal(), 0u);
 }
 
-TEST_F(Origin, OfAnotherSiteChangesNothing) {
+TEST_F(Origin, OfAnotherSiteChangesAndReadsNothing) {
     for (const char* origin :
          {"http://evil.example", "https://evil.example:8080", "null", "gateway"}) {
         request.headers["origin"] = origin;
-        for (const char* method : {"PUT", "POST"}) {
+        for (const char* method : {"PUT", "POST", "DELETE", "GET", "HEAD"}) {
             request.method = method;
             EXPECT_EQ(refusal(), 403u) << method << ' ' << origin;
         }
-        request.method = "GET";
+        request.method = "OPTIONS";
         EXPECT_EQ(refusal(), 0u);
     }
     request.method = "PUT";
