@@ -184,6 +184,15 @@ class Request(Browser):
         self.find(".answer button").click()
         self.wait(lambda: "i32" in self.text(".answer"))
 
+    def test_an_answer_leads_to_its_frames_in_the_scope(self):
+        self.ask("UW100", 2)
+        self.find("#read").click()
+        self.wait(lambda: self.all(".answer a"))
+        self.assertRegex(self.text(".answer a"), r"^on the wire: #\d+$")
+        self.find(".answer a").click()
+        self.wait(lambda: self.all(".detail .bytes"))
+        self.assertEqual(self.text(".detail .bytes").replace(" ", "")[:12], "1F0300640002")
+
     def test_what_the_panel_does_not_have_is_told_in_words(self):
         self.ask("XY7", 1)
         self.wait(lambda: "XY7" in self.text(".plan .refusal"))

@@ -30,13 +30,19 @@ async function ask(method, path, body, headers = {}) {
     const given = response.headers.get('Content-Type') ?? '';
     const parsed = given.includes('json') ? await response.json() : {detail: await response.text()};
     if (!response.ok) throw new Refused(response.status, parsed);
-    costs.set(parsed, response.headers.get('Panelgate-Transactions')?.split(',').map((one) => one.trim().split('/')) ?? []);
+    costs.set(parsed, response.headers.get('Panelgate-Transactions')?.split(',').map(transaction) ?? []);
     return parsed;
 }
 
 const costs = new WeakMap();
 
-/** The transactions that an answer has cost: [[line, number in its trace]]; [] where nobody tells. */
+/** "floor1:17", or "17" where one line alone was asked. */
+function transaction(text) {
+    const [number, line] = text.trim().split(':').reverse();
+    return [line ?? null, Number(number)];
+}
+
+/** The transactions that an answer has cost: [[line or null, id in its trace]]; [] where nobody tells. */
 export const costOf = (answer) => costs.get(answer) ?? [];
 
 export const get = (path) => ask('GET', path);

@@ -20,7 +20,8 @@ function parts(given) {
 
 /** Where the bus scope shows what an answer has cost. */
 function onTheWire(body) {
-    return costOf(body).map(([line, number]) => [' · ', h('a', {href: `#/scope/${line}/${number}`}, t('on.wire', {number}))]);
+    const own = live.stations.find((one) => one.name === body.station)?.line ?? body.station?.split(':')[0];
+    return costOf(body).filter(([line]) => line ?? own).map(([line, number]) => [' · ', h('a', {href: `#/scope/${line ?? own}/t${number}`}, t('on.wire', {number}))]);
 }
 
 class Box {

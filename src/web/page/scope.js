@@ -22,7 +22,7 @@ class Scope {
     #pointers = new Map();  // that are down, by id: x
     #wanted;
 
-    /** `wanted`: the number of a frame to begin with, when the line's trace still has it. */
+    /** `wanted`: which frame to begin with, when the line's trace still has it. */
     constructor(line, wanted) {
         this.line = line;
         this.#wanted = wanted;
@@ -67,7 +67,7 @@ class Scope {
     }
 
     #seek() {
-        const frame = this.#wanted && this.trace.timeline.segments.find((one) => one.sequence === this.#wanted);
+        const frame = this.#wanted && this.trace.timeline.segments.find(this.#wanted);
         if (!frame) return;
         this.#wanted = null;
         this.#span = CLOSE;
@@ -232,11 +232,14 @@ function legend() {
     return h('ul', {class: 'legend'}, ['sent', 'received', 'think', 'gap', 'silence', 'rest', 'discarded', 'decision'].map(key));
 }
 
-/** The view: {node, stop}. `argument`: a line, or nothing for the first; `detail`: a frame's number. */
+/** The view: {node, stop}. `argument`: a line, or nothing for the first; `detail`: a frame's number, or a
+ *  transaction's ("t17"). */
 export function scopeView({argument, detail}) {
     const name = argument ?? live.lines[0]?.name;
     if (!live.line(name)) return {node: h('p', {class: 'empty'}, t('no.lines'))};
-    const scope = new Scope(name, detail === undefined ? null : Number(detail));
+    const number = Number(detail?.replace('t', ''));
+    const wanted = detail?.startsWith('t') ? (one) => one.transaction === number : (one) => one.sequence === number;
+    const scope = new Scope(name, detail === undefined ? null : wanted);
     const chooser = live.lines.length < 2 ? null : h('p', {class: 'bar'}, t('line'),
         choice(t('line'), live.lines.map((line) => [line.name, line.name]), name, (chosen) => { location.hash = `#/scope/${chosen}`; }));
     return {node: h('div', null, h('h1', null, t('nav.scope'), ' ', h('small', null, name)), chooser, scope.node), stop: () => scope.stop()};
