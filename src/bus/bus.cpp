@@ -339,29 +339,10 @@ std::optional<Refusal> Bus::refusal_of_write(std::uint8_t station) const {
     return state_->rights.judge_write(station);
 }
 
-std::vector<TraceFrame> Bus::trace(std::size_t last) const {
-    return state_->book.store().frames(last);
-}
+TracePart Bus::trace(std::size_t last) const { return state_->book.store().part(last); }
 
-std::vector<TraceDecision> Bus::decisions(std::size_t last) const {
-    return state_->book.store().decisions(last);
-}
-
-std::vector<TraceFrame> Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.store().frames_since(sequence, most);
-}
-
-std::vector<TraceDecision> Bus::decisions_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.store().decisions_since(sequence, most);
-}
-
-std::vector<TraceTransaction> Bus::transactions(std::size_t last) const {
-    return state_->book.store().transactions(last);
-}
-
-std::vector<TraceTransaction> Bus::transactions_since(std::uint64_t sequence,
-                                                      std::size_t most) const {
-    return state_->book.store().transactions_since(sequence, most);
+TracePart Bus::trace_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->book.store().part_since(sequence, most);
 }
 
 std::vector<IncidentHead> Bus::incidents() const { return state_->book.incidents().heads(); }

@@ -1,6 +1,7 @@
 #include "incident_book.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 namespace panelgate::bus {
@@ -85,7 +86,7 @@ std::optional<Incident> IncidentBook::fetch(std::uint64_t id) {
     for (const auto& kept : kept_) {
         if (kept->head.id != id) continue;
         kept->head.read = true;
-        return Incident{kept->head, kept->store.all()};
+        return Incident{kept->head, kept->store.part(SIZE_MAX)};
     }
     return std::nullopt;
 }

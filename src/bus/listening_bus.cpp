@@ -199,15 +199,6 @@ void ListeningBus::tell_refused(std::uint8_t station, ByteView pdu, ClientId cli
 
 void ListeningBus::cancel(ClientId client) { state_->names.forget(client); }
 
-std::vector<TraceDecision> ListeningBus::decisions(std::size_t last) const {
-    return state_->book.store().decisions(last);
-}
-
-std::vector<TraceDecision> ListeningBus::decisions_since(std::uint64_t sequence,
-                                                         std::size_t most) const {
-    return state_->book.store().decisions_since(sequence, most);
-}
-
 void ListeningBus::name_client(ClientId client, std::string name) {
     state_->names.set(client, std::move(name));
 }
@@ -233,21 +224,10 @@ std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) cons
     return state_->refusal(station);
 }
 
-std::vector<TraceFrame> ListeningBus::trace(std::size_t last) const {
-    return state_->book.store().frames(last);
-}
+TracePart ListeningBus::trace(std::size_t last) const { return state_->book.store().part(last); }
 
-std::vector<TraceFrame> ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
-    return state_->book.store().frames_since(sequence, most);
-}
-
-std::vector<TraceTransaction> ListeningBus::transactions(std::size_t last) const {
-    return state_->book.store().transactions(last);
-}
-
-std::vector<TraceTransaction> ListeningBus::transactions_since(std::uint64_t sequence,
-                                                               std::size_t most) const {
-    return state_->book.store().transactions_since(sequence, most);
+TracePart ListeningBus::trace_since(std::uint64_t sequence, std::size_t most) const {
+    return state_->book.store().part_since(sequence, most);
 }
 
 std::vector<IncidentHead> ListeningBus::incidents() const {

@@ -70,12 +70,7 @@ void TraceBook::end(const arbiter::Exchange& exchange) {
     found->end = exchange.end;
     found->station = exchange.station;
     found->time = wall_.at(exchange.first_bit_out);
-    found->arrived = exchange.arrived;
-    found->granted = exchange.granted;
-    found->first_bit_out = exchange.first_bit_out;
-    found->last_bit_out = exchange.last_bit_out;
-    found->first_byte_in = exchange.first_byte_in;
-    found->last_byte_in = exchange.last_byte_in;
+    static_cast<TransactionInstants&>(*found) = exchange;
     incidents_.end(*found);
     judge(*found, exchange.last_bit_out);
 }

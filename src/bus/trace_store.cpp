@@ -118,19 +118,7 @@ TraceDecision TraceStore::told(const RecordedDecision& decision) const {
 
 TraceTransaction TraceStore::told(const RecordedTransaction& one) const {
     TraceTransaction made;
-    made.id = one.id;
-    made.first = one.first;
-    made.sequence = one.sequence;
-    made.station = one.station;
-    made.end = one.end;
-    made.time = one.time;
-    made.arrived = one.arrived;
-    made.granted = one.granted;
-    made.first_bit_out = one.first_bit_out;
-    made.last_bit_out = one.last_bit_out;
-    made.first_byte_in = one.first_byte_in;
-    made.last_byte_in = one.last_byte_in;
-    made.answered = one.answered;
+    static_cast<TransactionFacts&>(made) = one;
     for (std::size_t i = frames_.place_behind(one.first - 1); i < frames_.size(); ++i) {
         const RecordedFrame& frame = frames_.at(i);
         if (frame.transaction != one.id) break;
@@ -194,8 +182,13 @@ std::vector<TraceTransaction> TraceStore::transactions_since(std::uint64_t seque
         transactions_.since(sequence, std::min(most, ended() - before)));
 }
 
-TracePart TraceStore::all() const {
-    return {frames(frames_.size()), decisions(decisions_.size()), transactions(ended())};
+TracePart TraceStore::part(std::size_t last) const {
+    return {frames(last), decisions(last), transactions(last)};
+}
+
+TracePart TraceStore::part_since(std::uint64_t sequence, std::size_t most) const {
+    return {frames_since(sequence, most), decisions_since(sequence, most),
+            transactions_since(sequence, most)};
 }
 
 }  // namespace panelgate::bus

@@ -36,22 +36,13 @@ struct RecordedDecision {
     std::size_t size = 0;
 };
 /// As TraceTransaction; its frames tell the rest.
-struct RecordedTransaction {
-    static constexpr std::uint64_t kOpen = UINT64_MAX;
+struct RecordedTransaction : TransactionFacts {
+    static constexpr std::uint64_t kOpen = UINT64_MAX;  ///< its end has no number yet
 
-    std::uint64_t id = 0;
-    std::uint64_t first = 0;
-    std::uint64_t sequence = kOpen;  ///< of its end
-    WallTime time{};
-    std::optional<TimePoint> arrived{};
-    TimePoint granted;
-    TimePoint first_bit_out;
-    TimePoint last_bit_out;
-    std::optional<TimePoint> first_byte_in{};
-    std::optional<TimePoint> last_byte_in{};
-    std::optional<TimePoint> answered{};
-    TransactionEnd end = TransactionEnd::open;
-    std::uint8_t station = 0;
+    RecordedTransaction() {
+        sequence = kOpen;
+        end = TransactionEnd::open;
+    }
 };
 
 /// Frames, decisions and transactions of a line in memory of a fixed size. What is no longer whole
@@ -89,7 +80,9 @@ class TraceStore {
     std::vector<TraceTransaction> transactions(std::size_t last) const;
     std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
                                                      std::size_t most) const;
-    TracePart all() const;
+    // ... and all three kinds.
+    TracePart part(std::size_t last) const;
+    TracePart part_since(std::uint64_t sequence, std::size_t most) const;
 
   private:
     TraceFrame told(const RecordedFrame& frame) const;

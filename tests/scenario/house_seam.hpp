@@ -123,7 +123,7 @@ class HouseSeam final : public bus::BusClient {
     bus::StationStatus station_status(std::uint8_t station) const override {
         return bus_.station_status(station);
     }
-    std::vector<bus::TraceFrame> trace(std::size_t last) const override { return bus_.trace(last); }
+    bus::TracePart trace(std::size_t last) const override { return bus_.trace(last); }
 
     bool idle() const { return open_.empty(); }
     std::uint64_t answers() const { return answers_; }

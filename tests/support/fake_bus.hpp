@@ -67,32 +67,12 @@ class FakeBus : public bus::BusClient {
     std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
         return rights.judge_write(station);
     }
-    std::vector<bus::TraceFrame> trace(std::size_t last) const override {
-        const auto skip = frames.size() - std::min(last, frames.size());
-        return {frames.begin() + static_cast<std::ptrdiff_t>(skip), frames.end()};
+    bus::TracePart trace(std::size_t most) const override {
+        return {last(frames, most), last(made, most), last(exchanges, most)};
     }
-
-    std::vector<bus::TraceDecision> decisions(std::size_t last) const override {
-        const auto skip = made.size() - std::min(last, made.size());
-        return {made.begin() + static_cast<std::ptrdiff_t>(skip), made.end()};
-    }
-
-    std::vector<bus::TraceFrame> trace_since(std::uint64_t sequence,
-                                             std::size_t most) const override {
-        return since(frames, sequence, most);
-    }
-    std::vector<bus::TraceDecision> decisions_since(std::uint64_t sequence,
-                                                    std::size_t most) const override {
-        return since(made, sequence, most);
-    }
-
-    std::vector<bus::TraceTransaction> transactions(std::size_t last) const override {
-        const auto skip = exchanges.size() - std::min(last, exchanges.size());
-        return {exchanges.begin() + static_cast<std::ptrdiff_t>(skip), exchanges.end()};
-    }
-    std::vector<bus::TraceTransaction> transactions_since(std::uint64_t sequence,
-                                                          std::size_t most) const override {
-        return since(exchanges, sequence, most);
+    bus::TracePart trace_since(std::uint64_t sequence, std::size_t most) const override {
+        return {since(frames, sequence, most), since(made, sequence, most),
+                since(exchanges, sequence, most)};
     }
     std::vector<bus::IncidentHead> incidents() const override {
         std::vector<bus::IncidentHead> heads;
@@ -135,6 +115,11 @@ class FakeBus : public bus::BusClient {
     std::vector<bus::Incident> frozen;
 
   private:
+    template <class Entry>
+    static std::vector<Entry> last(const std::vector<Entry>& all, std::size_t most) {
+        const auto skip = all.size() - std::min(most, all.size());
+        return {all.begin() + static_cast<std::ptrdiff_t>(skip), all.end()};
+    }
     template <class Entry>
     static std::vector<Entry> since(const std::vector<Entry>& all, std::uint64_t sequence,
                                     std::size_t most) {

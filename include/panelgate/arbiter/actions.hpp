@@ -14,6 +14,7 @@
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/transaction_end.hpp"
+#include "panelgate/base/transaction_instants.hpp"
 #include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
@@ -42,16 +43,10 @@ struct Note {
 };
 /// With Settings::explain: a transaction is over. Said behind the frame that ends it, before the
 /// Finish of those that it answers.
-struct Exchange {
+struct Exchange : TransactionInstants {
     Transaction transaction = 0;
     TransactionEnd end = TransactionEnd::open;
     std::uint8_t station = 0;
-    std::optional<TimePoint> arrived;  ///< the request that leads; nothing: nobody waits for it
-    TimePoint granted;                 ///< it is its turn
-    TimePoint first_bit_out;           ///< by the line's rate, as what follows
-    TimePoint last_bit_out;
-    std::optional<TimePoint> first_byte_in;  ///< of what was taken for its reply
-    std::optional<TimePoint> last_byte_in;
 };
 /// With Settings::explain: why something is not done now, or not at all. One line.
 struct Decision {

@@ -152,33 +152,11 @@ class BusClient {
         static_cast<void>(station);
         return {};
     }
-    /// The last frames, oldest first, at most `last`.
-    virtual std::vector<TraceFrame> trace(std::size_t last) const = 0;
-    /// The last decisions, oldest first, at most `last`.
-    virtual std::vector<TraceDecision> decisions(std::size_t last) const {
-        static_cast<void>(last);
-        return {};
-    }
-    /// The first frames that follow this sequence number, oldest first, at most `most`.
-    virtual std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const {
-        static_cast<void>(sequence);
-        static_cast<void>(most);
-        return {};
-    }
-    /// The same of the decisions.
-    virtual std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
-                                                       std::size_t most) const {
-        static_cast<void>(sequence);
-        static_cast<void>(most);
-        return {};
-    }
-    /// The same of the transactions that are over, each with its frames.
-    virtual std::vector<TraceTransaction> transactions(std::size_t last) const {
-        static_cast<void>(last);
-        return {};
-    }
-    virtual std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
-                                                             std::size_t most) const {
+    /// The last frames, decisions and transactions that are over, oldest first, at most `last` of
+    /// each.
+    virtual TracePart trace(std::size_t last) const = 0;
+    /// The first of each that follow this sequence number, oldest first, at most `most` of each.
+    virtual TracePart trace_since(std::uint64_t sequence, std::size_t most) const {
         static_cast<void>(sequence);
         static_cast<void>(most);
         return {};

@@ -35,14 +35,8 @@ class ListeningBus final : public LineBus {
     LineStatus status() const override;
     StationStatus station_status(std::uint8_t station) const override;
     std::optional<Refusal> refusal_of_write(std::uint8_t station) const override;
-    std::vector<TraceFrame> trace(std::size_t last) const override;
-    std::vector<TraceFrame> trace_since(std::uint64_t sequence, std::size_t most) const override;
-    std::vector<TraceDecision> decisions(std::size_t last) const override;
-    std::vector<TraceDecision> decisions_since(std::uint64_t sequence,
-                                               std::size_t most) const override;
-    std::vector<TraceTransaction> transactions(std::size_t last) const override;
-    std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
-                                                     std::size_t most) const override;
+    TracePart trace(std::size_t last) const override;
+    TracePart trace_since(std::uint64_t sequence, std::size_t most) const override;
     std::vector<IncidentHead> incidents() const override;
     std::optional<Incident> incident(std::uint64_t id) override;
     void name_client(ClientId client, std::string name) override;

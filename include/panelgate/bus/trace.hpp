@@ -10,6 +10,7 @@
 #include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/base/transaction_end.hpp"
+#include "panelgate/base/transaction_instants.hpp"
 #include "panelgate/base/wall_time.hpp"
 
 namespace panelgate::bus {
@@ -53,24 +54,22 @@ struct TraceDecision {
     WallTime time{};  ///< `at`, by the clock on the wall
 };
 
-/// One request on the wire that is over, and what came of it.
-struct TraceTransaction {
-    std::uint64_t id = 0;        ///< counts a line's transactions, from 1
-    std::uint64_t first = 0;     ///< sequence of its request
-    std::uint64_t sequence = 0;  ///< of its end: one count with frames and decisions
-    std::uint8_t station = 0;    ///< 0: a broadcast
-    FrameKind kind = FrameKind::request;
+/// What one request on the wire was, without its frames.
+struct TransactionFacts : TransactionInstants {
+    std::uint64_t id = 0;                 ///< counts a line's transactions, from 1
+    std::uint64_t first = 0;              ///< sequence of its request
+    std::uint64_t sequence = 0;           ///< of its end: one count with frames and decisions
+    WallTime time{};                      ///< of first_bit_out
+    std::optional<TimePoint> answered{};  ///< whoever had asked; nothing: it was not, by this one
     TransactionEnd end = TransactionEnd::ok;
+    std::uint8_t station = 0;  ///< 0: a broadcast
+};
+
+/// One that is over, and what came of it.
+struct TraceTransaction : TransactionFacts {
+    FrameKind kind = FrameKind::request;
     std::string reason;  ///< "read", "write", "poll", "retry", "probe"…: what it was sent for
     std::string client;  ///< who wanted it; "": nobody, or one without a name
-    WallTime time{};     ///< of first_bit_out
-    std::optional<TimePoint> arrived;  ///< the request that it answers; nothing: nobody's
-    TimePoint granted;                 ///< it was its turn
-    TimePoint first_bit_out;
-    TimePoint last_bit_out;
-    std::optional<TimePoint> first_byte_in;
-    std::optional<TimePoint> last_byte_in;
-    std::optional<TimePoint> answered;  ///< whoever had asked; nothing: it was not, by this one
     Bytes request;
     Bytes reply;  ///< empty: none
     std::vector<TraceFrame> discarded;

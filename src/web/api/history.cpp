@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "answer.hpp"
-#include "csv.hpp"
 #include "handlers.hpp"
-#include "long_answer.hpp"
 #include "panelgate/bus/line_history.hpp"
 #include "panelgate/points/station_history.hpp"
 #include "station_path.hpp"
+#include "table_answer.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -62,32 +61,18 @@ json::object describe(const bus::LineSample& sample, const WallClock& wall) {
     return object;
 }
 
-/// The samples as a table, or behind these members. `object_of` makes an object of a sample.
-template <class Sample, class ObjectOf>
-Handling tell(HttpRequest request, json::object members, std::vector<Sample> samples,
-              std::span<const std::string_view> columns, ObjectOf object_of) {
-    const bool as_csv = prefers_csv(request.headers["accept"]);
-    LongAnswer body;
-    for (const auto& [name, value] : members) body.member(name, value);
-    std::string table = csv_line(columns);
-    body.begin_list("samples");
-    for (const Sample& sample : samples) {
-        const json::object one = object_of(sample);
-        if (as_csv) {
-            table += csv_line(one, columns);
-            body.add(nullptr);  // counts turns
-        } else {
-            body.add(one);
-        }
-        if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
-    body.end_list();
-    HttpResponse response = as_csv ? csv_response(std::move(table)) : body.response();
-    response.headers.emplace_back("Vary", "Accept");
-    co_return response;
+/// `describe_one` makes an object of a sample.
+template <class Sample, class Describe>
+Table table_of(std::vector<Sample> samples, std::span<const std::string_view> columns,
+               Describe describe_one) {
+    Table table;
+    table.name = "samples";
+    table.columns = columns;
+    table.count = samples.size();
+    table.entry = [samples = std::move(samples), describe_one](std::size_t i) {
+        return describe_one(samples[i]);
+    };
+    return table;
 }
 
 WallClock wall_of(const Api& api) { return {api.providers.now(), api.providers.wall()}; }
@@ -103,16 +88,15 @@ Handling get_point_history(HttpRequest request, const Api* api) {
         co_return to_response(
             problem(404, "no history is kept of '" + point.name + "'; texts have none"));
     const WallClock wall = wall_of(*api);
-    json::object members;
-    members["station"] = found->station.name;
-    members["point"] = point.name;
-    members["unit"] = point.unit;
-    members["every_ms"] = whole_ms(history->width());
-    const auto as_json = [&point, wall](const points::HistorySample& sample) {
-        return describe(sample, point, wall);
-    };
-    Handling telling = tell(std::move(request), std::move(members),
-                            history->samples(point, wall.now), kPointColumns, as_json);
+    Table table = table_of(history->samples(point, wall.now), kPointColumns,
+                           [&point, wall](const points::HistorySample& sample) {
+                               return describe(sample, point, wall);
+                           });
+    table.members["station"] = found->station.name;
+    table.members["point"] = point.name;
+    table.members["unit"] = point.unit;
+    table.members["every_ms"] = whole_ms(history->width());
+    Handling telling = table_answer(std::move(request), std::move(table));
     co_return co_await std::move(telling);
 }
 
@@ -123,12 +107,12 @@ Handling get_line_history(HttpRequest request, const Api* api) {
     if (history == nullptr)
         co_return to_response(problem(404, "no history is kept of '" + (*line)->name + '\''));
     const WallClock wall = wall_of(*api);
-    json::object members;
-    members["line"] = (*line)->name;
-    members["every_ms"] = whole_ms(history->width());
-    const auto as_json = [wall](const bus::LineSample& sample) { return describe(sample, wall); };
-    Handling telling = tell(std::move(request), std::move(members), history->samples(wall.now),
-                            kLineColumns, as_json);
+    Table table =
+        table_of(history->samples(wall.now), kLineColumns,
+                 [wall](const bus::LineSample& sample) { return describe(sample, wall); });
+    table.members["line"] = (*line)->name;
+    table.members["every_ms"] = whole_ms(history->width());
+    Handling telling = table_answer(std::move(request), std::move(table));
     co_return co_await std::move(telling);
 }
 

@@ -31,7 +31,7 @@ std::optional<Wanted> wanted_of(std::string_view text) {
     Wanted wanted;
     wanted.capture = text.ends_with(kCapture);
     if (wanted.capture) text.remove_suffix(kCapture.size());
-    const auto id = to_number(text);
+    const auto id = to_number<std::uint64_t>(text);
     if (!id) return std::nullopt;
     wanted.id = *id;
     return wanted;

@@ -7,7 +7,6 @@
 #include "ask.hpp"
 #include "csv.hpp"
 #include "handlers.hpp"
-#include "long_answer.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
@@ -15,6 +14,7 @@
 #include "patience.hpp"
 #include "point_json.hpp"
 #include "station_path.hpp"
+#include "table_answer.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;
@@ -63,26 +63,18 @@ Handling get_points(HttpRequest request, const Api* api) {
     if (!station) co_return to_response(station.error());
     const auto raw = query_flag(request, "raw");
     if (!raw) co_return to_response(raw.error());
-    const bool as_csv = prefers_csv(request.headers["accept"]);
-    if (as_csv && *raw) co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
-    LongAnswer body;
-    std::string table = csv_line(kColumns);
-    body.begin_list("points");
-    const std::size_t count = station->points == nullptr ? 0 : station->points->points().size();
-    for (std::size_t i = 0; i < count; ++i) {
-        const json::object one =
-            describe(*api, *station->points, station->points->points()[i], *raw);
-        if (as_csv) table += csv_line(one, kColumns);
-        body.add(one);
-        if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
-        co_await std::move(turn);
-        if (request.caller->has_left()) co_return HttpResponse{};
-    }
-    body.end_list();
-    HttpResponse response = as_csv ? csv_response(std::move(table)) : body.response();
-    response.headers.emplace_back("Vary", "Accept");
-    co_return response;
+    if (*raw && prefers_csv(request.headers["accept"]))
+        co_return to_response(problem(400, "raw is for JSON, not for text/csv"));
+    const points::StationPoints* const all = station->points;
+    Table table;
+    table.name = "points";
+    table.columns = kColumns;
+    table.count = all == nullptr ? 0 : all->points().size();
+    table.entry = [api, all, with_raw = *raw](std::size_t i) {
+        return describe(*api, *all, all->points()[i], with_raw);
+    };
+    Handling telling = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(telling);
 }
 
 Handling get_point(HttpRequest request, const Api* api) {

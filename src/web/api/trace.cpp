@@ -1,8 +1,6 @@
 #include <boost/asio/awaitable.hpp>
-#include <charconv>
 #include <cstdint>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "accept.hpp"
@@ -28,12 +26,9 @@ Parsed<TracePage> page_of(const HttpRequest& request, const bus::BusClient& bus)
         query_number(request, "last", 1, kMaxTrace, follows ? kMaxTrace : kDefaultTrace);
     if (!most) return most.error();
     if (!follows) return last_of_trace(bus, *most);
-    std::uint64_t number = 0;
-    const std::string& text = since->second;
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (wrong != std::errc() || end != text.data() + text.size())
-        return problem(400, "since must be a sequence number: what `next` said, or 0");
-    return trace_since(bus, number, *most);
+    const auto number = to_number<std::uint64_t>(since->second);
+    if (!number) return problem(400, "since must be a sequence number: what `next` said, or 0");
+    return trace_since(bus, *number, *most);
 }
 
 bool wants_text(const HttpRequest& request) {

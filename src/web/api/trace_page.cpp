@@ -44,15 +44,14 @@ void cut(bus::TracePart& part, std::size_t most) {
 
 TracePage last_of_trace(const bus::BusClient& bus, std::size_t most) {
     TracePage page;
-    page.part = {bus.trace(most), bus.decisions(most), bus.transactions(most)};
+    page.part = bus.trace(most);
     page.next = last_number(page.part);
     return page;
 }
 
 TracePage trace_since(const bus::BusClient& bus, std::uint64_t since, std::size_t most) {
     TracePage page;
-    page.part = {bus.trace_since(since, most), bus.decisions_since(since, most),
-                 bus.transactions_since(since, most)};
+    page.part = bus.trace_since(since, most);
     cut(page.part, most);
     page.next = last_number(page.part);
     if (page.next == 0) page.next = std::min(since, last_of_trace(bus, 1).next);

@@ -1,8 +1,8 @@
 #include "panelgate/web/http/event_hub.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <system_error>
+
+#include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
 namespace {
@@ -62,9 +62,8 @@ bool EventHub::is_idle() {
 std::optional<std::uint64_t> EventHub::number_of(std::string_view id) const {
     if (!id.starts_with(epoch_ + '-')) return std::nullopt;
     id.remove_prefix(epoch_.size() + 1);
-    std::uint64_t number = 0;
-    const auto [end, wrong] = std::from_chars(id.data(), id.data() + id.size(), number);
-    if (wrong != std::errc() || end != id.data() + id.size() || number > last_) return std::nullopt;
+    const auto number = to_number<std::uint64_t>(id);
+    if (!number || *number > last_) return std::nullopt;
     return number;
 }
 

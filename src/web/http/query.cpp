@@ -1,20 +1,11 @@
 #include "panelgate/web/http/query.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <string>
-#include <system_error>
 
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {
-
-std::optional<unsigned> to_number(std::string_view text, int base) {
-    unsigned number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
-    if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    return number;
-}
 
 std::optional<Problem> check_queries(const HttpRequest& request,
                                      std::span<const std::string_view> known) {

@@ -24,7 +24,7 @@ class CountedLine final : public bus::LineBus {
     void cancel(bus::ClientId) override {}
     bus::LineStatus status() const override { return {}; }
     bus::StationStatus station_status(std::uint8_t) const override { return {}; }
-    std::vector<bus::TraceFrame> trace(std::size_t) const override { return {}; }
+    bus::TracePart trace(std::size_t) const override { return {}; }
 
     mutable int looks = 0;
 };

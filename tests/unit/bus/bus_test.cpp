@@ -159,7 +159,7 @@ TEST_F(BusTest, SaysWhyInTheTraceAndWhoUsesTheLine) {
     bus->start();
     bus->name_client(1, "modbus_tcp 10.0.0.7:5000");
     ask(17, kRead);
-    const auto frames = bus->trace(10);
+    const auto frames = bus->trace(10).frames;
     ASSERT_FALSE(frames.empty());
     EXPECT_THAT(frames[0].why,
                 ::testing::StartsWith("read of modbus_tcp 10.0.0.7:5000 to station 17: next"));
@@ -176,7 +176,7 @@ TEST_F(BusTest, TellsInTheTraceWhenByTheClockOnTheWall) {
     bus->start();
     const WallTime before = rt::wall_now();
     ask(17, kRead);
-    for (const TraceFrame& frame : bus->trace(2)) {
+    for (const TraceFrame& frame : bus->trace(2).frames) {
         EXPECT_GE(frame.time, before - 1s);
         EXPECT_LE(frame.time, rt::wall_now() + 1s);
     }
@@ -197,7 +197,7 @@ TEST_F(BusTest, CarriesARequestToTheLineAndTheReplyBack) {
     EXPECT_TRUE(answer.transmitted);
     ASSERT_EQ(line->written.size(), 1u);
     EXPECT_EQ(line->written[0], "11 03 00 6B 00 03 76 87"_hex);
-    const auto trace = bus->trace(10);
+    const auto trace = bus->trace(10).frames;
     ASSERT_EQ(trace.size(), 2u);
     EXPECT_EQ(trace[0].kind, FrameKind::request);
     EXPECT_EQ(trace[1].bytes, "11 03 06 02 2B 00 00 00 64 C8 BA"_hex);
@@ -208,15 +208,16 @@ TEST_F(BusTest, NumbersFramesAndDecisionsOfALineTogether) {
     bus->start();
     ask(17, kRead);
     std::set<std::uint64_t> numbers;
-    for (const TraceFrame& frame : bus->trace(100)) numbers.insert(frame.sequence);
-    for (const TraceDecision& decision : bus->decisions(100)) numbers.insert(decision.sequence);
-    EXPECT_EQ(numbers.size(), bus->trace(100).size() + bus->decisions(100).size());
+    for (const TraceFrame& frame : bus->trace(100).frames) numbers.insert(frame.sequence);
+    for (const TraceDecision& decision : bus->trace(100).decisions)
+        numbers.insert(decision.sequence);
+    EXPECT_EQ(numbers.size(), bus->trace(100).frames.size() + bus->trace(100).decisions.size());
     EXPECT_EQ(*numbers.begin(), 1u);
     EXPECT_EQ(*numbers.rbegin(), numbers.size());
-    ASSERT_GE(bus->trace(100).size(), 2u);
-    const auto later = bus->trace_since(bus->trace(100)[0].sequence, 1);
+    ASSERT_GE(bus->trace(100).frames.size(), 2u);
+    const auto later = bus->trace_since(bus->trace(100).frames[0].sequence, 1).frames;
     ASSERT_EQ(later.size(), 1u);
-    EXPECT_EQ(later[0].sequence, bus->trace(100)[1].sequence);
+    EXPECT_EQ(later[0].sequence, bus->trace(100).frames[1].sequence);
 }
 
 TEST_F(BusTest, AnswersLineDownBeforeTheDeviceIsThere) {
@@ -235,7 +236,7 @@ TEST_F(BusTest, GivesPollsReadsAndWritesTheirClass) {
     ask(17, kRead, 1, true);
     ask(17, kWrite, 1, true);
     std::vector<std::string> classes;
-    for (const TraceFrame& frame : bus->trace(100)) {
+    for (const TraceFrame& frame : bus->trace(100).frames) {
         if (frame.kind == FrameKind::request)
             classes.push_back(frame.why.substr(0, frame.why.find(' ')));
     }
@@ -320,8 +321,8 @@ TEST_F(BusTest, P1StaleBytesAreReadBeforeARequestIsSent) {
     EXPECT_GE(clock.now() - asked, silent_interval({1000000, 8, Parity::none, 1}));
     ASSERT_TRUE(run_until([&] { return got.has_value(); }));
     EXPECT_EQ(got->pdu.value(), kReply);
-    EXPECT_EQ(bus->trace(1).front().bytes, modbus::encode_adu(17, kReply));
-    EXPECT_EQ(direction_of(bus->trace(10).front().kind), FrameDirection::discarded);
+    EXPECT_EQ(bus->trace(1).frames.front().bytes, modbus::encode_adu(17, kReply));
+    EXPECT_EQ(direction_of(bus->trace(10).frames.front().kind), FrameDirection::discarded);
 }
 
 TEST_F(BusTest, RefusalsAreHandedOutAMillisecondApart) {

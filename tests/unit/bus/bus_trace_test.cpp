@@ -78,7 +78,7 @@ TEST_F(BusTrace, ATransactionHasItsInstantsFramesClientAndReason) {
     const TimePoint asked = clock.now();
     const Answer answer = ask();
     EXPECT_EQ(answer.transactions.last(), 1u);
-    const auto all = bus->transactions(9);
+    const auto all = bus->trace(9).transactions;
     ASSERT_EQ(all.size(), 1u);
     const TraceTransaction& one = all[0];
     EXPECT_EQ(one.id, 1u);
@@ -95,7 +95,7 @@ TEST_F(BusTrace, ATransactionHasItsInstantsFramesClientAndReason) {
     EXPECT_GE(*one.last_byte_in, *one.first_byte_in);
     ASSERT_TRUE(one.answered);
     EXPECT_GE(*one.answered, *one.last_byte_in);
-    const auto frames = bus->trace(9);
+    const auto frames = bus->trace(9).frames;
     EXPECT_EQ(frames.at(0).sequence, one.first);
     EXPECT_EQ(frames.at(0).transaction, 1u);
     EXPECT_EQ(frames.at(1).transaction, 1u);
@@ -106,18 +106,18 @@ TEST_F(BusTrace, SaysWhatEachWasSentFor) {
     ask(kRead, true);
     ask("06 00 01 00 03"_hex);
     std::vector<std::string> reasons;
-    for (const TraceTransaction& one : bus->transactions(9)) reasons.push_back(one.reason);
+    for (const TraceTransaction& one : bus->trace(9).transactions) reasons.push_back(one.reason);
     EXPECT_THAT(reasons, testing::ElementsAre("poll", "write"));
 }
 
 TEST_F(BusTrace, FollowsByTheNumbersOfTheirEnds) {
     ask_often(3);
-    const auto first = bus->transactions_since(0, 1);
+    const auto first = bus->trace_since(0, 1).transactions;
     ASSERT_EQ(first.size(), 1u);
-    const auto rest = bus->transactions_since(first[0].sequence, 9);
+    const auto rest = bus->trace_since(first[0].sequence, 9).transactions;
     ASSERT_EQ(rest.size(), 2u);
     EXPECT_EQ(rest[0].id, 2u);
-    EXPECT_TRUE(bus->transactions_since(rest[1].sequence, 9).empty());
+    EXPECT_TRUE(bus->trace_since(rest[1].sequence, 9).transactions.empty());
 }
 
 TEST_F(BusTrace, OneThatGivesUpIsAnsweredByItsLastAttempt) {
@@ -125,7 +125,7 @@ TEST_F(BusTrace, OneThatGivesUpIsAnsweredByItsLastAttempt) {
     make_bus();
     line->reply.clear();
     const Answer answer = ask();
-    const auto all = bus->transactions(9);
+    const auto all = bus->trace(9).transactions;
     ASSERT_EQ(all.size(), 2u);
     EXPECT_EQ(all[1].reason, "retry");
     EXPECT_FALSE(all[0].answered);

@@ -80,11 +80,11 @@ TEST_F(ListeningBusTest, TellsWhatPassesBy) {
     EXPECT_TRUE(report.up);
     EXPECT_GT(report.last_success_unix, 0);
     EXPECT_NEAR(report.wire.turnaround.sum, 0.004, 1e-6);
-    const auto trace = bus->trace(10);
+    const auto trace = bus->trace(10).frames;
     ASSERT_EQ(trace.size(), 2u);
     EXPECT_EQ(trace[0].kind, FrameKind::heard_request);
     EXPECT_EQ(trace[1].kind, FrameKind::reply);
-    EXPECT_EQ(bus->trace_since(trace[0].sequence, 10).size(), 1u);
+    EXPECT_EQ(bus->trace_since(trace[0].sequence, 10).frames.size(), 1u);
     EXPECT_TRUE(bus->status().listens);
 }
 
@@ -150,7 +150,7 @@ TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
     say(10ms, 17, "83 02"_hex);  // nobody asked
     say(10ms, 18, kRead);
     say(10ms, 18, "83 02"_hex);
-    const auto all = bus->transactions(9);
+    const auto all = bus->trace(9).transactions;
     ASSERT_EQ(all.size(), 2u);
     EXPECT_EQ(all[0].id, 1u);
     EXPECT_EQ(all[0].reason, "heard request");
@@ -162,7 +162,7 @@ TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
     EXPECT_FALSE(all[0].answered);
     EXPECT_EQ(all[0].discarded.size(), 1u);
     EXPECT_EQ(all[1].end, TransactionEnd::exception);
-    EXPECT_EQ(bus->transactions_since(all[0].sequence, 9).size(), 1u);
+    EXPECT_EQ(bus->trace_since(all[0].sequence, 9).transactions.size(), 1u);
     EXPECT_TRUE(bus->incidents().empty());
 }
 

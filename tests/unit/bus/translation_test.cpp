@@ -98,7 +98,7 @@ TEST_F(BusTranslatesTest, OthersAndBroadcastsGoOutAsTheyCame) {
 
 TEST_F(BusTranslatesTest, TraceAndCountersShowBothFunctions) {
     answer(17, kWord, kWordReply);
-    const TraceFrame sent = bus->trace(2).front();
+    const TraceFrame sent = bus->trace(2).frames.front();
     EXPECT_EQ(sent.bytes, modbus::encode_adu(17, kWordSent));
     EXPECT_TRUE(sent.why.ends_with(", instead of function 6")) << sent.why;
     const StationReport& press = report_of(1);

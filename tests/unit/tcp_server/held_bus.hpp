@@ -58,7 +58,7 @@ class HeldBus : public bus::BusClient {
     void protect(std::uint8_t station) {
         rights = bus::Rights({{station, {"protected", bus::Access::read_only, {}}}});
     }
-    std::vector<bus::TraceFrame> trace(std::size_t) const override { return {}; }
+    bus::TracePart trace(std::size_t) const override { return {}; }
 
     /// Answers the held request at `index`.
     void answer(std::size_t index, Result<Bytes> pdu, bool transmitted = true) {
