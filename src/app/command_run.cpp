@@ -19,6 +19,7 @@
 #include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/punctual.hpp"
+#include "panelgate/rt/service_manager.hpp"
 #include "reachable.hpp"
 #include "run_loop.hpp"
 
@@ -56,6 +57,7 @@ ExitCode serve(config::Config config, bool simulate,
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
+    rt::ServiceManager manager(clock);
     SignalLoop loop(io);
     Gateway gateway(io.get_executor(), std::move(config), simulate);
     try {
@@ -65,11 +67,17 @@ ExitCode serve(config::Config config, bool simulate,
         return kUnavailable;
     }
     started(gateway);
-    return loop.run({.begin = [&] { gateway.stop_accepting(); },
-                     .done = [&] { return gateway.drained(); },
-                     .finish = [&] { gateway.stop(); },
-                     .open = [&] { return gateway.owing(); },
-                     .longest_answer = gateway.longest_answer()});
+    manager.ready([&gateway] { return gateway.status(); });
+    Ending ending{.begin = {},
+                  .done = [&] { return gateway.drained(); },
+                  .finish = [&] { gateway.stop(); },
+                  .open = [&] { return gateway.owing(); },
+                  .longest_answer = gateway.longest_answer()};
+    ending.begin = [&] {
+        manager.stopping(ending.patience());
+        gateway.stop_accepting();
+    };
+    return loop.run(ending);
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {

@@ -19,6 +19,7 @@
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/web/http/json_text.hpp"
+#include "service_status.hpp"
 #include "simulated_line.hpp"
 #include "wiring.hpp"
 
@@ -280,6 +281,10 @@ std::size_t Gateway::owing() const {
     for (const auto& listener : listeners_) count += listener->counters().connections;
     for (const auto& master : serial_masters_) count += master->idle() ? 0 : 1;
     return count;
+}
+
+std::string Gateway::status() const {
+    return service_status(plant_, openings_.standing(), openings_.missing());
 }
 
 void Gateway::stop() {

@@ -54,6 +54,8 @@ class Gateway {
     std::size_t owing() const;
     /// The longest that a request which was accepted may take to its answer.
     Duration longest_answer() const;
+    /// In words, for who has started the program.
+    std::string status() const;
     /// Closes everything.
     void stop();
 

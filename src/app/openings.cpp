@@ -20,15 +20,6 @@ std::string words(const error_code& why) {
     return why.message();
 }
 
-error_code open(const Door& door) {
-    const error_code error = door.open();
-    if (!error) {
-        rt::log(rt::LogLevel::info, "listening",
-                {{door.kind, endpoint_text(door.address, door.opened_port())}});
-    }
-    return error;
-}
-
 void tell_wait(const Door& door, const error_code& why) {
     rt::log(rt::LogLevel::warn, "listener waits", {{door.kind, where(door)}, {"why", words(why)}});
 }
@@ -51,6 +42,15 @@ void Openings::start() {
     later();
 }
 
+error_code Openings::open(const Door& door) {
+    const error_code error = door.open();
+    if (error) return error;
+    const std::string place = endpoint_text(door.address, door.opened_port());
+    rt::log(rt::LogLevel::info, "listening", {{door.kind, place}});
+    standing_ += (standing_.empty() ? "" : ", ") + door.kind + ' ' + place;
+    return error;
+}
+
 /// The gateway serves meanwhile: nothing that happens here ends it any more.
 void Openings::try_again() {
     for (Waiting& waiting : waiting_) {
@@ -69,6 +69,7 @@ void Openings::later() {
 void Openings::stop() {
     again_->cancel();
     waiting_.clear();
+    standing_.clear();
 }
 
 std::string Openings::missing() const {

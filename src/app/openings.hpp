@@ -43,6 +43,8 @@ class Openings {
     void stop();
     /// Those that do not stand, and why, in words; empty: all stand.
     std::string missing() const;
+    /// Those that stand: "modbus_tcp 127.0.0.1:502, http 127.0.0.1:8080".
+    const std::string& standing() const { return standing_; }
 
   private:
     struct Waiting {
@@ -51,10 +53,12 @@ class Openings {
     };
     void try_again();
     void later();
+    boost::system::error_code open(const Door& door);
 
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> again_;
     std::vector<Waiting> waiting_;
+    std::string standing_;
 };
 
 /// What somebody can do about a listener that cannot be opened; empty: nothing is known.

@@ -1,10 +1,7 @@
 #include "panelgate/rt/log.hpp"
 
 #include <fmt/format.h>
-#include <spdlog/details/null_mutex.h>
 #include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/base_sink.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,29 +10,14 @@
 #include <memory>
 
 #include "panelgate/rt/clock.hpp"
+#include "panelgate/rt/journal.hpp"
 #include "panelgate/rt/log_output.hpp"
 #include "panelgate/rt/log_throttle.hpp"
 
 namespace panelgate::rt {
 namespace {
 
-LogFormat g_format = LogFormat::text;
-
-spdlog::level::level_enum level_of(LogLevel level) {
-    switch (level) {
-        case LogLevel::error:
-            return spdlog::level::err;
-        case LogLevel::warn:
-            return spdlog::level::warn;
-        case LogLevel::info:
-            return spdlog::level::info;
-        case LogLevel::debug:
-            return spdlog::level::debug;
-        case LogLevel::trace:
-            return spdlog::level::trace;
-    }
-    std::abort();
-}
+LogSettings g_settings;
 
 /// As the configuration calls them.
 std::string_view word(LogLevel level) {
@@ -54,34 +36,47 @@ std::string_view word(LogLevel level) {
     std::abort();
 }
 
-LogOutput& output() {
-    static LogOutput instance(STDERR_FILENO);
-    return instance;
-}
+/// Where lines go, as it is when the first one does.
+struct Destination {
+    Destination() : Destination(stderr_is_journal()) {}
+    explicit Destination(bool its_journal) : Destination(its_journal, open(its_journal)) {}
+    Destination(bool its_journal, int its_socket)
+        : journal(its_journal),
+          native(its_socket >= 0),
+          output(native ? its_socket : STDERR_FILENO) {}
+    static int open(bool journal) { return journal ? connect_to_journal() : -1; }
 
-class Sink final : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
-  public:
-    std::string formatted(const spdlog::details::log_msg& message) {
-        spdlog::memory_buf_t line;
-        formatter_->format(message, line);
-        return {line.data(), line.size()};
-    }
-
-  private:
-    void sink_it_(const spdlog::details::log_msg& message) override {
-        output().write(formatted(message));
-    }
-    void flush_() override {}
+    bool journal;
+    bool native;  ///< by journald's own protocol
+    LogOutput output;
 };
 
-const std::shared_ptr<Sink>& sink() {
-    static const auto instance = std::make_shared<Sink>();
+Destination& destination() {
+    static Destination instance;
     return instance;
 }
 
-spdlog::logger& logger() {
-    static spdlog::logger instance("panelgate", sink());
-    return instance;
+LogOutput& output() { return destination().output; }
+
+/// The journal has its own time.
+std::string pattern() {
+    if (g_settings.format == LogFormat::json) return R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})";
+    return destination().journal ? "%v" : "%Y-%m-%dT%H:%M:%S.%eZ %v";
+}
+
+std::string with_time(const std::string& text) {
+    spdlog::pattern_formatter formatter(pattern(), spdlog::pattern_time_type::utc, "\n");
+    spdlog::memory_buf_t line;
+    formatter.format({"panelgate", spdlog::level::off, text}, line);
+    return {line.data(), line.size()};
+}
+
+/// As it is written.
+std::string whole(LogLevel level, const LogLine& line) {
+    const std::string text = with_time(line.text);
+    if (destination().native) return line.fields + "MESSAGE=" + text;
+    if (!destination().journal) return text;
+    return fmt::format("<{}>{}", journal_priority(level), text);
 }
 
 /// Of the LogTap that lives.
@@ -113,16 +108,16 @@ std::string text_value(const std::string& value) {
 }
 
 std::string field_of(std::string_view key, const std::string& value) {
-    return g_format == LogFormat::json ? fmt::format(",\"{}\":\"{}\"", key, escaped(value))
-                                       : fmt::format(" {}={}", key, text_value(value));
+    return g_settings.format == LogFormat::json ? fmt::format(",\"{}\":\"{}\"", key, escaped(value))
+                                                : fmt::format(" {}={}", key, text_value(value));
 }
 
-std::string line_of(LogLevel level, std::string_view event, std::span<const LogField> fields) {
-    std::string line =
-        g_format == LogFormat::json
-            ? fmt::format("\"level\":\"{}\",\"event\":\"{}\"", word(level), escaped(event))
-            : fmt::format("{} {}", word(level), event);
-    for (const auto& [key, value] : fields) line += field_of(key, value);
+LogLine line_of(LogLevel level, std::string_view event, std::span<const LogField> fields) {
+    LogLine line{g_settings.format == LogFormat::json
+                     ? fmt::format("\"level\":\"{}\",\"event\":\"{}\"", word(level), escaped(event))
+                     : fmt::format("{} {}", word(level), event)};
+    for (const auto& [key, value] : fields) line.text += field_of(key, value);
+    if (destination().native) line.fields = journal_fields(level, event, fields);
     return line;
 }
 
@@ -138,17 +133,21 @@ std::string subject_of(std::span<const LogField> fields) {
     return subject;
 }
 
-void put(LogLevel level, std::string line, std::uint64_t left_out) {
-    if (left_out > 0) line += field_of("left_out", std::to_string(left_out));
-    if (g_tapped) return g_tapped->push_back(std::move(line));
-    logger().log(level_of(level), line);
+void put(LogLevel level, LogLine line, std::uint64_t left_out) {
+    if (left_out > 0) {
+        const std::string count = std::to_string(left_out);
+        line.text += field_of("left_out", count);
+        if (destination().native) append_journal_field(line.fields, "left_out", count);
+    }
+    if (g_tapped) return g_tapped->push_back(std::move(line.text));
+    output().write(whole(level, line));
 }
 
 /// From error to info: unless its subject has said the same too often.
 void put_at_pace(LogLevel level, std::string_view event, std::string_view subject,
                  std::span<const LogField> fields, const LogThrottle::Pace& pace) {
     const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event, subject, pace);
-    std::string line = line_of(level, event, fields);
+    LogLine line = line_of(level, event, fields);
     if (passed) return put(level, std::move(line), *passed);
     g_throttle.hold(event, subject, level, std::move(line));
 }
@@ -161,20 +160,14 @@ void put_held(TimePoint now) {
 }  // namespace
 
 void set_up_log(const LogSettings& settings) {
-    g_format = settings.format;
-    logger().set_level(level_of(settings.level));
-    const bool json = settings.format == LogFormat::json;
-    logger().set_formatter(std::make_unique<spdlog::pattern_formatter>(
-        json ? R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})" : "%Y-%m-%dT%H:%M:%S.%eZ %v",
-        spdlog::pattern_time_type::utc, "\n"));
+    g_settings = settings;
     output().on_lost([](std::uint64_t lines) {
-        const std::string text = line_of(LogLevel::warn, "log lines dropped",
-                                         {{LogField{"count", std::to_string(lines)}}});
-        return sink()->formatted({"panelgate", spdlog::level::warn, text});
+        const LogField count{"count", std::to_string(lines)};
+        return whole(LogLevel::warn, line_of(LogLevel::warn, "log lines dropped", {&count, 1}));
     });
 }
 
-bool log_enabled(LogLevel level) { return logger().should_log(level_of(level)); }
+bool log_enabled(LogLevel level) { return level <= g_settings.level; }
 
 std::uint64_t log_lines_dropped() { return output().dropped(); }
 

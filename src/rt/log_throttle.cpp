@@ -35,12 +35,12 @@ std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view e
     }
     --seen.credit;
     seen.last = now;
-    seen.held.clear();
+    seen.held.reset();
     return std::exchange(seen.left_out, 0);
 }
 
 void LogThrottle::hold(std::string_view event, std::string_view subject, LogLevel level,
-                       std::string line) {
+                       LogLine line) {
     const auto found = seen_.find(key_of(event, subject));
     if (found == seen_.end()) return;
     found->second.level = level;
@@ -50,8 +50,9 @@ void LogThrottle::hold(std::string_view event, std::string_view subject, LogLeve
 std::vector<LogThrottle::Held> LogThrottle::take_held(TimePoint now) {
     std::vector<Held> all;
     for (auto& [key, seen] : seen_) {
-        if (seen.held.empty() || now - seen.last < seen.interval) continue;
-        all.push_back({seen.level, std::exchange(seen.held, {}), seen.left_out - 1});
+        if (!seen.held || now - seen.last < seen.interval) continue;
+        all.push_back({seen.level, std::move(*seen.held), seen.left_out - 1});
+        seen.held.reset();
         seen.left_out = 0;
         seen.last = now;
     }

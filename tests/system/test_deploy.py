@@ -43,6 +43,12 @@ class Deploy(unittest.TestCase):
             rated = run("systemd-analyze", "security", "--offline=true", "--threshold=20", str(unit))
             self.assertEqual(rated.returncode, 0, rated.stdout)
 
+    def test_the_service_is_told_of_and_watched_over(self):
+        text = SERVICE.read_text()
+        for line in ("Type=notify", "NotifyAccess=main", "WatchdogSec=30", "Restart=on-failure",
+                     "ExecReload=/bin/kill -HUP $MAINPID", "LoadCredential=panelgate-key"):
+            self.assertIn(f"\n{line}\n", text)
+
     def test_P7_the_service_comes_back_as_often_as_it_takes_with_every_kind_of_uart(self):
         unit = configparser.ConfigParser(strict=False, interpolation=None, delimiters="=")
         unit.optionxform = str

@@ -7,19 +7,18 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
+#include "panelgate/rt/log_line.hpp"
 #include "panelgate/rt/settings.hpp"
 
 namespace panelgate::rt {
 
 class Clock;
 
-using LogField = std::pair<std::string_view, std::string>;
-
 /// To stderr, whose reader may be slow, stopped or gone: nobody waits for it. Lines that it does
-/// not take wait (LogOutput); then they are lost and counted.
+/// not take wait (LogOutput); then they are lost and counted. Where stderr is systemd's journal,
+/// journald is told each line with its priority and fields (journal.hpp), or by <N> before it.
 void set_up_log(const LogSettings& settings);
 bool log_enabled(LogLevel level);
 /// Lines that nobody will see, because stderr's reader stood still.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/rt/log_line.hpp"
 #include "panelgate/rt/settings.hpp"
 
 namespace panelgate::rt {
@@ -33,12 +34,12 @@ class LogThrottle {
     /// The last one that was left out, and how many before it.
     struct Held {
         LogLevel level = LogLevel::info;
-        std::string line;
+        LogLine line;
         std::uint64_t left_out = 0;
     };
     /// Keeps the one that pass() has just left out: what came last is to be told when nothing
     /// follows.
-    void hold(std::string_view event, std::string_view subject, LogLevel level, std::string line);
+    void hold(std::string_view event, std::string_view subject, LogLevel level, LogLine line);
     /// Those whose interval is over; each stands for all before it.
     std::vector<Held> take_held(TimePoint now);
 
@@ -49,7 +50,7 @@ class LogThrottle {
         int credit = 0;
         std::uint64_t left_out = 0;
         LogLevel level = LogLevel::info;
-        std::string held{};  ///< of those left out the last; empty: none
+        std::optional<LogLine> held{};  ///< of those left out the last
     };
     void make_room(TimePoint now);
 

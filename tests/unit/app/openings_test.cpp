@@ -47,6 +47,7 @@ TEST_F(OpeningsTest, SayWhereEachListens) {
     EXPECT_EQ(log.count("info listening modbus_tcp=127.0.0.1:502"), 1u);
     EXPECT_EQ(log.count("info listening modbus_tcp=[::1]:502"), 1u);
     EXPECT_EQ(openings.missing(), "");
+    EXPECT_EQ(openings.standing(), "modbus_tcp 127.0.0.1:502, modbus_tcp [::1]:502");
     EXPECT_EQ(clock.armed(), 0u);
 }
 

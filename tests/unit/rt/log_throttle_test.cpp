@@ -25,14 +25,14 @@ TEST(LogThrottle, WhatCameLastIsToldWhenNothingFollows) {
     LogThrottle throttle;
     const auto say = [&](TimePoint now, const char* line) {
         if (!throttle.pass(now, "write", "press"))
-            throttle.hold("write", "press", LogLevel::info, line);
+            throttle.hold("write", "press", LogLevel::info, {line});
     };
     for (int i = 0; i < LogThrottle::kIncidents.burst; ++i) say(kStart, "passes");
     for (const char* line : {"one", "two", "three"}) say(kStart + 1s, line);
     EXPECT_TRUE(throttle.take_held(kStart + 1min).empty());
     const auto held = throttle.take_held(kStart + LogThrottle::kIncidents.interval);
     ASSERT_EQ(held.size(), 1u);
-    EXPECT_EQ(held[0].line, "three");
+    EXPECT_EQ(held[0].line.text, "three");
     EXPECT_EQ(held[0].left_out, 2u);
     EXPECT_TRUE(throttle.take_held(TimePoint::max()).empty()) << "once";
 }
