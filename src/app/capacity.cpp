@@ -17,7 +17,7 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     made.response_timeout = settings.response_timeout;
     made.think_time = station.think_time;
     made.gap = settings.frame_gap.value_or(silent_interval(line.device.serial));
-    made.memory = memory_of(*station.profile);
+    made.memory = memory_of(station.profile);
     const auto wants = points::wants_of(station.points, station.polls);
     for (std::size_t i = 0; i < wants.size() && !line.listens; ++i) {
         const bool point = i < station.points.size();

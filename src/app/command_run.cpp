@@ -2,25 +2,27 @@
 #include <cstddef>
 #include <functional>
 #include <iostream>
+#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "capacity.hpp"
 #include "commands.hpp"
-#include "connection_limits.hpp"
+#include "file_watch.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/rt/asio_clock.hpp"
-#include "panelgate/rt/descriptors.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/punctual.hpp"
 #include "panelgate/rt/service_manager.hpp"
+#include "prepare.hpp"
 #include "reachable.hpp"
+#include "reloader.hpp"
 #include "run_loop.hpp"
 
 namespace panelgate::app {
@@ -30,50 +32,64 @@ const Embedded& shipped_demo();  // config/demo.yaml, compiled in
 
 namespace {
 
-/// Before the first one is opened.
-void fit_to_descriptors(config::Config& config) {
-    const std::size_t limit = rt::raise_descriptor_limit();
-    const std::string lowered = fit_connections(config, limit);
-    if (lowered.empty()) return;
-    rt::log(rt::LogLevel::warn, "max_connections lowered",
-            {{"to", lowered},
-             {"why", "this process may open " + std::to_string(limit) +
-                         " files (LimitNOFILE of the service, ulimit -Hn)"}});
+/// What becomes of a configuration.
+struct Service {
+    bool simulate = false;
+    std::string file{};  ///< that can be read again
+    bool watch = false;  ///< ... as soon as it has changed
+};
+
+void reload(Reloader& reloader, const std::string& cause) {
+    const std::string why = reloader.barred(false);
+    if (!why.empty()) return rt::log(rt::LogLevel::warn, "no reload", {{"why", why}});
+    reloader.reload(false, cause, [](const auto&) {});  // the log says what came of it
+}
+
+/// The process to the configuration, and the other way round.
+void fit(config::Config& config) {
+    rt::set_up_log(config.log);
+    for (const Notice& notice : prepare(config))
+        rt::log(rt::LogLevel::warn, notice.event, {{"warning", notice.text}});
+    for (const std::string& refused : rt::be_punctual(config.realtime))
+        rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
 }
 
 /// `started` is told the gateway once it serves.
-ExitCode serve(config::Config config, bool simulate,
+ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const Gateway&)>& started) {
-    rt::set_up_log(config.log);
-    for (const std::string& warning : config.warnings)
-        rt::log(rt::LogLevel::warn, "configuration", {{"warning", warning}});
-    for (const Capacity& line : capacities(config)) {
-        if (plan::verdict(line.plan) != plan::Verdict::fine)
-            rt::log(rt::LogLevel::warn, "planned load", {{"warning", overload_text(line)}});
-    }
-    for (const std::string& refused : rt::be_punctual(config.realtime))
-        rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
-    fit_to_descriptors(config);
+    fit(config);
     boost::asio::io_context io(1);
     rt::AsioClock clock(io.get_executor());
     const rt::LogDrain drain(clock);
     rt::ServiceManager manager(clock);
     SignalLoop loop(io);
-    Gateway gateway(io.get_executor(), std::move(config), simulate);
+    Reloader reloader(io.get_executor(), service.file);
+    Gateway gateway(io.get_executor(), std::make_shared<const config::Config>(std::move(config)),
+                    service.simulate, &reloader);
     try {
         gateway.start();
     } catch (const std::runtime_error& error) {
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
+    reloader.serve(gateway);
+    reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
     manager.ready([&gateway] { return gateway.status(); });
+    std::optional<FileWatch> watch;
+    if (service.watch)
+        watch.emplace(io.get_executor(), clock, service.file,
+                      [&] { reload(reloader, "the file has changed"); });
     Ending ending{.begin = {},
                   .done = [&] { return gateway.drained(); },
                   .finish = [&] { gateway.stop(); },
                   .open = [&] { return gateway.owing(); },
-                  .longest_answer = gateway.longest_answer()};
+                  .longest_answer = {},
+                  .reload = [&] { reload(reloader, "SIGHUP"); }};
     ending.begin = [&] {
+        watch.reset();
+        reloader.stop();
+        ending.longest_answer = gateway.longest_answer();
         manager.stopping(ending.patience());
         gateway.stop_accepting();
     };
@@ -119,10 +135,14 @@ bool listen_on(const std::string& text, Settings& settings) {
 
 }  // namespace
 
-ExitCode run(const std::string& file, bool simulate) {
+ExitCode run(const std::string& file, bool simulate, bool watch) {
+    if (watch && file == "-") {
+        std::cerr << "panelgate: --watch needs a file: standard input is read only once\n";
+        return kUsage;
+    }
     Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
-    return serve(std::move(*loaded.config), simulate, [](const Gateway&) {});
+    return serve(std::move(*loaded.config), {simulate, file, watch}, [](const Gateway&) {});
 }
 
 ExitCode demo(const std::string& http, const std::string& modbus) {
@@ -131,7 +151,7 @@ ExitCode demo(const std::string& http, const std::string& modbus) {
     config::Config& config = *loaded.config;
     if (!listen_on(http, *config.http) || !listen_on(modbus, config.modbus_tcp[0])) return kUsage;
     const config::Config shown = config;
-    return serve(std::move(config), false,
+    return serve(std::move(config), {},
                  [&](const Gateway& gateway) { print_demo_help(shown, gateway); });
 }
 

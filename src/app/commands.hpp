@@ -10,7 +10,8 @@ namespace panelgate::app {
 inline constexpr const char* kDefaultConfig = "/etc/panelgate/panelgate.yaml";
 
 /// One function a command; each returns the exit code and has told the user why on stderr.
-ExitCode run(const std::string& file, bool simulate);
+/// `watch`: a file that changes is read again.
+ExitCode run(const std::string& file, bool simulate, bool watch);
 /// `http` and `modbus` replace the demo's addresses when not empty: "ADDR:PORT".
 ExitCode demo(const std::string& http, const std::string& modbus);
 /// `allow_overload`: a line that has more to carry than its time is a warning, not kBadConfig.
@@ -18,6 +19,15 @@ ExitCode check(const std::string& file, bool json, bool allow_overload);
 /// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
 /// default where there is none that can be read.
 ExitCode health(const std::string& file, const std::string& http);
+/// The command line of `reload` as typed.
+struct ReloadOptions {
+    std::string file;        ///< says where the gateway listens
+    std::string http;        ///< or this does: "ADDR:PORT"
+    std::string token_file;  ///< its first line is a token of the role operator
+    bool rollback = false;   ///< to what ran before
+};
+/// Has a running gateway read its file again, and prints its verdict.
+ExitCode reload(const ReloadOptions& options);
 /// `links`: "NAME=PTY-LINK" or "NAME=tcp://ADDR:PORT" a line; no entry: its pty alone. `http`:
 /// "ADDR:PORT" of the REST that sets faults, or empty.
 ExitCode simulate(const std::string& file, const std::vector<std::string>& links,

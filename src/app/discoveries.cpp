@@ -20,19 +20,20 @@ std::optional<std::string> Discoveries::start(std::string_view name, std::string
                                               unsigned share_percent) {
     const auto list = scan::station_list(stations);
     if (!list) return std::string("is not ") + scan::kStationListForm;
-    const Line& line = *std::ranges::find(plant_.lines(), name, [](const Line& one) {
+    const Place place = place_();
+    const Line& line = *std::ranges::find(place.plant.lines(), name, [](const Line& one) {
         return std::string_view(one.configured->name);
     });
     scan::DiscoverySettings settings;
     settings.share = share_percent * kPercent;
     for (const std::uint8_t id : *list)
-        if (plant_.find(name, id) == nullptr) settings.stations.push_back(id);
+        if (place.plant.find(name, id) == nullptr) settings.stations.push_back(id);
     // Of a far end nobody knows how its panels are set.
     if (line.configured->kind != config::Line::Kind::tcp)
         settings.format = line.configured->device.serial;
     const std::string key(name);
-    auto search = std::make_shared<LineDiscovery>(clock_, *line.bus, profiles_, std::move(settings),
-                                                  [this, key] { tell(key); });
+    auto search = std::make_shared<LineDiscovery>(clock_, *line.bus, place.profiles,
+                                                  std::move(settings), [this, key] { tell(key); });
     by_line_[key] = search;
     rt::log(rt::LogLevel::info, "discovery begins",
             {{"line", key},

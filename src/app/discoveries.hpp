@@ -1,10 +1,12 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "line_discovery.hpp"
 #include "panelgate/profile/load_profile.hpp"
@@ -19,9 +21,13 @@ namespace panelgate::app {
 /// last answers.
 class Discoveries final : public web::DiscoverySource {
   public:
-    Discoveries(rt::Clock& clock, const Plant& plant, const profile::Catalogue& profiles,
-                web::EventHub& hub)
-        : clock_(clock), plant_(plant), profiles_(profiles), hub_(hub) {}
+    /// What is there when somebody asks.
+    struct Place {
+        const Plant& plant;
+        std::shared_ptr<const profile::Catalogue> profiles;
+    };
+    Discoveries(rt::Clock& clock, std::function<Place()> place, web::EventHub& hub)
+        : clock_(clock), place_(std::move(place)), hub_(hub) {}
 
     std::optional<std::string> start(std::string_view line, std::string_view stations,
                                      unsigned share_percent) override;
@@ -34,8 +40,7 @@ class Discoveries final : public web::DiscoverySource {
     void tell(const std::string& line) const;
 
     rt::Clock& clock_;
-    const Plant& plant_;
-    const profile::Catalogue& profiles_;
+    std::function<Place()> place_;
     web::EventHub& hub_;
     std::map<std::string, std::shared_ptr<LineDiscovery>, std::less<>> by_line_;
 };

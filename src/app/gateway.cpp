@@ -2,39 +2,22 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/asio/ip/host_name.hpp>
 #include <charconv>
 #include <memory>
 #include <random>
 #include <string>
-#include <system_error>
 #include <utility>
 #include <variant>
 
-#include "address_families.hpp"
-#include "inventory.hpp"
-#include "panelgate/bus/listening_bus.hpp"
-#include "panelgate/line/tcp_line.hpp"
-#include "panelgate/line/tty_line.hpp"
-#include "panelgate/metrics/exposition.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/web/http/json_text.hpp"
+#include "prepare.hpp"
+#include "reloader.hpp"
 #include "service_status.hpp"
-#include "simulated_line.hpp"
 #include "wiring.hpp"
 
 namespace panelgate::app {
 
 namespace {
-
-boost::system::error_code error_of(tcp_server::Listener& listener) {
-    try {
-        listener.start();
-    } catch (const std::system_error& error) {
-        return error.code();
-    }
-    return {};
-}
 
 /// Of the ids of events: another one in each life of the program.
 std::string new_epoch() {
@@ -45,130 +28,40 @@ std::string new_epoch() {
     return std::string(text.data(), end);
 }
 
+/// The line of this configuration that runs as `line`; null: none does.
+const config::Line* find_same(const config::Config& config, const config::Line& line) {
+    const auto found = std::ranges::find_if(config.lines, [&](const config::Line& one) {
+        return one.name == line.name && one.listens == line.listens;
+    });
+    return found == config.lines.end() ? nullptr : &*found;
+}
+
+std::vector<points::RelayRoute> routes_of(const Scene& scene) {
+    std::vector<points::RelayRoute> routes;
+    for (const points::Relay& relay : scene.config->relays)
+        routes.push_back(route_of(scene.plant, relay));
+    return routes;
+}
+
+std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Scene>& scene) {
+    return {scene, &scene->directory};
+}
+
 }  // namespace
 
-Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate)
+Gateway::Gateway(boost::asio::any_io_executor executor,
+                 std::shared_ptr<const config::Config> config, bool simulate, Reloader* reloads)
     : executor_(std::move(executor)),
       clock_(executor_),
-      config_(std::move(config)),
-      events_(new_epoch()) {
-    separate_families(config_);
-    for (const config::Line& line : config_.lines) add_line(line, simulate);
-    add_relays();
-    for (const tcp_server::Settings& settings : config_.modbus_tcp) add_listener(settings);
-    for (const serial_server::Settings& settings : config_.serial_masters)
-        add_serial_master(settings);
-    if (config_.http) add_http(*config_.http);
-}
-
-void Gateway::add_line(const config::Line& line, bool simulate) {
-    bus::Settings settings = bus_settings(line);
-    settings.observe = [this, name = line.name](const bus::BusEvent& event) {
-        on_bus_event(name, event);
-    };
-    line::Settings device = line.device;
-    sim::SimulatedBus* simulated = nullptr;
-    if (simulate || line.kind == config::Line::Kind::simulated) {
-        simulated_.push_back(simulate_line(executor_, clock_, line));
-        simulated = simulated_.back().get();
-        device.device = simulated->device();
-        device.rs485 = {};
-        device.simulated = true;
-        settings.device = kSimulatedDevice;
-    }
-    const bool remote = line.kind == config::Line::Kind::tcp && simulated == nullptr;
-    settings.arbiter.may_stall = remote;
-    auto wire = remote ? line::make_tcp_line(executor_, clock_, std::move(device))
-                       : line::make_tty_line(executor_, clock_, std::move(device));
-    if (line.listens) {
-        buses_.push_back(std::make_unique<bus::ListeningBus>(executor_, clock_, std::move(settings),
-                                                             std::move(wire)));
-    } else {
-        buses_.push_back(
-            std::make_unique<bus::Bus>(executor_, clock_, std::move(settings), std::move(wire)));
-    }
-    plant_.add(line, *buses_.back(), simulated);
-    add_points(line, *buses_.back());
-}
-
-void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
-    publish(events_, plant_, line, event);
-    if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
-    const auto* write = std::get_if<bus::WriteEvent>(&event);
-    if (write == nullptr) return;
-    const auto listener = write_listeners_.find(line);
-    if (listener != write_listeners_.end()) listener->second(*write);
-    if (relay_listener_) relay_listener_(line, *write);
-}
-
-void Gateway::add_points(const config::Line& line, bus::LineBus& bus) {
-    auto wanted = polled_stations(line);
-    if (wanted.empty()) return;
-    if (line.listens) return add_heard(line, wanted);
-    add_poller(line, std::move(wanted), bus);
-}
-
-void Gateway::add_heard(const config::Line& line,
-                        const std::vector<points::PolledStation>& wanted) {
-    for (const points::PolledStation& one : wanted) {
-        const auto [heard, added] = heard_.try_emplace({line.name, one.id}, one.wants, one.memory);
-        Station& station = plant_.at(line.name, one.id);
-        const config::Station& configured = *station.configured;
-        station.points.emplace(configured.points, configured.polls, heard->second.readings());
-    }
-}
-
-/// A broadcast is to all of them.
-void Gateway::hear(const std::string& line, const tap::Transaction& heard) {
-    for (auto& [place, values] : heard_) {
-        if (place.first != line || (heard.station != 0 && heard.station != place.second)) continue;
-        const auto wants = values.on_heard(heard);
-        if (!wants.empty()) on_points(line, place.second, wants);
-    }
-}
-
-void Gateway::on_points(const std::string& line, std::uint8_t id,
-                        const std::vector<std::size_t>& wants) {
-    Station& station = plant_.at(line, id);
-    remember(station, wants, clock_.now());
-    publish_points(events_, station, wants, clock_.now());
-}
-
-/// Who serves nobody keeps nothing.
-void Gateway::keep_histories() {
-    std::size_t points = 0;
-    for (const Station& station : plant_.stations())
-        points += station.points ? station.points->points().size() : 0;
-    const Duration width = points::StationHistory::width_for(points);
-    for (const Station& station : plant_.stations()) {
-        if (!station.points) continue;
-        plant_.at(station.line, station.id).history.emplace(station.points->points(), width);
-    }
-    std::vector<const bus::LineBus*> lines;
-    for (const auto& bus : buses_) lines.push_back(bus.get());
-    line_histories_ = std::make_unique<LineHistories>(clock_, std::move(lines));
-}
-
-/// One a line. What it reads answers clients too, where a station's max_age allows it.
-void Gateway::add_poller(const config::Line& line, std::vector<points::PolledStation> polled,
-                         bus::LineBus& bus) {
-    pollers_.push_back(std::make_unique<points::Poller>(clock_, bus, std::move(polled)));
-    points::Poller& poller = *pollers_.back();
-    for (const config::Station& station : line.stations) {
-        const points::StationPolls* polls = poller.find(station.id);
-        if (polls == nullptr) continue;
-        plant_.at(line.name, station.id).points.emplace(station.points, station.polls, *polls);
-    }
-    write_listeners_[line.name] = poller.write_listener();
-    poller.on_update([this, name = line.name](std::uint8_t id, const auto& wants) {
-        on_points(name, id, wants);
-    });
-}
-
-void Gateway::add_relays() {
-    std::vector<points::RelayRoute> routes;
-    for (const points::Relay& relay : config_.relays) routes.push_back(route_of(plant_, relay));
-    relays_ = std::make_unique<points::Relays>(clock_, std::move(routes));
+      simulate_(simulate),
+      reloads_(reloads),
+      events_(new_epoch()),
+      servers_(executor_, clock_) {
+    Lines lines = lines_of(*config);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        lines_.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
+    show(make_scene(std::move(config), std::move(lines)));
+    relays_ = std::make_unique<points::Relays>(clock_, routes_of(*scene_));
     relay_listener_ = relays_->write_listener();
     relays_->on_state([](const points::RelayStatus& relay) {
         const bool ok = relay.state == points::RelayState::ok;
@@ -177,141 +70,176 @@ void Gateway::add_relays() {
     });
 }
 
-void Gateway::add_listener(tcp_server::Settings settings) {
-    boost::system::error_code unknown;
-    settings.host = boost::asio::ip::host_name(unknown);
-    if (config_.http) settings.url = "http://" + config_.http->name() + '/';
-    tcp_server::UnitMap units(settings, plant_.listener_lines());
-    plant_.add_units(units);
-    listeners_.push_back(std::make_unique<tcp_server::Listener>(
-        executor_, clock_, std::move(settings), std::move(units), PANELGATE_VERSION));
-}
-
-/// Who else answers on the master's line is not ours to speak for: only what is listed is served.
-void Gateway::add_serial_master(const serial_server::Settings& settings) {
-    auto lines = plant_.listener_lines();
-    for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
-    serial_masters_.push_back(std::make_unique<serial_server::SerialMaster>(
-        clock_, settings, tcp_server::UnitMap(settings.access, lines),
-        line::make_tty_line(executor_, clock_, settings.device)));
-}
-
-void Gateway::add_http(const web::Settings& settings) {
-    web::Providers providers;
-    const auto copy = [this] {
-        return [this, points = PointCopy(plant_)](metrics::Snapshot& into) mutable {
-            return copy_figures(into, points);
-        };
+LineWatch Gateway::watch() {
+    LineWatch watch;
+    watch.event = [this](const std::string& line, const bus::BusEvent& event) {
+        on_event(line, event);
     };
-    scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
+    watch.points = [this](const std::string& line, std::uint8_t station,
+                          const std::vector<std::size_t>& wants) {
+        on_points(line, station, wants);
+    };
+    return watch;
+}
+
+void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
+    publish(events_, scene_->plant, line, event);
+    const auto* write = std::get_if<bus::WriteEvent>(&event);
+    if (write != nullptr && relay_listener_) relay_listener_(line, *write);
+}
+
+void Gateway::on_points(const std::string& line, std::uint8_t id,
+                        const std::vector<std::size_t>& wants) {
+    if (scene_->plant.find(line, id) == nullptr) return;  // it is about to be shown
+    Station& station = scene_->plant.at(line, id);
+    remember(station, wants, clock_.now());
+    publish_points(events_, station, wants, clock_.now());
+}
+
+/// Those that there are already, and new ones.
+Gateway::Lines Gateway::lines_of(const config::Config& config) {
+    Lines lines;
+    for (const config::Line& line : config.lines) {
+        const auto found = lines_.find({line.name, line.listens});
+        lines.push_back(found != lines_.end() ? found->second
+                                              : std::make_shared<RunningLine>(
+                                                    executor_, clock_, line, simulate_, watch()));
+    }
+    return lines;
+}
+
+void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const config::Line& now = config.lines[i];
+        const config::Line* before = find_same(*scene_->config, now);
+        if (lines_.emplace(std::pair(now.name, now.listens), lines[i]).second) {
+            lines[i]->start();
+        } else if (before == nullptr) {
+            lines[i]->apply(now, now);
+        } else if (*before != now) {
+            lines[i]->apply(*before, now);
+        }
+    }
+}
+
+void Gateway::retire_lines(const Lines& lines) {
+    for (std::size_t i = 0; i < scene_->lines.size(); ++i) {
+        const auto& line = scene_->lines[i];
+        if (std::ranges::find(lines, line) != lines.end()) continue;
+        if (discoveries_) discoveries_->stop(scene_->config->lines[i].name);
+        line->stop();
+    }
+}
+
+/// Who serves nobody keeps nothing.
+void Gateway::show(const std::shared_ptr<Scene>& scene) {
+    if (scene->config->http) {
+        if (!line_histories_)
+            line_histories_ =
+                std::make_unique<LineHistories>(clock_, std::vector<const bus::LineBus*>());
+        keep_histories(*scene, scene_.get(), *line_histories_);
+        scene->directory = directory_of(scene->plant, *scene->config->profiles->find("generic"));
+        for (std::size_t i = 0; i < scene->histories.size(); ++i)
+            scene->directory.lines[i].history = scene->histories[i].get();
+    }
+    scene_ = scene;
+}
+
+void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
+    Lines lines = lines_of(*config);
+    Plant draft;
+    for (std::size_t i = 0; i < lines.size(); ++i)
+        draft.add(config->lines[i], lines[i]->bus(), nullptr);
+    const auto directory = [this] { return directory_in(scene_); };
+    servers_.open(*config, draft, {directory, [this] { return providers(); }});
+    // Nothing below fails.
+    const bool kept_nothing = line_histories_ == nullptr;
+    retire_lines(lines);
+    apply_lines(*config, lines);
+    show(make_scene(std::move(config), std::move(lines)));
+    if (kept_nothing && line_histories_) line_histories_->start();
+    relays_->apply(routes_of(*scene_));
+    servers_.apply(*scene_->config, scene_->plant, directory_in(scene_), shown, longest_answer());
+}
+
+web::Providers Gateway::providers() {
+    if (!scrapes_) {
+        const auto copy = [this] {
+            return [this, points = PointCopy(scene_->plant),
+                    scene = scene_](metrics::Snapshot& into) mutable {
+                return copy_figures(into, points, *scene);
+            };
+        };
+        scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
+        discoveries_ = std::make_unique<Discoveries>(
+            clock_, [this] { return Discoveries::Place{scene_->plant, scene_->config->profiles}; },
+            events_);
+    }
+    web::Providers providers;
     providers.metrics = scrapes_.get();
     providers.metrics_type = metrics::kContentType;
-    providers.ready = [this] { return ready_ && openings_.missing().empty(); };
-    providers.missing = [this] { return openings_.missing(); };
+    providers.ready = [this] { return ready_ && servers_.missing().empty(); };
+    providers.missing = [this] { return servers_.missing(); };
     providers.version = PANELGATE_VERSION;
     providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };
-    providers.configuration =
-        std::make_shared<const std::string>(web::json_text(inventory_json(config_)));
     providers.wall = rt::wall_now;
-    discoveries_ = std::make_unique<Discoveries>(clock_, plant_, *config_.profiles, events_);
     providers.discovery = discoveries_.get();
-    keep_histories();
-    directory_ = directory_of(plant_, *config_.profiles->find("generic"));
-    for (std::size_t i = 0; i < buses_.size(); ++i)
-        directory_.lines[i].history = &line_histories_->at(i);
-    http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers));
-}
-
-void Gateway::add_doors() {
-    for (std::size_t i = 0; i < listeners_.size(); ++i) {
-        const tcp_server::Settings& settings = config_.modbus_tcp[i];
-        tcp_server::Listener* listener = listeners_[i].get();
-        openings_.add({"modbus_tcp", settings.address, settings.port,
-                       [listener] { return error_of(*listener); },
-                       [listener] { return listener->port(); }});
-    }
-    if (!http_) return;
-    openings_.add({"http", config_.http->address, config_.http->port,
-                   [this] { return http_->start(); }, [this] { return http_->port(); }});
+    providers.reload = reloads_;
+    return providers;
 }
 
 void Gateway::start() {
     lag_.start();
-    for (const auto& simulated : simulated_) simulated->start();
-    for (const auto& bus : buses_) bus->start();
-    for (const auto& poller : pollers_) poller->start();
+    for (const auto& line : scene_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
-    for (const auto& master : serial_masters_) master->start();
-    add_doors();
-    openings_.start();
+    const auto directory = [this] { return directory_in(scene_); };
+    servers_.open(*scene_->config, scene_->plant, {directory, [this] { return providers(); }});
+    servers_.apply(*scene_->config, scene_->plant, directory(), shown_text(*scene_->config),
+                   longest_answer());
     ready_ = true;
 }
 
 Duration Gateway::longest_answer() const {
     Duration longest{};
-    for (const config::Line& line : config_.lines)
+    for (const config::Line& line : scene_->config->lines)
         longest = std::max(longest, line.arbiter.queue.deadline);
     return longest;
 }
 
 void Gateway::stop_accepting() {
     ready_ = false;
-    openings_.stop();
     if (discoveries_) discoveries_->stop_all();
     events_.end();
-    open_listeners_ = listeners_.size();
-    for (const auto& listener : listeners_) {
-        listener->stop([this] { --open_listeners_; });
-    }
-    for (const auto& master : serial_masters_) master->finish();
-    if (http_) http_->stop(longest_answer());
-}
-
-bool Gateway::drained() const {
-    const auto idle = [](const auto& master) { return master->idle(); };
-    return open_listeners_ == 0 && std::ranges::all_of(serial_masters_, idle) &&
-           (!http_ || http_->connections() == 0);
-}
-
-std::size_t Gateway::owing() const {
-    std::size_t count = http_ ? http_->connections() : 0;
-    for (const auto& listener : listeners_) count += listener->counters().connections;
-    for (const auto& master : serial_masters_) count += master->idle() ? 0 : 1;
-    return count;
+    servers_.stop_accepting(longest_answer());
 }
 
 std::string Gateway::status() const {
-    return service_status(plant_, openings_.standing(), openings_.missing());
+    return service_status(scene_->plant, servers_.standing(), servers_.missing());
 }
 
 void Gateway::stop() {
     lag_.stop();
-    for (const auto& listener : listeners_) listener->close_now();
-    for (const auto& master : serial_masters_) master->stop();
-    http_.reset();
+    servers_.close();
     if (line_histories_) line_histories_->stop();
     relays_->stop();
-    for (const auto& poller : pollers_) poller->stop();
-    for (const auto& bus : buses_) bus->stop();
-    for (const auto& simulated : simulated_) simulated->stop();
+    for (const auto& line : scene_->lines) line->stop();
 }
 
 /// One piece: a line, some points, or all the rest, which is small.
-bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const {
+bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points,
+                           const Scene& scene) const {
     const std::size_t lines = snapshot.lines.size();
-    if (lines < buses_.size()) {
-        snapshot.lines.push_back(buses_[lines]->report());
+    if (lines < scene.lines.size()) {
+        snapshot.lines.push_back(scene.lines[lines]->bus().report());
         return true;
     }
     if (points.next(snapshot.points, clock_.now())) return true;
-    for (const auto& listener : listeners_) snapshot.listeners.push_back(listener->counters());
-    for (const auto& master : serial_masters_)
-        snapshot.serial_masters.push_back(master->counters());
     snapshot.relays = relay_samples(relays_->status());
-    if (http_) snapshot.http = http_->counters();
+    servers_.copy_figures(snapshot);
+    if (reloads_->barred(false).empty()) snapshot.reloads = reloads_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     snapshot.runtime.loop_lag = lag_.seconds();

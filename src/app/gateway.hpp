@@ -3,7 +3,6 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,43 +14,48 @@
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/line_bus.hpp"
-#include "panelgate/bus/write_event.hpp"
 #include "panelgate/config/config.hpp"
-#include "panelgate/points/heard_values.hpp"
-#include "panelgate/points/poller.hpp"
+#include "panelgate/metrics/exposition.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/loop_lag.hpp"
-#include "panelgate/serial_server/serial_master.hpp"
-#include "panelgate/sim/simulated_bus.hpp"
-#include "panelgate/tap/heard.hpp"
-#include "panelgate/tcp_server/listener.hpp"
-#include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
-#include "plant.hpp"
+#include "running_line.hpp"
+#include "scene.hpp"
 #include "scrapes.hpp"
+#include "servers.hpp"
 #include "showing.hpp"
 
 namespace panelgate::app {
 
-/// The composition root: builds the tree of objects of one configuration and owns it. One thread.
+class Reloader;
+
+/// The composition root: what is made of a configuration, and what becomes of it when there is
+/// another one. One thread.
 class Gateway {
   public:
-    Gateway(boost::asio::any_io_executor executor, config::Config config, bool simulate);
+    /// `reloads`: who is asked by REST to read the file again; null: nobody. It outlives this.
+    Gateway(boost::asio::any_io_executor executor, std::shared_ptr<const config::Config> config,
+            bool simulate, Reloader* reloads);
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
 
     /// Opens lines and listeners. Throws CannotListen when a listener cannot be opened; one whose
     /// address is not there yet is opened later.
     void start();
+    /// Serves this from now on; lines, listeners, clients and points that are the same do not
+    /// notice. Throws CannotListen, or std::system_error without a pty for a simulated line; then
+    /// nothing has changed. `shown`: its text for REST. Stations that are the same panels share
+    /// their profile with those that run (config::share_profiles()).
+    void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
+    const std::shared_ptr<const config::Config>& config() const { return scene_->config; }
     /// Stops accepting; what was accepted is answered within its deadline.
     void stop_accepting();
     /// Nothing is owed to any client any more.
-    bool drained() const;
+    bool drained() { return servers_.drained(); }
     /// Connections to whom something is owed, once nothing more is accepted.
-    std::size_t owing() const;
+    std::size_t owing() const { return servers_.owing(); }
     /// The longest that a request which was accepted may take to its answer.
     Duration longest_answer() const;
     /// In words, for who has started the program.
@@ -59,53 +63,41 @@ class Gateway {
     /// Closes everything.
     void stop();
 
-    std::uint16_t http_port() const { return http_ ? http_->port() : std::uint16_t{0}; }
-    std::uint16_t modbus_port() const {
-        return listeners_.empty() ? std::uint16_t{0} : listeners_[0]->port();
-    }
+    std::uint16_t http_port() const { return servers_.http_port(); }
+    std::uint16_t modbus_port() const { return servers_.modbus_port(); }
 
   private:
-    void on_bus_event(const std::string& line, const bus::BusEvent& event);
-    void add_line(const config::Line& line, bool simulate);
-    void add_points(const config::Line& line, bus::LineBus& bus);
-    void add_poller(const config::Line& line, std::vector<points::PolledStation> polled,
-                    bus::LineBus& bus);
-    void add_heard(const config::Line& line, const std::vector<points::PolledStation>& polled);
-    void hear(const std::string& line, const tap::Transaction& heard);
+    using Lines = std::vector<std::shared_ptr<RunningLine>>;
+
+    LineWatch watch();
+    void on_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const std::string& line, std::uint8_t station,
                    const std::vector<std::size_t>& wants);
-    void keep_histories();
-    void add_relays();
-    void add_listener(tcp_server::Settings settings);
-    void add_serial_master(const serial_server::Settings& settings);
-    void add_http(const web::Settings& settings);
-    void add_doors();
-    bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const;
+    Lines lines_of(const config::Config& config);
+    void apply_lines(const config::Config& config, const Lines& lines);
+    void retire_lines(const Lines& lines);
+    void show(const std::shared_ptr<Scene>& scene);
+    void apply_relays();
+    web::Providers providers();
+    bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points, const Scene& scene) const;
 
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
-    config::Config config_;
+    bool simulate_;
+    Reloader* reloads_;
     web::EventHub events_;  ///< buses publish to it to their end
-    Plant plant_;           ///< what there is; everybody below is looked up in it, or shown by it
-    /// Who hears of the writes on a line, by its name; buses tell to their end.
-    std::map<std::string, std::function<void(const bus::WriteEvent&)>> write_listeners_;
+    /// Never null; what is there to be looked up, or shown.
+    std::shared_ptr<Scene> scene_;
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
-    std::vector<std::unique_ptr<sim::SimulatedBus>> simulated_;
-    std::vector<std::unique_ptr<bus::LineBus>> buses_;  ///< by the order of config_.lines
-    std::unique_ptr<Discoveries> discoveries_;          ///< null without `http:`
-    std::unique_ptr<LineHistories> line_histories_;     ///< null without `http:`
-    std::vector<std::unique_ptr<points::Poller>> pollers_;
-    /// Of lines that are only listened to, by their name and the station's id.
-    std::map<std::pair<std::string, std::uint8_t>, points::HeardValues> heard_;
+    /// Those of earlier configurations too, closed: whoever still knows one gets an answer, and it
+    /// is taken up again under its name. By name and mode.
+    std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines_;
+    std::unique_ptr<Discoveries> discoveries_;       ///< null until there is `http:`
+    std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;
-    std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
-    std::vector<std::unique_ptr<serial_server::SerialMaster>> serial_masters_;
-    std::unique_ptr<Scrapes> scrapes_;
-    web::Directory directory_;  ///< REST's view of the plant; empty without `http:`
-    std::unique_ptr<web::Server> http_;
-    Openings openings_{clock_};  ///< of the listeners and of HTTP
-    std::size_t open_listeners_ = 0;
+    std::unique_ptr<Scrapes> scrapes_;  ///< null until there is `http:`
+    Servers servers_;
     bool ready_ = false;
 };
 

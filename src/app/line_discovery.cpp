@@ -44,11 +44,12 @@ Reply reply_of(const bus::Answer& answer) {
 }  // namespace
 
 LineDiscovery::LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
-                             const profile::Catalogue& profiles, scan::DiscoverySettings settings,
-                             std::function<void()> told)
+                             std::shared_ptr<const profile::Catalogue> profiles,
+                             scan::DiscoverySettings settings, std::function<void()> told)
     : clock_(clock),
       bus_(bus),
-      discovery_(profiles, settings, clock.now()),
+      profiles_(std::move(profiles)),
+      discovery_(*profiles_, settings, clock.now()),
       share_percent_(static_cast<unsigned>(std::lround(settings.share * kHundred))),
       told_(std::move(told)),
       client_(bus::next_client_id()),

@@ -21,8 +21,9 @@ class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
   public:
     using State = web::DiscoveryReport::State;
 
-    /// Clock and bus outlive it, and the profiles. `told` is called after each step.
-    LineDiscovery(rt::Clock& clock, bus::BusClient& bus, const profile::Catalogue& profiles,
+    /// Clock and bus outlive it. `told` is called after each step.
+    LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
+                  std::shared_ptr<const profile::Catalogue> profiles,
                   scan::DiscoverySettings settings, std::function<void()> told);
 
     void start();
@@ -43,6 +44,7 @@ class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
 
     rt::Clock& clock_;
     bus::BusClient& bus_;
+    std::shared_ptr<const profile::Catalogue> profiles_;
     scan::Discovery discovery_;
     unsigned share_percent_;
     std::function<void()> told_;

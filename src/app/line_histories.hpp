@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <vector>
 
@@ -21,20 +20,25 @@ class LineHistories {
     /// The clock and the lines outlive it.
     LineHistories(rt::Clock& clock, std::vector<const bus::LineBus*> lines);
 
+    /// From now on these. The past of those that are among them stays, unless slots have another
+    /// width.
+    void apply(std::vector<const bus::LineBus*> lines);
+
     void start();
-    void stop() { alarm_->cancel(); }
-    /// By the order of the lines.
-    const bus::LineHistory& at(std::size_t line) const { return histories_[line]; }
+    void stop();
+    /// By the order of the lines. May outlive this.
+    const std::shared_ptr<bus::LineHistory>& at(std::size_t line) const { return histories_[line]; }
 
   private:
     void look();
 
     rt::Clock& clock_;
     std::vector<const bus::LineBus*> lines_;
-    std::deque<bus::LineHistory> histories_;
+    std::vector<std::shared_ptr<bus::LineHistory>> histories_;
     std::unique_ptr<rt::Alarm> alarm_;
     TimePoint began_{};
     std::int64_t looks_ = 0;
+    bool running_ = false;
 };
 
 }  // namespace panelgate::app

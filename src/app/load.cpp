@@ -12,6 +12,8 @@
 namespace panelgate::app {
 namespace {
 
+constexpr std::string_view kCannotRead = "cannot be read: ";
+
 std::optional<std::string> environment(const std::string& name) {
     const char* value = std::getenv(name.c_str());
     if (value == nullptr) return std::nullopt;
@@ -22,37 +24,48 @@ std::optional<std::string> environment(const std::string& name) {
 
 std::string path_of(const std::string& typed) { return typed == "-" ? "/dev/stdin" : typed; }
 
-Loaded load_file(const std::string& typed) {
-    const std::string path = path_of(typed);
+Loaded read_file(const std::string& path) {
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
         const std::string why =
             errno == EPIPE ? "nobody writes to this pipe" : std::strerror(errno);
-        std::cerr << "panelgate: cannot read " << path << ": " << why
-                  << " (give another file with -c)\n";
-        return {std::nullopt, kNoInput, {{path, {0, 0}, "cannot be read: " + why}}};
+        return {std::nullopt, kNoInput, {{path, {0, 0}, std::string(kCannotRead) + why}}, {}};
     }
-    return load_text(*text, path);
+    return read_text(*text, path);
 }
 
-Loaded load_text(std::string_view text, const std::string& name) {
+Loaded read_text(std::string_view text, const std::string& name) {
     yaml::Problems problems(name);
     Loaded loaded;
     loaded.config = config::load(text, config::RealFiles(), problems, environment);
     if (!loaded.config) {
-        std::cerr << problems.text();
         loaded.code = kBadConfig;
         loaded.problems = problems.list();
+        loaded.told = problems.text();
     }
     return loaded;
 }
 
-std::optional<config::Config> read_quietly(const std::string& typed) {
+Loaded load_file(const std::string& typed) {
     const std::string path = path_of(typed);
-    const auto text = config::RealFiles::read_any(path);
-    if (!text) return std::nullopt;
-    yaml::Problems problems(path);
-    return config::load(*text, config::RealFiles(), problems, environment);
+    Loaded loaded = read_file(path);
+    if (loaded.code == kNoInput) {
+        std::cerr << "panelgate: cannot read " << path << ": "
+                  << loaded.problems.front().message.substr(kCannotRead.size())
+                  << " (give another file with -c)\n";
+    }
+    std::cerr << loaded.told;
+    return loaded;
+}
+
+Loaded load_text(std::string_view text, const std::string& name) {
+    Loaded loaded = read_text(text, name);
+    std::cerr << loaded.told;
+    return loaded;
+}
+
+std::optional<config::Config> read_quietly(const std::string& typed) {
+    return read_file(path_of(typed)).config;
 }
 
 void print_warnings(const config::Config& config) {

@@ -18,10 +18,15 @@ struct Loaded {
     /// What is wrong, when there is no configuration; of a file that cannot be read without a place
     /// (line 0).
     std::vector<yaml::Problem> problems;
+    std::string told;  ///< the same for stderr; not of a file that cannot be read
 };
 
 /// What is read: `-` is standard input.
 std::string path_of(const std::string& typed);
+/// Checks a text, and tells nobody but whoever calls.
+Loaded read_text(std::string_view text, const std::string& name);
+/// Reads and checks a file, and tells nobody but whoever calls.
+Loaded read_file(const std::string& path);
 /// Reads and checks a file, `-` for standard input. Its warnings are told by whoever uses it.
 Loaded load_file(const std::string& typed);
 /// The same for text; `name` stands in messages.

@@ -38,6 +38,7 @@ class CommandLine {
         add_address();
         add_profiles();
         add_health();
+        add_reload();
         add_help();
     }
 
@@ -147,7 +148,10 @@ class CommandLine {
         command->add_flag(
             "--simulate", simulated_,
             "replace every line's device by a simulated bus with the configured stations");
-        command->callback([this] { code_ = run(file_, simulated_); });
+        command->add_flag("--watch", watch_,
+                          "read the file again when it has changed, as on SIGHUP (Kubernetes: a "
+                          "mounted ConfigMap)");
+        command->callback([this] { code_ = run(file_, simulated_, watch_); });
     }
 
     void add_demo() {
@@ -230,10 +234,29 @@ class CommandLine {
         command->callback([this] { code_ = health(file_, http_); });
     }
 
+    void add_reload() {
+        CLI::App* command = cli_.add_subcommand(
+            "reload", "have a running gateway read its file again, and print its verdict");
+        command->add_option("-c,--config", reload_.file, "its file, which says where it listens")
+            ->capture_default_str();
+        command->add_option("--http", reload_.http, "ADDR:PORT of its REST API");
+        command->add_option("--token-file", reload_.token_file,
+                            "a file whose first line is a token of the role operator");
+        command->add_flag("--rollback", reload_.rollback,
+                          "serve what ran before the last reload, whatever the file says");
+        command->footer(
+            "Exit codes: 0 it serves the file, or did already; 1 nobody could be asked; 69 valid, "
+            "but\nsomething could not be opened; 78 the file has faults. After 69 and 78 nothing "
+            "has changed.");
+        command->callback([this] { code_ = reload(reload_); });
+    }
+
     CLI::App cli_{kAbout, "panelgate"};
     ExitCode code_ = kFine;
     std::string file_ = kDefaultConfig;
     bool simulated_ = false;
+    bool watch_ = false;
+    ReloadOptions reload_{.file = kDefaultConfig, .http = {}, .token_file = {}};
     std::string http_;
     std::string modbus_;
     std::string format_ = "text";

@@ -28,33 +28,52 @@ void tell_wait(const Door& door, const error_code& why) {
 
 Openings::Openings(rt::Clock& clock) : clock_(clock), again_(clock.make_alarm()) {}
 
-void Openings::start() {
-    for (Waiting& waiting : waiting_) {
-        waiting.why = open(waiting.door);
-        if (!waiting.why) continue;
-        if (waiting.why != errc::address_not_available) {
-            const std::string advice = listening_advice(waiting.why, waiting.door.port);
-            throw CannotListen("cannot listen on " + where(waiting.door) + ": " +
-                               waiting.why.message() + (advice.empty() ? "" : "; " + advice));
+void Openings::open(const std::vector<Door>& doors) {
+    std::vector<Waiting> late;
+    for (const Door& door : doors) {
+        const error_code why = opened(door);
+        if (!why) continue;
+        if (why != errc::address_not_available) {
+            const std::string advice = listening_advice(why, door.port);
+            throw CannotListen("cannot listen on " + where(door) + ": " + why.message() +
+                               (advice.empty() ? "" : "; " + advice));
         }
-        tell_wait(waiting.door, waiting.why);
+        tell_wait(door, why);
+        late.push_back({door, why});
     }
+    waiting_.insert(waiting_.end(), late.begin(), late.end());
     later();
 }
 
-error_code Openings::open(const Door& door) {
+void Openings::take_over(const std::vector<Door>& doors) {
+    for (const Door& door : doors) waiting_.push_back({door, {}});
+    try_again();
+}
+
+void Openings::forget(const void* whose) {
+    std::erase_if(waiting_, [&](const Waiting& waiting) { return waiting.door.whose == whose; });
+    std::erase_if(standing_, [&](const auto& standing) { return standing.first == whose; });
+}
+
+error_code Openings::opened(const Door& door) {
     const error_code error = door.open();
     if (error) return error;
     const std::string place = endpoint_text(door.address, door.opened_port());
     rt::log(rt::LogLevel::info, "listening", {{door.kind, place}});
-    standing_ += (standing_.empty() ? "" : ", ") + door.kind + ' ' + place;
+    standing_.emplace_back(door.whose, door.kind + ' ' + place);
     return error;
+}
+
+std::string Openings::standing() const {
+    std::string text;
+    for (const auto& [whose, place] : standing_) text += (text.empty() ? "" : ", ") + place;
+    return text;
 }
 
 /// The gateway serves meanwhile: nothing that happens here ends it any more.
 void Openings::try_again() {
     for (Waiting& waiting : waiting_) {
-        const error_code why = open(waiting.door);
+        const error_code why = opened(waiting.door);
         if (why && why != waiting.why) tell_wait(waiting.door, why);
         waiting.why = why;
     }

@@ -21,6 +21,7 @@ struct Door {
     std::uint16_t port = 0;
     std::function<boost::system::error_code()> open;
     std::function<std::uint16_t()> opened_port;  ///< once it is open
+    const void* whose = nullptr;                 ///< for forget()
 };
 
 /// A listener that cannot be opened; its text says what helps.
@@ -37,14 +38,18 @@ class Openings {
 
     explicit Openings(rt::Clock& clock);
 
-    void add(Door door) { waiting_.push_back({std::move(door), {}}); }
-    /// Tries all of them, in their order. Throws CannotListen for what time alone does not mend.
-    void start();
+    /// Opens all of them, in their order. Throws CannotListen for what time alone does not mend;
+    /// then those before it may be open, and nothing more is tried for any of these.
+    void open(const std::vector<Door>& doors);
+    /// Opens these as soon as it is possible: whoever held their address has just left.
+    void take_over(const std::vector<Door>& doors);
+    /// Not any more.
+    void forget(const void* whose);
     void stop();
     /// Those that do not stand, and why, in words; empty: all stand.
     std::string missing() const;
     /// Those that stand: "modbus_tcp 127.0.0.1:502, http 127.0.0.1:8080".
-    const std::string& standing() const { return standing_; }
+    std::string standing() const;
 
   private:
     struct Waiting {
@@ -53,12 +58,12 @@ class Openings {
     };
     void try_again();
     void later();
-    boost::system::error_code open(const Door& door);
+    boost::system::error_code opened(const Door& door);
 
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> again_;
     std::vector<Waiting> waiting_;
-    std::string standing_;
+    std::vector<std::pair<const void*, std::string>> standing_;  ///< whose, and where
 };
 
 /// What somebody can do about a listener that cannot be opened; empty: nothing is known.

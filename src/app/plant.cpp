@@ -15,7 +15,8 @@ const Station* first(const std::deque<Station>& stations, const Wanted& wanted) 
 
 }  // namespace
 
-void Plant::add(const config::Line& line, bus::BusClient& bus, sim::SimulatedBus* simulated) {
+void Plant::add(const config::Line& line, bus::BusClient& bus,
+                const std::shared_ptr<sim::SimulatedBus>& simulated) {
     lines_.push_back({&line, simulated != nullptr ? kSimulatedDevice : line.device.device, &bus});
     for (const config::Station& configured : line.stations) {
         Station& station = stations_.emplace_back();

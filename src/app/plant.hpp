@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,8 +33,9 @@ struct Line {
 
 /// A station that the configuration lists. What it refers to outlives the plant.
 struct Station : bus::StationRef {
-    const config::Station* configured = nullptr;    ///< never null
-    sim::SimulatedBus* simulated = nullptr;         ///< where its panel is played; null: a real one
+    const config::Station* configured = nullptr;  ///< never null
+    /// Where its panel is played; null: a real one.
+    std::shared_ptr<sim::SimulatedBus> simulated;
     std::optional<points::StationPoints> points;    ///< what its polls bring, when it has any
     std::optional<points::StationHistory> history;  ///< ... and have brought; where REST is served
     /// The id by which Modbus/TCP clients reach it: of the first listener that has one.
@@ -45,7 +47,8 @@ struct Station : bus::StationRef {
 class Plant {
   public:
     /// A line with all its stations. `simulated`: null for a real one.
-    void add(const config::Line& line, bus::BusClient& bus, sim::SimulatedBus* simulated);
+    void add(const config::Line& line, bus::BusClient& bus,
+             const std::shared_ptr<sim::SimulatedBus>& simulated);
     /// What this listener's clients call the stations that no listener before it has reached.
     void add_units(const tcp_server::UnitMap& units);
 
@@ -59,6 +62,7 @@ class Plant {
     const Station* find_unit(int unit) const;
     /// Of a station that add() has brought.
     Station& at(std::string_view line, std::uint8_t id);
+    std::deque<Station>& stations() { return stations_; }
     /// Its name, or its id when it is not listed; "" for everybody (station 0).
     std::string name_of(std::string_view line, std::uint8_t id) const;
 

@@ -73,8 +73,12 @@ class Loop {
     void wait_for_reload() {
         reloads_.async_wait([this](error_code error, int) {
             if (error) return;
-            rt::log(rt::LogLevel::warn, "no reload",
-                    {{"why", "this version reads its file at start only"}});
+            if (ending_.reload && !ending_now_) {
+                ending_.reload();
+            } else {
+                rt::log(rt::LogLevel::warn, "no reload",
+                        {{"why", ending_now_ ? "it is stopping" : "there is no file to be read"}});
+            }
             wait_for_reload();
         });
     }

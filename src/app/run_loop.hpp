@@ -11,13 +11,14 @@
 
 namespace panelgate::app {
 
-/// What a program does when it is told to end.
+/// What a program does when it is told to end, or to read its file again.
 struct Ending {
     std::function<void()> begin;   ///< first SIGTERM or SIGINT: stop accepting
     std::function<bool()> done;    ///< asked again and again until true
     std::function<void()> finish;  ///< then, or when patience() is over, or at the second signal
     std::function<std::size_t()> open{};  ///< connections that are still owed an answer
     Duration longest_answer{};            ///< of what is in flight
+    std::function<void()> reload{};       ///< at SIGHUP; empty: nothing can be read again
 
     /// What has been accepted is answered within its time, and the answer needs a moment to leave.
     Duration patience() const { return std::max<Duration>(10s, longest_answer + 2s); }
@@ -28,7 +29,7 @@ class SignalLoop {
   public:
     explicit SignalLoop(boost::asio::io_context& io);
     /// Runs the loop until a signal, also an earlier one, has ended it: kFine, or kCut when a
-    /// second one came before it was done. SIGHUP is told to be no reload in this version.
+    /// second one came before it was done.
     ExitCode run(const Ending& ending);
 
   private:

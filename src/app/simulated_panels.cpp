@@ -26,7 +26,7 @@ void SimulatedPanels::add(const config::Line& line, const std::string& link) {
         entry.line = line.name;
         entry.id = station.id;
         entry.profile = station.profile;
-        entry.simulated = simulated_panel(&bus, station.id);
+        entry.simulated = simulated_panel(buses_.back(), station.id);
     }
 }
 
@@ -55,8 +55,9 @@ void SimulatedPanels::serve_faults(const config::Endpoint& endpoint) {
     providers.version = PANELGATE_VERSION;
     providers.now = [this] { return clock_.now(); };
     providers.events = &nothing_happens_;
-    http_ = std::make_unique<web::Server>(executor_, settings, directory_, std::move(providers),
-                                          web::Surface::simulator);
+    http_ = std::make_unique<web::Server>(executor_, settings,
+                                          std::make_shared<const web::Directory>(directory_),
+                                          std::move(providers), web::Surface::simulator);
     if (const auto error = http_->start())
         throw std::system_error(error, "cannot listen on " + settings.name());
     const std::string place = endpoint_text(endpoint.address, http_->port());

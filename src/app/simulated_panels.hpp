@@ -43,7 +43,7 @@ class SimulatedPanels {
 
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
-    std::vector<std::unique_ptr<sim::SimulatedBus>> buses_;
+    std::vector<std::shared_ptr<sim::SimulatedBus>> buses_;
     std::vector<std::unique_ptr<PtyLink>> links_;
     std::vector<std::unique_ptr<TcpBridge>> bridges_;
     web::EventHub nothing_happens_;

@@ -28,24 +28,23 @@ std::optional<bus::Rule> rule_of(profile::Judgement judgement) {
     std::abort();
 }
 
-/// Refuses what the panel's manual rules out. The profile outlives it.
-bus::Guard guard_of(const profile::PanelProfile& profile) {
-    return [&profile](const modbus::Request& request) -> std::optional<bus::Objection> {
-        const auto rule = rule_of(profile::judge(profile, request));
+/// Refuses what the panel's manual rules out.
+bus::Guard guard_of(const profile::ProfileRef& panel) {
+    return [panel](const modbus::Request& request) -> std::optional<bus::Objection> {
+        const auto rule = rule_of(profile::judge(*panel, request));
         if (!rule) return std::nullopt;
-        return bus::Objection{*rule, profile::explain(profile, request)};
+        return bus::Objection{*rule, profile::explain(*panel, request)};
     };
 }
 
-/// The profile outlives it.
-void add_translation(bus::StationSettings& station, const profile::PanelProfile& profile) {
-    for (const profile::Translation& possible : profile::translations(profile)) {
+void add_translation(bus::StationSettings& station, const profile::ProfileRef& panel) {
+    for (const profile::Translation& possible : profile::translations(*panel)) {
         station.translations.emplace_back(possible.asked, possible.sent);
         station.functions.push_back(possible.asked);
     }
     if (station.translations.empty()) return;
-    station.translate = [&profile](const modbus::Request& request) {
-        return profile::translate(profile, request);
+    station.translate = [panel](const modbus::Request& request) {
+        return profile::translate(*panel, request);
     };
 }
 
@@ -76,8 +75,8 @@ bus::Settings bus_settings(const config::Line& line) {
         made.name = station.name;
         made.access = station.read_only ? bus::Access::read_only : bus::Access::read_write;
         made.functions = functions_of(*station.profile);
-        if (station.guard) made.guard = guard_of(*station.profile);
-        if (station.translate && !station.guard) add_translation(made, *station.profile);
+        if (station.guard) made.guard = guard_of(station.profile);
+        if (station.translate && !station.guard) add_translation(made, station.profile);
     }
     return settings;
 }
@@ -92,17 +91,17 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
                                                 frame_gap(line, station.id));
         entry.limits.think_time = station.think_time;
-        entry.memory = memory_of(*station.profile);
+        entry.memory = memory_of(station.profile);
     }
     return polled;
 }
 
-points::SharedMemory memory_of(const profile::PanelProfile& panel) {
+points::SharedMemory memory_of(const profile::ProfileRef& panel) {
     points::SharedMemory memory;
-    memory.shown_as = [&panel](const modbus::Span& written) {
-        return profile::shown_as(panel, written);
+    memory.shown_as = [panel](const modbus::Span& written) {
+        return profile::shown_as(*panel, written);
     };
-    memory.known = panel.name != "generic";  // which says what anybody could
+    memory.known = panel->name != "generic";  // which says what anybody could
     return memory;
 }
 
@@ -121,7 +120,7 @@ points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
     route.to = to.bus;
     route.to_station = to.id;
     route.to_line = to.line;
-    route.to_memory = memory_of(*to.configured->profile);
+    route.to_memory = memory_of(to.configured->profile);
     route.to_has_multiple = takes_multiple(*to.configured->profile, relay.to.table);
     return route;
 }

@@ -13,12 +13,11 @@ namespace panelgate::app {
 
 // What the configuration means to each module.
 
-/// The profiles of the line's stations outlive the bus.
 bus::Settings bus_settings(const config::Line& line);
 /// The stations that have points or poll blocks.
 std::vector<points::PolledStation> polled_stations(const config::Line& line);
-/// Which items are shown elsewhere as well. The profile outlives it.
-points::SharedMemory memory_of(const profile::PanelProfile& panel);
+/// Which items are shown elsewhere as well.
+points::SharedMemory memory_of(const profile::ProfileRef& panel);
 /// The panel has function 15 or 16 for this table.
 bool takes_multiple(const profile::PanelProfile& panel, modbus::Table table);
 /// A relay whose ends the plant has: the configuration was checked.

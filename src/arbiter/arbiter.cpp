@@ -9,21 +9,52 @@
 
 namespace panelgate::arbiter {
 
+namespace {
+
+/// What follows from others is put in.
+Settings completed(Settings settings) {
+    settings.end_of_frame = std::max(settings.end_of_frame, silent_interval(settings.serial));
+    // Of ASCII each other character tells something.
+    if (settings.serial.mode == SerialMode::ascii)
+        settings.end_of_frame += byte_time(settings.serial);
+    settings.reply_hole = std::max(settings.reply_hole, settings.end_of_frame);
+    return settings;
+}
+
+Quiet quiet_of(const Settings& settings) {
+    return Quiet(frame_time(settings.serial, modbus::kMaxRtuAdu), silent_interval(settings.serial));
+}
+
+}  // namespace
+
 Arbiter::Arbiter(Settings settings)
-    : settings_(std::move(settings)),
+    : settings_(completed(std::move(settings))),
       orders_(crc_orders(settings_)),
       stations_(settings_),
       schedule_(settings_),
-      quiet_(frame_time(settings_.serial, modbus::kMaxRtuAdu), silent_interval(settings_.serial)),
+      quiet_(quiet_of(settings_)),
       strays_(settings_.serial, orders_),
       reception_(settings_),
       echo_memory_(settings_.echo),
       ledger_(settings_) {
-    settings_.end_of_frame = std::max(settings_.end_of_frame, silent_interval(settings_.serial));
-    // Of ASCII each other character tells something.
     if (settings_.serial.mode == SerialMode::ascii)
-        settings_.end_of_frame += byte_time(settings_.serial);
-    settings_.reply_hole = std::max(settings_.reply_hole, settings_.end_of_frame);
+        ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
+}
+
+void Arbiter::apply(Settings settings) {
+    settings = completed(std::move(settings));
+    const bool same_wire = is_same_wire(settings_, settings);
+    settings_ = std::move(settings);
+    stations_.apply(settings_);
+    schedule_.apply(settings_);
+    reception_.apply(settings_);
+    ledger_.apply(settings_);
+    if (same_wire) return;
+    orders_ = crc_orders(settings_);
+    quiet_ = quiet_of(settings_);
+    strays_ = Strays(settings_.serial, orders_);
+    echo_memory_ = EchoMemory(settings_.echo);
+    ascii_.reset();
     if (settings_.serial.mode == SerialMode::ascii)
         ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
 }

@@ -41,10 +41,15 @@ FrameKind kind_of(const Group& group) {
 
 }  // namespace
 
-Ledger::Ledger(const Settings& settings)
-    : explain_(settings.explain), orders_(crc_orders(settings)) {
-    for (const StationSettings& station : settings.stations) stations_[station.id];
-    stations_[kUnlisted];
+Ledger::Ledger(const Settings& settings) { apply(settings); }
+
+void Ledger::apply(const Settings& settings) {
+    explain_ = settings.explain;
+    orders_ = crc_orders(settings);
+    std::map<std::uint8_t, StationCounters> before = std::exchange(stations_, {});
+    stations_[kUnlisted] = std::move(before[kUnlisted]);
+    for (const StationSettings& station : settings.stations)
+        stations_[station.id] = std::move(before[station.id]);
 }
 
 std::optional<Action> Ledger::poll() {

@@ -44,6 +44,13 @@ Schedule::Schedule(const Settings& settings)
       backlog_(settings.queue),
       sharing_(settings.share_reads) {}
 
+void Schedule::apply(const Settings& settings) {
+    quarantine_ = settings.quarantine;
+    may_stall_ = settings.may_stall;
+    backlog_.queue().apply(settings.queue);
+    sharing_.apply(settings.share_reads);
+}
+
 /// Nothing else can come then that would be taken for the reply to this request: to what it was
 /// asked before (P1), or to a broadcast (P8). No reply is that to a broadcast.
 TimePoint Schedule::rested(const Stations& stations, std::uint8_t id,

@@ -6,6 +6,13 @@
 
 namespace panelgate::arbiter {
 
+bool is_same_wire(const Settings& one, const Settings& other) {
+    const bool ascii = one.serial.mode == SerialMode::ascii;
+    return one.serial == other.serial && one.ascii_digits == other.ascii_digits &&
+           one.echo == other.echo && one.paced == other.paced && one.may_stall == other.may_stall &&
+           crc_orders(one) == crc_orders(other) && (!ascii || one.reply_hole == other.reply_hole);
+}
+
 modbus::CrcOrders crc_orders(const Settings& settings) {
     using modbus::CrcOrder;
     modbus::CrcOrders orders;

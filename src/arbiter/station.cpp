@@ -17,6 +17,14 @@ Station::Station(const StationSettings& settings, const OfflineSettings& offline
       adaptive_(settings.timeout_floor, settings.response_timeout),
       trail_(frame) {}
 
+void Station::apply(const StationSettings& settings, const OfflineSettings& offline, bool listed) {
+    settings_ = settings;
+    listed_ = listed;
+    health_.apply(offline);
+    late_.apply(settings.late_window, settings.response_timeout);
+    adaptive_.apply(settings.timeout_floor, settings.response_timeout);
+}
+
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
     owed_pdu_ = pdu;

@@ -11,12 +11,17 @@ namespace {
 constexpr std::size_t kUsualReply = 45;  // bytes: 20 registers
 }
 
-Stations::Stations(const Settings& settings)
-    : offline_(settings.offline),
-      unlisted_(settings.unlisted),
-      standard_gap_(silent_interval(settings.serial)),
-      frame_(frame_time(settings.serial, kUsualReply)) {
+Stations::Stations(const Settings& settings) { apply(settings); }
+
+void Stations::apply(const Settings& settings) {
+    offline_ = settings.offline;
+    unlisted_ = settings.unlisted;
+    standard_gap_ = silent_interval(settings.serial);
+    frame_ = frame_time(settings.serial, kUsualReply);
+    configured_.clear();
     for (const StationSettings& station : settings.stations) configured_[station.id] = station;
+    for (auto& [id, station] : stations_)
+        station.apply(this->settings(id), offline_, configured_.contains(id));
 }
 
 const StationSettings& Stations::settings(std::uint8_t id) const {

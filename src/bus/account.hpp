@@ -21,6 +21,8 @@ void observe(const Settings& settings, const BusEvent& event);
 class Account {
   public:
     explicit Account(const Settings& settings);
+    /// Those are others now.
+    void apply() { counters_.apply(settings_.stations); }
 
     void add(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
              Outcome outcome, Duration took);

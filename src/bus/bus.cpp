@@ -65,6 +65,8 @@ struct Bus::State final : public line::Line::Events {
     void on_down(const std::string& why) override;
     void on_bytes(ByteView bytes) override;
 
+    void apply(Settings next, std::unique_ptr<line::Line> other);
+    void leave_line();
     void transact(Request request, AnswerHandler handler);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
@@ -152,6 +154,29 @@ void Bus::State::on_bytes(ByteView bytes) {
         confirm_end(now);
         arbiter.on_rx(now, bytes);
     });
+}
+
+void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other) {
+    if (other) leave_line();
+    settings = std::move(next);
+    rights = Rights(settings.stations);
+    account.apply();
+    doctor.apply();
+    const auto go_on = [this](TimePoint) { arbiter.apply(settings.arbiter); };
+    if (!other) return drive.tell(go_on);
+    line = std::move(other);
+    drive.use(*line);
+    drive.hear(go_on);
+    line->start(*this);
+}
+
+/// As if it were lost.
+void Bus::State::leave_line() {
+    line->stop();
+    drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
+    drive.rest();
+    if (std::exchange(up, false)) book.on_line_down(clock.now());
+    why_down = "its settings have changed, and it is being opened";
 }
 
 void Bus::State::transact(Request request, AnswerHandler handler) {
@@ -283,6 +308,10 @@ void Bus::stop() {
         state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
         state_->drive.rest();
     });
+}
+
+void Bus::apply(Settings settings, std::unique_ptr<line::Line> line) {
+    state_->call([&] { state_->apply(explained(std::move(settings)), std::move(line)); });
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {

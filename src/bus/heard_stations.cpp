@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <utility>
 
 #include "panelgate/modbus/exception.hpp"
 
@@ -21,10 +22,15 @@ Outcome outcome_of(const tap::Transaction& heard) {
     std::abort();
 }
 
-HeardStations::HeardStations(const Stations& listed, int offline_after)
-    : offline_after_(offline_after) {
-    wire_[0];
-    for (const auto& [id, station] : listed) wire_[id];
+HeardStations::HeardStations(const Stations& listed, int offline_after) {
+    apply(listed, offline_after);
+}
+
+void HeardStations::apply(const Stations& listed, int offline_after) {
+    offline_after_ = offline_after;
+    Wire before = std::exchange(wire_, {});
+    wire_[0] = std::move(before[0]);
+    for (const auto& [id, station] : listed) wire_[id] = std::move(before[id]);
 }
 
 arbiter::StationCounters& HeardStations::wire_of(std::uint8_t station) {

@@ -24,6 +24,8 @@ class HeardStations {
 
     /// `offline_after`: silences in a row.
     HeardStations(const Stations& listed, int offline_after);
+    /// What was counted on the wire of stations that are no longer listed is forgotten.
+    void apply(const Stations& listed, int offline_after);
 
     void count(const tap::Transaction& heard);
     void count(const tap::Frame& frame);
@@ -45,7 +47,7 @@ class HeardStations {
     void count_answer(One& one, const tap::Transaction& heard);
     void count_failure(One& one, const tap::Transaction& heard);
 
-    int offline_after_;
+    int offline_after_ = 1;
     std::map<std::uint8_t, One> stations_;
     Wire wire_;
     arbiter::LineCounters line_;

@@ -37,6 +37,8 @@ doctor::Sample sample_of(const LineCounts& counts) {
 LineDoctor::LineDoctor(const Settings& settings)
     : settings_(settings), doctor_(settings.doctor, facts_of(settings.arbiter)) {}
 
+void LineDoctor::apply() { doctor_.apply(facts_of(settings_.arbiter)); }
+
 void LineDoctor::begin(TimePoint now, const LineCounts& counts) {
     doctor_.begin(now, sample_of(counts));
 }

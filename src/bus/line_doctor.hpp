@@ -24,6 +24,9 @@ class LineDoctor {
     /// The settings outlive it.
     explicit LineDoctor(const Settings& settings);
 
+    /// Those are others now.
+    void apply();
+
     void begin(TimePoint now, const LineCounts& counts);
     /// Something happened: looks once a step.
     void look(TimePoint now, const LineCounts& counts);

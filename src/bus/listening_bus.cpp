@@ -189,6 +189,24 @@ void ListeningBus::stop() {
     state_->drive.rest();
 }
 
+void ListeningBus::apply(Settings settings, std::unique_ptr<line::Line> line) {
+    State& state = *state_;
+    if (line) {
+        state.line->stop();
+        if (state.up) state.on_down("its settings have changed, and it is being opened");
+        state.drive.rest();
+    }
+    state.settings = std::move(settings);
+    state.heard.apply(state.settings.stations, state.settings.arbiter.offline.after);
+    state.account.apply();
+    state.doctor.apply();
+    if (!line) return;
+    state.matcher = tap::Matcher(tap_settings(state.settings.arbiter));
+    state.line = std::move(line);
+    state.drive.use(*state.line);
+    state.line->start(state);
+}
+
 void ListeningBus::transact(Request request, AnswerHandler handler) {
     state_->refuse(std::move(request), std::move(handler));
 }

@@ -1,5 +1,7 @@
 #include "request_counters.hpp"
 
+#include <utility>
+
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -21,9 +23,14 @@ Outcome outcome_of(const Answer& answer) {
     return answer.shared ? Outcome::shared : Outcome::ok;
 }
 
-RequestCounters::RequestCounters(const Stations& stations) {
+RequestCounters::RequestCounters(const Stations& stations) { apply(stations); }
+
+void RequestCounters::apply(const Stations& stations) {
+    std::map<std::uint8_t, StationReport> before = std::exchange(stations_, {});
+    stations_[0] = std::move(before[0]);
     stations_[0].station = "other";
     for (const auto& [id, station] : stations) {
+        stations_[id] = std::move(before[id]);
         stations_[id].station = station.name;
         stations_[id].configured = true;
         for (const std::uint8_t function : station.functions) stations_[id].requests[function];

@@ -22,6 +22,8 @@ Outcome outcome_of(const Answer& answer);
 class RequestCounters {
   public:
     explicit RequestCounters(const Stations& stations);
+    /// What was counted of stations that are no longer listed is forgotten.
+    void apply(const Stations& stations);
 
     void count(std::uint8_t station, std::uint8_t function, Outcome outcome, Duration took);
     /// One that was counted went out as function `sent`.

@@ -98,6 +98,14 @@ bool is_http(std::string_view key) {
     });
 }
 
+/// Whoever is given a station may keep its profile.
+void keep_profiles(Config& config) {
+    for (Line& line : config.lines) {
+        for (Station& station : line.stations)
+            station.profile = profile::ProfileRef(station.profile, config.profiles);
+    }
+}
+
 void load_tree(Loading& loading, yaml::Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
     drop_extensions(tree);
@@ -106,6 +114,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     if (tree.kind != yaml::Node::Kind::map) return;
     loading.config.profiles = load_profiles(loading, root);
     load_lines(loading, root);
+    keep_profiles(loading.config);
     for (const yaml::Node& body : unused) judge_template(loading, body);
     load_modbus_tcp(loading, root);
     load_serial_masters(loading, root);

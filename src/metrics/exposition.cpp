@@ -273,6 +273,25 @@ void add_loop(Families& out, const Snapshot& snapshot) {
     out.push_back(lag.take());
 }
 
+void add_reloads(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.reloads) return;
+    const config::ReloadCounters& reloads = *snapshot.reloads;
+    Family total = make_counter("panelgate_config_reloads_total",
+                                "Times the configuration was read again, by what came of it.");
+    for (const ReloadOutcome outcome : kReloadOutcomes)
+        total.counter({{"outcome", std::string(label(outcome))}},
+                      reloads.reloads[static_cast<std::size_t>(outcome)]);
+    out.push_back(total.take());
+    Family good = make_gauge("panelgate_config_last_reload_successful",
+                             "Whether the last reload, if there was one, was served.");
+    good.gauge({}, reloads.last_succeeded ? 1 : 0);
+    out.push_back(good.take());
+    Family last = make_gauge("panelgate_config_last_reload_success_timestamp_seconds",
+                             "When the configuration was last read and served; the start counts.");
+    last.gauge({}, reloads.last_success_unix);
+    out.push_back(last.take());
+}
+
 void add_process(Families& out, const Snapshot& snapshot) {
     Family build = make_gauge("panelgate_build_info", "1, with the version as a label.");
     build.gauge({{"version", snapshot.version}}, 1);
@@ -307,10 +326,10 @@ void add_process(Families& out, const Snapshot& snapshot) {
 
 using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
-    add_requests,       add_translated,    add_station_times, add_wire_counters,
-    add_exceptions,     add_line_counters, add_uart_counters, add_line_state,
-    add_station_state,  add_points,        add_relays,        add_listeners,
-    add_serial_masters, add_http,          add_loop,          add_process,
+    add_requests,      add_translated,    add_station_times,  add_wire_counters, add_exceptions,
+    add_line_counters, add_uart_counters, add_line_state,     add_station_state, add_points,
+    add_relays,        add_listeners,     add_serial_masters, add_http,          add_loop,
+    add_reloads,       add_process,
 };
 
 }  // namespace

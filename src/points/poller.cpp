@@ -10,72 +10,113 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     struct Station {
         std::uint8_t id = 0;
         bus::ClientId client = bus::next_client_id();  ///< of its own: stations take turns
-        StationPolls polls;
+        PlanLimits limits;
+        std::shared_ptr<StationPolls> polls;
     };
+    using StationPtr = std::shared_ptr<Station>;  ///< shared with answers that are under way
 
     State(rt::Clock& c, bus::BusClient& b) : clock(c), bus(b), alarm(c.make_alarm()) {}
 
     void ask_all();
-    void ask(std::size_t index, StationPolls::Due due);
-    void on_answer(std::size_t index, std::size_t read, const bus::Answer& answer, TimePoint asked);
+    StationPtr make(PolledStation wanted) const;
+    void apply(std::vector<PolledStation> wanted);
+    void introduce(const Station& station);
+    void ask(const StationPtr& station, StationPolls::Due due);
+    void on_answer(Station& station, std::size_t read, const bus::Answer& answer, TimePoint asked);
     void on_write(const bus::WriteEvent& write);
     void arm();
 
     rt::Clock& clock;
     bus::BusClient& bus;
     std::unique_ptr<rt::Alarm> alarm;
-    std::vector<Station> stations;
+    std::vector<StationPtr> stations;
     Update update;
     bool running = false;
 };
 
 void Poller::State::ask_all() {
     const TimePoint now = clock.now();
-    for (std::size_t i = 0; i < stations.size(); ++i) {
-        for (StationPolls::Due& due : stations[i].polls.take_due(now)) ask(i, std::move(due));
+    for (const StationPtr& station : stations) {
+        for (StationPolls::Due& due : station->polls->take_due(now)) ask(station, std::move(due));
     }
     arm();
 }
 
-void Poller::State::ask(std::size_t index, StationPolls::Due due) {
-    bus::Request request{.station = stations[index].id,
+void Poller::State::ask(const StationPtr& station, StationPolls::Due due) {
+    bus::Request request{.station = station->id,
                          .request = std::move(due.request),
-                         .client = stations[index].client,
+                         .client = station->client,
                          .poll = true};
-    bus.transact(std::move(request), [weak = weak_from_this(), index, read = due.read,
-                                      asked = clock.now()](const bus::Answer& answer) {
-        const auto self = weak.lock();
-        if (self && self->running) self->on_answer(index, read, answer, asked);
-    });
+    bus.transact(std::move(request),
+                 [weak = weak_from_this(), of = std::weak_ptr(station), read = due.read,
+                  asked = clock.now()](const bus::Answer& answer) {
+                     const auto self = weak.lock();
+                     const auto alive = of.lock();  // it is still polled, and so
+                     if (self && self->running && alive)
+                         self->on_answer(*alive, read, answer, asked);
+                 });
 }
 
-void Poller::State::on_answer(std::size_t index, std::size_t read, const bus::Answer& answer,
+void Poller::State::on_answer(Station& station, std::size_t read, const bus::Answer& answer,
                               TimePoint asked) {
     // Asked is the safe side: the value is at most as old as that.
-    const auto wants = stations[index].polls.on_answer(clock.now(), read, answer.pdu, asked);
-    if (update && !wants.empty()) update(stations[index].id, wants);
+    const auto wants = station.polls->on_answer(clock.now(), read, answer.pdu, asked);
+    if (update && !wants.empty()) update(station.id, wants);
     arm();
+}
+
+Poller::State::StationPtr Poller::State::make(PolledStation wanted) const {
+    auto made = std::make_shared<Station>();
+    made->id = wanted.id;
+    made->limits = wanted.limits;
+    made->polls = std::make_shared<StationPolls>(std::move(wanted.wants), std::move(wanted.limits),
+                                                 clock.now(), std::move(wanted.memory));
+    return made;
+}
+
+void Poller::State::introduce(const Station& station) {
+    bus.name_client(station.client, "poll of station " + std::to_string(station.id));
+}
+
+void Poller::State::apply(std::vector<PolledStation> wanted) {
+    const std::vector<StationPtr> before = std::exchange(stations, {});
+    for (PolledStation& one : wanted) {
+        const auto found = std::ranges::find(before, one.id, &Station::id);
+        const bool known = found != before.end();
+        if (known && (*found)->polls->wants() == one.wants && (*found)->limits == one.limits) {
+            (*found)->polls->apply(std::move(one.memory));
+            stations.push_back(*found);
+            continue;
+        }
+        stations.push_back(make(std::move(one)));
+        if (known) stations.back()->polls->adopt(*(*found)->polls);
+        if (running) introduce(*stations.back());
+    }
+    for (const StationPtr& old : before) {
+        if (running && std::ranges::find(stations, old) == stations.end()) bus.cancel(old->client);
+    }
+    if (running) arm();
 }
 
 /// Asks nobody: it is told from inside the bus.
 void Poller::State::on_write(const bus::WriteEvent& write) {
     const TimePoint now = clock.now();
-    for (Station& station : stations) {
-        if (write.station != 0 && write.station != station.id) continue;
+    for (const StationPtr& station : stations) {
+        if (write.station != 0 && write.station != station->id) continue;
         if (write.ended) {
-            station.polls.on_written(now, write.items);
+            station->polls->on_written(now, write.items);
             continue;
         }
-        const auto wants = station.polls.on_write(now, write.items);
-        if (update && !wants.empty()) update(station.id, wants);
+        const auto wants = station->polls->on_write(now, write.items);
+        if (update && !wants.empty()) update(station->id, wants);
     }
     if (write.ended) arm();
 }
 
 void Poller::State::arm() {
     std::optional<TimePoint> next;
-    for (const Station& station : stations) {
-        const auto due = station.polls.next_due();
+    for (const StationPtr& station : stations) {
+        const auto due = station->polls->next_due();
         if (due && (!next || *due < *next)) next = due;
     }
     if (next) {
@@ -87,16 +128,12 @@ void Poller::State::arm() {
 
 Poller::Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations)
     : state_(std::make_shared<State>(clock, bus)) {
-    const TimePoint now = clock.now();
-    for (PolledStation& station : stations) {
-        state_->stations.push_back(
-            {station.id, bus::next_client_id(),
-             StationPolls(std::move(station.wants), std::move(station.limits), now,
-                          std::move(station.memory))});
-    }
+    state_->apply(std::move(stations));
 }
 
 Poller::~Poller() { stop(); }
+
+void Poller::apply(std::vector<PolledStation> stations) { state_->apply(std::move(stations)); }
 
 void Poller::on_update(Update update) { state_->update = std::move(update); }
 
@@ -109,21 +146,19 @@ std::function<void(const bus::WriteEvent&)> Poller::write_listener() const {
 
 void Poller::start() {
     state_->running = true;
-    for (const State::Station& station : state_->stations) {
-        state_->bus.name_client(station.client, "poll of station " + std::to_string(station.id));
-    }
+    for (const State::StationPtr& station : state_->stations) state_->introduce(*station);
     state_->arm();
 }
 
 void Poller::stop() {
     if (!std::exchange(state_->running, false)) return;
     state_->alarm->cancel();
-    for (const State::Station& station : state_->stations) state_->bus.cancel(station.client);
+    for (const State::StationPtr& station : state_->stations) state_->bus.cancel(station->client);
 }
 
-const StationPolls* Poller::find(std::uint8_t station) const {
+std::shared_ptr<const StationPolls> Poller::find(std::uint8_t station) const {
     const auto found = std::ranges::find(state_->stations, station, &State::Station::id);
-    return found == state_->stations.end() ? nullptr : &found->polls;
+    return found == state_->stations.end() ? nullptr : (*found)->polls;
 }
 
 }  // namespace panelgate::points

@@ -23,6 +23,13 @@ bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
     return route.to_memory.changes(*write.items, target).value_or(false);
 }
 
+/// The same registers are copied between the same panels.
+bool is_same(const RelayRoute& one, const RelayRoute& other) {
+    return one.relay == other.relay && one.from == other.from && one.to == other.to &&
+           one.from_station == other.from_station && one.to_station == other.to_station &&
+           one.to_has_multiple == other.to_has_multiple;
+}
+
 /// Why an answer is none; empty when it is one.
 std::string failure_of(const bus::Answer& answer) {
     if (!answer.pdu) return std::string(label(outcome_of(answer.pdu.error())));
@@ -47,7 +54,7 @@ Bytes write_of(const RelayRoute& route, ByteView reply) {
 }  // namespace
 
 struct Relays::State : std::enable_shared_from_this<Relays::State> {
-    struct Entry {
+    struct Entry : std::enable_shared_from_this<Entry> {
         Entry(rt::Clock& clock, RelayRoute r) : route(std::move(r)), alarm(clock.make_alarm()) {
             status.name = route.relay.name();
         }
@@ -75,11 +82,15 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
     bool holds(const Entry& entry, const Bytes& write) const;
     void check_target(Entry& entry);
     void on_write(const std::string& line, const bus::WriteEvent& write);
+    void apply(std::vector<RelayRoute> routes);
+    void begin(Entry& entry, TimePoint due);
+    void end(Entry& entry);
     void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
     void set(Entry& entry, RelayState state, std::string why = {});
 
     rt::Clock& clock;
-    std::vector<std::unique_ptr<Entry>> entries;
+    using EntryPtr = std::shared_ptr<Entry>;  ///< shared with answers that are under way
+    std::vector<EntryPtr> entries;
     std::set<bus::ClientId> clients;  ///< of the relays
     Changed changed;
     bool running = false;
@@ -103,9 +114,10 @@ void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station,
     if (!request) return (this->*then)(entry, bus::Answer{.pdu = request.error()});
     bus.transact(
         {.station = station, .request = std::move(*request), .client = entry.client, .poll = true},
-        [weak = weak_from_this(), &entry, then](const bus::Answer& answer) {
+        [weak = weak_from_this(), kept = entry.weak_from_this(), then](const bus::Answer& answer) {
             const auto self = weak.lock();
-            if (self && self->running) (self.get()->*then)(entry, answer);
+            const auto alive = kept.lock();
+            if (self && self->running && alive) (self.get()->*then)(*alive, answer);
         });
 }
 
@@ -198,14 +210,48 @@ void Relays::State::set(Entry& entry, RelayState state, std::string why) {
     if (changed) changed(entry.status);
 }
 
+/// The entry of an unchanged relay goes on: what it has written is not written again.
+void Relays::State::apply(std::vector<RelayRoute> routes) {
+    std::vector<EntryPtr> before = std::exchange(entries, {});
+    clients.clear();
+    for (RelayRoute& route : routes) {
+        const auto found = std::ranges::find_if(
+            before, [&](const EntryPtr& entry) { return entry && is_same(entry->route, route); });
+        if (found != before.end()) {
+            entries.push_back(std::move(*found));
+            entries.back()->route = std::move(route);
+        } else {
+            entries.push_back(std::make_shared<Entry>(clock, std::move(route)));
+            if (running) begin(*entries.back(), clock.now());
+        }
+        clients.insert(entries.back()->client);
+    }
+    for (const EntryPtr& gone : before) {
+        if (gone && running) end(*gone);
+    }
+}
+
+void Relays::State::begin(Entry& entry, TimePoint due) {
+    entry.due = due;
+    for (bus::BusClient* bus : {entry.route.from, entry.route.to})
+        bus->name_client(entry.client, "relay " + entry.status.name);
+    arm(entry);
+}
+
+void Relays::State::end(Entry& entry) {
+    entry.alarm->cancel();
+    entry.route.from->cancel(entry.client);
+    entry.route.to->cancel(entry.client);
+}
+
 Relays::Relays(rt::Clock& clock, std::vector<RelayRoute> routes)
     : state_(std::make_shared<State>(clock)) {
-    for (RelayRoute& route : routes)
-        state_->entries.push_back(std::make_unique<State::Entry>(clock, std::move(route)));
-    for (const auto& entry : state_->entries) state_->clients.insert(entry->client);
+    state_->apply(std::move(routes));
 }
 
 Relays::~Relays() { stop(); }
+
+void Relays::apply(std::vector<RelayRoute> routes) { state_->apply(std::move(routes)); }
 
 void Relays::on_state(Changed changed) { state_->changed = std::move(changed); }
 
@@ -214,21 +260,13 @@ void Relays::start() {
     const TimePoint now = state_->clock.now();
     const auto count = static_cast<Duration::rep>(state_->entries.size());
     Duration::rep index = 0;
-    for (const auto& entry : state_->entries) {
-        entry->due = now + entry->route.relay.every * index++ / count;  // spread
-        for (bus::BusClient* bus : {entry->route.from, entry->route.to})
-            bus->name_client(entry->client, "relay " + entry->status.name);
-        state_->arm(*entry);
-    }
+    for (const auto& entry : state_->entries)
+        state_->begin(*entry, now + entry->route.relay.every * index++ / count);  // spread
 }
 
 void Relays::stop() {
     if (!std::exchange(state_->running, false)) return;
-    for (const auto& entry : state_->entries) {
-        entry->alarm->cancel();
-        entry->route.from->cancel(entry->client);
-        entry->route.to->cancel(entry->client);
-    }
+    for (const auto& entry : state_->entries) state_->end(*entry);
 }
 
 std::vector<RelayStatus> Relays::status() const {

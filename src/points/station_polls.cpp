@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
+#include <tuple>
 #include <utility>
 
 #include "panelgate/modbus/exception.hpp"
@@ -75,6 +77,24 @@ StationPolls::StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint
         for (const std::size_t want : read.wants) {
             if (++reads[want] > 1) pieces_[want];
         }
+    }
+}
+
+void StationPolls::adopt(const StationPolls& before) {
+    adopt_readings(wants_, readings_, before.wants_, before.readings_);
+}
+
+void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readings,
+                    const std::vector<Want>& known_wants, const std::vector<Reading>& known) {
+    const auto order = [](const modbus::Span& span) {
+        return std::tuple(span.table, span.first, span.count);
+    };
+    std::map<std::tuple<modbus::Table, std::uint32_t, std::uint32_t>, std::size_t> places;
+    for (std::size_t i = 0; i < known_wants.size(); ++i)
+        places.emplace(order(known_wants[i].span), i);
+    for (std::size_t i = 0; i < wants.size(); ++i) {
+        const auto found = places.find(order(wants[i].span));
+        if (found != places.end()) readings[i] = known[found->second];
     }
 }
 

@@ -34,6 +34,7 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
 
     /// Binds and receives. What is wrong, or nothing; then it may be tried again.
     boost::system::error_code open(const std::string& address, std::uint16_t port, bool ipv6_only);
+    void allow(const rt::AccessList& allowed) { allowed_ = allowed; }
     /// Takes no more, answers what is on the lines, turns away what waits.
     void finish();
     /// At once; requests that wait are taken back from their buses. May be called twice.

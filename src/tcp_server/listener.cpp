@@ -82,6 +82,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     }
 
     void start();
+    void apply(Settings settings, UnitMap units);
     std::uint16_t port() const { return acceptor_.port(); }
     Counters counters() const;
     void stop(std::function<void()> done);
@@ -113,6 +114,17 @@ void Listener::Core::start() {
     if (!of_udp) return;
     acceptor_.close();
     throw std::system_error(of_udp, "cannot receive datagrams on " + settings.name());
+}
+
+void Listener::Core::apply(Settings settings, UnitMap units) {
+    allowed_ = rt::AccessList(settings.allow);
+    if (datagrams_) datagrams_->allow(allowed_);
+    shared_->settings = std::move(settings);
+    shared_->units = std::move(units);
+    const std::set<std::shared_ptr<Session>> sessions = sessions_;  // close() erases
+    for (const auto& session : sessions) {
+        if (!allowed_.allows(session->peer())) session->close();
+    }
 }
 
 Counters Listener::Core::counters() const {
@@ -190,6 +202,9 @@ Listener::Listener(const asio::any_io_executor& executor, rt::Clock& clock, Sett
 Listener::~Listener() { core_->close_now(); }
 
 void Listener::start() { core_->start(); }
+void Listener::apply(Settings settings, UnitMap units) {
+    core_->apply(std::move(settings), std::move(units));
+}
 std::uint16_t Listener::port() const { return core_->port(); }
 Counters Listener::counters() const { return core_->counters(); }
 void Listener::stop(std::function<void()> done) { core_->stop(std::move(done)); }

@@ -40,6 +40,11 @@ void Session::start(Caller caller) {
     read();
 }
 
+asio::ip::address Session::peer() const {
+    error_code gone;
+    return socket_.remote_endpoint(gone).address();
+}
+
 /// What waits is turned away, or the end would take as long as a client cares to pipeline.
 void Session::finish() {
     if (closed_) return;

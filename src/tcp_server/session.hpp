@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <cstdint>
 #include <functional>
@@ -30,6 +31,9 @@ class Session : public std::enable_shared_from_this<Session> {
             ClosedHandler on_closed);
 
     void start(Caller caller);
+    /// The address of the other end; of a connection that is cut already, none that is allowed
+    /// anything.
+    boost::asio::ip::address peer() const;
     /// Takes no more requests, answers what is in flight, turns away what waits, then closes.
     void finish();
     /// Closes at once and takes its waiting requests back from the buses. May be called twice.

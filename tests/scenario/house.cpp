@@ -124,7 +124,7 @@ void House::judge_poll(std::uint8_t station, const std::vector<std::size_t>& wan
 void House::judge_points() {
     if (!polling_ || std::exchange(judged_, seam_.answers()) == seam_.answers()) return;
     for (const Panel& panel : panels_) {
-        const points::StationPolls* polls = poller_->find(panel.id());
+        const auto polls = poller_->find(panel.id());
         if (polls == nullptr || plan_.calm) continue;
         const points::Want& want = polls->wants()[1];
         const points::Reading& reading = polls->reading(1);

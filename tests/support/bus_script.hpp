@@ -81,6 +81,12 @@ class BusScript {
         arbiter_.on_line_up(now_);
         drain();
     }
+    /// Not recorded: a reload is nobody's step.
+    void apply(const arbiter::Settings& settings) {
+        settings_ = settings;
+        arbiter_.apply(settings);
+        drain();
+    }
     /// Bytes arrive now.
     void hear(ByteView bytes) {
         record({.verb = BusStep::Verb::hear, .bytes = Bytes(bytes.begin(), bytes.end())});

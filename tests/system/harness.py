@@ -184,12 +184,12 @@ class Closed(Exception):
 class Client:
     """Raw Modbus/TCP: what was sent is what the test says, nothing is repaired."""
 
-    def __init__(self, port, patience=PATIENCE, receive_buffer=None):
+    def __init__(self, port, patience=PATIENCE, receive_buffer=None, host="127.0.0.1"):
         self.socket = socket.socket()
         self.socket.settimeout(patience)
         if receive_buffer:
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self.socket.connect(("127.0.0.1", port))
+        self.socket.connect((host, port))
         self._transaction = 0
 
     def __enter__(self):

@@ -40,7 +40,7 @@ class Stop(unittest.TestCase):
         with harness.configured(config.gateway(config.line())) as program:
             for habit in (signal.SIGUSR1, signal.SIGUSR2, signal.SIGHUP):
                 program.process.send_signal(habit)
-            program.log.wait_for("no reload")
+            program.log.wait_for("reload outcome=unchanged")
             self.assertIsNone(program.process.poll())
 
     def test_a_second_sigterm_ends_at_once_with_a_code_and_a_line_when_requests_are_cut(self):

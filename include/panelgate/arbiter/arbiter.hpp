@@ -57,6 +57,10 @@ class Arbiter {
   public:
     explicit Arbiter(Settings settings);
 
+    /// Goes on with these. What is owed stays, as does what is known of stations, and what waits.
+    /// Only while the line is down (before on_line_up) if it is not is_same_wire().
+    void apply(Settings settings);
+
     /// Accepts a job (its deadline is set here), or a fault at once: busy, line_down, offline. An
     /// accepted job gets exactly one Finish.
     Result<Ticket> submit(TimePoint now, Job job);

@@ -44,6 +44,8 @@ class JobQueue {
     static constexpr int kPollTurn = 10;  ///< a poll gets at least every tenth
 
     explicit JobQueue(const QueueSettings& settings) : settings_(settings) {}
+    /// For whoever comes from now on: what waits stays.
+    void apply(const QueueSettings& settings) { settings_ = settings; }
 
     /// What came of push(): taken or refused; taken at the cost of others, which are to be answered
     /// busy: one, or more where reads that others rode on count in their place.

@@ -17,6 +17,12 @@ class LateWindow {
     LateWindow(std::optional<Duration> fixed, Duration response_timeout)
         : fixed_(fixed), timeout_(response_timeout), window_(response_timeout) {}
 
+    /// What has grown does not shrink by that.
+    void apply(std::optional<Duration> fixed, Duration response_timeout) {
+        fixed_ = fixed;
+        timeout_ = response_timeout;
+        window_ = std::max(window_, timeout_);
+    }
     Duration value() const { return fixed_.value_or(window_); }
     /// A reply came this long after the timeout of its request.
     void on_late(Duration lateness) {

@@ -21,6 +21,8 @@ namespace panelgate::arbiter {
 class Ledger {
   public:
     explicit Ledger(const Settings& settings);
+    /// What was counted of stations that are no longer listed is forgotten.
+    void apply(const Settings& settings);
 
     std::optional<Action> poll();
     /// `wire`: the bytes that say `adu` on the line.
@@ -77,7 +79,7 @@ class Ledger {
     void count_damaged(const Attempt& attempt);
     void count_stray(const modbus::Unused& part, Part what, std::uint8_t asked, Duration lateness);
 
-    bool explain_;
+    bool explain_ = false;
     modbus::CrcOrders orders_;
     bool inside_attempt_ = false;
     std::optional<TimePoint> told_collision_;

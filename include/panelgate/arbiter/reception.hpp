@@ -16,6 +16,11 @@ class Reception {
     explicit Reception(const Settings& settings)
         : serial_(settings.serial), deadline_(settings.queue.deadline) {}
 
+    /// For jobs from now on.
+    void apply(const Settings& settings) {
+        serial_ = settings.serial;
+        deadline_ = settings.queue.deadline;
+    }
     /// Its ticket, its deadline, and the last moment at which starting it makes sense: when the
     /// request, a gap and its normal reply still fit. Counting only the shortest reply, an
     /// exception, would fill an overloaded line with transactions whose answers come too late for

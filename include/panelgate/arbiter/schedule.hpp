@@ -21,6 +21,8 @@ class Schedule {
   public:
     explicit Schedule(const Settings& settings);
 
+    void apply(const Settings& settings);
+
     struct Next {
         std::optional<Group> group;  ///< nothing: not now
         bool new_way = false;        ///< the line is to be opened anew first

@@ -39,12 +39,14 @@ struct StationSettings {
     /// The profile vouches for these two. Else reads are joined only up to what the station has
     /// answered before (P6).
     bool vouched = false;
+    friend bool operator==(const StationSettings&, const StationSettings&) = default;
 };
 
 struct QueueSettings {
     std::size_t limit = 256;      ///< requests that wait on this line
     std::size_t per_client = 32;  ///< of one client
     Duration deadline = 2s;       ///< of a request, from its arrival to its answer
+    friend bool operator==(const QueueSettings&, const QueueSettings&) = default;
 };
 
 /// Who has to be quiet after a timeout until a late reply can no longer come (P1).
@@ -81,7 +83,12 @@ struct Settings {
     EchoMode echo = EchoMode::off;
     /// Say why each request goes now and why one is refused.
     bool explain = false;
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
+
+/// What has to be right of a line before the first byte is the same: one that runs need not be
+/// opened anew to go on with the other settings.
+bool is_same_wire(const Settings& one, const Settings& other);
 
 /// Those of the stations. ASCII has no CRC: what it says is written down with the standard's. A
 /// broadcast has the standard's, but where all listed stations have the

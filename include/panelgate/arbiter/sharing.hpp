@@ -16,6 +16,7 @@ class Sharing {
     static constexpr std::size_t kRemembered = 64;
 
     explicit Sharing(bool share) : share_(share) {}
+    void apply(bool share) { share_ = share; }
 
     /// The leader and what the same transaction can answer: contained reads always; touching ones
     /// as far as the panel is known to take the length. One request saves a request, a reply header

@@ -39,6 +39,10 @@ class Station {
     Station(const StationSettings& settings, const OfflineSettings& offline, bool listed,
             Duration frame = {});
 
+    /// It is asked otherwise from now on, or is (no more) listed. What it owes and what is known of
+    /// it stay; a rest that has begun is not cut short.
+    void apply(const StationSettings& settings, const OfflineSettings& offline, bool listed);
+
     // What it owes (P1)
 
     /// An attempt that left at `sent` ended without its own reply: one more is owed, until it has

@@ -12,6 +12,7 @@ struct OfflineSettings {
     int after = 3;               ///< silent transactions in a row; 1..1000
     Duration probe_min = 500ms;  ///< first pause between two probes
     Duration probe_max = 5s;     ///< the pause doubles up to here
+    friend bool operator==(const OfflineSettings&, const OfflineSettings&) = default;
 };
 
 /// What is known of one station's life. Pure. A transaction that hears anything of the station,
@@ -19,6 +20,9 @@ struct OfflineSettings {
 class StationHealth {
   public:
     explicit StationHealth(OfflineSettings settings = {}) : settings_(settings) {}
+
+    /// From now on; pauses that have begun stay.
+    void apply(const OfflineSettings& settings) { settings_ = settings; }
 
     Health state() const { return state_; }
     bool offline() const { return state_ == Health::offline; }

@@ -16,6 +16,9 @@ class Stations {
   public:
     explicit Stations(const Settings& settings);
 
+    /// What is known of stations that both list stays.
+    void apply(const Settings& settings);
+
     Station& of(std::uint8_t id);
     const Station* find(std::uint8_t id) const;
     /// The configured ones, or those for unlisted stations.
@@ -101,8 +104,8 @@ class Stations {
 
     OfflineSettings offline_;
     StationSettings unlisted_;
-    Duration standard_gap_;
-    Duration frame_;  ///< what a usual reply takes on this line
+    Duration standard_gap_{};
+    Duration frame_{};  ///< what a usual reply takes on this line
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     ProbeBudget probes_{ProbeBudget::kOffline};

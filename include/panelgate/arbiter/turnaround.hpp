@@ -52,6 +52,10 @@ class AdaptiveTimeout {
   public:
     AdaptiveTimeout(Duration floor, Duration ceiling) : floor_(floor), ceiling_(ceiling) {}
 
+    void apply(Duration floor, Duration ceiling) {
+        floor_ = floor;
+        ceiling_ = ceiling;
+    }
     void on_reply() { silent_ = 0; }
     void on_timeout() { silent_ = std::min(silent_ + 1, 16); }
     Duration value(const Turnaround& seen) const {

@@ -8,6 +8,7 @@ namespace panelgate {
 struct Network {
     std::string address;
     unsigned prefix = 0;
+    friend bool operator==(const Network&, const Network&) = default;
 };
 
 }  // namespace panelgate

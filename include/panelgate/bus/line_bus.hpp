@@ -1,9 +1,17 @@
 #pragma once
 
+#include <memory>
+
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/bus/counters.hpp"
 
+namespace panelgate::line {
+class Line;
+}
+
 namespace panelgate::bus {
+
+struct Settings;
 
 /// What the program starts, stops and counts: a line that is driven (Bus), or one that is only
 /// listened to (ListeningBus).
@@ -12,6 +20,10 @@ class LineBus : public BusClient {
     virtual void start() = 0;
     /// Closes the line.
     virtual void stop() = 0;
+    /// Goes on with these. What is owed, counted, recorded and known stays, but for stations that
+    /// are no longer listed. `line` takes the place of the one before, whose requests end as when a
+    /// line is lost, and is opened; null, the same goes on: only where is_same_wire().
+    virtual void apply(Settings settings, std::unique_ptr<line::Line> line) = 0;
     virtual LineReport report() const = 0;
 };
 

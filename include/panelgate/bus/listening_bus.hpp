@@ -28,6 +28,7 @@ class ListeningBus final : public LineBus {
 
     void start() override;
     void stop() override;
+    void apply(Settings settings, std::unique_ptr<line::Line> line) override;
 
     void transact(Request request, AnswerHandler handler) override;
     void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;

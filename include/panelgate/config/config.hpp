@@ -10,6 +10,7 @@
 #include "panelgate/line/settings.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
+#include "panelgate/profile/profile_ref.hpp"
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"
@@ -23,7 +24,7 @@ namespace panelgate::config {
 struct Station {
     std::uint8_t id = 1;
     std::string name;  ///< unique over all lines; "LINE-ID" is given when the file has none
-    const profile::PanelProfile* profile = nullptr;  ///< owned by Config::profiles, never null
+    profile::ProfileRef profile;  ///< never null
     bool read_only = false;
     bool listens = false;       ///< its line is only listened to
     bool guard = false;         ///< what the profile rules out is refused without using the bus
@@ -32,6 +33,7 @@ struct Station {
     sim::Misbehaviour faults;   ///< of the simulated panel
     std::vector<points::Point> points;
     std::vector<points::Poll> polls;
+    friend bool operator==(const Station&, const Station&) = default;
 };
 
 struct Line {
@@ -44,6 +46,7 @@ struct Line {
     bool refuse_unlisted = false;
     bool simulated_echo = false;  ///< the simulated adapter hears itself
     std::vector<Station> stations;
+    friend bool operator==(const Line&, const Line&) = default;
 };
 
 /// A valid configuration (README, Configuration): defaults filled in, references resolved.
@@ -60,6 +63,10 @@ struct Config {
     /// text.
     std::vector<std::string> warnings;
 };
+
+/// Stations of `next` whose panel the one that runs describes alike are given that one's profile:
+/// what compares equal then is the same.
+void share_profiles(Config& next, const Config& running);
 
 /// Reads a file's content; nothing when it cannot be read. For profiles_dir and token files.
 struct Files {

@@ -21,6 +21,8 @@ class Doctor {
 
     Doctor(Settings settings, LineFacts facts);
 
+    /// They are others now; what was found stands until the next look.
+    void apply(LineFacts facts) { facts_ = std::move(facts); }
     /// The line was opened: what was counted before tells nothing about it. Findings stay until
     /// there is something to judge by.
     void begin(TimePoint now, Sample counted);

@@ -28,8 +28,10 @@ template <class Machine, class Host>
 class Drive {
   public:
     Drive(rt::Clock& clock, Line& line, Machine& machine, Host& host)
-        : clock_(clock), line_(line), machine_(machine), host_(host), alarm_(clock.make_alarm()) {}
+        : clock_(clock), line_(&line), machine_(machine), host_(host), alarm_(clock.make_alarm()) {}
 
+    /// Another one from now on; the one before says nothing any more.
+    void use(Line& line) { line_ = &line; }
     /// What the line itself says: `verb(now)`. It may be in the midst of handing over its input.
     template <class Verb>
     void hear(Verb verb) {
@@ -39,12 +41,12 @@ class Drive {
     /// What anybody else wants: `verb(now)`.
     template <class Verb>
     void tell(Verb verb) {
-        line_.poll_input();
+        line_->poll_input();
         hear(std::move(verb));
     }
     /// The alarm rings no more, until the next verb.
     void rest() {
-        line_.hold_input(false);
+        line_->hold_input(false);
         silence();
     }
 
@@ -74,7 +76,7 @@ class Drive {
                 next = busy;
                 sharp = false;
             }
-            line_.hold_input(hold);
+            line_->hold_input(hold);
         }
         if (next == armed_) return;
         if (!next) return silence();
@@ -87,7 +89,7 @@ class Drive {
     }
 
     rt::Clock& clock_;
-    Line& line_;
+    Line* line_;
     Machine& machine_;
     Host& host_;
     std::unique_ptr<rt::Alarm> alarm_;

@@ -36,6 +36,7 @@ struct Settings {
     /// nothing. A connection is only read.
     bool listen_only = false;
     bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 /// Digits and dots that are no IPv4 address, such as 10.0.0.300: no name looks like this.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "panelgate/bus/counters.hpp"
+#include "panelgate/config/counters.hpp"
 #include "panelgate/metrics/process.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
@@ -25,6 +26,7 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
+    std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;

@@ -35,6 +35,8 @@ class CrcOrders {
         return high_first_[address] ? CrcOrder::high_first : CrcOrder::low_first;
     }
 
+    friend bool operator==(const CrcOrders&, const CrcOrders&) = default;
+
   private:
     std::bitset<256> high_first_;
 };

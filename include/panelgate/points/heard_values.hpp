@@ -25,6 +25,11 @@ class HeardValues {
     /// another now: read, failed, or old.
     std::vector<std::size_t> on_heard(const tap::Transaction& heard);
 
+    /// What the one before knew of the same items is known here, too.
+    void adopt(const HeardValues& before) {
+        adopt_readings(wants_, readings_, before.wants_, before.readings_);
+    }
+
     const std::vector<Reading>& readings() const { return readings_; }
 
   private:

@@ -73,6 +73,7 @@ struct Point {
 
     /// Items of the table: bits or registers.
     unsigned count() const;
+    friend bool operator==(const Point&, const Point&) = default;
 };
 
 /// Why no request of this panel could write the point, whatever the value: one sentence for the

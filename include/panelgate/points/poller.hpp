@@ -35,6 +35,10 @@ class Poller {
     Poller(const Poller&) = delete;
     Poller& operator=(const Poller&) = delete;
 
+    /// From now on these are polled. What is the same goes on as it was; what was known of the same
+    /// items still is.
+    void apply(std::vector<PolledStation> stations);
+
     void on_update(Update update);
     /// For whoever hears of the writes on this line; may be called when the poller is gone.
     std::function<void(const bus::WriteEvent&)> write_listener() const;
@@ -42,8 +46,8 @@ class Poller {
     /// Takes what waits back from the bus.
     void stop();
 
-    /// Of the station with this id; null when it is not polled.
-    const StationPolls* find(std::uint8_t station) const;
+    /// Of the station with this id; null when it is not polled. May outlive the poller.
+    std::shared_ptr<const StationPolls> find(std::uint8_t station) const;
 
   private:
     struct State;

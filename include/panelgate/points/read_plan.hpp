@@ -20,12 +20,14 @@ namespace panelgate::points {
 struct Want {
     modbus::Span span;    ///< at least one item, none beyond the end of the table
     Duration every = 1s;  ///< above 0
+    friend bool operator==(const Want&, const Want&) = default;
 };
 
 /// What the panel can do with one table.
 struct TableLimits {
     std::uint32_t max_items = 0;                  ///< of one read; 0 = this table cannot be read
     std::vector<profile::AddressRange> readable;  ///< what a read may cross without being asked to
+    friend bool operator==(const TableLimits&, const TableLimits&) = default;
 };
 
 /// What bounds the reads of one station, and what they cost.
@@ -42,6 +44,7 @@ struct PlanLimits {
     const TableLimits& of(modbus::Table table) const {
         return tables[static_cast<std::size_t>(table)];
     }
+    friend bool operator==(const PlanLimits&, const PlanLimits&) = default;
 };
 
 /// The profile's limits within the standard's (AP 6.1 to 6.4: 2000 bits, 125 registers) and its

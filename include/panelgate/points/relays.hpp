@@ -41,6 +41,9 @@ class Relays {
     Relays(const Relays&) = delete;
     Relays& operator=(const Relays&) = delete;
 
+    /// From now on these; those that are the same go on as if nothing had happened.
+    void apply(std::vector<RelayRoute> routes);
+
     /// Called when the state of a relay becomes another one.
     void on_state(Changed changed);
     void start();

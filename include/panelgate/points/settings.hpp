@@ -23,6 +23,7 @@ struct Poll {
     std::uint16_t address = 0;
     std::uint32_t count = 1;
     Duration every = 1s;
+    friend bool operator==(const Poll&, const Poll&) = default;
 };
 
 /// One end of a relay.
@@ -31,6 +32,7 @@ struct RelayEnd {
     std::string at;       ///< the notation
     modbus::Table table = modbus::Table::holding_registers;
     std::uint16_t address = 0;
+    friend bool operator==(const RelayEnd&, const RelayEnd&) = default;
 };
 
 /// Copies a block from one station to another (the manuals' 1:1:N and N:1:N systems).
@@ -47,6 +49,7 @@ struct Relay {
     std::string name() const {
         return from.station + '/' + from.at + " to " + to.station + '/' + to.at;
     }
+    friend bool operator==(const Relay&, const Relay&) = default;
 };
 
 }  // namespace panelgate::points

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -33,6 +34,8 @@ class StationHistory {
     }
     /// The points outlive it.
     StationHistory(const std::vector<Point>& points, Duration width);
+    /// The past of points that are the same as one of its is this one's, too, from now on for both.
+    void adopt(const StationHistory& before);
 
     /// What has become of a point of the station. A stale value says nothing new.
     void record(TimePoint now, const Point& point, const PointReading& reading);
@@ -45,12 +48,12 @@ class StationHistory {
 
   private:
     const SlotRing& ring_of(const Point& point) const {
-        return rings_[static_cast<std::size_t>(&point - points_->data())];
+        return *rings_[static_cast<std::size_t>(&point - points_->data())];
     }
 
     const std::vector<Point>* points_;
     Duration width_;
-    std::vector<SlotRing> rings_;  ///< one a point
+    std::vector<std::shared_ptr<SlotRing>> rings_;  ///< one a point
 };
 
 }  // namespace panelgate::points

@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/points/settings.hpp"
@@ -35,6 +37,13 @@ class StationPoints {
     StationPoints(const std::vector<Point>& points, const std::vector<Poll>& blocks,
                   const StationPolls& polls)
         : StationPoints(points, blocks, polls.readings()) {}
+    /// The same of polls or of what is heard, which it keeps.
+    template <class Source>
+    StationPoints(const std::vector<Point>& points, const std::vector<Poll>& blocks,
+                  std::shared_ptr<const Source> source)
+        : StationPoints(points, blocks, source->readings()) {
+        kept_ = std::move(source);
+    }
 
     const std::vector<Point>& points() const { return *points_; }
     const Point* find(std::string_view name) const;
@@ -51,6 +60,7 @@ class StationPoints {
     const std::vector<Point>* points_;
     const std::vector<Poll>* blocks_;
     const std::vector<Reading>* readings_;
+    std::shared_ptr<const void> kept_;  ///< whose readings they are
 };
 
 }  // namespace panelgate::points

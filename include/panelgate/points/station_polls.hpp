@@ -5,6 +5,8 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
@@ -41,6 +43,10 @@ Quality quality_of(const Reading& reading, Duration every, TimePoint now);
 /// The age at which a value that is to be read so often is bad.
 Duration bad_after(Duration every);
 
+/// Each of these wants is given what is known of the same items.
+void adopt_readings(const std::vector<Want>& wants, std::vector<Reading>& readings,
+                    const std::vector<Want>& known_wants, const std::vector<Reading>& known);
+
 /// What is known of memory that a panel shows in several tables.
 struct SharedMemory {
     /// Everything that a write of these items changes; empty: it may change all other tables.
@@ -71,6 +77,10 @@ class StationPolls {
     /// Wants that the panel cannot serve are never read and stay bad.
     StationPolls(std::vector<Want> wants, PlanLimits limits, TimePoint start,
                  SharedMemory memory = {});
+
+    /// What the one before knew of the same items is known here, too.
+    void adopt(const StationPolls& before);
+    void apply(SharedMemory memory) { memory_ = std::move(memory); }
 
     std::vector<Due> take_due(TimePoint now);
     std::optional<TimePoint> next_due() const { return schedule_.next_due(); }

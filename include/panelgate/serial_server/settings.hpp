@@ -36,6 +36,7 @@ struct Settings {
     /// them. Longer than an adapter's latency timer.
     Duration glitch = 20ms;
     std::size_t open_broadcasts = 8;  ///< on the lines; more are dropped
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 }  // namespace panelgate::serial_server

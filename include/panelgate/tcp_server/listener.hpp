@@ -32,6 +32,10 @@ class Listener {
 
     /// Binds and accepts. Throws std::system_error with the address in its text when it cannot.
     void start();
+    /// Serves by these from the next request on; whoever may not be connected any more is cut off.
+    /// Only with settings.is_same_door(). Throws as the constructor does, and then nothing has
+    /// changed.
+    void apply(Settings settings, UnitMap units);
     /// The port it is bound to; 0 before start().
     std::uint16_t port() const;
     Counters counters() const;

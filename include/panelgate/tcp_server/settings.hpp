@@ -25,6 +25,7 @@ enum class Retransmissions : std::uint8_t { join_writes, join, pass };
 struct UnitTarget {
     std::string line;
     std::uint8_t station = 0;
+    friend bool operator==(const UnitTarget&, const UnitTarget&) = default;
 };
 
 /// One listener for Modbus over TCP.
@@ -68,6 +69,12 @@ struct Settings {
     std::string host;  ///< name of the machine
 
     std::string name() const { return endpoint_text(address, port); }
+    /// What cannot change without closing the one listener and opening another.
+    bool is_same_door(const Settings& other) const {
+        return address == other.address && port == other.port && ipv6_only == other.ipv6_only &&
+               framing == other.framing && ascii_digits == other.ascii_digits && udp == other.udp;
+    }
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 }  // namespace panelgate::tcp_server

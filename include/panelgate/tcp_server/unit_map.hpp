@@ -18,6 +18,7 @@ struct LineInfo {
     bus::BusClient* bus = nullptr;
     std::vector<std::uint8_t> stations;  ///< ids that the configuration lists
     bool pass_unlisted = true;
+    friend bool operator==(const LineInfo&, const LineInfo&) = default;
 };
 
 /// The station behind a unit id. Station 0 (of an alias) is everybody on that line.

@@ -12,6 +12,7 @@ namespace panelgate::web {
 /// What handlers work on. The directory outlives every caller that has not left.
 struct Api {
     const Directory* directory = nullptr;
+    std::shared_ptr<const Directory> keeps;  ///< the same, where it may be replaced
     Providers providers;
     std::shared_ptr<KeyBook> keys;  ///< never null
 };
@@ -55,6 +56,9 @@ Handling get_device_plan(HttpRequest request, const Api* api);
 Handling get_interpretations(HttpRequest request, const Api* api);
 Handling get_events(HttpRequest request, const Api* api);
 Handling get_relays(HttpRequest request, const Api* api);
+
+Handling get_reload(HttpRequest request, const Api* api);
+Handling post_reload(HttpRequest request, const Api* api);
 
 Handling get_simulated(HttpRequest request, const Api* api);
 Handling put_simulated(HttpRequest request, const Api* api);

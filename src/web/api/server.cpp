@@ -10,21 +10,35 @@
 
 namespace panelgate::web {
 
-Server::Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-               Providers providers, Surface surface) {
+Server::Server(boost::asio::any_io_executor executor, Settings settings,
+               std::shared_ptr<const Directory> directory, Providers providers, Surface surface)
+    : providers_(std::move(providers)),
+      surface_(surface),
+      keys_(std::make_shared<KeyBook>(providers_.settings)),
+      listener_(std::make_shared<HttpListener>(
+          std::move(executor), site_of(std::move(settings), std::move(directory)))) {}
+
+std::shared_ptr<const Site> Server::site_of(Settings settings,
+                                            std::shared_ptr<const Directory> directory) const {
     auto api = std::make_shared<Api>();
-    api->directory = &directory;
-    api->providers = std::move(providers);
-    keys_ = std::make_shared<KeyBook>(api->providers.settings);
+    api->directory = directory.get();
+    api->keeps = std::move(directory);
+    api->providers = providers_;
     api->keys = keys_;
     auto site = std::make_shared<Site>();
     site->settings = std::move(settings);
-    site->product = "panelgate/" + api->providers.version;
-    site->now = api->providers.now;
+    site->product = "panelgate/" + providers_.version;
+    site->now = providers_.now;
     site->routes =
-        surface == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
+        surface_ == Surface::gateway ? routes(std::move(api)) : simulator_routes(std::move(api));
     site->next_caller = bus::next_client_id;
-    listener_ = std::make_shared<HttpListener>(std::move(executor), std::move(site));
+    return site;
+}
+
+void Server::apply(Settings settings, std::shared_ptr<const Directory> directory,
+                   SharedText configuration) {
+    providers_.configuration = std::move(configuration);
+    listener_->apply(site_of(std::move(settings), std::move(directory)));
 }
 
 Server::~Server() {

@@ -28,6 +28,21 @@ error_code HttpListener::open() {
     return acceptor_.open(settings.address, settings.port, settings.ipv6_only);
 }
 
+void HttpListener::apply(std::shared_ptr<const Site> site) {
+    allowed_ = rt::AccessList(site->settings.allow);
+    const bool others_may = site->settings.tokens != shared_->site->settings.tokens ||
+                            site->settings.anonymous != shared_->site->settings.anonymous;
+    shared_->serve(std::move(site));
+    const auto sessions = sessions_;
+    for (const auto& [id, session] : sessions) {
+        if (!allowed_.allows(session->peer())) {
+            session->abandon();
+        } else if (others_may) {
+            session->end_events();
+        }
+    }
+}
+
 const Counters& HttpListener::counters() const { return shared_->counters; }
 
 std::uint16_t HttpListener::port() const { return acceptor_.port(); }

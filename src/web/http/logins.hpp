@@ -16,6 +16,7 @@ namespace panelgate::web {
 class Logins {
   public:
     explicit Logins(const LoginSettings& settings) : settings_(settings) {}
+    void apply(const LoginSettings& settings) { settings_ = settings; }
 
     /// How long a request with a token waits before anybody looks at it: its turn is taken.
     Duration turn(TimePoint now, const std::string& address);

@@ -4,11 +4,14 @@
 
 namespace panelgate::web {
 
-Places::Places(const Settings& settings)
-    : limit_(settings.max_connections),
-      limit_of_address_(settings.max_per_address),
-      limit_of_held_(settings.max_held),
-      limit_of_probes_(settings.probe_places) {}
+Places::Places(const Settings& settings) { apply(settings); }
+
+void Places::apply(const Settings& settings) {
+    limit_ = settings.max_connections;
+    limit_of_address_ = settings.max_per_address;
+    limit_of_held_ = settings.max_held;
+    limit_of_probes_ = settings.probe_places;
+}
 
 Places::Arrival Places::admit(const std::string& address) const {
     Arrival arrival;

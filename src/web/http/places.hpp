@@ -27,6 +27,8 @@ class Places {
     };
 
     explicit Places(const Settings& settings);
+    /// For who comes from now on.
+    void apply(const Settings& settings);
 
     Arrival arrive(Id id, const std::string& address);
     /// A whole request is here: nobody takes its place before idle(). These do nothing for who has
@@ -60,10 +62,10 @@ class Places {
                               const std::string* address = nullptr) const;
     std::optional<Id> suspect_of_another(const std::string& address) const;
 
-    std::size_t limit_;
-    std::size_t limit_of_address_;
-    std::size_t limit_of_held_;
-    std::size_t limit_of_probes_;
+    std::size_t limit_ = 0;
+    std::size_t limit_of_address_ = 0;
+    std::size_t limit_of_held_ = 0;
+    std::size_t limit_of_probes_ = 0;
     std::map<Id, Guest> guests_;
     std::uint64_t turn_ = 0;
 };

@@ -178,6 +178,7 @@ asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
 /// The handler's answer; exceptions end here.
 asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request,
                                                   std::optional<Problem> barred) {
+    const std::shared_ptr<const Site> site = shared_->site;  // to the end of this request
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
     if (!barred) barred = check_origin(request, shared_->hosts, local_);
@@ -264,7 +265,7 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         if (error) break;
         text = listener->take();
         if (!text.empty()) continue;
-        if (listener->ended() || stopping_) break;
+        if (listener->ended() || stopping_ || events_end_) break;
         ErrorCode rung;
         bell.expires_after(kHeartbeat);
         co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
@@ -289,6 +290,16 @@ asio::awaitable<void> HttpSession::drain() {
         total += co_await stream_.async_read_some(asio::buffer(waste),
                                                   asio::redirect_error(asio::use_awaitable, error));
     }
+}
+
+void HttpSession::end_events() {
+    events_end_ = listener_ != nullptr;
+    if (listener_ && listener_->wake) listener_->wake();
+}
+
+asio::ip::address HttpSession::peer() const {
+    ErrorCode gone;
+    return stream_.socket().remote_endpoint(gone).address();
 }
 
 void HttpSession::stop(Duration reading) {

@@ -32,6 +32,10 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     /// Answers the request that runs, then closes; closes at once when none does. From now on a
     /// client has no longer than `reading` to take an answer.
     void stop(Duration reading);
+    /// Where events are sent, the stream ends behind what waits.
+    void end_events();
+    /// The address of the other end.
+    boost::asio::ip::address peer() const;
     /// Closes at once; whoever works for the client is told.
     void abandon();
 
@@ -66,6 +70,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::steady_timer last_moment_;  ///< after stop(): to take the answer
     bool busy_ = false;                      ///< a whole request is here and not yet answered
     bool stopping_ = false;
+    bool events_end_ = false;
     Duration time_to_read_;  ///< of an answer
 };
 

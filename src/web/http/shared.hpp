@@ -19,8 +19,16 @@ struct Shared {
           logins(site->settings.logins),
           places(site->settings) {}
 
-    const std::shared_ptr<const Site> site;
-    const HostNames hosts;
+    /// Another one from now on; who works on the one before holds it.
+    void serve(std::shared_ptr<const Site> other) {
+        site = std::move(other);
+        hosts = HostNames(site->settings, machine_names());
+        logins.apply(site->settings.logins);
+        places.apply(site->settings);
+    }
+
+    std::shared_ptr<const Site> site;
+    HostNames hosts;
     Logins logins;
     Places places;
     Counters counters;

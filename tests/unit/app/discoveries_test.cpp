@@ -64,7 +64,13 @@ class DiscoveriesTest : public testing::Test {
     web::EventHub hub;
     std::shared_ptr<web::EventHub::Listener> listener = hub.listen({});
     std::uint8_t held = 0;  ///< a station whose question nobody answers yet
-    Discoveries discoveries{clock, plant, shipped, hub};
+    Discoveries discoveries{clock,
+                            [this] {
+                                return Discoveries::Place{plant,
+                                                          std::shared_ptr<const profile::Catalogue>(
+                                                              std::shared_ptr<void>(), &shipped)};
+                            },
+                            hub};
 };
 
 TEST_F(DiscoveriesTest, FindsAnUnlistedPanelAndSaysWhatToPaste) {

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "panelgate/bus/bus.hpp"
 #include "support/manual_clock.hpp"
 
 namespace panelgate::app {
@@ -14,6 +15,7 @@ class CountedLine final : public bus::LineBus {
   public:
     void start() override {}
     void stop() override {}
+    void apply(bus::Settings, std::unique_ptr<line::Line>) override {}
     bus::LineReport report() const override {
         ++looks;
         bus::LineReport report;
@@ -47,7 +49,7 @@ TEST(LineHistories, LooksAtEachLineOnceASlotAndAtOneAtATime) {
         EXPECT_EQ(looks(), i);
     }
     for (const CountedLine& line : lines) EXPECT_EQ(line.looks, 10);
-    EXPECT_EQ(histories.at(0).samples(clock.now()).size(), 9u);
+    EXPECT_EQ(histories.at(0)->samples(clock.now()).size(), 9u);
     histories.stop();
     clock.advance(60s);
     EXPECT_EQ(looks(), 50);
@@ -57,9 +59,9 @@ TEST(LineHistories, OfManyLinesHaveWiderSlots) {
     test::ManualClock clock;
     CountedLine line;
     LineHistories few(clock, std::vector<const bus::LineBus*>(100, &line));
-    EXPECT_EQ(few.at(0).width(), 5s);
+    EXPECT_EQ(few.at(0)->width(), 5s);
     LineHistories many(clock, std::vector<const bus::LineBus*>(300, &line));
-    EXPECT_EQ(many.at(299).width(), 20s);
+    EXPECT_EQ(many.at(299)->width(), 20s);
     LineHistories(clock, {}).start();
 }
 

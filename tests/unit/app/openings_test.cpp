@@ -16,16 +16,16 @@ using ::testing::HasSubstr;
 class OpeningsTest : public testing::Test {
   protected:
     void add(const std::string& address, std::uint16_t port, errc::errc_t& why) {
-        openings.add({"modbus_tcp", address, port,
-                      [this, &why] {
-                          ++tries;
-                          return errc::make_error_code(why);
-                      },
-                      [port] { return port; }});
+        doors.push_back({"modbus_tcp", address, port,
+                         [this, &why] {
+                             ++tries;
+                             return errc::make_error_code(why);
+                         },
+                         [port] { return port; }});
     }
     std::string refusal() {
         try {
-            openings.start();
+            openings.open(doors);
         } catch (const CannotListen& error) {
             return error.what();
         }
@@ -34,6 +34,7 @@ class OpeningsTest : public testing::Test {
 
     test::ManualClock clock;
     Openings openings{clock};
+    std::vector<Door> doors;
     rt::LogTap log;
     int tries = 0;
     errc::errc_t first = errc::success;
@@ -43,7 +44,7 @@ class OpeningsTest : public testing::Test {
 TEST_F(OpeningsTest, SayWhereEachListens) {
     add("127.0.0.1", 502, first);
     add("::1", 502, second);
-    openings.start();
+    openings.open(doors);
     EXPECT_EQ(log.count("info listening modbus_tcp=127.0.0.1:502"), 1u);
     EXPECT_EQ(log.count("info listening modbus_tcp=[::1]:502"), 1u);
     EXPECT_EQ(openings.missing(), "");
@@ -55,7 +56,7 @@ TEST_F(OpeningsTest, P7AnAddressThatIsNotThereYetIsTriedUntilItIs) {
     first = errc::address_not_available;
     add("2001:db8::7", 502, first);
     add("127.0.0.1", 502, second);
-    openings.start();
+    openings.open(doors);
     EXPECT_EQ(log.count("listening modbus_tcp=127.0.0.1:502"), 1u);
     EXPECT_THAT(openings.missing(), HasSubstr("modbus_tcp [2001:db8::7]:502"));
     clock.advance(1h);
@@ -70,7 +71,7 @@ TEST_F(OpeningsTest, P7AnAddressThatIsNotThereYetIsTriedUntilItIs) {
 TEST_F(OpeningsTest, P7NothingEndsAGatewayThatServes) {
     first = errc::address_not_available;
     add("192.0.2.7", 502, first);
-    openings.start();
+    openings.open(doors);
     first = errc::address_in_use;
     clock.advance(10 * Openings::kPause);
     EXPECT_EQ(log.count("listener waits modbus_tcp=192.0.2.7:502 why=\"Address already in use\""),
@@ -83,7 +84,7 @@ TEST_F(OpeningsTest, P7NothingEndsAGatewayThatServes) {
 TEST_F(OpeningsTest, NobodyIsTriedAgainAfterTheEnd) {
     first = errc::address_not_available;
     add("192.0.2.7", 502, first);
-    openings.start();
+    openings.open(doors);
     openings.stop();
     clock.advance(1min);
     EXPECT_EQ(tries, 1);

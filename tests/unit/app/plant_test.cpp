@@ -104,11 +104,12 @@ TEST_F(PlantTest, ListenersSeeItsLines) {
 TEST_F(PlantTest, ASimulatedLineHasNoDevice) {
     EXPECT_EQ(plant.lines()[0].device, "/dev/floor1");
     test::ManualClock clock;
-    sim::SimulatedBus played(io.get_executor(), clock, {}, {});
+    const auto played = std::make_shared<sim::SimulatedBus>(
+        io.get_executor(), clock, sim::Settings{}, std::vector<sim::Station>{});
     const config::Line played_line = line("played", {station(1, "filler")});
-    plant.add(played_line, bus1, &played);
+    plant.add(played_line, bus1, played);
     EXPECT_EQ(plant.lines().back().device, "sim");
-    EXPECT_EQ(plant.find("filler")->simulated, &played);
+    EXPECT_EQ(plant.find("filler")->simulated, played);
     EXPECT_EQ(plant.find("press")->simulated, nullptr);
 }
 

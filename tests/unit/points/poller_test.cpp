@@ -92,5 +92,39 @@ TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {
     EXPECT_EQ(updates[5] + updates[9], 0u);
 }
 
+TEST_F(PollerTest, AnotherSetOfStationsLeavesThoseThatAreTheSameAlone) {
+    poller->start();
+    ASSERT_TRUE(run_until([&] { return updates[5] >= 2; }));
+    const auto before = poller->find(5);
+    const bus::ClientId client = bus.requests[0].client;
+    std::vector<PolledStation> stations(2);
+    stations[0] = {7, {{{Table::holding_registers, 1, 1}, 1ms}}, limits()};
+    stations[1] = {5, {{{Table::holding_registers, 100, 1}, 1ms}}, limits()};
+    poller->apply(std::move(stations));
+    EXPECT_EQ(poller->find(5), before);
+    EXPECT_EQ(poller->find(9), nullptr);
+    EXPECT_EQ(bus.cancelled.size(), 1u) << "what 9 had waiting";
+    updates.clear();
+    ASSERT_TRUE(run_until([&] { return updates[5] >= 2 && updates[7] >= 2; }));
+    EXPECT_EQ(updates.count(9), 0u);
+    EXPECT_EQ(bus.requests[0].client, client);
+}
+
+TEST_F(PollerTest, P10WhatIsKnownOfItemsThatAreStillWantedStaysKnown) {
+    poller->start();
+    ASSERT_TRUE(run_until([&] { return updates[5] >= 1; }));
+    const auto sampled = poller->find(5)->reading(0).sampled;
+    bus.script = [](const bus::Request&) { return std::optional<bus::Answer>(); };
+    std::vector<PolledStation> stations(1);
+    stations[0] = {
+        5,
+        {{{Table::holding_registers, 90, 1}, 1h}, {{Table::holding_registers, 100, 1}, 1h}},
+        limits()};
+    poller->apply(std::move(stations));
+    EXPECT_FALSE(poller->find(5)->reading(0).sampled);
+    EXPECT_EQ(poller->find(5)->reading(1).sampled, sampled);
+    EXPECT_EQ(poller->find(5)->reading(1).values, std::vector<std::uint16_t>{42});
+}
+
 }  // namespace
 }  // namespace panelgate::points

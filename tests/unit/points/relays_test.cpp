@@ -13,10 +13,10 @@ namespace {
 
 class RelaysTest : public testing::Test {
   protected:
-    void make(bool on_change, std::uint32_t count = 2) {
+    RelayRoute route_to(std::uint16_t address, bool on_change, std::uint32_t count = 2) {
         RelayRoute route;
         route.relay.from = {"press", "UW100", modbus::Table::holding_registers, 100};
-        route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, 200};
+        route.relay.to = {"oven", "GDT200", modbus::Table::holding_registers, address};
         route.relay.count = count;
         route.relay.every = every;
         route.relay.on_change = on_change;
@@ -29,9 +29,12 @@ class RelaysTest : public testing::Test {
             return std::vector{
                 written, modbus::Span{modbus::Table::holding_registers, written.first / 16u, 1}};
         };
+        return route;
+    }
+    void make(bool on_change, std::uint32_t count = 2) {
         from.script = [this](const bus::Request&) { return source; };
         to.script = [this](const bus::Request&) { return target; };
-        relays = std::make_unique<Relays>(clock, std::vector{route});
+        relays = std::make_unique<Relays>(clock, std::vector{route_to(200, on_change, count)});
         relays->on_state([this](const RelayStatus& status) { states.push_back(text_of(status)); });
         relays->start();
     }
@@ -237,6 +240,20 @@ TEST_F(RelaysTest, StopsWithWhatItHasOpen) {
     EXPECT_EQ(from.cancelled.size(), 1u);
     EXPECT_FALSE(test::run_until(io, clock, [] { return false; })) << "something goes on";
     EXPECT_TRUE(to.requests.empty());
+}
+
+TEST_F(RelaysTest, P2ARelayThatStaysWritesNothingAgainWhenAnotherComes) {
+    make(true);
+    run_until([&] { return status().writes == 1; });
+    relays->apply({route_to(300, true), route_to(200, true)});
+    run_until([&] { return relays->status()[0].writes == 1; });
+    run_until([&] { return relays->status()[1].reads > 10; });
+    EXPECT_EQ(relays->status()[1].writes, 1u);
+    EXPECT_EQ(to.requests.size(), 2u);
+    relays->apply({route_to(300, true)});
+    EXPECT_EQ(relays->status().size(), 1u);
+    run_until([&] { return status().reads > 20; });
+    EXPECT_EQ(to.requests.size(), 2u);
 }
 
 }  // namespace

@@ -103,5 +103,19 @@ TEST(StationHistoryWidth, GrowsWithTheNumberOfPointsAndBoundsTheirMemory) {
     }
 }
 
+TEST_F(StationHistoryTest, ThePastOfPointsThatAreTheSameGoesOn) {
+    for (std::size_t i = 0; i < points.size(); ++i) points[i].name = "p" + std::to_string(i);
+    good(0, std::int64_t{5}, 1s);
+    std::vector<Point> others{points[1], points[0]};
+    StationHistory next(others, 1s);
+    next.adopt(history);
+    EXPECT_EQ(next.samples(others[1], kStart + 2s).size(), 1u);
+    EXPECT_TRUE(next.samples(others[0], kStart + 2s).empty());
+    others[1].scale = 2;
+    StationHistory scaled(others, 1s);
+    scaled.adopt(history);
+    EXPECT_TRUE(scaled.samples(others[1], kStart + 2s).empty()) << "it means something else";
+}
+
 }  // namespace
 }  // namespace panelgate::points

@@ -53,8 +53,8 @@ struct StationEntry : bus::StationRef {
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 
-/// What the API serves: the view that it needs of the plant. Filled at load; may be changed between
-/// requests of the one thread.
+/// What the API serves: the view that it needs of the plant. Constant; a changed plant has another
+/// one.
 struct Directory {
     const profile::PanelProfile* generic = nullptr;  ///< of stations that nobody has listed
     std::vector<LineEntry> lines;

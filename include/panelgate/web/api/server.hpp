@@ -25,6 +25,8 @@ namespace panelgate::web {
 class DiscoverySource;
 class HttpListener;
 class KeyBook;
+class ReloadSource;
+struct Site;
 
 /// What the server shows besides the directory. The functions are called in the one thread.
 struct Providers {
@@ -38,19 +40,20 @@ struct Providers {
     std::function<std::vector<points::RelayStatus>()> relays;
     EventHub* events = nullptr;            ///< never null; outlives the server
     DiscoverySource* discovery = nullptr;  ///< null only where there are no lines; outlives it
-    SharedText configuration;  ///< in force, a JSON object without secrets; null: not shown
+    ReloadSource* reload = nullptr;  ///< null: the configuration cannot be read again; outlives it
+    SharedText configuration;        ///< in force, a JSON object without secrets; null: not shown
     ApiSettings settings{};
 };
 
 /// Who is served: the gateway, or simulated panels alone, whose directory may be without buses.
 enum class Surface : std::uint8_t { gateway, simulator };
 
-/// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor; the
-/// directory and what it points to outlive the server.
+/// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor.
 class Server {
   public:
-    Server(boost::asio::any_io_executor executor, Settings settings, const Directory& directory,
-           Providers providers, Surface surface = Surface::gateway);
+    Server(boost::asio::any_io_executor executor, Settings settings,
+           std::shared_ptr<const Directory> directory, Providers providers,
+           Surface surface = Surface::gateway);
     /// Ends everything that stop() would let finish; answers still owed are not sent.
     ~Server();
     Server(const Server&) = delete;
@@ -58,6 +61,10 @@ class Server {
 
     /// Opens the listener. On an error (address in use, not an address…) nothing is open.
     boost::system::error_code start();
+    /// Serves these from the next request on, for HttpListener::apply(); what runs ends on what was
+    /// there when it came, and keeps it until then.
+    void apply(Settings settings, std::shared_ptr<const Directory> directory,
+               SharedText configuration);
     /// The port that is listened on; 0 before start().
     std::uint16_t port() const;
     /// Closes the listener and idle connections; running requests are answered, then closed. A
@@ -68,6 +75,11 @@ class Server {
     const Counters& counters() const;
 
   private:
+    std::shared_ptr<const Site> site_of(Settings settings,
+                                        std::shared_ptr<const Directory> directory) const;
+
+    Providers providers_;
+    Surface surface_;
     std::shared_ptr<KeyBook> keys_;
     std::shared_ptr<HttpListener> listener_;
 };

@@ -24,6 +24,7 @@ struct Token {
     std::string name;
     Role role = Role::viewer;
     std::string secret;  ///< read from its file at load
+    friend bool operator==(const Token&, const Token&) = default;
 };
 
 /// How guesses at tokens are slowed down, by address.
@@ -35,6 +36,7 @@ struct LoginSettings {
     Duration forgiven_after = 10s;  ///< each
     unsigned remembered = 20;       ///< at most, of an address
     std::size_t addresses = 256;    ///< at most
+    friend bool operator==(const LoginSettings&, const LoginSettings&) = default;
 };
 
 struct Settings {
@@ -59,6 +61,11 @@ struct Settings {
     Duration half_close_grace = 2s;
 
     std::string name() const { return endpoint_text(address, port); }
+    /// What cannot change without closing the one listener and opening another.
+    bool is_same_door(const Settings& other) const {
+        return address == other.address && port == other.port && ipv6_only == other.ipv6_only;
+    }
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 }  // namespace panelgate::web

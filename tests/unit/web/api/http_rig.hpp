@@ -111,6 +111,8 @@ class HttpRig : public ::testing::Test {
         io.poll();
     }
 
+    /// The rig's own, which tests change.
+    std::shared_ptr<const Directory> shown() const { return {std::shared_ptr<void>(), &directory}; }
     void add_meter() {
         StationEntry meter;
         static_cast<bus::StationRef&>(meter) = {"meter", "floor1", 5, &bus};
@@ -133,7 +135,7 @@ class HttpRig : public ::testing::Test {
         providers.events = &events;
         providers.discovery = discovery;
         providers.configuration = configuration;
-        server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
+        server = std::make_unique<Server>(io.get_executor(), settings, shown(), providers);
         EXPECT_FALSE(server->start());
         return *server;
     }

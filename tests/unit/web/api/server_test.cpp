@@ -284,11 +284,11 @@ TEST_F(WebServer, SaysWhyItCannotListen) {
     start();
     Settings same = settings;
     same.port = server->port();
-    Server second(io.get_executor(), same, directory, Providers{});
+    Server second(io.get_executor(), same, shown(), Providers{});
     EXPECT_EQ(second.start(), boost::system::errc::address_in_use);
     EXPECT_EQ(second.port(), 0);
     same.address = "nowhere";
-    Server third(io.get_executor(), same, directory, Providers{});
+    Server third(io.get_executor(), same, shown(), Providers{});
     EXPECT_TRUE(third.start());
 }
 
@@ -296,7 +296,7 @@ TEST_F(WebServer, AnswersAHandlerThatThrowsWith500) {
     Providers providers;
     providers.ready = []() -> bool { throw std::runtime_error("no"); };
     providers.missing = [] { return std::string(); };
-    server = std::make_unique<Server>(io.get_executor(), settings, directory, providers);
+    server = std::make_unique<Server>(io.get_executor(), settings, shown(), providers);
     ASSERT_FALSE(server->start());
     Client client = connect();
     EXPECT_EQ(client.ask("GET", "/readyz").status(), 500u);

@@ -1,0 +1,102 @@
+#include <boost/json/parse.hpp>
+#include <boost/json/value.hpp>
+#include <fstream>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "commands.hpp"
+#include "http_door.hpp"
+#include "panelgate/base/endpoint_text.hpp"
+#include "question.hpp"
+
+namespace panelgate::app {
+namespace {
+
+namespace json = boost::json;
+
+constexpr Duration kPatience = 60s;             // a large file on a small machine
+constexpr std::size_t kMost = 8 * 1024 * 1024;  // bytes of the verdict
+
+std::string text_in(const json::object& object, std::string_view name) {
+    const json::value* found = object.if_contains(name);
+    return found != nullptr && found->is_string() ? std::string(found->as_string()) : "";
+}
+
+/// Each text of a list, a line.
+void print_list(std::ostream& out, const json::object& verdict, std::string_view name,
+                std::string_view before) {
+    const json::value* list = verdict.if_contains(name);
+    if (list == nullptr || !list->is_array()) return;
+    for (const json::value& one : list->as_array())
+        if (one.is_string()) out << before << std::string(one.as_string()) << '\n';
+}
+
+void print_faults(const json::object& verdict) {
+    const json::value* list = verdict.if_contains("errors");
+    if (list == nullptr || !list->is_array()) return;
+    for (const json::value& one : list->as_array()) {
+        const json::object* fault = one.if_object();
+        if (fault == nullptr) continue;
+        std::cerr << text_in(*fault, "file");
+        if (fault->contains("line"))
+            std::cerr << ':' << fault->at("line") << ':' << fault->at("column");
+        std::cerr << ": " << text_in(*fault, "detail") << '\n';
+    }
+}
+
+/// Of a gateway that has understood the question.
+ExitCode tell(const json::object& verdict) {
+    const std::string outcome = text_in(verdict, "outcome");
+    if (outcome == "applied" || outcome == "unchanged") {
+        std::cout << outcome << '\n';
+        print_list(std::cout, verdict, "changes", "  ");
+        print_list(std::cerr, verdict, "warnings", "");
+        print_list(std::cerr, verdict, "restart_needed", "only a restart changes: ");
+        return kFine;
+    }
+    print_faults(verdict);
+    std::cerr << "panelgate: not reloaded: " << text_in(verdict, "detail") << '\n';
+    return outcome == "invalid" ? kBadConfig : kUnavailable;
+}
+
+/// "" where none is given; nothing (and told) where it cannot be read.
+std::optional<std::string> secret_in(const std::string& file) {
+    if (file.empty()) return "";
+    std::ifstream in(file);
+    std::string secret;
+    if (std::getline(in, secret) && !secret.empty()) return secret;
+    std::cerr << "panelgate: no token can be read from " << file << " (its first line is one)\n";
+    return std::nullopt;
+}
+
+}  // namespace
+
+ExitCode reload(const ReloadOptions& options) {
+    const auto door = http_door(options.file, options.http);
+    if (const auto* none = std::get_if<NoDoor>(&door)) {
+        std::cerr << "panelgate: not reloaded: " << none->why << "; or kill -HUP its process\n";
+        return none->code;
+    }
+    const auto secret = secret_in(options.token_file);
+    if (!secret) return kNoInput;
+    const auto& [address, port] = std::get<config::Endpoint>(door);
+    const std::string place = endpoint_text(address, port);
+    const std::string request =
+        "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
+        " HTTP/1.1\r\nHost: " + place + (secret->empty() ? "" : "\r\nAuthorization: Bearer ") +
+        *secret + "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+    const Said said =
+        ask(address, port, request, kPatience, kMost, [](const Said&) { return false; });
+    boost::system::error_code wrong;
+    const json::value body = json::parse(said.body(), wrong);
+    if (!wrong && body.is_object() && body.as_object().contains("outcome"))
+        return tell(body.as_object());
+    std::string why = said.text.empty() ? said.silence() : said.status();
+    if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
+    std::cerr << "panelgate: not reloaded: http://" << place << ": " << why << '\n';
+    return kNotReady;
+}
+
+}  // namespace panelgate::app

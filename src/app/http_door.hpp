@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <variant>
+
+#include "exit_code.hpp"
+#include "panelgate/config/endpoint.hpp"
+
+namespace panelgate::app {
+
+/// Why nobody can know where a gateway listens.
+struct NoDoor {
+    std::string why;
+    ExitCode code = kNotReady;
+};
+/// Where the gateway's HTTP listens, its address one that can be connected to: `http` (ADDR:PORT),
+/// or, when that is "", what the file says. A file that is not there or has faults says the
+/// default: a gateway that runs has read another one.
+std::variant<config::Endpoint, NoDoor> http_door(const std::string& file, const std::string& http);
+
+}  // namespace panelgate::app

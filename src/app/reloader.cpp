@@ -1,0 +1,172 @@
+#include "reloader.hpp"
+
+#include <system_error>
+#include <utility>
+
+#include "difference.hpp"
+#include "gateway.hpp"
+#include "load.hpp"
+#include "openings.hpp"
+#include "panelgate/rt/log.hpp"
+#include "prepare.hpp"
+
+namespace panelgate::app {
+namespace {
+
+using rt::LogLevel;
+
+constexpr const char* kStopping = "the gateway is stopping";
+constexpr std::size_t kWaiting = 256;  ///< who may wait for a reload
+
+double unix_now() {
+    return std::chrono::duration<double>(rt::wall_now().time_since_epoch()).count();
+}
+
+web::ReloadVerdict::Fault fault_of(const yaml::Problem& problem) {
+    return {problem.file, problem.mark.line, problem.mark.column, problem.message};
+}
+
+void tell(const web::ReloadVerdict& verdict) {
+    const std::string outcome(label(verdict.outcome));
+    for (const web::ReloadVerdict::Fault& fault : verdict.faults) {
+        rt::log(LogLevel::error, "configuration",
+                {{"error", yaml::format({fault.file, {fault.line, fault.column}, fault.text})}});
+    }
+    for (const std::string& change : verdict.changes)
+        rt::log(LogLevel::info, "configuration changed", {{"change", change}});
+    for (const std::string& warning : verdict.warnings)
+        rt::log(LogLevel::warn, "configuration", {{"warning", warning}});
+    for (const std::string& later : verdict.later)
+        rt::log(LogLevel::warn, "restart needed", {{"for", later}});
+    const bool good =
+        verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
+    rt::log(good ? LogLevel::info : LogLevel::error, "reload",
+            {{"outcome", outcome},
+             {"cause", verdict.cause},
+             {"rollback", verdict.rollback ? "true" : "false"},
+             {"changes", std::to_string(verdict.changes.size())},
+             {"why", verdict.why}});
+}
+
+}  // namespace
+
+/// One reload. The loop fills it, then it is the worker's, then the loop's again.
+struct Reloader::Job {
+    std::string file;
+    std::shared_ptr<const config::Config> running;
+    std::shared_ptr<const config::Config> rollback;  ///< null: the file is read
+    std::shared_ptr<const config::Config> next;      ///< null: there is none
+    web::SharedText shown;
+    web::ReloadVerdict verdict;
+
+    void read();
+    void compare();
+};
+
+/// In the worker: all that takes long.
+void Reloader::Job::read() try {
+    if (rollback) {
+        next = rollback;
+    } else {
+        Loaded loaded = read_file(file);
+        for (const yaml::Problem& problem : loaded.problems)
+            verdict.faults.push_back(fault_of(problem));
+        if (!loaded.config) {
+            verdict.outcome = ReloadOutcome::invalid;
+            return;
+        }
+        config::share_profiles(*loaded.config, *running);
+        for (const Notice& notice : prepare(*loaded.config))
+            verdict.warnings.push_back(
+                notice.event == "configuration" ? notice.text : notice.event + ": " + notice.text);
+        next = std::make_shared<const config::Config>(std::move(*loaded.config));
+    }
+    compare();
+} catch (const std::exception& error) {
+    next = nullptr;
+    verdict.outcome = ReloadOutcome::failed;
+    verdict.why = error.what();
+}
+
+void Reloader::Job::compare() {
+    for (const Change& change : differences(*running, *next))
+        verdict.changes.push_back(to_string(change));
+    if (next->realtime != running->realtime) verdict.later.emplace_back("realtime");
+    verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
+    shown = shown_text(*next);
+}
+
+Reloader::Reloader(boost::asio::any_io_executor executor, std::string file)
+    : file_(std::move(file)), worker_(std::move(executor)) {
+    counters_.last_success_unix = unix_now();
+}
+
+void Reloader::serve(Gateway& gateway) { gateway_ = &gateway; }
+
+std::string Reloader::barred(bool rollback) const {
+    if (stopping_) return kStopping;
+    if (waiting_.size() >= kWaiting) return "too many wait for a reload; try again";
+    if (rollback)
+        return before_ ? "" : "nothing else has run since the start, so there is no way back";
+    if (file_.empty()) return "this gateway runs the built-in demo, which is no file";
+    if (file_ == "-")
+        return "the configuration was read from standard input, which is read only once";
+    return {};
+}
+
+void Reloader::reload(bool rollback, std::string cause, Handler handler) {
+    waiting_.push_back({rollback, std::move(cause), std::move(handler)});
+    if (served_.empty()) begin();
+}
+
+/// The wishes that have come together are one, as far as they are the same.
+void Reloader::begin() {
+    const bool rollback = waiting_.front().rollback;
+    std::vector<Waiting> others;
+    for (Waiting& one : std::exchange(waiting_, {}))
+        (one.rollback == rollback ? served_ : others).push_back(std::move(one));
+    waiting_ = std::move(others);
+    if (step_) step_(true);
+    auto job = std::make_shared<Job>();
+    job->file = file_;
+    job->running = gateway_->config();
+    if (rollback) job->rollback = before_;
+    job->verdict.rollback = rollback;
+    job->verdict.cause = served_.front().cause;
+    worker_.run([job] { job->read(); }, [this, job] { apply(job); });
+}
+
+/// In one turn of the loop.
+void Reloader::apply(const std::shared_ptr<Job>& job) {
+    if (stopping_) {
+        job->verdict.outcome = ReloadOutcome::failed;
+        job->verdict.why = kStopping;
+    } else if (job->next && job->verdict.outcome == ReloadOutcome::applied) {
+        try {
+            gateway_->apply(job->next, job->shown);
+            before_ = job->running;
+            if (job->next->log != job->running->log) rt::set_up_log(job->next->log);
+        } catch (const std::runtime_error& error) {  // a door, a pty
+            job->verdict.outcome = ReloadOutcome::failed;
+            job->verdict.why = error.what();
+        }
+    }
+    end(job);
+}
+
+void Reloader::end(const std::shared_ptr<Job>& job) {
+    web::ReloadVerdict& verdict = job->verdict;
+    verdict.at = rt::wall_now();
+    const bool good =
+        verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
+    ++counters_.reloads[static_cast<std::size_t>(verdict.outcome)];
+    counters_.last_succeeded = good;
+    if (good) counters_.last_success_unix = unix_now();
+    tell(verdict);
+    last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
+    if (step_) step_(false);
+    for (Waiting& one : std::exchange(served_, {})) one.handler(last_);
+    if (!waiting_.empty()) begin();
+}
+
+}  // namespace panelgate::app

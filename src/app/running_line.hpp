@@ -1,0 +1,80 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/bus/line_bus.hpp"
+#include "panelgate/config/config.hpp"
+#include "panelgate/points/heard_values.hpp"
+#include "panelgate/points/poller.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/sim/simulated_bus.hpp"
+
+namespace panelgate::app {
+
+/// Whoever is told what happens on a line, by its name.
+struct LineWatch {
+    std::function<void(const std::string& line, const bus::BusEvent& event)> event;
+    /// These wants of a station's points are others now: of StationPoints, by wants_of().
+    std::function<void(const std::string& line, std::uint8_t station,
+                       const std::vector<std::size_t>& wants)>
+        points;
+};
+
+/// The line goes on as it is: nothing that has to be right before the first byte is another.
+bool is_same_wire(const config::Line& before, const config::Line& now, bool simulate);
+
+/// One line as it runs: its bus, the panels that are simulated for it, and what is polled or heard
+/// on it. Its bus is the same object through all reloads, so that whoever knows it may go on
+/// asking; of a line that is configured no more it is closed and stays. One thread.
+class RunningLine {
+  public:
+    /// `simulate`: whatever its device. The clock outlives it. Throws std::system_error when there
+    /// is no pty left.
+    RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock, const config::Line& line,
+                bool simulate, LineWatch watch);
+    RunningLine(const RunningLine&) = delete;
+    RunningLine& operator=(const RunningLine&) = delete;
+
+    void start();
+    void stop();
+    /// Goes on as this; `before` is what it was. Opens it again after stop().
+    void apply(const config::Line& before, const config::Line& now);
+
+    bus::LineBus& bus() { return *bus_; }
+    const bus::LineBus& bus() const { return *bus_; }
+    const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
+    bool listens() const { return listens_; }
+    /// What is known of its points; nothing without any. The configuration outlives it, not this.
+    std::optional<points::StationPoints> points_of(const config::Station& station) const;
+
+  private:
+    bus::Settings settings_of(const config::Line& line);
+    std::unique_ptr<line::Line> make_wire(const config::Line& line);
+    void apply_points(const config::Line& line);
+    void on_event(const std::string& line, const bus::BusEvent& event);
+    void hear(const std::string& line, const tap::Transaction& heard);
+
+    boost::asio::any_io_executor executor_;
+    rt::Clock& clock_;
+    bool simulate_;
+    bool listens_;
+    LineWatch watch_;
+    /// Of a line that is only listened to, by station.
+    std::map<std::uint8_t, std::shared_ptr<points::HeardValues>> heard_;
+    std::function<void(const bus::WriteEvent&)> write_listener_;  ///< the poller's
+    std::shared_ptr<sim::SimulatedBus> simulated_;                ///< null for a real device
+    std::unique_ptr<bus::LineBus> bus_;                           ///< tells those above to its end
+    std::unique_ptr<points::Poller> poller_;  ///< null where nothing was ever polled
+    bool running_ = false;
+};
+
+}  // namespace panelgate::app

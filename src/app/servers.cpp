@@ -1,0 +1,218 @@
+#include "servers.hpp"
+
+#include <algorithm>
+#include <boost/asio/ip/host_name.hpp>
+#include <iterator>
+#include <system_error>
+#include <utility>
+
+#include "panelgate/line/tty_line.hpp"
+#include "panelgate/tcp_server/unit_map.hpp"
+
+namespace panelgate::app {
+namespace {
+
+boost::system::error_code error_of(tcp_server::Listener& listener) {
+    try {
+        listener.start();
+    } catch (const std::system_error& error) {
+        return error.code();
+    }
+    return {};
+}
+
+Door door_of(const tcp_server::Settings& settings, tcp_server::Listener* listener) {
+    return {"modbus_tcp",
+            settings.address,
+            settings.port,
+            [listener] { return error_of(*listener); },
+            [listener] { return listener->port(); },
+            listener};
+}
+
+Door door_of(const web::Settings& settings, web::Server* server) {
+    return {"http",
+            settings.address,
+            settings.port,
+            [server] { return server->start(); },
+            [server] { return server->port(); },
+            server};
+}
+
+/// Who else answers on the master's line is not ours to speak for: only what is listed is served.
+std::vector<tcp_server::LineInfo> lines_of_master(const Plant& plant) {
+    auto lines = plant.listener_lines();
+    for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
+    return lines;
+}
+
+}  // namespace
+
+Servers::Servers(boost::asio::any_io_executor executor, rt::Clock& clock)
+    : executor_(std::move(executor)), clock_(clock), openings_(clock) {}
+
+tcp_server::Settings Servers::completed(tcp_server::Settings settings,
+                                        const config::Config& config) const {
+    boost::system::error_code unknown;
+    settings.host = boost::asio::ip::host_name(unknown);
+    if (config.http) settings.url = "http://" + config.http->name() + '/';
+    return settings;
+}
+
+Servers::Modbus Servers::make(const tcp_server::Settings& settings, const Plant& plant) {
+    tcp_server::UnitMap units(settings, plant.listener_lines());
+    return {settings, std::make_unique<tcp_server::Listener>(executor_, clock_, settings,
+                                                             std::move(units), PANELGATE_VERSION)};
+}
+
+Servers::Modbus* Servers::find(const tcp_server::Settings& settings) {
+    const auto found = std::ranges::find_if(listeners_, [&](const Modbus& one) {
+        return one.listener && one.settings.is_same_door(settings);
+    });
+    return found == listeners_.end() ? nullptr : &*found;
+}
+
+/// By somebody who stands; whether it leaves or not.
+bool Servers::is_taken(const std::string& address, std::uint16_t port) const {
+    const auto there = [&](const auto& settings) {
+        return port != 0 && settings.port == port && settings.address == address;
+    };
+    return std::ranges::any_of(listeners_,
+                               [&](const Modbus& one) { return there(one.settings); }) ||
+           (http_ && there(http_->settings));
+}
+
+void Servers::open(const config::Config& config, const Plant& plant, const Web& web) try {
+    open_new(config, plant, web);
+} catch (...) {
+    fresh_ = {};
+    throw;
+}
+
+void Servers::open_new(const config::Config& config, const Plant& plant, const Web& web) {
+    fresh_ = {};
+    std::vector<Door> now;
+    const auto add = [&](Door door) {
+        (is_taken(door.address, door.port) ? fresh_.late : now).push_back(std::move(door));
+    };
+    for (const tcp_server::Settings& configured : config.modbus_tcp) {
+        const tcp_server::Settings settings = completed(configured, config);
+        if (find(settings) != nullptr) {
+            fresh_.listeners.push_back({settings, nullptr});
+            continue;
+        }
+        fresh_.listeners.push_back(make(settings, plant));
+        add(door_of(settings, fresh_.listeners.back().listener.get()));
+    }
+    if (config.http && !(http_ && http_->settings.is_same_door(*config.http))) {
+        auto server = std::make_unique<web::Server>(executor_, *config.http, web.directory(),
+                                                    web.providers());
+        fresh_.http = Http{*config.http, std::move(server)};
+        add(door_of(*config.http, fresh_.http->server.get()));
+    }
+    openings_.open(now);
+}
+
+void Servers::apply(const config::Config& config, const Plant& plant,
+                    const std::shared_ptr<const web::Directory>& directory,
+                    const web::SharedText& shown, Duration longest) {
+    Fresh fresh = std::exchange(fresh_, {});
+    for (Modbus& one : fresh.listeners) {
+        if (one.listener) continue;
+        one.listener = std::move(find(one.settings)->listener);
+        one.listener->apply(one.settings,
+                            tcp_server::UnitMap(one.settings, plant.listener_lines()));
+    }
+    for (Modbus& old : std::exchange(listeners_, std::move(fresh.listeners))) {
+        if (old.listener) leave(std::move(old));
+    }
+    if (http_ && (fresh.http || !config.http)) leave(*std::exchange(http_, {}), longest);
+    if (fresh.http) http_ = std::move(fresh.http);
+    if (http_) {
+        http_->settings = *config.http;
+        http_->server->apply(*config.http, directory, shown);
+    }
+    apply_masters(config, plant);
+    openings_.take_over(fresh.late);
+}
+
+/// It stands in the list until its last client has gone.
+void Servers::leave(Modbus modbus) {
+    openings_.forget(modbus.listener.get());
+    leaving_->push_back(std::move(modbus));
+    const auto place = std::prev(leaving_->end());
+    place->listener->stop([list = std::weak_ptr(leaving_), place] {
+        if (const auto alive = list.lock()) alive->erase(place);
+    });
+}
+
+void Servers::leave(Http http, Duration longest) {
+    openings_.forget(http.server.get());
+    std::erase_if(leaving_http_, [](const Http& old) { return old.server->connections() == 0; });
+    http.server->stop(longest);
+    leaving_http_.push_back(std::move(http));
+}
+
+void Servers::apply_masters(const config::Config& config, const Plant& plant) {
+    const auto lines = lines_of_master(plant);
+    std::vector<Master> before = std::exchange(masters_, {});
+    for (const serial_server::Settings& settings : config.serial_masters) {
+        const auto same = std::ranges::find_if(before, [&](const Master& one) {
+            return one.settings == settings && one.lines == lines;
+        });
+        if (same == before.end()) {
+            masters_.push_back({settings, lines, nullptr});
+            continue;
+        }
+        masters_.push_back(std::move(*same));
+        before.erase(same);
+    }
+    before.clear();  // the device of one may be that of another
+    for (Master& one : masters_) {
+        if (one.master) continue;
+        one.master = std::make_unique<serial_server::SerialMaster>(
+            clock_, one.settings, tcp_server::UnitMap(one.settings.access, one.lines),
+            line::make_tty_line(executor_, clock_, one.settings.device));
+        one.master->start();
+    }
+}
+
+void Servers::stop_accepting(Duration longest) {
+    openings_.stop();
+    open_listeners_ = listeners_.size();
+    for (const Modbus& one : listeners_) one.listener->stop([this] { --open_listeners_; });
+    for (const Master& one : masters_) one.master->finish();
+    if (http_) http_->server->stop(longest);
+}
+
+bool Servers::drained() {
+    const auto idle = [](const Master& one) { return one.master->idle(); };
+    const auto silent = [](const Http& one) { return one.server->connections() == 0; };
+    return open_listeners_ == 0 && leaving_->empty() && std::ranges::all_of(masters_, idle) &&
+           (!http_ || silent(*http_)) && std::ranges::all_of(leaving_http_, silent);
+}
+
+std::size_t Servers::owing() const {
+    std::size_t count = http_ ? http_->server->connections() : 0;
+    for (const Http& old : leaving_http_) count += old.server->connections();
+    for (const Modbus& one : listeners_) count += one.listener->counters().connections;
+    for (const Modbus& old : *leaving_) count += old.listener->counters().connections;
+    for (const Master& one : masters_) count += one.master->idle() ? 0 : 1;
+    return count;
+}
+
+void Servers::close() {
+    for (const Modbus& one : listeners_) one.listener->close_now();
+    for (const Modbus& old : *leaving_) old.listener->close_now();
+    for (const Master& one : masters_) one.master->stop();
+    http_.reset();
+    leaving_http_.clear();
+}
+
+void Servers::copy_figures(metrics::Snapshot& snapshot) const {
+    for (const Modbus& one : listeners_) snapshot.listeners.push_back(one.listener->counters());
+    for (const Master& one : masters_) snapshot.serial_masters.push_back(one.master->counters());
+    if (http_) snapshot.http = http_->server->counters();
+}
+
+}  // namespace panelgate::app

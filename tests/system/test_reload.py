@@ -1,0 +1,268 @@
+"""Another configuration for a program that runs: what is the same does not notice."""
+import contextlib
+import http.client
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import tempfile
+import threading
+import unittest
+
+import config
+import harness
+from harness import read_registers
+from test_points import until
+
+ROUNDS = int(os.environ.get("PANELGATE_RELOADS", "40"))
+METER = "{id: 1, name: meter, profile: omron-cp2e, points: [{name: level, at: D100, every: 50ms}]}"
+STEADY = config.line("steady", stations=METER)
+MIXER = "{id: 5, name: mixer, profile: autonics-gp-2005}"
+IO = "{id: 17, name: io, profile: autonics-arm}"
+OVEN = "{id: 20, name: oven, profile: panasonic-gt, poll: [{read: GDT0, count: 4, every: 50ms}]}"
+
+
+def other(stations=MIXER, **keys):
+    return config.line("other", stations=stations, **keys)
+
+
+def plant(*lines, modbus=config.FREE_PORT, **keys):
+    return config.gateway(STEADY, *lines, http=config.OPERATOR, modbus=modbus, **keys)
+
+
+class Running:
+    """A program with a file that can be changed."""
+
+    def __init__(self, text, *arguments):
+        self.text = text
+        self.arguments = arguments
+
+    def __enter__(self):
+        self._stack = contextlib.ExitStack()
+        folder = pathlib.Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+        self.file = folder / "panelgate.yaml"
+        self.file.write_text(self.text)
+        self.program = self._stack.enter_context(
+            harness.Program("run", "-c", str(self.file), *self.arguments))
+        self.program.http_port()
+        return self
+
+    def __exit__(self, *failure):
+        return self._stack.__exit__(*failure)
+
+    def reload(self, text=None, path="/api/v1/reload"):
+        if text is not None:
+            self.file.write_text(text)
+        return self.program.rest("POST", path)
+
+    def metric(self, name):
+        with contextlib.closing(http.client.HTTPConnection(
+                "127.0.0.1", self.program.http_port(), timeout=harness.PATIENCE)) as connection:
+            connection.request("GET", "/metrics")
+            text = connection.getresponse().read().decode()
+        return [line.rsplit(" ", 1)[1] for line in text.splitlines() if line.startswith(name)]
+
+
+class Reader(threading.Thread):
+    """A client that asks a station of the steady line without pause, over one connection."""
+
+    def __init__(self, port, unit=1):
+        super().__init__(daemon=True)
+        self.client = harness.Client(port)
+        self.unit = unit
+        self.good = 0
+        self.bad = []
+        self.ending = threading.Event()
+        self.start()
+
+    def run(self):
+        try:
+            while not self.ending.is_set():
+                reply = self.client.ask(self.unit, read_registers(100, 2))
+                if reply[:2] == bytes([3, 4]):
+                    self.good += 1
+                else:
+                    self.bad.append(reply)
+        except Exception as lost:  # told by end()
+            self.bad.append(lost)
+
+    def end(self):
+        self.ending.set()
+        self.join(harness.PATIENCE)
+        return self.bad
+
+
+class Reload(unittest.TestCase):
+    def test_says_what_changes_and_serves_it(self):
+        with Running(plant(other())) as running:
+            self.assertEqual(running.program.get("/api/v1/reload"), (200, {"outcome": "none"}))
+            status, verdict = running.reload()
+            self.assertEqual((status, verdict["outcome"], verdict["changes"]),
+                             (200, "unchanged", []))
+            status, verdict = running.reload(plant(other(f"{MIXER}, {IO}")))
+            self.assertEqual((status, verdict["outcome"]), (200, "applied"))
+            self.assertEqual(verdict["changes"], ["lines/other/stations/io: added"])
+            self.assertEqual(running.program.get("/api/v1/stations/io")[1]["id"], 17)
+            client = harness.Client(running.program.modbus_port())
+            self.assertEqual(client.ask(17, read_registers(0))[0], 3)
+            self.assertEqual(running.program.get("/api/v1/reload")[1], verdict)
+
+    def test_a_bad_file_changes_nothing_and_is_told_everywhere(self):
+        with Running(plant(other())) as running:
+            reader = Reader(running.program.modbus_port())
+            status, problem = running.reload(plant(other("{id: 300, name: x, prifile: generic}")))
+            self.assertEqual((status, problem["outcome"]), (422, "invalid"))
+            self.assertEqual({error["line"] for error in problem["errors"]}, {9})
+            self.assertTrue(any("prifile" in error["detail"] for error in problem["errors"]))
+            self.assertEqual(running.program.get("/readyz")[0], 200)
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
+            self.assertEqual(running.metric('panelgate_config_reloads_total{outcome="invalid"}'),
+                             ["1"])
+            self.assertEqual(running.metric("panelgate_config_last_reload_successful"), ["0"])
+            running.program.log.wait_for(r"error configuration error=.*panelgate.yaml:9:\d+: .*")
+            self.assertEqual(reader.end(), [])
+            running.file.unlink()
+            self.assertEqual(running.reload()[0], 422)
+            self.assertEqual(running.reload(plant(other()))[1]["outcome"], "unchanged")
+            self.assertEqual(running.metric("panelgate_config_last_reload_successful"), ["1"])
+
+    def test_the_way_back_leads_to_what_ran_before(self):
+        with Running(plant(other())) as running:
+            self.assertEqual(running.reload(path="/api/v1/reload?rollback=true")[0], 409)
+            running.reload(plant(other(IO)))
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 404)
+            status, verdict = running.reload(path="/api/v1/reload?rollback=true")
+            self.assertEqual((status, verdict["outcome"], verdict["rollback"]),
+                             (200, "applied", True))
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
+            self.assertEqual(running.program.get("/api/v1/stations/io")[0], 404)
+
+    def test_by_signal_and_by_a_file_that_is_replaced(self):
+        with Running(plant(other()), "--watch") as running:
+            running.file.write_text(plant(other(f"{MIXER}, {IO}")))
+            running.program.process.send_signal(signal.SIGHUP)
+            running.program.log.wait_for(r"reload outcome=applied cause=SIGHUP")
+            new = running.file.with_suffix(".new")
+            new.write_text(plant(other(f"{MIXER}, {IO}, {OVEN}")))
+            new.replace(running.file)
+            running.program.log.wait_for(r'reload outcome=applied cause="the file has changed"')
+            self.assertEqual(running.program.get("/api/v1/stations/oven")[0], 200)
+
+    def test_listeners_come_and_go_and_clients_of_others_stay(self):
+        with Running(plant(other())) as running:
+            first = harness.Client(running.program.modbus_port())
+            self.assertEqual(first.ask(1, read_registers(100))[0], 3)
+            text = plant(other(), modbus=config.FREE_PORT + '}, {listen: "127.0.0.2:0", '
+                                                            'access: read_only')
+            self.assertEqual(running.reload(text)[1]["outcome"], "applied")
+            second = harness.Client(running.program.modbus_port(2), host="127.0.0.2")
+            self.assertEqual(second.ask(1, read_registers(100))[0], 3)
+            self.assertEqual(second.ask(1, harness.write_register(100, 1))[0], 0x86)
+            self.assertEqual(running.reload(plant(other()))[1]["outcome"], "applied")
+            with self.assertRaises(harness.Closed):
+                second.ask(1, read_registers(100))
+            self.assertEqual(first.ask(1, read_registers(100))[0], 3)
+            text = plant(other(), modbus=config.FREE_PORT + ", access: read_only")
+            self.assertEqual(running.reload(text)[1]["outcome"], "applied")
+            self.assertEqual(first.ask(1, harness.write_register(100, 1))[0], 0x86,
+                             "the same connection, by the new rules")
+            text = plant(other(), modbus=config.FREE_PORT + ", allow: [192.0.2.0/24]")
+            running.reload(text)
+            with self.assertRaises(harness.Closed):
+                first.ask(1, read_registers(100))
+
+    def test_a_port_that_somebody_has_is_no_reload(self):
+        with Running(plant(other())) as running, harness.Helper(
+                ["python3", "-c", "import socket; s = socket.create_server(('127.0.0.1', 0));"
+                                  "print(s.getsockname()[1], flush=True); input()"]) as somebody:
+            port = int(somebody.out.wait_for(r"^(\d+)$").group(1))
+            text = plant(other(IO), modbus=f'listen: "127.0.0.1:{port}"')
+            status, problem = running.reload(text)
+            self.assertEqual((status, problem["outcome"]), (409, "failed"))
+            self.assertIn("another program listens there", problem["detail"])
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
+            client = harness.Client(running.program.modbus_port())
+            self.assertEqual(client.ask(5, read_registers(0))[0], 3)
+
+    def test_points_that_are_the_same_keep_their_values_and_their_past(self):
+        slow = METER.replace("every: 50ms", "every: 60min")
+        before = config.gateway(config.line("steady", stations=slow), http=config.OPERATOR)
+        more = slow.replace("}]}", "}, {name: more, at: D200, every: 50ms}]}")
+        after = config.gateway(config.line("steady", stations=more), http=config.OPERATOR)
+        path = "/api/v1/stations/meter/points/"
+        with Running(before) as running:
+            until(lambda: running.program.get(path + "level")[1]["quality"] == "good")
+            age = running.program.get(path + "level")[1]["age_ms"]
+            self.assertEqual(running.reload(after)[1]["changes"],
+                             ["lines/steady/stations/meter/points/more: added"])
+            level = running.program.get(path + "level")[1]
+            self.assertEqual(level["quality"], "good")
+            self.assertGreaterEqual(level["age_ms"], age)
+            self.assertEqual(len(running.program.get(path + "level/history")[1]["samples"]), 1)
+            until(lambda: running.program.get(path + "more")[1]["quality"] == "good")
+
+    def test_the_command_says_what_came_of_it(self):
+        with Running(plant(other())) as running:
+            door = f"127.0.0.1:{running.program.http_port()}"
+
+            def command(*more):
+                done = subprocess.run([harness.PANELGATE, "reload", "--http", door, *more],
+                                      capture_output=True, text=True, timeout=harness.PATIENCE)
+                return done.returncode, done.stdout, done.stderr
+            self.assertEqual(command()[:2], (0, "unchanged\n"))
+            running.file.write_text(plant(other(IO)))
+            code, out, _ = command()
+            self.assertEqual(code, 0)
+            self.assertIn("  lines/other/stations/mixer: removed\n", out)
+            running.file.write_text("lines: 7\n")
+            code, out, told = command()
+            self.assertEqual((code, out), (78, ""))
+            self.assertRegex(told, r"panelgate.yaml:1:8: .*")
+            self.assertEqual(command("--rollback")[0], 0)
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
+
+    def test_p1_p3_two_hundred_reloads_and_nobody_on_an_unchanged_line_notices(self):
+        """PANELGATE_RELOADS of them; the full count is for the bench."""
+        away = plant()
+        variants = [
+            plant(other(f"{MIXER}, {IO}")), plant(other(f"{MIXER}, {OVEN}")),
+            plant(other(timing="{response_timeout: 300ms}")), plant(other(echo="off")),
+            plant(other(retries=2, queue="{limit: 64}")), away, plant(other()),
+            plant(other(), config.line("third", stations=IO)),
+            plant(other(), modbus=config.FREE_PORT + ", max_connections: 100"),
+        ]
+        with Running(plant(other())) as running:
+            port = running.program.modbus_port()
+            readers = [Reader(port) for _ in range(3)]
+            changed = Reader(port, unit=5)
+            events = http.client.HTTPConnection("127.0.0.1", running.program.http_port(),
+                                                timeout=harness.PATIENCE)
+            events.request("GET", "/api/v1/events?types=point&station=meter")
+            stream = events.getresponse()
+            for turn in range(ROUNDS):
+                before = [reader.good for reader in readers]
+                status, verdict = running.reload(variants[turn % len(variants)])
+                self.assertEqual((status, verdict["outcome"]), (200, "applied"), verdict)
+                until(lambda: all(r.good > n or r.bad for r, n in zip(readers, before)))
+                self.assertEqual(
+                    running.program.get("/api/v1/stations/meter/points/level")[1]["quality"],
+                    "good")
+            for reader in readers:
+                self.assertEqual(reader.end(), [])
+            # P1, P3: on the line that changes, each is answered: by its panel, or that it is away.
+            for reply in changed.end():
+                self.assertIsInstance(reply, bytes, reply)
+                self.assertIn((reply[0], reply[1]), [(0x83, 0x0A), (0x83, 0x0B), (0x83, 0x06)])
+            self.assertGreater(changed.good, 0)
+            line = stream.readline()  # what it was sent meanwhile, and is still being sent
+            self.assertTrue(line)
+            events.close()
+            lag = [float(value) for value in running.metric("panelgate_loop_lag_seconds_bucket")]
+            print(json.dumps({"reloads": ROUNDS, "answers": sum(r.good for r in readers),
+                              "changed_good": changed.good, "changed_bad": len(changed.bad),
+                              "loop_lag_buckets": lag}))
+
+
+if __name__ == "__main__":
+    unittest.main()

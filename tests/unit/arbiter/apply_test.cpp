@@ -1,0 +1,114 @@
+#include "arbiter_fixture.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+/// Other settings for an arbiter that runs.
+class ApplyTest : public ArbiterTest {
+  protected:
+    StationSettings& station(std::size_t index) { return settings.stations[index]; }
+};
+
+TEST_F(ApplyTest, WhatWaitsIsAskedAndAnsweredAllTheSame) {
+    const Ticket first = bus.submit(17, read_at(1), 1);
+    const Ticket second = bus.submit(18, read_at(2), 2);
+    station(1).response_timeout = 100ms;
+    settings.queue.limit = 1;
+    bus.apply(settings);
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answered(first));
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(18, kReply);
+    EXPECT_TRUE(bus.answered(second));
+}
+
+TEST_F(ApplyTest, TheNextRequestIsWaitedForAsTheNewSettingsSay) {
+    station(0).response_timeout = 50ms;
+    station(0).retries = 0;
+    bus.apply(settings);
+    const Ticket asked = bus.submit(17, kRead, 1);
+    bus.run_to_end_of_request();
+    bus.run_for(60ms);
+    EXPECT_TRUE(bus.answered(asked));
+    EXPECT_EQ(bus.answer(asked).pdu.error(), Fault::timeout);
+}
+
+TEST_F(ApplyTest, P1AShorterTimeoutEndsNoRestThatHasBegun) {
+    station(0).retries = 0;
+    bus.apply(settings);
+    const Ticket asked = bus.submit(17, read_at(1), 1);
+    bus.run_to_end_of_request();
+    bus.run_for(501ms);
+    ASSERT_TRUE(bus.answered(asked));
+    station(0).response_timeout = 20ms;
+    bus.apply(settings);
+    bus.submit(17, read_at(2), 1);
+    const std::size_t sent = bus.sent.size();
+    bus.run_for(400ms);
+    EXPECT_EQ(bus.sent.size(), sent) << "its reply to the first may still come";
+}
+
+TEST_F(ApplyTest, P1WhatIsOwedIsOwedOnAnotherWireToo) {
+    bus.submit(17, read_at(1), 1);
+    bus.run_to_end_of_request();
+    bus.line_down();
+    settings.echo = EchoMode::off;
+    settings.serial.baud = 19200;
+    bus.apply(settings);
+    bus.line_up();
+    const Ticket next = bus.submit(17, read_at(2), 2);
+    bus.run_for(100ms);
+    bus.hear_reply(17, kReply);  // late, of the first
+    bus.run_for(10ms);
+    EXPECT_FALSE(bus.answered(next));
+    ASSERT_TRUE(bus.next_sent());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, reply_number(7));
+    EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(7));
+}
+
+TEST_F(ApplyTest, AStationThatIsListedNoLongerIsAskedAsTheOthers) {
+    settings.stations.pop_back();
+    settings.unlisted.response_timeout = 50ms;
+    settings.unlisted.retries = 0;
+    bus.apply(settings);
+    const Ticket asked = bus.submit(18, kRead, 1);
+    bus.run_to_end_of_request();
+    bus.run_for(60ms);
+    EXPECT_TRUE(bus.answered(asked));
+    EXPECT_FALSE(bus.arbiter().station_counters().contains(18));
+}
+
+TEST_F(ApplyTest, WhatWasCountedOfAStationStays) {
+    bus.submit(17, kRead, 1);
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    const auto before = bus.arbiter().station_counters().at(17).symptoms.answered;
+    ASSERT_EQ(before, 1u);
+    station(0).retries = 3;
+    bus.apply(settings);
+    EXPECT_EQ(bus.arbiter().station_counters().at(17).symptoms.answered, before);
+    EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
+}
+
+TEST(IsSameWire, OfTimesAndStationsButNotOfWhatIsOnTheWire) {
+    const Settings one = settings_38400();
+    Settings other = one;
+    other.queue.limit = 7;
+    other.unlisted.retries = 5;
+    other.stations.pop_back();
+    EXPECT_TRUE(is_same_wire(one, other));
+    other.serial.baud = 9600;
+    EXPECT_FALSE(is_same_wire(one, other));
+    other = one;
+    other.echo = EchoMode::on;
+    EXPECT_FALSE(is_same_wire(one, other));
+    other = one;
+    other.stations[0].crc_order = modbus::CrcOrder::high_first;
+    EXPECT_FALSE(is_same_wire(one, other));
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
