@@ -32,6 +32,7 @@ struct Notation {
     unsigned digits = 0;
     /// A shorter spelling that is also understood (41029 for 401029: 4), 0 = none.
     unsigned short_digits = 0;
+    friend bool operator==(const Notation&, const Notation&) = default;
 };
 
 /// Item addresses [first, last], 0-based as on the wire.
@@ -41,6 +42,7 @@ struct AddressRange {
     bool contains(std::uint32_t address, std::uint32_t count = 1) const {
         return address >= first && count <= last + 1 - address && address <= last;
     }
+    friend bool operator==(const AddressRange&, const AddressRange&) = default;
 };
 
 /// A piece of a panel's memory as the manual names it.
@@ -61,6 +63,7 @@ struct Area {
     bool reaches(modbus::Table other) const {
         return table == other || std::ranges::find(also, other) != also.end();
     }
+    friend bool operator==(const Area&, const Area&) = default;
 };
 
 struct FunctionRule {
@@ -68,6 +71,7 @@ struct FunctionRule {
     unsigned max_count = 0;  ///< items in one request; 0 = the standard's limit
     bool broadcast = false;
     std::string source;
+    friend bool operator==(const FunctionRule&, const FunctionRule&) = default;
 };
 
 /// A list of what is allowed; an empty one allows everything.
@@ -82,6 +86,7 @@ struct Serial {
     std::vector<int> stop_bits;
     SerialFormat default_format;
     std::string source;
+    friend bool operator==(const Serial&, const Serial&) = default;
 };
 
 struct Timing {
@@ -89,17 +94,20 @@ struct Timing {
     unsigned max_gap_bits =
         0;  ///< the panel ignores a request with a longer pause inside; 0 = not given
     std::string source;
+    friend bool operator==(const Timing&, const Timing&) = default;
 };
 
 struct ExceptionMeaning {
     std::uint8_t code = 0;
     std::string meaning;  ///< as the manual words it
+    friend bool operator==(const ExceptionMeaning&, const ExceptionMeaning&) = default;
 };
 
 /// A notation that people try and that no function reaches, and why.
 struct Unreachable {
     std::string prefix;
     std::string reason;
+    friend bool operator==(const Unreachable&, const Unreachable&) = default;
 };
 
 /// A read that tells this panel from others, for a scanner.
@@ -108,6 +116,7 @@ struct Identification {
     Bytes reply;        ///< how the panel's reply PDU begins; an exception counts
     std::string means;  ///< what that shows
     std::string source;
+    friend bool operator==(const Identification&, const Identification&) = default;
 };
 
 /// Values a simulated panel starts with, and which of them move.
@@ -116,6 +125,7 @@ struct Simulation {
         std::string area;
         std::uint32_t address = 0;
         std::vector<std::uint16_t> values;  ///< consecutive; bits are 0 or 1
+        friend bool operator==(const Cell&, const Cell&) = default;
     };
     struct Motion {
         enum class Kind : std::uint8_t { ramp, sine, toggle, clock };
@@ -125,12 +135,14 @@ struct Simulation {
         double low = 0;
         double high = 100;
         Duration period = 60s;
+        friend bool operator==(const Motion&, const Motion&) = default;
     };
     std::vector<Cell> memory;
     std::vector<Motion> motion;
     /// What a write into a protected part of a readable area is answered: the GP manuals allow
     /// both.
     std::uint8_t protected_exception = 3;
+    friend bool operator==(const Simulation&, const Simulation&) = default;
 };
 
 /// What the manual of one panel family says. Data only: config/profiles/NAME.yaml.
@@ -160,6 +172,7 @@ struct PanelProfile {
     const Area* find_area(modbus::Table table, std::uint32_t address) const;
     /// Items that one request with this function may carry: the profile's or the standard's limit.
     unsigned max_count(std::uint8_t function) const;
+    friend bool operator==(const PanelProfile&, const PanelProfile&) = default;
 };
 
 }  // namespace panelgate::profile
