@@ -10,6 +10,7 @@
 
 #include "capacity.hpp"
 #include "commands.hpp"
+#include "difference.hpp"
 #include "inventory.hpp"
 #include "load.hpp"
 #include "panelgate/base/utf8.hpp"
@@ -66,8 +67,27 @@ Judged judge(const config::Config& config, bool allow_overload) {
     return judged;
 }
 
+/// The file that is compared with; none: nothing is.
+struct Compared {
+    std::string file;
+    Loaded loaded;
+};
+
+void print_changes(const std::string& file, const config::Config& config,
+                   const Compared& compared) {
+    const std::vector<Change> changes = differences(*compared.loaded.config, config);
+    const std::string way = " from " + compared.file + " to " + file;
+    if (changes.empty()) {
+        std::cout << "nothing changes" << way << '\n';
+        return;
+    }
+    std::cout << changes.size() << " change(s)" << way << ":\n";
+    for (const Change& change : changes) std::cout << "  " << to_string(change) << '\n';
+}
+
 /// Of a file with faults `lines` and its like are not there.
-void print_json(const std::string& file, const Loaded& loaded, const Judged& judged) {
+void print_json(const std::string& file, const Loaded& loaded, const Judged& judged,
+                const Compared& compared) {
     json::object all{{"valid", loaded.config && judged.errors.empty()}};
     json::array warnings;
     if (loaded.config) {
@@ -79,7 +99,11 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
         for (const std::string& warning : loaded.config->warnings) warnings.emplace_back(warning);
     }
     for (const std::string& warning : judged.warnings) warnings.emplace_back(warning);
+    if (loaded.config && compared.loaded.config)
+        all["changes"] = to_json(differences(*compared.loaded.config, *loaded.config));
     json::array errors = errors_json(file, loaded.problems);
+    for (json::value& error : errors_json(compared.file, compared.loaded.problems))
+        errors.push_back(std::move(error));
     for (const std::string& error : judged.errors)
         errors.push_back(json::object{{"file", file}, {"message", error}});
     all["errors"] = std::move(errors);
@@ -89,23 +113,28 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
 
 }  // namespace
 
-ExitCode check(const std::string& file, bool json, bool allow_overload) {
+ExitCode check(const std::string& file, const CheckOptions& options) {
     const Loaded loaded = load_file(file);
+    Compared compared{options.before, {}};
+    if (!compared.file.empty()) compared.loaded = load_file(compared.file);
     Judged judged;
     if (loaded.config) {
-        judged = judge(*loaded.config, allow_overload);
+        judged = judge(*loaded.config, options.allow_overload);
         print_warnings(*loaded.config);
         for (const std::string& told : judged.warnings)
             std::cerr << path_of(file) << ": warning: " << told << '\n';
         for (const std::string& told : judged.errors)
             std::cerr << path_of(file) << ": " << told << " (--allow-overload takes it)\n";
     }
-    if (json) {
-        print_json(file, loaded, judged);
-    } else if (loaded.config) {
+    if (options.json) {
+        print_json(file, loaded, judged, compared);
+    } else if (loaded.config && compared.loaded.config) {
+        print_changes(file, *loaded.config, compared);
+    } else if (loaded.config && compared.file.empty()) {
         print_text(file, *loaded.config, judged.lines);
     }
-    return loaded.config && !judged.errors.empty() ? kBadConfig : loaded.code;
+    if (loaded.config && !judged.errors.empty()) return kBadConfig;
+    return loaded.code != kFine ? loaded.code : compared.loaded.code;
 }
 
 }  // namespace panelgate::app

@@ -14,8 +14,14 @@ inline constexpr const char* kDefaultConfig = "/etc/panelgate/panelgate.yaml";
 ExitCode run(const std::string& file, bool simulate, bool watch);
 /// `http` and `modbus` replace the demo's addresses when not empty: "ADDR:PORT".
 ExitCode demo(const std::string& http, const std::string& modbus);
-/// `allow_overload`: a line that has more to carry than its time is a warning, not kBadConfig.
-ExitCode check(const std::string& file, bool json, bool allow_overload);
+/// The command line of `check`.
+struct CheckOptions {
+    std::string before;  ///< a file: say what changes from it; empty: show what there is
+    bool json = false;
+    /// A line that has more to carry than its time is a warning, not kBadConfig.
+    bool allow_overload = false;
+};
+ExitCode check(const std::string& file, const CheckOptions& options);
 /// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
 /// default where there is none that can be read.
 ExitCode health(const std::string& file, const std::string& http);

@@ -168,10 +168,15 @@ class CommandLine {
         add_file(command);
         command->add_option("--format", format_, "text or json")
             ->check(CLI::IsMember({"text", "json"}));
-        command->add_flag("--allow-overload", allow_overload_,
+        command->add_option("--diff", check_.before,
+                            "say what changes from this file, in place of all that there is");
+        command->add_flag("--allow-overload", check_.allow_overload,
                           "a line that is planned to be busy for more than 100 % of its time is a "
                           "warning, not an error");
-        command->callback([this] { code_ = check(file_, format_ == "json", allow_overload_); });
+        command->callback([this] {
+            check_.json = format_ == "json";
+            code_ = check(file_, check_);
+        });
     }
 
     void add_simulate() {
@@ -260,7 +265,7 @@ class CommandLine {
     std::string http_;
     std::string modbus_;
     std::string format_ = "text";
-    bool allow_overload_ = false;
+    CheckOptions check_;
     std::vector<std::string> links_;
     ScanOptions scan_;
     std::string profile_;

@@ -226,6 +226,43 @@ class Files(unittest.TestCase):
         self.assertEqual(plan["http"]["anonymous"], "none")
         self.assertEqual((plan["valid"], plan["errors"]), (True, []))
 
+    def test_check_says_what_changes_from_another_file(self):
+        old = self.file.with_name("old.yaml")
+        old.write_text(good())
+        self.file.write_text(good() + "# the same\n")
+        same = run("check", "-c", str(self.file), "--diff", str(old))
+        self.assertEqual((same.returncode, same.stdout),
+                         (0, f"nothing changes from {old} to {self.file}\n"))
+        self.file.write_text(good() + "log: {level: warn}\n"
+                             "relays: [{from: press/UW0, to: press/UW100}]\n")
+        text = run("check", "-c", str(self.file), "--diff", str(old))
+        self.assertEqual((text.returncode, text.stdout),
+                         (0, f"2 change(s) from {old} to {self.file}:\n  log: level info -> warn\n"
+                             "  relays/press/UW0 to press/UW100: added\n"))
+        told = json.loads(run("check", "-c", str(self.file), "--diff", str(old),
+                              "--format", "json").stdout)
+        self.assertEqual(told["changes"], [
+            {"path": "log/level", "kind": "changed", "before": "info", "after": "warn"},
+            {"path": "relays/press/UW0 to press/UW100", "kind": "added"}])
+        self.assertTrue(told["valid"])
+
+    def test_a_comparison_tells_the_faults_of_both_files(self):
+        old = self.file.with_name("old.yaml")
+        old.write_text(good().replace("device: sim", "devise: sim"))
+        self.file.write_text(good().replace("data_bits: 8", "data_bits: 9"))
+        both = run("check", "-c", str(self.file), "--diff", str(old))
+        self.assertEqual((both.returncode, both.stdout), (BAD_CONFIG, ""))
+        self.assertIn(f"{old}:3:5: ", both.stderr)
+        self.assertIn(f"{self.file}:4:38: ", both.stderr)
+        self.file.write_text(good())
+        one = run("check", "-c", str(self.file), "--diff", str(old), "--format", "json")
+        self.assertEqual(one.returncode, BAD_CONFIG)
+        told = json.loads(one.stdout)
+        self.assertNotIn("changes", told)
+        self.assertEqual({error["file"] for error in told["errors"]}, {str(old)})
+        gone = run("check", "-c", str(self.file), "--diff", str(old) + "x")
+        self.assertEqual(gone.returncode, NO_INPUT)
+
     def test_check_tells_errors_as_json_too(self):
         self.file.write_text(good().replace("device: sim", "devise: sim")
                              .replace("data_bits: 8", "data_bits: 9"))

@@ -1,0 +1,143 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "difference.hpp"
+#include "support/yaml_text.hpp"
+#include "unit/config/memory_files.hpp"
+
+namespace panelgate::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+const config::MemoryFiles& files() {
+    static const config::MemoryFiles kFiles(
+        {{"/run/secrets/ops", "secret-0123456789"}, {"/run/secrets/other", "other-0123456789"}});
+    return kFiles;
+}
+
+std::optional<config::Config> load(const std::string& text) {
+    yaml::Problems problems("x.yaml");
+    return config::load(text, files(), problems);
+}
+
+std::string text_of(const fs::path& path) {
+    std::ifstream in(path);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// Has what the example has only in one way, or not at all.
+constexpr const char* kFurther = R"(lines:
+  - name: a
+    device: /dev/ttyS1
+    serial: {mode: ascii, data_bits: 7, ascii_lower_case: take}
+    rs485: {mode: kernel, rts_on_send: high, delay_before_send: 1ms, delay_after_send: 1ms,
+            receive_during_send: false}
+    timing: {response_timeout: adaptive, adaptive_floor: 20ms, adaptive_ceiling: 600ms}
+    simulate: {echo: true}
+    stations:
+      - id: 1
+        timing: {response_timeout: adaptive, adaptive_floor: 30ms, adaptive_ceiling: 700ms,
+                 frame_gap: auto, late_window: auto, think_time: 2ms}
+        simulate: {dead: false, slow: 1ms, late_by: 1ms, late: 0.1, drop: 0.1, damage: 0.1,
+                   truncate: 0.1, foreign_id: 0.1, duplicate: 0.1}
+      - {id: 2, access: read_write, profile: generic}
+  - name: b
+    device: /dev/ttyS7
+    mode: listen
+    serial: {baud: 9600, data_bits: 8, parity: none, stop_bits: 1}
+  - {name: c, device: /dev/ttyS8, serial: {mode: rtu}}
+modbus_tcp:
+  - {listen: "127.0.0.1:502", lines: [a], framing: ascii, ascii_lower_case: take, broadcast: silent}
+  - {listen: "127.0.0.1:503", retransmissions: join, units: {101: a/1, 102: a/1}}
+  - {listen: "127.0.0.1:504", framing: rtu, broadcast: silent}
+serial_masters:
+  - {name: plc, device: /dev/ttyS2, lines: [a], units: {7: a/1}, access: read_write, framing: ascii,
+     serial: {baud: 9600, data_bits: 7, parity: none, stop_bits: 1}, rs485: {mode: off},
+     broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
+  - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
+http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
+realtime: {priority: 20, lock_memory: true}
+)";
+
+constexpr const char* kWords =
+    "1 2 3 7 0.2 8 16 20ms 2s 1s none even on off kernel rts low rtu ascii tcp take "
+    "refuse read_only high_first master line station pass deny silent exception "
+    "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
+    "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
+    "a/2 floor1/20 /run/secrets/other ";
+
+/// What a value may be instead, likely ones first.
+std::vector<std::string> others(const yaml::Node& value) {
+    const std::string& now = value.scalar;
+    std::vector<std::string> all{now == "true" ? "false" : "true", "1" + now, now + "1"};
+    std::istringstream words(kWords);
+    for (std::string word; words >> word;) all.push_back(word);
+    std::erase(all, now);
+    return all;
+}
+
+struct Leaf {
+    std::string key;  ///< "lines/stations/id": without the places in lists
+    yaml::Node* value;
+};
+
+/// Templates and merges are told by what they make.
+void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& leaves) {
+    if (node.kind == yaml::Node::Kind::scalar) leaves.push_back({key, &node});
+    for (yaml::Node& item : node.items) find_leaves(item, key, leaves);
+    for (yaml::Entry& entry : node.entries) {
+        const std::string& name = entry.key;
+        if (name.starts_with("x-") || name.starts_with("template") || name == "<<") continue;
+        find_leaves(entry.value, key.empty() ? name : key + '/' + name, leaves);
+    }
+}
+
+/// Some other value that the loader takes makes a difference.
+bool makes_a_difference(const yaml::Node& tree, yaml::Node& value, const config::Config& before) {
+    const yaml::Node kept = value;
+    bool differs = false;
+    for (const std::string& other : others(kept)) {
+        value.scalar = other;
+        const auto after = load(yaml_text(tree));
+        differs = after && !differences(before, *after).empty();
+        if (differs) break;
+    }
+    value = kept;
+    return differs;
+}
+
+TEST(EveryKey, OfAConfigurationMakesADifference) {
+    std::map<std::string, bool> keys;
+    const fs::path example = fs::path(SOURCE_ROOT) / "config/panelgate.example.yaml";
+    for (const std::string& text : {std::string(kFurther), text_of(example)}) {
+        yaml::Problems problems("x.yaml");
+        yaml::Node tree = yaml::parse(text, problems);
+        const auto before = load(text);
+        ASSERT_TRUE(before && load(yaml_text(tree)) &&
+                    differences(*before, *load(yaml_text(tree))).empty())
+            << yaml_text(tree);
+        std::vector<Leaf> leaves;
+        find_leaves(tree, "", leaves);
+        for (const Leaf& leaf : leaves) {
+            bool& differs = keys[leaf.key];
+            differs = differs || makes_a_difference(tree, *leaf.value, *before);
+        }
+    }
+    EXPECT_GE(keys.size(), 120U);
+    for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
+}
+
+}  // namespace
+}  // namespace panelgate::app
