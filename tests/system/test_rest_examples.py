@@ -29,6 +29,7 @@ OF_A_FRAME = {"sequence", "time", "at", "bytes", "why", "transaction"}
 OF_A_TRANSACTION = {"id", "sequence", "ended", "time", "client", "arrived", "granted", "first_bit_out", "last_bit_out",
                     "first_byte_in", "last_byte_in", "answered", "request", "reply"}
 OF_AN_INCIDENT = {"time", "errors", "complete", "frames", "decisions", "transactions"}
+OF_A_RELOAD = {"at", "warnings"}
 OF_A_RELAY = {"state", "reads", "writes"}
 # Of panels that confirm and do not keep (verify_test.cpp), and of a line whose master speaks.
 UNSEEN = {("Written", "read_back"), ("Written", "verify_detail"), ("Problem", "read_back"),
@@ -83,7 +84,8 @@ def settled(value):
         return value
     passing = set(PASSING)
     for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY),
-                        ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT)):
+                        ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT),
+                        ("rollback", OF_A_RELOAD)):
         passing |= names if mark in value else set()
     return {key: "~" if key in passing and one is not None else settled(one)
             for key, one in value.items()}

@@ -39,7 +39,7 @@ constexpr Row kRows[] = {
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/configuration", get_configuration, kSee, kTagged},
     {"GET", "/api/v1/reload", get_reload, kSee},
-    {"POST", "/api/v1/reload", post_reload, kChange, kPlain, "rollback"},
+    {"POST", "/api/v1/reload", post_reload, kChange, kOnce, "rollback"},
     {"GET", "/api/v1/lines", get_lines, kSee, kTagged},
     {"GET", "/api/v1/lines/{}", get_line, kSee, kTagged},
     {"GET", "/api/v1/lines/{}/trace", get_trace, kSee, kPlain, "last since"},
