@@ -36,7 +36,7 @@ if [ -z "${PACKAGES_ROOT-}" ]; then
     [ ! -e /etc/apt/sources.list.d/debian.sources ] || mirror=(/etc/apt/sources.list.d/debian.sources)
     say "a Debian 12 of $architecture"
     mmdebstrap --quiet --mode=root --variant=minbase --architectures="$architecture" \
-        --include="$needed" bookworm "$work/root" "${mirror[@]}"
+        --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr --include="$needed" bookworm "$work/root" "${mirror[@]}"
     PACKAGES_ROOT=$work/root unshare --mount --net "$0" "$package"
     exit
 fi
