@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # deploy/install_packages.sh [build|run|test|try ...]   (default: build run)
-# Installs what is missing of these sections of packages.txt. Touches nothing, asks for no rights
-# and needs no network when all of it is there.
+# Installs what is missing of these sections of packages.txt; `package` is what makes and tests
+# Debian packages of it. Touches nothing, asks for no rights and needs no network when all of it is there.
 set -euo pipefail
 list="$(dirname "$(readlink -f "$0")")/packages.txt"
 

@@ -33,12 +33,14 @@ fail() { echo "image.sh: $*" >&2; podman "${store[@]}" logs $box >&2 || true; ex
 must() { "$@" || fail "failed: $*"; }
 inspect() { podman "${store[@]}" inspect --format "$1" "$2"; }
 
-# FROM has to find the pinned day's image without asking a registry: today's Debian plays its part.
+# FROM has to find the pinned day's image without asking a registry: today's Debian plays its part, with
+# /usr merged from the start as there; else usrmerge comes along, and 12 MB of Perl with it.
 base() {
     local tag
     tag=$(sed -n 's/^ARG DEBIAN=//p' Dockerfile)
     mmdebstrap --quiet --variant=minbase --mode=root --dpkgopt='path-exclude=/usr/share/doc/*' \
         --dpkgopt='path-exclude=/usr/share/man/*' --dpkgopt='path-exclude=/usr/share/locale/*' \
+        --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr \
         --customize-hook='rm -rf "$1"/var/lib/apt/lists/* "$1"/var/cache/apt/*' \
         bookworm "$work/slim.tar"
     podman "${store[@]}" import -q --change 'CMD ["bash"]' "$work/slim.tar" \

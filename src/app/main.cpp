@@ -214,7 +214,7 @@ class CommandLine {
     void add_address() {
         CLI::App* command =
             cli_.add_subcommand("address", "vendor notation to Modbus table and address, and back");
-        command->add_option("PROFILE", profile_)->required();
+        command->add_option("PROFILE", profile_, "a panel profile, by name")->required();
         command->add_option("NOTATION", notation_, "UB180, or back: coil/288")->required();
         add_profiles_dir(command, profiles_dir_);
         command->callback([this] { code_ = address(profile_, notation_, profiles_dir_); });
@@ -222,7 +222,7 @@ class CommandLine {
 
     void add_profiles() {
         CLI::App* command = cli_.add_subcommand("profiles", "list the panel profiles, or show one");
-        command->add_option("NAME", name_);
+        command->add_option("NAME", name_, "of the profile that is shown");
         add_profiles_dir(command, profiles_dir_);
         command->callback([this] { code_ = profiles(name_, profiles_dir_); });
     }

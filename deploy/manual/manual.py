@@ -1,0 +1,142 @@
+#!/usr/bin/env python3
+"""manual.py FOLDER PROGRAM...: panelgate.1, panelgate.yaml.5 and the bash completion, into FOLDER.
+
+Made of what stands in one place already: commands and options are what `PROGRAM help` prints, keys
+are config/panelgate.example.yaml. PROGRAM may have words before it (an emulator). The date is
+SOURCE_DATE_EPOCH, or today.
+"""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+EXAMPLE = HERE.parents[1] / "config/panelgate.example.yaml"
+ENTRY = re.compile(r"^  (\S.*?)(?:\s{2,}(\S.*))?$")
+COLUMN = " " * 30
+
+
+class Command:
+    """What `help COMMAND` prints: what it does, its usage, [(option or word, what it is)], notes."""
+
+    def __init__(self, name, text):
+        self.name = name
+        lines = text.splitlines()
+        self.about = lines[0]
+        self.usage = next(line for line in lines if line.startswith("Usage: ")).split()[3:]
+        self.entries, self.notes = [], []
+        inside = False
+        for line in lines[2:]:
+            if line.endswith(":") and not line.startswith(" "):
+                inside = True
+            elif inside and line.startswith(COLUMN) and self.entries:
+                left, right = self.entries[-1]
+                self.entries[-1] = (left, f"{right} {line.strip()}".strip())
+            elif inside and (found := ENTRY.match(line)):
+                self.entries.append((found[1], found[2] or ""))
+            elif line.strip():
+                inside = False
+                self.notes.append(line.strip())
+
+    def options(self):
+        """[(names, values)]: what begins with a dash; values None where it takes none."""
+        for left, _ in self.entries:
+            if left.startswith("-"):
+                names, *rest = left.split()
+                words = re.search(r"\{(.*)\}", left)
+                yield names.split(","), (words[1].split(",") if words else []) if rest else None
+
+
+def asked(program):
+    def run(*words):
+        return subprocess.run([*program, "help", *words], check=True, capture_output=True,
+                              text=True).stdout
+    listed = re.search(r"(?s)Subcommands:\n(.*)", run())[1]
+    names = re.findall(r"(?m)^  (\S+)", listed)
+    about = {name: re.search(rf"(?m)^  {name}\s+(.*)$", listed)[1] for name in names}
+    return [Command(name, run(name)) for name in names if name not in ("help", "version")], about
+
+
+def mdoc(text):
+    """Text that mdoc takes for nothing else."""
+    text = text.replace("\\", r"\e").replace("-", r"\-")
+    return re.sub(r"(?m)^([.'])", r"\\&\1", text)
+
+
+def left_side(left):
+    """An option as `help` writes it, as mdoc's macros."""
+    if not left.startswith("-"):
+        return "Ar " + left.split()[0]
+    names, *value = left.split(None, 1)
+    macros = " , ".join("Fl " + name[1:].replace("-", r"\-") for name in names.split(","))
+    if not value:
+        return macros
+    words = re.search(r"\{(.*)\}", value[0])
+    many = " Ar ..." if value[0].endswith("...") else ""
+    return f"{macros} Ar {words[1].replace(',', '|') if words else 'value'}{many}"
+
+
+def section(command):
+    lines = [f".Ss {command.name}", mdoc(command.about[0].upper() + command.about[1:] + ".")]
+    entries = [(left, right) for left, right in command.entries if "--help" not in left]
+    if entries:
+        lines.append(".Bl -tag -width Ds")
+        for left, right in entries:
+            default = re.search(r"=(\S+)", left)
+            right += f" (default: {default[1]})" if default else ""
+            lines.append(".It " + left_side(re.sub(r"=\S+", "", left)))
+            lines += [mdoc(right)] if right else []
+        lines.append(".El")
+    if command.notes:
+        lines += [".Pp", mdoc(" ".join(command.notes))]
+    return lines
+
+
+def page_1(commands):
+    synopsis = []
+    for command in commands:
+        words = [f"Oo Ar {word.strip('[]').lower()} Oc" if word.startswith("[") else f"Ar {word}"
+                 for word in command.usage]
+        synopsis += [".Nm", f".Cm {command.name} {' '.join(words)}".rstrip()]
+    parts = [line for command in commands for line in section(command)]
+    return {"SYNOPSIS": "\n".join(synopsis), "COMMANDS": "\n".join(parts)}
+
+
+def page_5():
+    return {"KEYS": mdoc(EXAMPLE.read_text().rstrip("\n"))}
+
+
+def completion(commands, about):
+    def case(pattern, words):
+        return f"        {pattern}) words='{words}' ;;"
+    values = [case("|".join(f"{command.name}:{name}" for name in names), " ".join(words))
+              for command in commands for names, words in command.options() if words]
+    options = [case(f"{command.name}:*", " ".join(name for names, _ in command.options()
+                                                  for name in names)) for command in commands]
+    helped = case("help:*", " ".join(command.name for command in commands))
+    return filled("panelgate.bash", {"NAMES": " ".join(about), "VALUES": "\n".join(values),
+                                     "OPTIONS": "\n".join([*options, helped])})
+
+
+def filled(name, values):
+    moment = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
+    day = time.gmtime(moment)
+    values["DATE"] = f"{time.strftime('%B', day)} {day.tm_mday}, {day.tm_year}"
+    return re.sub(r"@([A-Z]+)@", lambda found: values[found[1]], (HERE / f"{name}.in").read_text())
+
+
+def main(folder, *program):
+    commands, about = asked(program)
+    folder = pathlib.Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "panelgate.1").write_text(filled("panelgate.1", page_1(commands)))
+    (folder / "panelgate.yaml.5").write_text(filled("panelgate.yaml.5", page_5()))
+    (folder / "panelgate.bash").write_text(completion(commands, about))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    main(*sys.argv[1:])

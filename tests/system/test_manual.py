@@ -1,0 +1,84 @@
+"""The man pages and the completion: made of what the program says, whole, and in order."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import harness
+from harness import ROOT
+
+GETTERS = ("text|required_text|integer|required_integer|number|boolean|duration|choice|choice_index|"
+           "child|map|sequence|has")
+KEY = re.compile(rf'(?:\.|->)(?:{GETTERS})(?:<[^;(]*>)?\(\s*"([a-z_]+)"')
+
+
+def plain(page):
+    """The words of a page, without its macros."""
+    return page.replace(r"\-", "-").replace(r"\e", "\\")
+
+
+class Manual(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        subprocess.run([ROOT / "deploy/manual/manual.py", cls.folder, harness.PANELGATE], check=True,
+                       env={**os.environ, "SOURCE_DATE_EPOCH": "1771588800"}, timeout=harness.PATIENCE)
+
+    def page(self, name):
+        return plain((self.folder / name).read_text())
+
+    @unittest.skipUnless(shutil.which("mandoc"), "no mandoc here")
+    def test_the_pages_are_sound(self):
+        for name in ("panelgate.1", "panelgate.yaml.5"):
+            linted = subprocess.run(["mandoc", "-T", "lint", "-W", "warning", self.folder / name],
+                                    capture_output=True, text=True, check=False)
+            self.assertEqual((linted.returncode, linted.stdout), (0, ""))
+
+    def test_each_command_with_each_option_is_in_the_page(self):
+        page = self.page("panelgate.1")
+        listed = harness.run("help").stdout.split("Subcommands:")[1]
+        commands = set(re.findall(r"(?m)^  (\w+)", listed)) - {"help", "version"}
+        self.assertIn("run", commands)
+        for command in commands:
+            part = page.split(f"\n.Ss {command}\n")[1].split("\n.S")[0]
+            options = re.findall(r"(?m)^  (?:-\w,)?--([\w-]+)", harness.run("help", command).stdout)
+            for option in options:
+                self.assertEqual(f" -{option}" in part, option != "help", (command, option))
+        self.assertIn(".Dd February 20, 2026\n", page)
+
+    def test_each_exit_code_is_in_the_page(self):
+        page = self.page("panelgate.1")
+        codes = (ROOT / "src/app/exit_code.hpp").read_text()
+        for code in re.findall(r"= (\d+)", codes):
+            self.assertIn(f"\n.It {code}\n", page)
+
+    def test_each_key_of_the_configuration_is_in_the_page(self):
+        page = self.page("panelgate.yaml.5")
+        keys = {key for file in (ROOT / "src/config").glob("*.cpp")
+                for key in KEY.findall(file.read_text())}
+        self.assertGreater(len(keys), 80)
+        self.assertEqual([key for key in sorted(keys) if not re.search(rf"\b{key}:", page)], [])
+
+    def completed(self, *words):
+        script = (f"source {self.folder}/panelgate.bash; COMP_WORDS=({' '.join(words)}); "
+                  "COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _panelgate; echo ${COMPREPLY[@]}")
+        path = f"{pathlib.Path(harness.PANELGATE).parent}:{os.environ['PATH']}"
+        return subprocess.run(["bash", "-c", script], env={**os.environ, "PATH": path}, text=True,
+                              capture_output=True, check=True).stdout.split()
+
+    def test_bash_completes_commands_options_and_their_values(self):
+        self.assertEqual(self.completed("panelgate", "che"), ["check"])
+        self.assertEqual(self.completed("panelgate", "run", "--s"), ["--simulate"])
+        self.assertEqual(self.completed("panelgate", "check", "--format", '""'), ["text", "json"])
+        self.assertEqual(self.completed("panelgate", "address", "omr"), ["omron-cp2e"])
+        file = str(self.folder / "panelgate.y")
+        self.assertEqual(self.completed("panelgate", "run", "-c", file), [file + "aml.5"])
+
+
+if __name__ == "__main__":
+    unittest.main()
