@@ -58,6 +58,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor, config::Config config, b
     for (const serial_server::Settings& settings : config_.serial_masters)
         add_serial_master(settings);
     if (config_.http) add_http(*config_.http);
+    if (config_.mqtt)
+        northbound_ = std::make_unique<Northbound>(executor_, clock_, *config_.mqtt, plant_);
 }
 
 void Gateway::add_line(const config::Line& line, bool simulate) {
@@ -92,6 +94,7 @@ void Gateway::add_line(const config::Line& line, bool simulate) {
 
 void Gateway::on_bus_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, plant_, line, event);
+    if (northbound_) northbound_->on_bus_event(line, event);
     if (const auto* heard = std::get_if<tap::Transaction>(&event)) hear(line, *heard);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write == nullptr) return;
@@ -131,6 +134,7 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
     Station& station = plant_.at(line, id);
     remember(station, wants, clock_.now());
     publish_points(events_, station, wants, clock_.now());
+    if (northbound_) northbound_->on_points(station, wants);
 }
 
 /// Who serves nobody keeps nothing.
@@ -243,6 +247,7 @@ void Gateway::start() {
     for (const auto& poller : pollers_) poller->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
+    if (northbound_) northbound_->start();
     for (const auto& master : serial_masters_) master->start();
     add_doors();
     openings_.start();
@@ -287,6 +292,7 @@ void Gateway::stop() {
     for (const auto& listener : listeners_) listener->close_now();
     for (const auto& master : serial_masters_) master->stop();
     http_.reset();
+    if (northbound_) northbound_->stop();
     if (line_histories_) line_histories_->stop();
     relays_->stop();
     for (const auto& poller : pollers_) poller->stop();
@@ -307,6 +313,7 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points) const
         snapshot.serial_masters.push_back(master->counters());
     snapshot.relays = relay_samples(relays_->status());
     if (http_) snapshot.http = http_->counters();
+    if (northbound_) snapshot.mqtt = northbound_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     snapshot.runtime.loop_lag = lag_.seconds();

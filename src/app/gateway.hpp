@@ -12,6 +12,7 @@
 
 #include "discoveries.hpp"
 #include "line_histories.hpp"
+#include "northbound.hpp"
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -97,6 +98,7 @@ class Gateway {
     /// Of lines that are only listened to, by their name and the station's id.
     std::map<std::pair<std::string, std::uint8_t>, points::HeardValues> heard_;
     std::unique_ptr<points::Relays> relays_;
+    std::unique_ptr<Northbound> northbound_;  ///< null without `mqtt:`
     std::vector<std::unique_ptr<tcp_server::Listener>> listeners_;
     std::vector<std::unique_ptr<serial_server::SerialMaster>> serial_masters_;
     std::unique_ptr<Scrapes> scrapes_;

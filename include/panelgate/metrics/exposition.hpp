@@ -9,6 +9,7 @@
 
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/serial_server/counters.hpp"
@@ -25,6 +26,7 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
+    std::optional<mqtt::Counters> mqtt;
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;
