@@ -11,6 +11,7 @@
 
 #include "discoveries.hpp"
 #include "line_histories.hpp"
+#include "northbound.hpp"
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -77,7 +78,7 @@ class Gateway {
     void apply_lines(const config::Config& config, const Lines& lines);
     void retire_lines(const Lines& lines);
     void show(const std::shared_ptr<Scene>& scene);
-    void apply_relays();
+    void apply_northbound();
     web::Providers providers();
     bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points, const Scene& scene) const;
 
@@ -97,6 +98,7 @@ class Gateway {
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;
     std::unique_ptr<Scrapes> scrapes_;  ///< null until there is `http:`
+    std::unique_ptr<Northbound> northbound_;  ///< null without `mqtt:`
     Servers servers_;
     bool ready_ = false;
 };

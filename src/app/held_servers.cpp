@@ -76,6 +76,26 @@ void hold_http(const Holder& top, const web::Settings& settings) {
     }
 }
 
+void hold_mqtt(const Holder& top, const mqtt::Settings& settings) {
+    const auto given = [](const std::string& text) { return text.empty() ? "none" : text; };
+    Holder held = top.item("mqtt");
+    held.tell("broker", settings.broker());
+    held.tell("format", settings.format == mqtt::Format::json ? "json" : "sparkplug");
+    held.tell("topic", settings.topic);
+    held.tell("group", settings.group.empty() ? "of the topic" : settings.group);
+    held.tell("node", settings.node.empty() ? "the machine's" : settings.node);
+    held.tell("client_id", settings.client_id.empty() ? "the machine's" : settings.client_id);
+    held.tell("username", given(settings.username));
+    held.tell_secret("password", settings.password);
+    held.tell("write", settings.write ? "points" : "none");
+    held.tell("qos", settings.qos);
+    held.tell("keep_alive", settings.keep_alive);
+    held.tell("ca", given(settings.ca));
+    held.tell("certificate", given(settings.certificate));
+    held.tell("key", given(settings.key));
+    held.tell("store", settings.store);
+}
+
 }  // namespace
 
 void hold_servers(const Holder& top, const config::Config& config) {
@@ -85,6 +105,7 @@ void hold_servers(const Holder& top, const config::Config& config) {
     for (const serial_server::Settings& settings : config.serial_masters)
         hold_master(top, settings);
     if (config.http) hold_http(top, *config.http);
+    if (config.mqtt) hold_mqtt(top, *config.mqtt);
     for (const points::Relay& relay : config.relays) {
         Holder held = top.item("relays", relay.name());
         held.tell("count", std::size_t{relay.count});

@@ -10,6 +10,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/config/counters.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/serial_server/counters.hpp"
@@ -27,6 +28,7 @@ struct Snapshot {
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
     std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
+    std::optional<mqtt::Counters> mqtt;
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;
