@@ -100,13 +100,12 @@ void RunningLine::stop() {
 /// What is polled changes behind the bus: nothing is asked for in the old way then.
 void RunningLine::apply(const config::Line& before, const config::Line& now) {
     if (running_ && is_same_wire(before, now, simulate_)) {
-        bus_->apply(settings_of(now), nullptr);
+        bus_->apply(settings_of(now), nullptr, nullptr);
     } else {
-        const std::shared_ptr<sim::SimulatedBus> left = simulated_;
+        std::shared_ptr<sim::SimulatedBus> far_end = simulated_;
         auto wire = make_wire(now);
         if (simulated_) simulated_->start();
-        bus_->apply(settings_of(now), std::move(wire));
-        if (left) left->stop();
+        bus_->apply(settings_of(now), std::move(wire), std::move(far_end));
     }
     apply_points(now);
     if (!std::exchange(running_, true) && poller_) poller_->start();

@@ -60,7 +60,7 @@ void Arbiter::apply(Settings settings) {
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
-    if (!up_ || resetting_) return Fault::line_down;
+    if ((!up_ && !held_) || resetting_) return Fault::line_down;
     // Not while the client has something open there: it must not read older than its own write.
     const bool waits = schedule_.backlog().has(job.client, job.station);
     const bool open = waits || (active_ && active_->group().has(job.client, job.station));
@@ -107,8 +107,17 @@ void Arbiter::cancel(TimePoint now, Client client) {
     step(now);
 }
 
+void Arbiter::on_line_left() {
+    held_ = true;
+    up_ = false;
+    resetting_ = false;
+    strays_.forget();
+    reception_.memory().clear();
+}
+
 void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
+    held_ = false;
     resetting_ = false;
     proved_ = now;
     if (ascii_) ascii_->cut();
@@ -123,6 +132,7 @@ void Arbiter::on_line_up(TimePoint now) {
 /// What was sent is owed all the same: a device server may hand it to the next connection.
 void Arbiter::on_line_down(TimePoint now) {
     up_ = false;
+    held_ = false;
     resetting_ = false;
     strays_.forget();
     reception_.memory().clear();
@@ -193,7 +203,7 @@ void Arbiter::step(TimePoint now) {
     expire(now);
     if (!active_ && strays_.pending() && now >= quiet_.since() + settings_.end_of_frame)
         judge_idle(now);
-    while (up_ && !resetting_ && !active_ && start_next(now)) check_active(now);
+    while (up_ && !held_ && !resetting_ && !active_ && start_next(now)) check_active(now);
 }
 
 void Arbiter::check_active(TimePoint now) {
@@ -305,7 +315,7 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
         return next;
     }
     if (strays_.pending()) earlier(quiet_.since() + settings_.end_of_frame);
-    if (!up_ || resetting_) return next;
+    if (!up_ || held_ || resetting_) return next;
     if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
     return next;
 }

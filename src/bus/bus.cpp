@@ -1,6 +1,9 @@
 #include "panelgate/bus/bus.hpp"
 
+#include <boost/asio/post.hpp>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "account.hpp"
 #include "answers.hpp"
@@ -65,8 +68,10 @@ struct Bus::State final : public line::Line::Events {
     void on_down(const std::string& why) override;
     void on_bytes(ByteView bytes) override;
 
-    void apply(Settings next, std::unique_ptr<line::Line> other);
-    void leave_line();
+    void apply(Settings next, std::unique_ptr<line::Line> other, std::shared_ptr<void> far_end);
+    void take(Settings next);
+    void change_soon();
+    void change_line();
     void transact(Request request, AnswerHandler handler);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
@@ -92,6 +97,7 @@ struct Bus::State final : public line::Line::Events {
         load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, counts());
         if (calls == 0) answers.hand_over();
+        change_soon();
     }
     /// Somebody calls: whatever it leads to, nobody is answered before it ends.
     template <class Verb>
@@ -121,6 +127,15 @@ struct Bus::State final : public line::Line::Events {
     Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
+    /// Another line, to which this one changes as soon as it waits for no reply.
+    struct Change {
+        Settings settings;
+        std::unique_ptr<line::Line> line;
+        std::vector<std::shared_ptr<void>> far_ends;  ///< of the lines before
+        bool due = false;                             ///< it is posted
+    };
+    std::optional<Change> change;
+    std::shared_ptr<bool> alive = std::make_shared<bool>(true);
     int calls = 0;  ///< of those who ask, under way
     bool up = false;
     std::uint64_t ups = 0;  ///< how often the line came up
@@ -156,27 +171,57 @@ void Bus::State::on_bytes(ByteView bytes) {
     });
 }
 
-void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other) {
-    if (other) leave_line();
+void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other,
+                       std::shared_ptr<void> far_end) {
+    if (other) {
+        if (!change) change.emplace(Change{{}, nullptr, {}, false});
+        change->line = std::move(other);
+        change->far_ends.push_back(std::move(far_end));
+        arbiter.hold();
+    }
+    if (change) {
+        change->settings = std::move(next);
+        return change_soon();
+    }
+    take(std::move(next));
+    drive.tell([this](TimePoint) { arbiter.apply(settings.arbiter); });
+}
+
+void Bus::State::take(Settings next) {
     settings = std::move(next);
     rights = Rights(settings.stations);
     account.apply();
     doctor.apply();
-    const auto go_on = [this](TimePoint) { arbiter.apply(settings.arbiter); };
-    if (!other) return drive.tell(go_on);
-    line = std::move(other);
-    drive.use(*line);
-    drive.hear(go_on);
-    line->start(*this);
 }
 
-/// As if it were lost.
-void Bus::State::leave_line() {
-    line->stop();
-    drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
-    drive.rest();
-    if (std::exchange(up, false)) book.on_line_down(clock.now());
-    why_down = "its settings have changed, and it is being opened";
+/// Not from inside the line that is to go.
+void Bus::State::change_soon() {
+    if (!change || change->due || arbiter.is_waiting()) return;
+    change->due = true;
+    asio::post(executor, [this, life = std::weak_ptr(alive)] {
+        if (!life.expired()) change_line();
+    });
+}
+
+void Bus::State::change_line() {
+    if (!change) return;
+    change->due = false;
+    if (arbiter.is_waiting()) return;
+    Change made = std::move(*change);
+    change.reset();
+    call([&] {
+        line->stop();
+        if (std::exchange(up, false)) book.on_line_down(clock.now());
+        why_down = "its settings have changed, and it is being opened";
+        take(std::move(made.settings));
+        line = std::move(made.line);
+        drive.use(*line);
+        drive.hear([this](TimePoint) {
+            arbiter.on_line_left();
+            arbiter.apply(settings.arbiter);
+        });
+        line->start(*this);
+    });
 }
 
 void Bus::State::transact(Request request, AnswerHandler handler) {
@@ -303,6 +348,9 @@ void Bus::start() {
 }
 
 void Bus::stop() {
+    state_->change.reset();
+    state_->up = false;
+    state_->why_down = "it is closed";
     state_->call([this] {
         state_->line->stop();
         state_->drive.hear([this](TimePoint now) { state_->arbiter.on_line_down(now); });
@@ -310,8 +358,11 @@ void Bus::stop() {
     });
 }
 
-void Bus::apply(Settings settings, std::unique_ptr<line::Line> line) {
-    state_->call([&] { state_->apply(explained(std::move(settings)), std::move(line)); });
+void Bus::apply(Settings settings, std::unique_ptr<line::Line> line,
+                std::shared_ptr<void> far_end) {
+    state_->call([&] {
+        state_->apply(explained(std::move(settings)), std::move(line), std::move(far_end));
+    });
 }
 
 void Bus::transact(Request request, AnswerHandler handler) {

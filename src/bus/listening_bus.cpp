@@ -189,7 +189,9 @@ void ListeningBus::stop() {
     state_->drive.rest();
 }
 
-void ListeningBus::apply(Settings settings, std::unique_ptr<line::Line> line) {
+/// Nobody waits here, so the other line is there at once.
+void ListeningBus::apply(Settings settings, std::unique_ptr<line::Line> line,
+                         std::shared_ptr<void>) {
     State& state = *state_;
     if (line) {
         state.line->stop();

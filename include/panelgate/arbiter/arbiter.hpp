@@ -58,8 +58,14 @@ class Arbiter {
     explicit Arbiter(Settings settings);
 
     /// Goes on with these. What is owed stays, as does what is known of stations, and what waits.
-    /// Only while the line is down (before on_line_up) if it is not is_same_wire().
+    /// Only while the line is down or left if it is not is_same_wire().
     void apply(Settings settings);
+    /// The line is to be left for another one: nothing more starts, until on_line_up or
+    /// on_line_down. What is accepted waits.
+    void hold() { held_ = true; }
+    bool is_waiting() const { return active_.has_value(); }  ///< for what is on the wire
+    /// After hold(), not while is_waiting(): the line is closed, another one will be opened.
+    void on_line_left();
 
     /// Accepts a job (its deadline is set here), or a fault at once: busy, line_down, offline. An
     /// accepted job gets exactly one Finish.
@@ -164,6 +170,7 @@ class Arbiter {
     std::optional<Attempt> active_;
     TimePoint proved_{};  ///< what was sent before has passed: a later one was answered
     bool up_ = false;
+    bool held_ = false;       ///< between two lines, or about to be
     bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent
     Transaction transactions_ = 0;
     Duration latency_{};

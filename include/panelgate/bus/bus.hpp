@@ -61,7 +61,8 @@ class Bus final : public LineBus {
     void start() override;
     /// Closes the line; what waits is answered at once (line_down, line_lost).
     void stop() override;
-    void apply(Settings settings, std::unique_ptr<line::Line> line) override;
+    void apply(Settings settings, std::unique_ptr<line::Line> line,
+               std::shared_ptr<void> far_end) override;
 
     void transact(Request request, AnswerHandler handler) override;
     void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;

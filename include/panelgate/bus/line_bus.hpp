@@ -21,9 +21,11 @@ class LineBus : public BusClient {
     /// Closes the line.
     virtual void stop() = 0;
     /// Goes on with these. What is owed, counted, recorded and known stays, but for stations that
-    /// are no longer listed. `line` takes the place of the one before, whose requests end as when a
-    /// line is lost, and is opened; null, the same goes on: only where is_same_wire().
-    virtual void apply(Settings settings, std::unique_ptr<line::Line> line) = 0;
+    /// are no longer listed. `line` takes the place of the one before as soon as that waits for no
+    /// reply; meanwhile and until it is open requests wait for their turn. `far_end` is kept until
+    /// the one before is closed. Null, the same line goes on: only where is_same_wire().
+    virtual void apply(Settings settings, std::unique_ptr<line::Line> line,
+                       std::shared_ptr<void> far_end) = 0;
     virtual LineReport report() const = 0;
 };
 

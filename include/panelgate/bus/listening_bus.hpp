@@ -28,7 +28,8 @@ class ListeningBus final : public LineBus {
 
     void start() override;
     void stop() override;
-    void apply(Settings settings, std::unique_ptr<line::Line> line) override;
+    void apply(Settings settings, std::unique_ptr<line::Line> line,
+               std::shared_ptr<void> far_end) override;
 
     void transact(Request request, AnswerHandler handler) override;
     void tell_refused(std::uint8_t station, ByteView pdu, ClientId client) override;

@@ -15,7 +15,7 @@ class CountedLine final : public bus::LineBus {
   public:
     void start() override {}
     void stop() override {}
-    void apply(bus::Settings, std::unique_ptr<line::Line>) override {}
+    void apply(bus::Settings, std::unique_ptr<line::Line>, std::shared_ptr<void>) override {}
     bus::LineReport report() const override {
         ++looks;
         bus::LineReport report;

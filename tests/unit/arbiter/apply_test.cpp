@@ -69,6 +69,39 @@ TEST_F(ApplyTest, P1WhatIsOwedIsOwedOnAnotherWireToo) {
     EXPECT_EQ(bus.answer(next).pdu.value(), reply_number(7));
 }
 
+TEST_F(ApplyTest, P3BetweenTwoLinesRequestsWaitForTheirTurn) {
+    const Ticket first = bus.submit(17, read_at(1), 1);
+    bus.arbiter().hold();
+    const Ticket second = bus.submit(18, read_at(2), 2);
+    EXPECT_TRUE(bus.arbiter().is_waiting());
+    bus.run_to_end_of_request();
+    bus.hear_reply(17, kReply);
+    EXPECT_TRUE(bus.answered(first));
+    EXPECT_FALSE(bus.next_sent(100ms));
+    bus.arbiter().on_line_left();
+    const Ticket third = bus.submit(17, read_at(3), 1);
+    settings.serial.baud = 19200;
+    bus.apply(settings);
+    EXPECT_FALSE(bus.next_sent(100ms));
+    bus.line_up();
+    for (const Ticket ticket : {second, third}) {
+        ASSERT_TRUE(bus.next_sent());
+        bus.run_to_end_of_request();
+        bus.hear_reply(bus.sent.back().adu[0], reply_number(ticket));
+        EXPECT_TRUE(bus.answered(ticket));
+    }
+}
+
+TEST_F(ApplyTest, P7WhoWaitsForALineThatDoesNotOpenIsToldSo) {
+    bus.arbiter().hold();
+    const Ticket waits = bus.submit(17, kRead, 1);
+    bus.arbiter().on_line_left();
+    bus.line_down();
+    ASSERT_TRUE(bus.answered(waits));
+    EXPECT_EQ(bus.answer(waits).pdu.error(), Fault::line_down);
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::line_down);
+}
+
 TEST_F(ApplyTest, AStationThatIsListedNoLongerIsAskedAsTheOthers) {
     settings.stations.pop_back();
     settings.unlisted.response_timeout = 50ms;
