@@ -436,6 +436,7 @@ bool Bus::idle() const { return state_->arbiter.idle(); }
 LineReport Bus::report() const {
     LineReport report;
     report.line = state_->settings.name;
+    report.findings = state_->doctor.report();
     report.up = state_->up;
     report.queue_depth = state_->arbiter.queue_depth();
     report.wire = state_->arbiter.counters();

@@ -77,6 +77,14 @@ void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
     settings_.observe(LineEvent{true, what + cause + ", station " + station});
 }
 
+std::vector<FindingReport> LineDoctor::report() const {
+    std::vector<FindingReport> list;
+    for (const doctor::Finding& f : doctor_.findings())
+        list.push_back({std::string(code(f.cause)),
+                        f.station ? name_of(settings_.stations, *f.station) : "all"});
+    return list;
+}
+
 std::vector<LineFinding> LineDoctor::findings() const {
     std::vector<LineFinding> list;
     for (const doctor::Finding& f : doctor_.findings()) {

@@ -34,6 +34,7 @@ class LineDoctor {
     void glance(TimePoint now, const LineCounts& counts);
 
     std::vector<LineFinding> findings() const;
+    std::vector<FindingReport> report() const;
 
   private:
     void judge(TimePoint now, const LineCounts& counts);

@@ -261,6 +261,7 @@ std::optional<Incident> ListeningBus::incident(std::uint64_t id) {
 LineReport ListeningBus::report() const {
     LineReport report;
     report.line = state_->settings.name;
+    report.findings = state_->doctor.report();
     report.up = state_->up;
     report.wire = state_->heard.line();
     report.device = state_->line->counters();

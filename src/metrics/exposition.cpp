@@ -230,6 +230,18 @@ void add_line_state(Families& out, const Snapshot& snapshot) {
     out.push_back(wait.take());
 }
 
+void add_findings(Families& out, const Snapshot& snapshot) {
+    Family found = make_gauge("panelgate_findings",
+                              "1 while the line doctor takes this for a cause of errors; absent "
+                              "otherwise. Station all: the whole line.");
+    for (const LineReport& line : snapshot.lines) {
+        for (const bus::FindingReport& finding : line.findings)
+            found.gauge(
+                with(with(of_line(line), "station", finding.station), "cause", finding.cause), 1);
+    }
+    out.push_back(found.take());
+}
+
 void add_station_state(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge("panelgate_station_up", "1 while a configured station answers.");
     Family success =
@@ -327,10 +339,10 @@ void add_process(Families& out, const Snapshot& snapshot) {
 
 using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
-    add_requests,      add_translated,    add_station_times,  add_wire_counters, add_exceptions,
-    add_line_counters, add_uart_counters, add_line_state,     add_station_state, add_points,
-    add_relays,        add_listeners,     add_serial_masters, add_http,          add_mqtt,
-    add_loop,          add_reloads,       add_process,
+    add_requests,      add_translated,    add_station_times, add_wire_counters,  add_exceptions,
+    add_line_counters, add_uart_counters, add_line_state,    add_findings,       add_station_state,
+    add_points,        add_relays,        add_listeners,     add_serial_masters, add_http,
+    add_mqtt,          add_loop,          add_reloads,       add_process,
 };
 
 }  // namespace

@@ -137,6 +137,9 @@ class Scraped(unittest.TestCase):
         set_faults(plant.demo.http_port(), DEMO_FAULTS)
         set_faults(plant.box.ports[1], BOX_FAULTS)
         plant.far_end.stop()
+        with open(plant.box.file, "a") as file:  # ReloadFailed
+            file.write("nonsense: 1\n")
+        plant.box.process.send_signal(signal.SIGHUP)
         expected = alerts() - {"PanelgateDown"}
         texts = {}
 

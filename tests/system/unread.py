@@ -13,11 +13,11 @@ class Unread:
 
     def __init__(self, text):
         self.folder = tempfile.TemporaryDirectory()
-        path = os.path.join(self.folder.name, "panelgate.yaml")
-        with open(path, "w") as file:
+        self.file = os.path.join(self.folder.name, "panelgate.yaml")
+        with open(self.file, "w") as file:
             file.write(text)
         self.reader, writer = os.pipe()
-        self.process = subprocess.Popen([harness.PANELGATE, "run", "-c", path],
+        self.process = subprocess.Popen([harness.PANELGATE, "run", "-c", self.file],
                                         stdin=subprocess.DEVNULL, stderr=writer)
         os.close(writer)
         self.ports = self._ports()

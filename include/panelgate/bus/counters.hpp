@@ -31,6 +31,12 @@ struct StationReport {
 };
 
 /// Everything metrics/ copies from one line at a scrape.
+/// What the line doctor finds.
+struct FindingReport {
+    std::string cause;    ///< a stable word
+    std::string station;  ///< its name; "all" of the whole line
+};
+
 struct LineReport {
     std::string line;
     bool up = false;
@@ -38,6 +44,7 @@ struct LineReport {
     arbiter::LineCounters wire;
     line::Counters device;
     std::vector<StationReport> stations;
+    std::vector<FindingReport> findings;
 };
 
 }  // namespace panelgate::bus
