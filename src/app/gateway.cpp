@@ -56,7 +56,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       simulate_(simulate),
       reloads_(reloads),
       events_(new_epoch()),
-      servers_(executor_, clock_) {
+      servers_(executor_, clock_),
+      northbound_(executor_, clock_) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         lines_.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
@@ -84,6 +85,7 @@ LineWatch Gateway::watch() {
 
 void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, scene_->plant, line, event);
+    northbound_.on_bus_event(line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && relay_listener_) relay_listener_(line, *write);
 }
@@ -94,6 +96,7 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
     Station& station = scene_->plant.at(line, id);
     remember(station, wants, clock_.now());
     publish_points(events_, station, wants, clock_.now());
+    northbound_.on_points(station, wants);
 }
 
 /// Those that there are already, and new ones.
@@ -143,6 +146,7 @@ void Gateway::show(const std::shared_ptr<Scene>& scene) {
             scene->directory.lines[i].history = scene->histories[i].get();
     }
     scene_ = scene;
+    northbound_.show(scene_);
 }
 
 void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
@@ -199,6 +203,7 @@ void Gateway::start() {
     servers_.open(*scene_->config, scene_->plant, {directory, [this] { return providers(); }});
     servers_.apply(*scene_->config, scene_->plant, directory(), shown_text(*scene_->config),
                    longest_answer());
+    northbound_.start();
     ready_ = true;
 }
 
@@ -223,6 +228,7 @@ std::string Gateway::status() const {
 void Gateway::stop() {
     lag_.stop();
     servers_.close();
+    northbound_.stop();
     if (line_histories_) line_histories_->stop();
     relays_->stop();
     for (const auto& line : scene_->lines) line->stop();
@@ -239,6 +245,7 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points,
     if (points.next(snapshot.points, clock_.now())) return true;
     snapshot.relays = relay_samples(relays_->status());
     servers_.copy_figures(snapshot);
+    snapshot.mqtt = northbound_.counters();
     if (reloads_->barred(false).empty()) snapshot.reloads = reloads_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();

@@ -11,6 +11,7 @@
 
 #include "discoveries.hpp"
 #include "line_histories.hpp"
+#include "northbound.hpp"
 #include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -98,6 +99,7 @@ class Gateway {
     std::unique_ptr<points::Relays> relays_;
     std::unique_ptr<Scrapes> scrapes_;  ///< null until there is `http:`
     Servers servers_;
+    Northbound northbound_;
     bool ready_ = false;
 };
 

@@ -76,6 +76,28 @@ void hold_http(const Holder& top, const web::Settings& settings) {
     }
 }
 
+void hold_mqtt(const Holder& top, const mqtt::Settings& settings) {
+    const auto or_default = [](const std::string& text) {
+        return text.empty() ? std::string("default") : text;
+    };
+    Holder held = top.item("mqtt");
+    held.tell("broker", settings.broker());
+    held.tell("format", label(settings.format));
+    held.tell("topic", settings.topic);
+    held.tell("group", or_default(settings.group));
+    held.tell("node", or_default(settings.node));
+    held.tell("client_id", or_default(settings.client_id));
+    held.tell("username", or_default(settings.username));
+    held.tell_secret("password", settings.password);
+    held.tell("write", settings.write ? "points" : "none");
+    held.tell("qos", settings.qos);
+    held.tell("keep_alive", settings.keep_alive);
+    held.tell("ca", or_default(settings.ca));
+    held.tell("certificate", or_default(settings.certificate));
+    held.tell("key", or_default(settings.key));
+    held.tell("store", settings.store);
+}
+
 }  // namespace
 
 void hold_servers(const Holder& top, const config::Config& config) {
@@ -85,6 +107,7 @@ void hold_servers(const Holder& top, const config::Config& config) {
     for (const serial_server::Settings& settings : config.serial_masters)
         hold_master(top, settings);
     if (config.http) hold_http(top, *config.http);
+    if (config.mqtt) hold_mqtt(top, *config.mqtt);
     for (const points::Relay& relay : config.relays) {
         Holder held = top.item("relays", relay.name());
         held.tell("count", std::size_t{relay.count});

@@ -159,6 +159,14 @@ json::object http_json(const web::Settings& http) {
             {"allow", each(http.allow, network_json)}};
 }
 
+json::object mqtt_json(const mqtt::Settings& mqtt) {
+    return {{"broker", mqtt.broker()},
+            {"format", label(mqtt.format)},
+            {"topic", mqtt.topic},
+            {"store", mqtt.store},
+            {"write", mqtt.write ? "points" : "none"}};
+}
+
 }  // namespace
 
 json::object inventory_json(const config::Config& config) {
@@ -168,6 +176,7 @@ json::object inventory_json(const config::Config& config) {
     if (!config.serial_masters.empty())
         made["serial_masters"] = each(config.serial_masters, master_json);
     if (config.http) made["http"] = http_json(*config.http);
+    if (config.mqtt) made["mqtt"] = mqtt_json(*config.mqtt);
     return made;
 }
 

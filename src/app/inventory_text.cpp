@@ -174,6 +174,13 @@ std::string text_of(const web::Settings& http) {
     return text;
 }
 
+std::string text_of(const mqtt::Settings& mqtt) {
+    const bool json = mqtt.format == mqtt::Format::json;
+    return "mqtt " + mqtt.broker() + ": " + (json ? "json below " + mqtt.topic : "sparkplug") +
+           ", " + std::to_string(mqtt.store) + " changes are kept while it is away, points are " +
+           (mqtt.write ? "read and written\n" : "read\n");
+}
+
 }  // namespace
 
 std::string inventory_text(const config::Config& config) {
@@ -184,6 +191,7 @@ std::string inventory_text(const config::Config& config) {
         text += text_of(config, listener);
     for (const serial_server::Settings& master : config.serial_masters) text += text_of(master);
     if (config.http) text += text_of(*config.http);
+    if (config.mqtt) text += text_of(*config.mqtt);
     return text;
 }
 

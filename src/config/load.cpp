@@ -119,6 +119,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_modbus_tcp(loading, root);
     load_serial_masters(loading, root);
     load_http(loading, root);
+    load_mqtt(loading, root);
     load_log(loading, root);
     load_realtime(loading, root);
     load_relays(loading, root);
@@ -129,13 +130,13 @@ void load_tree(Loading& loading, yaml::Node& tree) {
                           std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
                               return is_http(entry.key);
                           });
-    const bool has_other = root.child("http") != nullptr || root.child("serial_masters") != nullptr;
+    const bool has_other = root.child("http") != nullptr ||
+                           root.child("serial_masters") != nullptr || root.child("mqtt") != nullptr;
     if (is_empty && !has_other && !mistyped)
         loading.problems.add({1, 1},
                              "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
                              "[{listen: 127.0.0.1:502}]");
     root.elsewhere(kElsewhere);
-    root.refuse("mqtt", "is not in this version; remove it");
     root.has("templates");  // known, though nothing of it is left
     root.finish();
     if (loading.problems.empty()) warn_of_doors(loading, tree);

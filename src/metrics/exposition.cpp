@@ -6,6 +6,7 @@
 
 #include "families.hpp"
 #include "http_families.hpp"
+#include "mqtt_families.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/base/priority.hpp"
@@ -328,8 +329,8 @@ using Part = void (*)(Families&, const Snapshot&);
 constexpr Part kParts[] = {
     add_requests,      add_translated,    add_station_times,  add_wire_counters, add_exceptions,
     add_line_counters, add_uart_counters, add_line_state,     add_station_state, add_points,
-    add_relays,        add_listeners,     add_serial_masters, add_http,          add_loop,
-    add_reloads,       add_process,
+    add_relays,        add_listeners,     add_serial_masters, add_http,          add_mqtt,
+    add_loop,          add_reloads,       add_process,
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/line/settings.hpp"
+#include "panelgate/mqtt/settings.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/profile/profile_ref.hpp"
@@ -57,6 +58,7 @@ struct Config {
     std::vector<tcp_server::Settings> modbus_tcp;
     std::vector<serial_server::Settings> serial_masters;
     std::optional<web::Settings> http;
+    std::optional<mqtt::Settings> mqtt;  ///< nothing: values go to no broker
     rt::LogSettings log;
     rt::RealtimeSettings realtime;
     /// Things that are legal but worth a word ("8N1 is outside the standard"), FILE:LINE:COLUMN

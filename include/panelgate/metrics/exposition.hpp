@@ -10,6 +10,7 @@
 #include "panelgate/bus/counters.hpp"
 #include "panelgate/config/counters.hpp"
 #include "panelgate/metrics/process.hpp"
+#include "panelgate/mqtt/counters.hpp"
 #include "panelgate/points/counters.hpp"
 #include "panelgate/rt/counters.hpp"
 #include "panelgate/serial_server/counters.hpp"
@@ -26,6 +27,7 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
+    std::optional<mqtt::Counters> mqtt;  ///< nothing: there is no broker
     std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
     std::string version;
     ProcessFacts process;

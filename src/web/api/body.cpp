@@ -4,9 +4,11 @@
 #include <boost/json/array.hpp>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "json_reader.hpp"
 #include "panelgate/base/decimal.hpp"
+#include "panelgate/web/api/value_json.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "repeated_member.hpp"
 
@@ -54,14 +56,20 @@ Parsed<std::uint16_t> cell(const json::value& value, modbus::Table table) {
 
 }  // namespace
 
-Parsed<json::object> parse_object(std::string_view body) {
-    const JsonRead read = read_json(body);
-    if (read.fault) return bad_json(body, *read.fault);
-    if (const auto twice = find_repeated_member(body))
+Parsed<json::value> parse_json(std::string_view text) {
+    JsonRead read = read_json(text);
+    if (read.fault) return bad_json(text, *read.fault);
+    if (const auto twice = find_repeated_member(text))
         return problem(400, "the member '" + excerpt(twice->name) +
-                                "' comes a second time: " + place_of(body, twice->at));
-    if (!read.value.is_object()) return problem(400, "the body must be a JSON object");
-    return read.value.get_object();
+                                "' comes a second time: " + place_of(text, twice->at));
+    return std::move(read.value);
+}
+
+Parsed<json::object> parse_object(std::string_view body) {
+    const auto value = parse_json(body);
+    if (!value) return value.error();
+    if (!value->is_object()) return problem(400, "the body must be a JSON object");
+    return value->get_object();
 }
 
 Parsed<json::object> parse_object(std::string_view body, Members known) {
@@ -122,12 +130,16 @@ Parsed<bool> flag_member(const json::object& object, std::string_view name) {
 Parsed<points::Value> value_member(const json::object& object) {
     const json::value* value = object.if_contains("value");
     if (value == nullptr) return problem(400, "the body needs \"value\"");
-    if (value->is_bool()) return points::Value(value->get_bool());
-    if (value->is_int64()) return points::Value(value->get_int64());
-    if (value->is_uint64()) return points::Value(value->get_uint64());
-    if (value->is_double()) return points::Value(value->get_double());
-    if (const auto digits = exact_digits(*value)) return points::Value(*Decimal::parse(*digits));
-    if (value->is_string()) return points::Value(std::string(value->get_string()));
+    return value_of(*value);
+}
+
+Parsed<points::Value> value_of(const json::value& value) {
+    if (value.is_bool()) return points::Value(value.get_bool());
+    if (value.is_int64()) return points::Value(value.get_int64());
+    if (value.is_uint64()) return points::Value(value.get_uint64());
+    if (value.is_double()) return points::Value(value.get_double());
+    if (const auto digits = exact_digits(value)) return points::Value(*Decimal::parse(*digits));
+    if (value.is_string()) return points::Value(std::string(value.get_string()));
     return problem(400, "value must be a number, true, false or a text");
 }
 

@@ -1,14 +1,11 @@
 #pragma once
 
 #include <boost/json/object.hpp>
-#include <boost/json/value.hpp>
 
 #include "panelgate/points/station_points.hpp"
-#include "panelgate/points/value.hpp"
+#include "panelgate/web/api/value_json.hpp"
 
 namespace panelgate::web {
-
-boost::json::value json_of(const points::Value& value);
 
 /// {"name","value","label","unit","quality","age_ms"} (README, REST).
 boost::json::object point_json(const points::Point& point, const points::PointReading& reading);

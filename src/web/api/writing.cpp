@@ -8,7 +8,7 @@
 #include "ask.hpp"
 #include "body.hpp"
 #include "panelgate/points/station_points.hpp"
-#include "point_json.hpp"
+#include "panelgate/web/api/point_order.hpp"
 #include "reading.hpp"
 #include "refusal.hpp"
 #include "write_plan.hpp"
@@ -54,11 +54,7 @@ Parsed<Writing> plan(const PointOfStation& to, const Parsed<json::object>& body,
     const auto value = value_member(*body);
     if (!value) return value.error();
     auto write = points::write_request(*to.station.profile, *to.point, *value, *rounding);
-    if (!write) {
-        if (write.error().malformed) return problem(400, write.error().message);
-        const char* const hint = write.error().inexact ? "; ?round=true writes the nearest" : "";
-        return problem(422, write.error().message + hint);
-    }
+    if (!write) return problem_of(write.error(), "; ?round=true writes the nearest");
     auto made = writing_of(to.station, write->pdu, *body);
     if (made) made->point = std::move(*write);
     return made;
@@ -70,14 +66,8 @@ bool is_unknown(const bus::Answer& answer) {
 }
 
 json::object confirmed(const Writing& writing) {
-    json::object body;
-    body["transmitted"] = true;
-    body["confirmed"] = true;
-    if (writing.point) {
-        body["value"] = json_of(writing.point->value);
-        if (writing.point->label) body["label"] = *writing.point->label;
-    }
-    return body;
+    if (writing.point) return web::confirmed(*writing.point);
+    return {{"transmitted", true}, {"confirmed", true}};
 }
 
 }  // namespace

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <boost/json/value.hpp>
+#include <string_view>
+
+#include "panelgate/points/value.hpp"
+#include "panelgate/web/http/problem.hpp"
+
+namespace panelgate::web {
+
+/// A point's value in JSON, with every digit; for json_text().
+boost::json::value json_of(const points::Value& value);
+
+/// Any JSON text; 400 with line and column of what is wrong, a member that comes twice included, at
+/// any depth.
+Parsed<boost::json::value> parse_json(std::string_view text);
+/// What a client wants a point to be.
+Parsed<points::Value> value_of(const boost::json::value& value);
+
+}  // namespace panelgate::web

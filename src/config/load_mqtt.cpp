@@ -1,0 +1,190 @@
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "loader.hpp"
+#include "panelgate/line/settings.hpp"
+#include "panelgate/yaml/quote.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using yaml::MapReader;
+
+constexpr std::string_view kExample = "{broker: mqtt://HOST:1883, topic: plant/panelgate}";
+constexpr std::string_view kBroker = "write it into the broker, such as broker: mqtt://HOST:1883";
+constexpr std::string_view kSecret =
+    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "read, and here password_file: with its path";
+constexpr std::string_view kTls =
+    "write broker: mqtts://HOST:8883; ca, certificate and key stand beside it";
+constexpr std::array<yaml::Elsewhere, 9> kElsewhere{{{"host", {}, {}, kBroker},
+                                                     {"port", {}, {}, kBroker},
+                                                     {"url", {}, {}, kBroker},
+                                                     {"server", {}, {}, kBroker},
+                                                     {"password", {}, {}, kSecret},
+                                                     {"secret", {}, {}, kSecret},
+                                                     {"token", {}, {}, kSecret},
+                                                     {"tls", {}, {}, kTls},
+                                                     {"ssl", {}, {}, kTls}}};
+
+/// "mqtt://HOST:PORT", "mqtts://HOST"; false on anything else.
+bool parse_broker(std::string_view text, mqtt::Settings& settings) {
+    constexpr std::string_view kPlain = "mqtt://";
+    constexpr std::string_view kSafe = "mqtts://";
+    settings.tls = text.starts_with(kSafe);
+    if (!settings.tls && !text.starts_with(kPlain)) return false;
+    std::string rest(text.substr((settings.tls ? kSafe : kPlain).size()));
+    auto endpoint = line::parse_tcp_device("tcp://" + rest);
+    if (!endpoint)
+        endpoint = line::parse_tcp_device("tcp://" + rest + (settings.tls ? ":8883" : ":1883"));
+    if (!endpoint) return false;
+    settings.host = endpoint->host;
+    settings.port = static_cast<std::uint16_t>(*yaml::parse_integer(endpoint->port));
+    return true;
+}
+
+void load_broker(MapReader& in, mqtt::Settings& settings) {
+    const auto text = in.required_text("broker");
+    if (!text || parse_broker(*text, settings)) return;
+    in.problem("broker",
+               "broker must be mqtt://HOST:PORT, or mqtts://HOST:PORT with TLS, such as "
+               "mqtt://broker.plant:1883, not " +
+                   yaml::quote(*text));
+}
+
+/// A part of topics; `kind` says what it must be.
+void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
+               std::string_view kind, std::string& part) {
+    constexpr std::size_t kLongest = 128;
+    const auto text = in.text(key);
+    if (!text) return;
+    const bool odd_end = text->starts_with('/') || text->ends_with('/') || text->starts_with('$');
+    if (odd_end || text->size() > kLongest || text->find_first_of(forbidden) != text->npos ||
+        text->find("//") != text->npos) {
+        in.problem(key, std::string(key) + " must be " + std::string(kind) + ", not " +
+                            yaml::quote(*text));
+        return;
+    }
+    part = *text;
+}
+
+/// The file's text without the line's end; "" and a problem when there is none.
+std::string load_password(Loading& loading, MapReader& in) {
+    const auto file = in.text("password_file");
+    if (!file) return "";
+    auto text = loading.files.is_special(*file) ? std::nullopt : loading.files.read(*file);
+    if (!text) {
+        in.problem("password_file",
+                   "cannot read the password file; give the path of a file that holds the password "
+                   "and that this program may read");
+        return "";
+    }
+    if (text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
+    while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
+    if (text->empty()) in.problem("password_file", "the password file is empty");
+    if (!in.has("username"))
+        in.problem("password_file", "a password needs a username; add username: NAME");
+    return *text;
+}
+
+void load_file(Loading& loading, MapReader& in, std::string_view key, bool tls, std::string& path) {
+    const auto text = in.text(key);
+    if (!text) return;
+    path = *text;
+    if (!tls)
+        in.problem(key, std::string(key) + " needs TLS; write broker: mqtts://HOST:8883");
+    else if (loading.files.is_special(path) || !loading.files.read(path))
+        in.problem(key, "cannot read " + path +
+                            "; give the path of a PEM file that this program "
+                            "may read");
+}
+
+void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
+    load_file(loading, in, "ca", settings.tls, settings.ca);
+    load_file(loading, in, "certificate", settings.tls, settings.certificate);
+    load_file(loading, in, "key", settings.tls, settings.key);
+    if (settings.certificate.empty() == settings.key.empty()) return;
+    in.problem(settings.key.empty() ? "certificate" : "key",
+               "certificate and key belong together; give both");
+}
+
+void load_format(MapReader& in, mqtt::Settings& settings) {
+    constexpr std::array<std::pair<std::string_view, mqtt::Format>, 2> kFormats{
+        {{"json", mqtt::Format::json}, {"sparkplug", mqtt::Format::sparkplug}}};
+    settings.format = in.choice<mqtt::Format>("format", kFormats).value_or(settings.format);
+    load_part(in, "topic", "+#",
+              "a topic such as plant/panelgate, without + and #, without $ in front or / at an end",
+              settings.topic);
+    load_part(in, "group", "+#/", "one level of a topic, without +, # and /", settings.group);
+    load_part(in, "node", "+#/", "one level of a topic, without +, # and /", settings.node);
+    if (const auto qos = in.integer("qos", 0, 1)) settings.qos = static_cast<int>(*qos);
+    const bool sparkplug = settings.format == mqtt::Format::sparkplug;
+    if (sparkplug && in.has("qos"))
+        in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
+    for (const std::string_view key : {"group", "node"}) {
+        if (!sparkplug && in.has(key))
+            in.problem(key, std::string(key) + " is of Sparkplug; add format: sparkplug");
+    }
+}
+
+void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
+    constexpr std::size_t kLongest = 128;
+    settings.client_id = in.text("client_id").value_or("");
+    if (settings.client_id.size() > kLongest)
+        in.problem("client_id", "client_id must have at most 128 characters");
+    settings.username = in.text("username").value_or("");
+    settings.password = load_password(loading, in);
+    if (const auto alive = in.duration("keep_alive", 5s, 1h)) {
+        settings.keep_alive = *alive;
+        if (*alive != std::chrono::floor<std::chrono::seconds>(*alive))
+            in.problem("keep_alive", "keep_alive must be of whole seconds, such as 60s");
+    }
+    constexpr std::int64_t kFewest = 100;
+    constexpr std::int64_t kMost = 1'000'000;
+    if (const auto store = in.integer("store", kFewest, kMost))
+        settings.store = static_cast<std::size_t>(*store);
+}
+
+bool is_loopback(std::string_view host) {
+    return host == "localhost" || host == "::1" || host.starts_with("127.");
+}
+
+void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& settings) {
+    if (is_loopback(settings.host)) return;
+    if (!settings.tls && !settings.password.empty())
+        loading.warn(in.mark("broker"),
+                     "the password crosses the network where everybody can read "
+                     "it; write broker: mqtts://" +
+                         settings.host + ":8883");
+    if (settings.write && settings.username.empty() && settings.certificate.empty())
+        loading.warn(
+            in.mark("write"),
+            "whoever may publish at this broker may write to the panels, and the gateway "
+            "shows it no name; give it a username, and rights at the broker for TOPIC/+/+/set");
+}
+
+}  // namespace
+
+void load_mqtt(Loading& loading, MapReader& root) {
+    const yaml::Node* node = root.map("mqtt", kExample);
+    if (node == nullptr) return;
+    MapReader in(*node, loading.problems, "mqtt", kExample);
+    in.elsewhere(kElsewhere);
+    mqtt::Settings settings;
+    load_broker(in, settings);
+    load_format(in, settings);
+    load_session(loading, in, settings);
+    load_tls(loading, in, settings);
+    constexpr std::array<std::pair<std::string_view, bool>, 2> kWrites{
+        {{"none", false}, {"points", true}}};
+    settings.write = in.choice<bool>("write", kWrites).value_or(false);
+    in.finish();
+    warn_of_broker(loading, in, settings);
+    loading.config.mqtt = std::move(settings);
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,154 @@
+#include "connection.hpp"
+
+#include <mosquitto.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace panelgate::mqtt {
+namespace {
+
+/// The C library's state, for as long as the program runs.
+void set_up_library() {
+    static const int ready = mosquitto_lib_init();
+    static_cast<void>(ready);
+}
+
+/// errno is of the call that has just failed.
+std::string why(int code) {
+    if (code == MOSQ_ERR_SUCCESS) return "";
+    if (code == MOSQ_ERR_ERRNO) return std::strerror(errno);
+    if (code == MOSQ_ERR_CONN_LOST) return "the broker has closed the connection";
+    if (code == MOSQ_ERR_KEEPALIVE) return "the broker does not answer";
+    return mosquitto_strerror(code);
+}
+
+const char* or_null(const std::string& text) { return text.empty() ? nullptr : text.c_str(); }
+
+mosquitto* new_session(const std::string& client_id, void* owner) {
+    set_up_library();
+    mosquitto* session = mosquitto_new(client_id.c_str(), true, owner);
+    if (session == nullptr) throw std::runtime_error("libmosquitto has no memory");
+    return session;
+}
+
+constexpr int kVerifyPeer = 1;  // SSL_VERIFY_PEER
+constexpr int kReads = 64;      // of one wake-up
+constexpr const char* kNothing = "panelgate/barrier";
+constexpr const char* kSystemTrust = "/etc/ssl/certs";
+
+}  // namespace
+
+/// In the order of libmosquitto's parameters; nothing is called back from here.
+struct Connection::Callbacks {
+    static Connection& of(void* owner) { return *static_cast<Connection*>(owner); }
+
+    static void connected(mosquitto*, void* owner, int code) {
+        Happened& happened = of(owner).happened_;
+        if (code == 0) {
+            happened.accepted = true;
+        } else {
+            happened.refused = mosquitto_connack_string(code);
+        }
+    }
+    static void delivered(mosquitto*, void* owner, int id) {
+        of(owner).happened_.delivered.push_back(id);
+    }
+    static void received(mosquitto*, void* owner, const mosquitto_message* message) {
+        const Settings& settings = of(owner).settings_;
+        const auto size = static_cast<std::size_t>(message->payloadlen);
+        // What is too long is told apart by one byte more.
+        const std::size_t kept = size > settings.payload ? settings.payload + 1 : size;
+        of(owner).happened_.received.push_back(
+            {message->topic, std::string(static_cast<const char*>(message->payload), kept),
+             message->retain});
+    }
+};
+
+Connection::Connection(const Settings& settings, const std::string& client_id)
+    : settings_(settings), session_(new_session(client_id, this), mosquitto_destroy) {}
+
+Connection::~Connection() = default;
+
+std::string Connection::set_up_tls() {
+    if (!settings_.tls) return "";
+    const char* const folder = settings_.ca.empty() ? kSystemTrust : nullptr;
+    const int code =
+        mosquitto_tls_set(session_.get(), or_null(settings_.ca), folder,
+                          or_null(settings_.certificate), or_null(settings_.key), nullptr);
+    if (code != MOSQ_ERR_SUCCESS) return "cannot use ca, certificate or key: " + why(code);
+    return why(mosquitto_tls_opts_set(session_.get(), kVerifyPeer, nullptr, nullptr));
+}
+
+std::string Connection::set_up(const Message& will) {
+    mosquitto* session = session_.get();
+    mosquitto_connect_callback_set(session, Callbacks::connected);
+    mosquitto_publish_callback_set(session, Callbacks::delivered);
+    mosquitto_unsubscribe_callback_set(session, Callbacks::delivered);
+    mosquitto_message_callback_set(session, Callbacks::received);
+    mosquitto_int_option(session, MOSQ_OPT_TCP_NODELAY, 1);
+    // Whoever publishes sees to it; one more is the farewell.
+    mosquitto_max_inflight_messages_set(session, static_cast<unsigned>(settings_.in_flight) + 1);
+    int code =
+        mosquitto_will_set(session, will.topic.c_str(), static_cast<int>(will.payload.size()),
+                           will.payload.data(), will.qos, will.retain);
+    if (code == MOSQ_ERR_SUCCESS && !settings_.username.empty())
+        code = mosquitto_username_pw_set(session, settings_.username.c_str(),
+                                         or_null(settings_.password));
+    if (code != MOSQ_ERR_SUCCESS) return why(code);
+    return set_up_tls();
+}
+
+std::string Connection::connect(const Message& will) {
+    std::string failed = set_up(will);
+    if (!failed.empty()) return failed;
+    const auto keep_alive = std::chrono::floor<std::chrono::seconds>(settings_.keep_alive).count();
+    return why(mosquitto_connect(session_.get(), settings_.host.c_str(), settings_.port,
+                                 static_cast<int>(keep_alive)));
+}
+
+int Connection::socket() const { return mosquitto_socket(session_.get()); }
+
+bool Connection::wants_write() const { return mosquitto_want_write(session_.get()); }
+
+/// TLS may hold what the socket does not show any more: so until there is nothing.
+std::string Connection::read() {
+    for (int i = 0; i < kReads; ++i) {
+        errno = 0;
+        const int code = mosquitto_loop_read(session_.get(), 1);
+        if (code != MOSQ_ERR_SUCCESS) return why(code);
+        if (errno == EAGAIN || errno == EWOULDBLOCK) break;
+    }
+    return "";
+}
+
+std::string Connection::write() { return why(mosquitto_loop_write(session_.get(), 1)); }
+
+std::string Connection::look_after() { return why(mosquitto_loop_misc(session_.get())); }
+
+int Connection::publish(const Message& message) {
+    int id = 0;
+    const int code = mosquitto_publish(session_.get(), &id, message.topic.c_str(),
+                                       static_cast<int>(message.payload.size()),
+                                       message.payload.data(), message.qos, message.retain);
+    return code == MOSQ_ERR_SUCCESS ? id : 0;
+}
+
+bool Connection::subscribe(const std::string& filter) {
+    return mosquitto_subscribe(session_.get(), nullptr, filter.c_str(), 0) == MOSQ_ERR_SUCCESS;
+}
+
+int Connection::barrier() {
+    int id = 0;
+    const int code = mosquitto_unsubscribe(session_.get(), &id, kNothing);
+    return code == MOSQ_ERR_SUCCESS ? id : 0;
+}
+
+void Connection::disconnect() { mosquitto_disconnect(session_.get()); }
+
+Connection::Happened Connection::take() { return std::exchange(happened_, {}); }
+
+}  // namespace panelgate::mqtt

@@ -1,0 +1,11 @@
+#include "panelgate/mqtt/settings.hpp"
+
+#include "panelgate/base/endpoint_text.hpp"
+
+namespace panelgate::mqtt {
+
+std::string Settings::broker() const {
+    return (tls ? "mqtts://" : "mqtt://") + endpoint_text(host, port);
+}
+
+}  // namespace panelgate::mqtt

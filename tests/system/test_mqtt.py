@@ -1,0 +1,339 @@
+"""Values at a real broker, and writes by way of it: mosquitto, listened to by paho."""
+import contextlib
+import json
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import threading
+import unittest
+
+import config
+import harness
+from test_events import Events
+from test_points import until
+
+try:
+    import paho.mqtt.client as paho
+except ImportError:
+    paho = None
+BROKER = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
+TOPIC = "plant/hall"
+PRESS = """{id: 31, name: press, profile: autonics-gplp-s, points: [
+      {name: level, at: UW100, type: i16, scale: 0.1, unit: celsius, writable: true, max: 400, every: 20ms},
+      {name: mode, at: UW105, labels: {0: stopped, 1: running}, writable: true, every: 20ms},
+      {name: ramp, at: UW201, every: 20ms}]}"""
+LOCKED = """{id: 30, name: locked, profile: autonics-gplp-s, access: read_only, points: [
+      {name: level, at: UW100, every: 20ms}]}"""
+COUNTER = """{id: 31, name: press, profile: autonics-gplp-s, points: [
+      {name: ramp, at: UW201, every: 100ms}]}"""
+FAST = {"timing": "{response_timeout: 60ms}", "offline": "{probe_min: 100ms, probe_max: 200ms}"}
+
+
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
+
+
+class Broker:
+    """mosquitto with a store of its own, so that a restart loses nothing that it has acknowledged;
+    a context manager."""
+
+    def __init__(self, extra=""):
+        self._folder = tempfile.TemporaryDirectory()
+        self.port = free_port()
+        self.file = pathlib.Path(self._folder.name) / "mosquitto.conf"
+        self.file.write_text(f"listener {self.port} 127.0.0.1\n{extra or 'allow_anonymous true'}\n"
+                             f"persistence true\npersistence_location {self._folder.name}/\n"
+                             "max_queued_messages 0\nmax_inflight_messages 0\nqueue_qos0_messages true\n"
+                             "log_dest stderr\nlog_type all\nuser root\n")
+        self.process = None
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+        self._folder.cleanup()
+
+    def start(self):
+        self.process = subprocess.Popen([BROKER, "-c", str(self.file)], stderr=subprocess.PIPE,
+                                        stdin=subprocess.DEVNULL, text=True, errors="replace")
+        self.log = harness.Output(self.process.stderr)
+        self.log.wait_for("mosquitto version .* running")
+
+    def stop(self):
+        if self.process is None:
+            return
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(harness.PATIENCE)
+        self.process = None
+
+    def restart(self):
+        self.stop()
+        self.start()
+
+
+class Listener:
+    """What comes by a topic; a context manager. With a name it is remembered by the broker."""
+
+    def __init__(self, broker, topic="#", name=None):
+        self.received = []  # (topic, payload, retained)
+        self._changed = threading.Condition()
+        self._subscribed = threading.Event()
+        self._client = paho.Client(name or "", clean_session=name is None)
+        self._client.reconnect_delay_set(1, 1)
+        self._client.on_connect = lambda client, *_: client.subscribe(topic, 1)
+        self._client.on_subscribe = lambda *_: self._subscribed.set()
+        self._client.on_message = self._take
+        self._client.connect("127.0.0.1", broker.port)
+        self._client.loop_start()
+
+    def __enter__(self):
+        assert self._subscribed.wait(harness.PATIENCE), "the broker takes no listener"
+        return self
+
+    def __exit__(self, *_):
+        self._client.disconnect()
+        self._client.loop_stop()
+
+    def _take(self, _client, _user, message):
+        with self._changed:
+            self.received.append((message.topic, message.payload, message.retain))
+            self._changed.notify_all()
+
+    def publish(self, topic, payload, retain=False):
+        self._client.publish(topic, payload, qos=1, retain=retain).wait_for_publish(harness.PATIENCE)
+
+    def of(self, topic):
+        """Payloads of a topic, as JSON."""
+        with self._changed:
+            return [json.loads(payload) for name, payload, _ in self.received if name == topic]
+
+    def wait_for(self, topic, fits=lambda body: True, after=0):
+        """The first of a topic's, behind so many of them, that fits."""
+        found = []
+
+        def look():
+            found[:] = [body for body in self.of_locked(topic)[after:] if fits(body)]
+            return found
+        with self._changed:
+            assert self._changed.wait_for(look, harness.PATIENCE), (topic, self.of_locked(topic)[-5:])
+        return found[0]
+
+    def of_locked(self, topic):
+        return [json.loads(payload) for name, payload, _ in self.received if name == topic]
+
+
+def plant(broker, *stations, more="", line=None):
+    """A gateway with these stations that knows this broker."""
+    mqtt = f"{{broker: 'mqtt://127.0.0.1:{broker.port}', topic: {TOPIC}, client_id: gateway{more}}}"
+    return config.gateway(config.line(stations=", ".join(stations or [PRESS]), **(line or FAST)),
+                          http=config.OPERATOR, modbus=None, mqtt=mqtt)
+
+
+def metric(program, name):
+    found = re.search(rf"^panelgate_mqtt_{name} (\S+)$", program.get("/metrics")[1], re.M)
+    return float(found.group(1))
+
+
+class Truth:
+    """What the gateway itself has read of a point, by its events; a context manager."""
+
+    def __init__(self, program, point):
+        self._events = Events(program, f"?types=point&point=press/{point}")
+        self.states = []
+        self._thread = threading.Thread(target=self._read, daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        sock = self._events._connection.sock or self._events.response.fp.raw._sock
+        with contextlib.suppress(OSError):
+            sock.shutdown(socket.SHUT_RDWR)
+        self._thread.join(harness.PATIENCE)
+
+    @property
+    def values(self):
+        return [value for value, _ in self.states if value is not None]
+
+    def _read(self):
+        with contextlib.suppress(OSError, ValueError):
+            for line in iter(self._events.response.readline, b""):
+                if line.startswith(b"data: ") and b'"quality"' in line:
+                    point = json.loads(line[6:])
+                    self.states.append((point["value"], point["quality"]))
+
+
+def changes(values):
+    """Without what is as the one before."""
+    return [value for i, value in enumerate(values) if i == 0 or value != values[i - 1]]
+
+
+def first_told(messages):
+    """The messages in the order in which each was told first: what was sent again is one."""
+    seen, told = set(), []
+    for body in messages:
+        key = (body["time"], body["value"], body["quality"])
+        if key not in seen:
+            seen.add(key)
+            told.append(body)
+    return told
+
+
+@unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
+                                      "(deploy/install_packages.sh test)")
+class Mqtt(unittest.TestCase):
+    def test_values_are_there_for_who_comes_later(self):
+        with Broker() as broker, harness.configured(plant(broker)) as program:
+            program.log.wait_for("mqtt connected")
+            until(lambda: metric(program, "stored") == 0 and metric(program, "published_total") > 5)
+            program.rest("PUT", "/api/v1/stations/press/points/level", {"value": 21.5})
+            with Listener(broker) as listener:
+                level = listener.wait_for(f"{TOPIC}/press/level", lambda body: body["value"] == 21.5)
+                self.assertEqual((level["quality"], level["unit"]), ("good", "celsius"))
+                self.assertRegex(level["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
+                mode = listener.wait_for(f"{TOPIC}/press/mode")
+                self.assertEqual((mode["value"], mode["label"]), (0, "stopped"))
+                self.assertEqual(listener.wait_for(f"{TOPIC}/status")["state"], "online")
+                self.assertEqual(listener.wait_for(f"{TOPIC}/line/floor1/state")["state"], "up")
+                listener.wait_for(f"{TOPIC}/station/press/state",
+                                  lambda body: body["state"] == "online")
+            self.assertEqual(metric(program, "connected"), 1)
+            self.assertEqual(metric(program, "dropped_total"), 0)
+
+    def test_the_broker_tells_of_a_death_and_the_gateway_of_its_end(self):
+        with Broker() as broker, Listener(broker) as listener:
+            status = f"{TOPIC}/status"
+            with harness.configured(plant(broker)) as program:
+                listener.wait_for(status, lambda body: body["state"] == "online")
+                program.ends_with = -signal.SIGKILL
+                program.stop(signal.SIGKILL)
+            dead = listener.wait_for(status, lambda body: body["state"] == "offline")
+            self.assertNotIn("time", dead)
+            with harness.configured(plant(broker)):
+                listener.wait_for(status, lambda body: body["state"] == "online", after=2)
+            self.assertIn("time", listener.wait_for(
+                status, lambda body: body["state"] == "offline", after=3))
+            with Listener(broker) as later:
+                self.assertEqual(later.wait_for(status)["state"], "offline")
+
+    def test_a_panel_that_dies_turns_stale_and_bad(self):
+        with Broker() as broker, Listener(broker) as listener, \
+                harness.configured(plant(broker)) as program:
+            ramp = f"{TOPIC}/press/ramp"
+            listener.wait_for(ramp, lambda body: body["quality"] == "good")
+            self.assertEqual(program.rest("PUT", "/api/v1/simulator/press", {"dead": True})[0], 200)
+            stale = listener.wait_for(ramp, lambda body: body["quality"] == "stale")
+            self.assertIsNotNone(stale["value"])
+            listener.wait_for(f"{TOPIC}/station/press/state",
+                              lambda body: body["state"] == "offline")
+            bad = listener.wait_for(ramp, lambda body: body["quality"] == "bad" and body["time"] > stale["time"])
+            self.assertIsNone(bad["value"])
+            told = len(listener.of(ramp))
+            self.assertEqual(program.rest("PUT", "/api/v1/simulator/press", {})[0], 200)
+            listener.wait_for(ramp, lambda body: body["quality"] == "good", after=told)
+
+    def test_writes_and_refused_writes(self):
+        text = None
+        with Broker() as broker, Listener(broker) as listener:
+            text = plant(broker, PRESS, LOCKED, more=", write: points")
+            with harness.configured(text) as program:
+                program.log.wait_for("mqtt connected")
+                broker.log.wait_for(r"gateway 0 plant/hall/\+/\+/set")
+                self.write(listener, "press/level", b"21.5", {"ok": True, "value": 21.5})
+                listener.wait_for(f"{TOPIC}/press/level", lambda body: body["value"] == 21.5)
+                self.write(listener, "press/mode", b'{"value": "running", "id": [7]}',
+                           {"ok": True, "value": 1, "label": "running", "id": [7]})
+                for place, payload, said in (
+                        ("press/level", b"400.5", "level must be at most 400"),
+                        ("press/level", b"21.55", "the nearest that it can be are 21.5 and 21.6"),
+                        ("press/ramp", b"1", "ramp is not writable"),
+                        ("locked/level", b"1", "station 'locked' is read-only"),
+                        ("press/level", b"{", "not JSON"),
+                        ("press/level", b'{"val": 1}', "the members are value and id, not val"),
+                        ("press/nobody", b"1", "there is no such point")):
+                    body = self.write(listener, place, payload, {"ok": False})
+                    self.assertIn(said, body["detail"])
+                self.assertEqual(program.values("/api/v1/stations/press/devices/UW100"), [215])
+                metrics = program.get("/metrics")[1]
+                self.assertIn('panelgate_mqtt_writes_total{outcome="ok"} 2\n', metrics)
+                self.assertIn('panelgate_mqtt_writes_total{outcome="refused"} 7\n', metrics)
+            listener.publish(f"{TOPIC}/press/level/set", b"33", retain=True)
+            with harness.configured(text) as program:
+                said = listener.wait_for(f"{TOPIC}/press/level/set/result",
+                                         lambda body: "retained" in body.get("detail", ""))
+                self.assertFalse(said["ok"])
+
+    def write(self, listener, place, payload, expected):
+        result = f"{TOPIC}/{place}/set/result"
+        before = len(listener.of(result))
+        listener.publish(f"{TOPIC}/{place}/set", payload)
+        body = listener.wait_for(result, after=before)
+        self.assertEqual({name: body.get(name) for name in expected}, expected, body)
+        return body
+
+    def test_nobody_writes_unless_the_configuration_says_so(self):
+        with Broker() as broker, harness.configured(plant(broker)) as program:
+            program.log.wait_for("mqtt connected")
+            until(lambda: metric(program, "published_total") > 5)
+            self.assertNotIn("SUBSCRIBE", broker.log.text())
+
+    def test_a_broker_that_restarts_twenty_times_gets_everything_in_order(self):
+        with Broker() as broker, Listener(broker, f"{TOPIC}/press/#", name="witness") as listener, \
+                harness.configured(plant(broker)) as program:
+            with Truth(program, "ramp") as truth:
+                listener.wait_for(f"{TOPIC}/press/ramp", lambda body: body["quality"] == "good")
+                for restart in range(20):
+                    broker.restart()
+                    until(lambda: metric(program, "reconnects_total") == restart + 1)
+                last = truth.values[-1]
+                listener.wait_for(f"{TOPIC}/press/ramp", lambda body: body["value"] == last)
+                self.in_order(listener.of(f"{TOPIC}/press/ramp"), truth.values, last)
+            self.assertEqual(metric(program, "reconnects_total"), 20)
+            self.assertEqual(metric(program, "dropped_total"), 0)
+
+    def in_order(self, messages, truth, last):
+        """Each value that was read, in the order in which it was read."""
+        told = changes([body["value"] for body in first_told(messages)
+                        if body["value"] is not None])
+        read = changes(truth)
+        read = read[:len(read) - read[::-1].index(last)]
+        told = told[:len(told) - told[::-1].index(last)]
+        self.assertGreater(len(read), 50)
+        self.assertEqual(told[-len(read):], read)
+
+    def test_of_what_does_not_fit_the_oldest_goes_and_is_counted(self):
+        with Broker() as broker, Listener(broker, f"{TOPIC}/press/ramp", name="witness") as listener, \
+                harness.configured(plant(broker, COUNTER, more=", store: 100")) as program:
+            with Truth(program, "ramp") as truth:
+                ramp = f"{TOPIC}/press/ramp"
+                listener.wait_for(ramp, lambda body: body["quality"] == "good")
+                until(lambda: metric(program, "stored") == 0)
+                broker.stop()
+                until(lambda: metric(program, "dropped_total") > 20)
+                broker.start()
+                program.log.wait_for("mqtt connected", 2)
+                until(lambda: metric(program, "stored") == 0)
+                dropped = metric(program, "dropped_total")
+                last = truth.values[-1]
+                listener.wait_for(ramp, lambda body: body["value"] == last)
+                told = changes([(body["value"], body["quality"])
+                                for body in first_told(listener.of(ramp))])
+                read = changes(truth.states)
+            end = (last, "good")
+            told, read = told[:told.index(end) + 1], read[:read.index(end) + 1]
+            told = told[told.index(read[0]):]  # the events were listened to later
+            gap = next(i for i, state in enumerate(told) if state != read[i])
+            self.assertEqual(told[gap:], read[gap - len(told):])
+            self.assertEqual(len(read) - len(told), dropped)
+
+
+if __name__ == "__main__":
+    unittest.main()
