@@ -56,7 +56,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       simulate_(simulate),
       reloads_(reloads),
       events_(new_epoch()),
-      servers_(executor_, clock_) {
+      servers_(executor_, clock_),
+      northbound_(executor_, clock_) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         lines_.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
@@ -84,7 +85,7 @@ LineWatch Gateway::watch() {
 
 void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
     publish(events_, scene_->plant, line, event);
-    if (northbound_) northbound_->on_bus_event(line, event);
+    northbound_.on_bus_event(line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && relay_listener_) relay_listener_(line, *write);
 }
@@ -95,7 +96,7 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
     Station& station = scene_->plant.at(line, id);
     remember(station, wants, clock_.now());
     publish_points(events_, station, wants, clock_.now());
-    if (northbound_) northbound_->on_points(station, wants);
+    northbound_.on_points(station, wants);
 }
 
 /// Those that there are already, and new ones.
@@ -145,6 +146,7 @@ void Gateway::show(const std::shared_ptr<Scene>& scene) {
             scene->directory.lines[i].history = scene->histories[i].get();
     }
     scene_ = scene;
+    northbound_.show(scene_);
 }
 
 void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
@@ -161,20 +163,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     show(make_scene(std::move(config), std::move(lines)));
     if (kept_nothing && line_histories_) line_histories_->start();
     relays_->apply(routes_of(*scene_));
-    apply_northbound();
     servers_.apply(*scene_->config, scene_->plant, directory_in(scene_), shown, longest_answer());
-}
-
-/// What it publishes is the same, or it says good-bye and comes again.
-void Gateway::apply_northbound() {
-    const std::optional<mqtt::Settings>& wanted = scene_->config->mqtt;
-    if (northbound_ && wanted && northbound_->go_on(*wanted, {scene_, &scene_->plant})) return;
-    if (northbound_) northbound_->stop();
-    northbound_.reset();
-    if (!wanted) return;
-    northbound_ = std::make_unique<Northbound>(
-        executor_, clock_, *wanted, std::shared_ptr<const Plant>(scene_, &scene_->plant));
-    northbound_->start();
 }
 
 web::Providers Gateway::providers() {
@@ -210,11 +199,11 @@ void Gateway::start() {
     for (const auto& line : scene_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
-    apply_northbound();
     const auto directory = [this] { return directory_in(scene_); };
     servers_.open(*scene_->config, scene_->plant, {directory, [this] { return providers(); }});
     servers_.apply(*scene_->config, scene_->plant, directory(), shown_text(*scene_->config),
                    longest_answer());
+    northbound_.start();
     ready_ = true;
 }
 
@@ -239,7 +228,7 @@ std::string Gateway::status() const {
 void Gateway::stop() {
     lag_.stop();
     servers_.close();
-    if (northbound_) northbound_->stop();
+    northbound_.stop();
     if (line_histories_) line_histories_->stop();
     relays_->stop();
     for (const auto& line : scene_->lines) line->stop();
@@ -256,7 +245,7 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points,
     if (points.next(snapshot.points, clock_.now())) return true;
     snapshot.relays = relay_samples(relays_->status());
     servers_.copy_figures(snapshot);
-    if (northbound_) snapshot.mqtt = northbound_->counters();
+    snapshot.mqtt = northbound_.counters();
     if (reloads_->barred(false).empty()) snapshot.reloads = reloads_->counters();
     snapshot.version = PANELGATE_VERSION;
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();

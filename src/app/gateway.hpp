@@ -78,7 +78,6 @@ class Gateway {
     void apply_lines(const config::Config& config, const Lines& lines);
     void retire_lines(const Lines& lines);
     void show(const std::shared_ptr<Scene>& scene);
-    void apply_northbound();
     web::Providers providers();
     bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points, const Scene& scene) const;
 
@@ -98,8 +97,8 @@ class Gateway {
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;
     std::unique_ptr<Scrapes> scrapes_;  ///< null until there is `http:`
-    std::unique_ptr<Northbound> northbound_;  ///< null without `mqtt:`
     Servers servers_;
+    Northbound northbound_;
     bool ready_ = false;
 };
 

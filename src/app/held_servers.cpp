@@ -77,22 +77,24 @@ void hold_http(const Holder& top, const web::Settings& settings) {
 }
 
 void hold_mqtt(const Holder& top, const mqtt::Settings& settings) {
-    const auto given = [](const std::string& text) { return text.empty() ? "none" : text; };
+    const auto or_default = [](const std::string& text) {
+        return text.empty() ? std::string("default") : text;
+    };
     Holder held = top.item("mqtt");
     held.tell("broker", settings.broker());
-    held.tell("format", settings.format == mqtt::Format::json ? "json" : "sparkplug");
+    held.tell("format", label(settings.format));
     held.tell("topic", settings.topic);
-    held.tell("group", settings.group.empty() ? "of the topic" : settings.group);
-    held.tell("node", settings.node.empty() ? "the machine's" : settings.node);
-    held.tell("client_id", settings.client_id.empty() ? "the machine's" : settings.client_id);
-    held.tell("username", given(settings.username));
+    held.tell("group", or_default(settings.group));
+    held.tell("node", or_default(settings.node));
+    held.tell("client_id", or_default(settings.client_id));
+    held.tell("username", or_default(settings.username));
     held.tell_secret("password", settings.password);
     held.tell("write", settings.write ? "points" : "none");
     held.tell("qos", settings.qos);
     held.tell("keep_alive", settings.keep_alive);
-    held.tell("ca", given(settings.ca));
-    held.tell("certificate", given(settings.certificate));
-    held.tell("key", given(settings.key));
+    held.tell("ca", or_default(settings.ca));
+    held.tell("certificate", or_default(settings.certificate));
+    held.tell("key", or_default(settings.key));
     held.tell("store", settings.store);
 }
 

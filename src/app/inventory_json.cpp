@@ -161,7 +161,7 @@ json::object http_json(const web::Settings& http) {
 
 json::object mqtt_json(const mqtt::Settings& mqtt) {
     return {{"broker", mqtt.broker()},
-            {"format", mqtt.format == mqtt::Format::json ? "json" : "sparkplug"},
+            {"format", label(mqtt.format)},
             {"topic", mqtt.topic},
             {"store", mqtt.store},
             {"write", mqtt.write ? "points" : "none"}};

@@ -1,245 +1,43 @@
 #include "northbound.hpp"
 
-#include <algorithm>
-#include <boost/asio/ip/host_name.hpp>
 #include <utility>
-#include <variant>
-
-#include "panelgate/base/health.hpp"
-#include "panelgate/points/station_points.hpp"
-#include "panelgate/rt/log.hpp"
-#include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
-namespace json = boost::json;
-namespace {
 
-constexpr std::size_t kSwept = 500;  ///< subjects a look: well below a millisecond
-constexpr Duration kSweep = 1s;
-constexpr const char* kName = "mqtt";
+Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock)
+    : executor_(std::move(executor)), clock_(clock) {}
 
-mqtt::Settings completed(mqtt::Settings settings) {
-    std::string host = boost::asio::ip::host_name();
-    if (settings.client_id.empty()) settings.client_id = "panelgate-" + host;
-    if (settings.node.empty()) settings.node = std::move(host);
-    if (settings.group.empty()) {
-        settings.group = settings.topic;
-        std::ranges::replace(settings.group, '/', '-');
-    }
-    return settings;
-}
-
-mqtt::Subjects subjects_of(const Plant& plant) {
-    mqtt::Subjects subjects;
-    for (const Line& line : plant.lines()) subjects.add_line(line.configured->name);
-    for (const Station& station : plant.stations()) {
-        subjects.add_station(station.name);
-        if (!station.points) continue;
-        for (const points::Point& point : station.points->points()) subjects.add_point(point);
-    }
-    return subjects;
-}
-
-bool publishes_alike(const Plant& one, const Plant& other) {
-    const auto name = [](const Line& line) { return line.configured->name; };
-    return std::ranges::equal(one.lines(), other.lines(), {}, name, name) &&
-           std::ranges::equal(one.stations(), other.stations(),
-                              [](const Station& a, const Station& b) {
-                                  return a.name == b.name && a.line == b.line &&
-                                         a.points.has_value() == b.points.has_value() &&
-                                         (!a.points || a.points->points() == b.points->points());
-                              });
-}
-
-}  // namespace
-
-/// A write that has gone to its bus.
-struct Northbound::Order {
-    mqtt::WriteCommand command;
-    const profile::PanelProfile* profile = nullptr;
-    web::PointOrder order;
-    std::shared_ptr<const Plant> plant;  ///< which all of it is of
-};
-
-Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock,
-                       mqtt::Settings settings, std::shared_ptr<const Plant> plant)
-    : clock_(clock),
-      configured_(std::move(settings)),
-      settings_(completed(configured_)),
-      plant_(std::move(plant)),
-      publisher_(settings_, subjects_of(*plant_)),
-      alarm_(clock.make_alarm()),
-      client_id_(bus::next_client_id()),
-      alive_(std::make_shared<Northbound*>(this)),
-      client_(std::move(executor), clock, settings_, publisher_,
-              [this](const mqtt::Command& command) { on_command(command); }) {
-    find_places();
-}
-
-void Northbound::find_places() {
-    places_.assign(plant_->lines().size(), {});
-    first_points_.clear();
-    for (const Station& station : plant_->stations()) {
-        places_.push_back({&station, nullptr});
-        if (!station.points) continue;
-        first_points_[&station] = places_.size();
-        for (const points::Point& point : station.points->points())
-            places_.push_back({&station, &point});
-    }
-}
-
-bool Northbound::go_on(const mqtt::Settings& settings, std::shared_ptr<const Plant> plant) {
-    if (settings != configured_ || !publishes_alike(*plant_, *plant)) return false;
-    plant_ = std::move(plant);
-    find_places();
-    return true;
+void Northbound::show(const std::shared_ptr<const Scene>& scene) {
+    if (session_ && session_->fits(*scene)) return session_->show(scene);
+    std::unique_ptr<BrokerSession> next;
+    if (scene->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, scene);
+    if (session_) session_->stop();
+    if (session_ && next) next->take_over(*session_);
+    session_ = std::move(next);
+    if (session_ && running_) session_->start();
 }
 
 void Northbound::start() {
-    client_.start();
-    sweep();
+    running_ = true;
+    if (session_) session_->start();
 }
 
 void Northbound::stop() {
-    alarm_->cancel();
-    client_.stop();
-    for (const Place& place : places_)
-        if (place.station != nullptr && place.point == nullptr)
-            place.station->bus->cancel(client_id_);
-    alive_.reset();
-}
-
-void Northbound::offer(std::size_t subject, mqtt::State state) {
-    if (publisher_.offer(subject, std::move(state))) client_.wake();
-}
-
-mqtt::State Northbound::state_of(const Station& station, const points::Point& point) const {
-    const TimePoint now = clock_.now();
-    const points::PointReading reading = station.points->read(point, now);
-    mqtt::State state;
-    state.value = reading.value;
-    state.text = reading.label.value_or("");
-    state.quality = reading.quality;
-    state.time = rt::wall_now();
-    if (reading.value && reading.age)
-        state.time = wall_time_of(now - *reading.age, now, state.time);
-    return state;
-}
-
-/// Lines tell of themselves (on_bus_event()).
-void Northbound::look(std::size_t subject) {
-    const Place& place = places_[subject];
-    if (place.station == nullptr) return;
-    if (place.point != nullptr) return offer(subject, state_of(*place.station, *place.point));
-    const Health health = place.station->bus->station_status(place.station->id).state;
-    mqtt::State state;
-    state.value = health != Health::offline;
-    state.text = label(health);
-    state.time = rt::wall_now();
-    offer(subject, std::move(state));
-}
-
-/// What becomes stale or bad by time alone, a part of the plant at a time.
-void Northbound::sweep() {
-    const std::size_t pieces = (places_.size() + kSwept - 1) / kSwept;
-    for (std::size_t i = 0; i < kSwept && i < places_.size(); ++i) {
-        look(swept_);
-        swept_ = (swept_ + 1) % places_.size();
-    }
-    const auto share = static_cast<std::int64_t>(std::max<std::size_t>(pieces, 1));
-    alarm_->arm(clock_.now() + std::max<Duration>(kSweep / share, 20ms), [this] { sweep(); });
+    running_ = false;
+    if (session_) session_->stop();
 }
 
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {
-    if (const auto* of_station = std::get_if<arbiter::StationEvent>(&event)) {
-        for (std::size_t i = 0; i < places_.size(); ++i) {
-            const Place& place = places_[i];
-            if (place.station != nullptr && place.point == nullptr && place.station->line == line &&
-                place.station->id == of_station->station)
-                look(i);
-        }
-    }
-    const auto* of_line = std::get_if<bus::LineEvent>(&event);
-    const auto subject = publisher_.subjects().find_line(line);
-    if (of_line == nullptr || !subject || (of_line->up && !of_line->why.empty())) return;
-    mqtt::State state;
-    state.value = of_line->up;
-    state.text = of_line->up ? "up" : "down: " + of_line->why;
-    state.time = rt::wall_now();
-    offer(*subject, std::move(state));
+    if (session_) session_->on_bus_event(line, event);
 }
 
 void Northbound::on_points(const Station& station, const std::vector<std::size_t>& wants) {
-    const auto first = first_points_.find(&station);
-    if (first == first_points_.end()) return;
-    for (const std::size_t want : wants)
-        if (station.points->point_of(want) != nullptr) look(first->second + want);
-    look(first->second - 1);  // the station: it may have answered for the first time
+    if (session_) session_->on_points(station, wants);
 }
 
-void Northbound::on_command(const mqtt::Command& command) {
-    if (std::holds_alternative<mqtt::Rebirth>(command)) {
-        publisher_.rebirth();
-        client_.wake();
-    } else if (const auto* bad = std::get_if<mqtt::BadCommand>(&command)) {
-        refuse(bad->topic, bad->id, web::problem(400, bad->why));
-    } else {
-        write(std::get<mqtt::WriteCommand>(command));
-    }
-}
-
-void Northbound::refuse(const std::string& topic, const std::string& id, const web::Problem& why) {
-    ++counters_.writes_refused;
-    rt::log(rt::LogLevel::warn, "mqtt write refused",
-            {{"topic", web::excerpt(topic)}, {"why", why.detail}});
-    json::object body{{"ok", false}};
-    for (const auto& [name, value] : web::json_of(why)) body[name] = value;
-    publisher_.answer({topic, id, web::json_text(body)});
-    client_.wake();
-}
-
-void Northbound::write(const mqtt::WriteCommand& command) {
-    const Place& place = places_[command.point];
-    const Station& station = *place.station;
-    const std::string topic = publisher_.topic_of(command.point);
-    if (writing_ >= settings_.writes)
-        return refuse(topic, command.id, web::problem(503, "too many writes are under way"));
-    const profile::PanelProfile& profile = *station.configured->profile;
-    auto order = web::order_of(*station.bus, station.id, profile, *place.point, command.value);
-    if (!order) {
-        publisher_.repeat(command.point);  // for who has none of our words
-        return refuse(topic, command.id, order.error());
-    }
-    bus::Request request = order->request;
-    request.client = client_id_;
-    station.bus->name_client(client_id_, kName);
-    ++writing_;
-    auto open = std::make_shared<const Order>(Order{command, &profile, std::move(*order), plant_});
-    station.bus->transact(std::move(request), [alive = std::weak_ptr<Northbound*>(alive_),
-                                               made = std::move(open)](const bus::Answer& answer) {
-        if (const auto self = alive.lock()) (*self)->finish(*made, answer);
-    });
-}
-
-void Northbound::finish(const Order& order, const bus::Answer& answer) {
-    --writing_;
-    const std::string topic = publisher_.topic_of(order.command.point);
-    const auto told = web::told(order.order, answer, *order.profile);
-    if (!told) publisher_.repeat(order.command.point);
-    if (!told && answer.refusal) return refuse(topic, order.command.id, told.error());
-    ++(told ? counters_.writes_ok : counters_.writes_failed);
-    json::object body{{"ok", static_cast<bool>(told)}};
-    for (const auto& [name, value] : told ? *told : web::json_of(told.error())) body[name] = value;
-    publisher_.answer({topic, order.command.id, web::json_text(body)});
-    client_.wake();
-}
-
-mqtt::Counters Northbound::counters() const {
-    mqtt::Counters all = client_.counters();
-    all.writes_ok = counters_.writes_ok;
-    all.writes_refused = counters_.writes_refused;
-    all.writes_failed = counters_.writes_failed;
-    return all;
+std::optional<mqtt::Counters> Northbound::counters() const {
+    if (!session_) return std::nullopt;
+    return session_->counters();
 }
 
 }  // namespace panelgate::app

@@ -2,78 +2,42 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <cstddef>
-#include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "broker_session.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/mqtt/client.hpp"
 #include "panelgate/mqtt/counters.hpp"
-#include "panelgate/mqtt/publisher.hpp"
-#include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/web/api/point_order.hpp"
-#include "plant.hpp"
+#include "scene.hpp"
 
 namespace panelgate::app {
 
-/// The plant at an MQTT broker: its points and the states of its stations and lines, and writes of
-/// points that come back. What it is given outlives it.
+/// What is served at the plant's broker, through all reloads. The clock outlives it. One thread.
 class Northbound {
   public:
-    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock, mqtt::Settings settings,
-               std::shared_ptr<const Plant> plant);
-    /// With the same lines, stations and points of another plant from now on; false, and nothing
-    /// has changed, where these or the settings are others.
-    bool go_on(const mqtt::Settings& settings, std::shared_ptr<const Plant> plant);
+    Northbound(boost::asio::any_io_executor executor, rt::Clock& clock);
 
+    /// From now on this; without `mqtt:` nothing. Where broker, points and stations are the same,
+    /// the connection stays; else it is made anew, and what waited is kept.
+    void show(const std::shared_ptr<const Scene>& scene);
     void start();
     void stop();
 
-    /// Of the gateway's lines: what has happened.
+    /// Of the lines of the scene.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
-    /// What has become of these wants of a station's polls.
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
-    mqtt::Counters counters() const;
+    /// Nothing without a broker.
+    std::optional<mqtt::Counters> counters() const;
 
   private:
-    /// Where what a subject tells is found.
-    struct Place {
-        const Station* station = nullptr;  ///< null: a line
-        const points::Point* point = nullptr;
-    };
-    struct Order;
-
-    void find_places();
-    void look(std::size_t subject);
-    void sweep();
-    mqtt::State state_of(const Station& station, const points::Point& point) const;
-    void offer(std::size_t subject, mqtt::State state);
-    void on_command(const mqtt::Command& command);
-    void write(const mqtt::WriteCommand& command);
-    void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
-    void finish(const Order& order, const bus::Answer& answer);
-
+    boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
-    mqtt::Settings configured_;
-    mqtt::Settings settings_;  ///< the same, completed
-    std::shared_ptr<const Plant> plant_;
-    std::vector<Place> places_;  ///< by subject
-    /// The first of a station's points; they follow each other.
-    std::map<const Station*, std::size_t> first_points_;
-    mqtt::Publisher publisher_;
-    std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
-    std::size_t swept_ = 0;
-    std::size_t writing_ = 0;  ///< writes under way
-    mqtt::Counters counters_;  ///< of writes
-    bus::ClientId client_id_;
-    std::shared_ptr<Northbound*> alive_;  ///< for answers that come later
-    mqtt::Client client_;
+    std::unique_ptr<BrokerSession> session_;  ///< null without a broker
+    bool running_ = false;
 };
 
 }  // namespace panelgate::app

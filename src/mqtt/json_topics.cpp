@@ -106,9 +106,9 @@ std::string JsonTopics::topic_of(std::size_t point) const {
 std::vector<Command> JsonTopics::commands(std::string_view topic, std::string_view payload,
                                           bool retained) const {
     std::string_view rest = topic;
-    if (!settings_.write || !rest.starts_with(settings_.topic + '/') || !rest.ends_with(kSet))
-        return {};
+    if (!settings_.write || !rest.starts_with(settings_.topic + '/')) return {};
     rest.remove_prefix(settings_.topic.size() + 1);
+    if (!rest.ends_with(kSet)) return {};
     rest.remove_suffix(kSet.size());
     const std::size_t slash = rest.find('/');
     if (slash == rest.npos) return {};

@@ -25,6 +25,16 @@ Publisher::Publisher(const Settings& settings, Subjects subjects)
 
 Publisher::~Publisher() = default;
 
+void Publisher::take_over(const Publisher& before) {
+    std::vector<std::optional<std::size_t>> here(before.states_.size());
+    for (std::size_t i = 0; i < here.size(); ++i) {
+        here[i] = subjects_->find_same(*before.subjects_, i);
+        if (here[i]) states_[*here[i]] = before.states_[i];
+    }
+    for (const Change& change : before.store_.changes())
+        if (here[change.subject]) store_.add(*here[change.subject], change.state);
+}
+
 bool Publisher::offer(std::size_t subject, State state) {
     std::optional<State>& known = states_[subject];
     if (known && known->same_as(state)) return false;

@@ -43,6 +43,12 @@ std::optional<std::size_t> Subjects::find(Subject::Kind kind, std::string_view n
     return static_cast<std::size_t>(found - all_.begin());
 }
 
+std::optional<std::size_t> Subjects::find_same(const Subjects& others, std::size_t subject) const {
+    const Subject& one = others[subject];
+    if (one.kind != Subject::Kind::point) return find(one.kind, one.name);
+    return find_point(others.station_of(subject), one.name);
+}
+
 std::optional<std::size_t> Subjects::find_line(std::string_view name) const {
     return find(Subject::Kind::line, name);
 }

@@ -335,5 +335,64 @@ class Mqtt(unittest.TestCase):
             self.assertEqual(len(read) - len(told), dropped)
 
 
+@unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
+                                      "(deploy/install_packages.sh test)")
+class Configuration(unittest.TestCase):
+    def test_a_reload_keeps_the_connection_or_what_waits(self):
+        with Broker() as broker, Listener(broker) as listener, tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "panelgate.yaml"
+            file.write_text(plant(broker, COUNTER))
+            with harness.Program("run", "-c", str(file)) as program:
+                listener.wait_for(f"{TOPIC}/press/ramp", lambda body: body["quality"] == "good")
+                file.write_text(plant(broker, COUNTER.replace("100ms", "110ms")))
+                self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
+                told = len(listener.of(f"{TOPIC}/press/ramp"))
+                listener.wait_for(f"{TOPIC}/press/ramp", after=told + 5)
+                self.assertEqual([body["state"] for body in listener.of(f"{TOPIC}/status")], ["online"])
+                broker.stop()
+                until(lambda: metric(program, "stored") > 10)
+                file.write_text(plant(broker, PRESS))
+                self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
+                self.assertGreater(metric(program, "stored"), 10)
+                broker.start()
+                with Listener(broker) as later:
+                    later.wait_for(f"{TOPIC}/press/mode")
+                file.write_text(config.gateway(config.line(), http=config.OPERATOR, modbus=None))
+                self.assertEqual(program.rest("POST", "/api/v1/reload")[0], 200)
+                with Listener(broker) as later:
+                    later.wait_for(f"{TOPIC}/status", lambda body: body["state"] == "offline")
+                self.assertNotIn("panelgate_mqtt", program.get("/metrics")[1])
+
+    @unittest.skipUnless(shutil.which("openssl") and shutil.which("mosquitto_passwd"), "needs openssl")
+    def test_tls_and_a_password(self):
+        with tempfile.TemporaryDirectory() as folder:
+            here = pathlib.Path(folder)
+            for name in ("right", "wrong"):
+                self.certify(here, name)
+            (here / "password").write_text("open sesame\n")
+            subprocess.run(["mosquitto_passwd", "-b", "-c", here / "users", "box", "open sesame"],
+                           check=True, capture_output=True)
+            secure = (f"certfile {here}/right.pem\nkeyfile {here}/right.key\n"
+                      f"allow_anonymous false\npassword_file {here}/users\n")
+            with Broker(secure) as broker:
+                self.connects(broker, f", ca: {here}/right.pem, username: box, password_file: {here}/password",
+                              "mqtt connected broker=mqtts://localhost")
+                self.connects(broker, f", ca: {here}/wrong.pem, username: box, password_file: {here}/password",
+                              "mqtt not connected .*TLS")
+                self.connects(broker, f", ca: {here}/right.pem", "mqtt not connected .*the broker refuses")
+
+    def connects(self, broker, more, said):
+        text = plant(broker, more=more).replace(f"mqtt://127.0.0.1:{broker.port}",
+                                                f"mqtts://localhost:{broker.port}")
+        with harness.configured(text) as program:
+            program.log.wait_for(said)
+
+    def certify(self, folder, name):
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2",
+                        "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost",
+                        "-keyout", folder / f"{name}.key", "-out", folder / f"{name}.pem"],
+                       check=True, capture_output=True)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -27,6 +27,7 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
+    std::optional<mqtt::Counters> mqtt;  ///< nothing: there is no broker
     std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
     std::optional<mqtt::Counters> mqtt;
     std::string version;

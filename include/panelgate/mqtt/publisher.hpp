@@ -26,6 +26,8 @@ class Publisher {
     Publisher& operator=(const Publisher&) = delete;
 
     const Subjects& subjects() const { return *subjects_; }
+    /// Before anything is offered: what another one knows, and has not told, of what is here too.
+    void take_over(const Publisher& before);
     /// What is known of a subject now. Nothing new: nothing is sent. True: it was.
     bool offer(std::size_t subject, State state);
     /// Its state is sent once more.

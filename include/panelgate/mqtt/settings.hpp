@@ -3,12 +3,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::mqtt {
 
 enum class Format : std::uint8_t { json, sparkplug };
+/// As the configuration writes it.
+inline std::string_view label(Format format) {
+    return format == Format::json ? "json" : "sparkplug";
+}
 
 struct Settings {
     std::string host;
@@ -39,9 +44,9 @@ struct Settings {
     Duration first_pause = 500ms;  ///< before the broker is tried again; doubled
     Duration longest_pause = 15s;
 
-    friend bool operator==(const Settings&, const Settings&) = default;
     /// "mqtt://HOST:PORT"
     std::string broker() const;
+    friend bool operator==(const Settings&, const Settings&) = default;
 };
 
 }  // namespace panelgate::mqtt

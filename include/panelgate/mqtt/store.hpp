@@ -26,6 +26,7 @@ class Store {
     /// Whatever was sent and not acknowledged has to be sent again.
     void lost() { sent_ = 0; }
 
+    const std::deque<Change>& changes() const { return changes_; }
     std::size_t size() const { return changes_.size(); }
     std::size_t in_flight() const { return sent_; }
     std::uint64_t dropped() const { return dropped_; }

@@ -23,6 +23,8 @@ struct Subject {
     std::string unit{};       ///< of a point, as the rest
     points::Type type = points::Type::u16;
     bool scaled = false;  ///< its value is no raw number
+
+    friend bool operator==(const Subject&, const Subject&) = default;
 };
 
 /// What is published, in one order: lines; then each station with its points behind it. A subject's
@@ -41,6 +43,9 @@ class Subjects {
     const std::string& station_of(std::size_t point) const {
         return all_[all_[point].station].name;
     }
+    /// Which one has the names of this of others.
+    std::optional<std::size_t> find_same(const Subjects& others, std::size_t subject) const;
+    friend bool operator==(const Subjects&, const Subjects&) = default;
     std::optional<std::size_t> find_line(std::string_view name) const;
     std::optional<std::size_t> find_station(std::string_view name) const;
     std::optional<std::size_t> find_point(std::size_t station, std::string_view name) const;

@@ -73,6 +73,19 @@ TEST(Exposition, CountsWhatTheHttpServerAnsweredAndWhoGuessed) {
                                         "panelgate_login_failures_total 3"});
 }
 
+TEST(Exposition, TellsOfTheBrokerWhereThereIsOne) {
+    Snapshot snapshot = filled();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
+    snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1};
+    expect_lines(
+        exposition(snapshot),
+        {"panelgate_mqtt_connected 1", "panelgate_mqtt_stored 5",
+         "panelgate_mqtt_published_total 100", "panelgate_mqtt_dropped_total 7",
+         "panelgate_mqtt_reconnects_total 2", "panelgate_mqtt_writes_total{outcome=\"ok\"} 3",
+         "panelgate_mqtt_writes_total{outcome=\"refused\"} 4",
+         "panelgate_mqtt_writes_total{outcome=\"failed\"} 1"});
+}
+
 TEST(Exposition, GivesTheCountersOfAStationExactly) {
     expect_lines(
         exposition(filled()),

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <boost/asio/any_io_executor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "panelgate/bus/bus.hpp"
+#include "panelgate/mqtt/client.hpp"
+#include "panelgate/mqtt/counters.hpp"
+#include "panelgate/mqtt/publisher.hpp"
+#include "panelgate/mqtt/settings.hpp"
+#include "panelgate/rt/clock.hpp"
+#include "panelgate/web/api/point_order.hpp"
+#include "scene.hpp"
+
+namespace panelgate::app {
+
+/// A plant at an MQTT broker: its points and the states of its stations and lines, and writes of
+/// points that come back. The clock outlives it. One thread.
+class BrokerSession {
+  public:
+    /// Of a scene that has `mqtt:`.
+    BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
+                  std::shared_ptr<const Scene> scene);
+
+    /// This one says the same of the same: show() will do.
+    bool fits(const Scene& scene) const;
+    /// What it tells of is looked up in this scene from now on; fits(scene).
+    void show(std::shared_ptr<const Scene> scene);
+    /// Before start(): tells what another one has not told any more.
+    void take_over(const BrokerSession& before);
+
+    void start();
+    void stop();
+
+    /// Of the gateway's lines: what has happened.
+    void on_bus_event(const std::string& line, const bus::BusEvent& event);
+    /// What has become of these wants of a station's polls.
+    void on_points(const Station& station, const std::vector<std::size_t>& wants);
+
+    mqtt::Counters counters() const;
+
+  private:
+    /// Where what a subject tells is found.
+    struct Place {
+        const Station* station = nullptr;  ///< null: a line
+        const points::Point* point = nullptr;
+    };
+    struct Order;
+
+    void look(std::size_t subject);
+    void sweep();
+    mqtt::State state_of(const Station& station, const points::Point& point) const;
+    void offer(std::size_t subject, mqtt::State state);
+    void on_command(const mqtt::Command& command);
+    void write(const mqtt::WriteCommand& command);
+    void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
+    void finish(const Order& order, const bus::Answer& answer);
+
+    rt::Clock& clock_;
+    std::shared_ptr<const Scene> scene_;  ///< where the places are
+    mqtt::Settings settings_;
+    std::vector<Place> places_;  ///< by subject
+    /// The first of a station's points; they follow each other.
+    std::map<const Station*, std::size_t> first_points_;
+    mqtt::Publisher publisher_;
+    std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
+    std::size_t swept_ = 0;
+    std::size_t writing_ = 0;  ///< writes under way
+    mqtt::Counters counters_;  ///< of writes, and of sessions before
+    bus::ClientId client_id_;
+    std::shared_ptr<BrokerSession*> alive_;  ///< for answers that come later
+    mqtt::Client client_;
+};
+
+}  // namespace panelgate::app

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/mqtt/publisher.hpp"
+
+namespace panelgate::mqtt {
+
+/// Subject 0: line floor1; 1: station press; 2: its level (scaled, celsius), 3: mode (i16), 4: name
+/// (a text); 5: station oven; 6: its level (u32).
+inline Subjects small_plant() {
+    Subjects subjects;
+    subjects.add_line("floor1");
+    subjects.add_station("press");
+    points::Point level;
+    level.name = "level";
+    level.type = points::Type::i16;
+    level.scale = 0.1;
+    level.unit = "celsius";
+    subjects.add_point(level);
+    points::Point mode;
+    mode.name = "mode";
+    mode.type = points::Type::i16;
+    subjects.add_point(mode);
+    points::Point name;
+    name.name = "name";
+    name.type = points::Type::string;
+    subjects.add_point(name);
+    subjects.add_station("oven");
+    points::Point other;
+    other.name = "level";
+    other.type = points::Type::u32;
+    subjects.add_point(other);
+    return subjects;
+}
+
+inline constexpr WallTime kNoon{std::chrono::microseconds(1'700'000'000'250'000)};
+
+inline State good(points::Value value, WallTime time = kNoon) {
+    State state;
+    state.value = std::move(value);
+    state.time = time;
+    return state;
+}
+
+inline State station(bool alive, std::string word) {
+    State state = good(alive);
+    state.text = std::move(word);
+    return state;
+}
+
+/// Everything that is to be said now; what is a change is in flight then.
+inline std::vector<Publisher::Outgoing> take_all(Publisher& publisher, WallTime now = kNoon) {
+    std::vector<Publisher::Outgoing> all;
+    while (auto outgoing = publisher.next(now)) all.push_back(std::move(*outgoing));
+    return all;
+}
+
+inline std::vector<std::string> topics(const std::vector<Publisher::Outgoing>& all) {
+    std::vector<std::string> names;
+    for (const Publisher::Outgoing& one : all) names.push_back(one.message.topic);
+    return names;
+}
+
+inline std::string hex(std::string_view text) {
+    return to_hex({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, "");
+}
+
+}  // namespace panelgate::mqtt

@@ -1,0 +1,146 @@
+#include "panelgate/mqtt/publisher.hpp"
+
+#include <gmock/gmock.h>
+
+#include "mqtt_plant.hpp"
+
+namespace panelgate::mqtt {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+Settings settings() {
+    Settings made;
+    made.topic = "t";
+    made.store = 5;
+    return made;
+}
+
+class MqttPublisher : public ::testing::Test {
+  protected:
+    Publisher publisher_{settings(), small_plant()};
+
+    void count(int from, int to) {
+        for (int i = from; i <= to; ++i) publisher_.offer(3, good(std::int64_t{i}));
+    }
+    /// The values of t/press/mode among these.
+    static std::vector<std::string> counted(const std::vector<Publisher::Outgoing>& all) {
+        std::vector<std::string> values;
+        for (const Publisher::Outgoing& one : all) {
+            const std::string& text = one.message.payload;
+            if (one.message.topic == "t/press/mode")
+                values.push_back(text.substr(9, text.find(',') - 9));
+        }
+        return values;
+    }
+    void deliver(const std::vector<Publisher::Outgoing>& all) {
+        for (const Publisher::Outgoing& one : all) publisher_.delivered(one.change);
+    }
+};
+
+TEST_F(MqttPublisher, SaysNothingWithoutAConnection) {
+    count(1, 2);
+    EXPECT_THAT(take_all(publisher_), IsEmpty());
+    EXPECT_EQ(publisher_.store().size(), 2U);
+}
+
+TEST_F(MqttPublisher, TellsChangesOnly) {
+    EXPECT_TRUE(publisher_.offer(3, good(std::int64_t{1})));
+    EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{1}, kNoon + std::chrono::seconds(1))));
+    State stale = good(std::int64_t{1});
+    stale.quality = points::Quality::stale;
+    EXPECT_TRUE(publisher_.offer(3, stale));
+}
+
+TEST_F(MqttPublisher, ABirthEndsWithWhatIsNowBehindWhatHasBeen) {
+    count(1, 3);
+    publisher_.connected();
+    const auto all = take_all(publisher_);
+    EXPECT_EQ(all.front().message.topic, "t/status");
+    EXPECT_THAT(counted(all), ElementsAre("1", "2", "3", "3"));
+}
+
+TEST_F(MqttPublisher, WhatIsLostOnItsWayIsToldAgainAndNothingElse) {
+    publisher_.connected();
+    deliver(take_all(publisher_));
+    count(1, 3);
+    auto all = take_all(publisher_);
+    publisher_.delivered(all[0].change);
+    publisher_.disconnected();
+    count(4, 4);
+    publisher_.connected();
+    all = take_all(publisher_);
+    EXPECT_THAT(counted(all), ElementsAre("2", "3", "4", "4"));
+    deliver(all);
+    publisher_.disconnected();
+    publisher_.connected();
+    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("4"));
+}
+
+TEST_F(MqttPublisher, OfWhatDoesNotFitTheOldestGoesAndIsCounted) {
+    count(1, 8);
+    EXPECT_EQ(publisher_.store().dropped(), 3U);
+    publisher_.connected();
+    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("4", "5", "6", "7", "8", "8"));
+}
+
+TEST_F(MqttPublisher, AChangeDuringABirthIsNotFollowedByWhatWasBefore) {
+    count(1, 1);
+    publisher_.offer(6, good(std::uint64_t{9}));
+    publisher_.connected();
+    std::vector<Publisher::Outgoing> all;
+    for (int i = 0; i < 3; ++i) all.push_back(*publisher_.next(kNoon));  // status, both changes
+    count(2, 2);
+    for (auto& one : take_all(publisher_)) all.push_back(std::move(one));
+    EXPECT_THAT(counted(all), ElementsAre("1", "2", "2"));
+}
+
+TEST_F(MqttPublisher, RepeatsWhatAWriterHasToSeeAgain) {
+    publisher_.connected();
+    take_all(publisher_);
+    publisher_.repeat(3);  // nothing is known of it
+    EXPECT_THAT(take_all(publisher_), IsEmpty());
+    count(1, 1);
+    deliver(take_all(publisher_));
+    publisher_.repeat(3);
+    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("1"));
+}
+
+TEST_F(MqttPublisher, AnotherPlantTakesOverWhatItHasToo) {
+    publisher_.connected();
+    take_all(publisher_);
+    count(1, 1);
+    take_all(publisher_);                         // on its way
+    publisher_.offer(4, good(std::string("x")));  // of a point that goes
+    count(2, 2);
+    Subjects fewer;
+    fewer.add_station("oven");
+    fewer.add_station("press");
+    points::Point mode;
+    mode.name = "mode";
+    mode.type = points::Type::i16;
+    fewer.add_point(mode);
+    Publisher next(settings(), fewer);
+    next.take_over(publisher_);
+    EXPECT_EQ(next.store().size(), 2U);
+    EXPECT_FALSE(next.offer(2, good(std::int64_t{2}))) << "it is known";
+    next.connected();
+    EXPECT_THAT(counted(take_all(next)), ElementsAre("1", "2", "2"));
+}
+
+TEST_F(MqttPublisher, AnswersAreBoundedAndEndWithTheConnection) {
+    publisher_.answer({"x", "", "{}"});  // nobody is there
+    publisher_.connected();
+    take_all(publisher_);
+    for (std::size_t i = 0; i < 2 * settings().results; ++i) publisher_.answer({"x", "", "{}"});
+    EXPECT_EQ(take_all(publisher_).size(), settings().results);
+    publisher_.answer({"x", "", "{}"});
+    publisher_.disconnected();
+    publisher_.connected();
+    EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("t/status"));
+}
+
+}  // namespace
+}  // namespace panelgate::mqtt
