@@ -72,6 +72,8 @@ make_sysroot() {
     mmdebstrap --quiet --variant=extract --architectures="$architecture" --include="$list" \
         --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr \
         --extract-hook="deploy/package/database.sh \"\$1\"" bookworm "$sysroot.part" "${mirror[@]}"
+    # qemu -L would look there first, and its /dev/ptmx belongs to no devpts.
+    rm -rf "$sysroot.part/dev"
     mv "$sysroot.part" "$sysroot"
 }
 
@@ -128,9 +130,19 @@ run_tests() {
     configure ON
     say "unit tests of the pure modules${emulator:+ by $emulator}"
     make "${pure[@]/#/unit_}"
-    (cd "$build" && ctest --output-on-failure -R "^unit\.($(IFS='|'; echo "${pure[*]}"))\$")
+    local module
+    [ -z "$emulator" ] || export PANELGATE_SANITIZED=1  # a tenth of what is played at length
+    for module in "${pure[@]}"; do "${run[@]}" "$build/unit_$module" --gtest_brief=1; done
     say "the demo${emulator:+ by $emulator}"
-    deploy/package/demo_test.sh "$packages/panelgate_$version-1_$architecture.deb" "${run[@]}"
+    local termios=()
+    if [ -n "$emulator" ]; then
+        # shellcheck disable=SC2086  # flags are words
+        clang++-19 --target="$triple" --sysroot="$sysroot" $flags -std=c++20 -O1 -fno-strict-aliasing \
+            -shared -fPIC -o "$build/old_termios.so" deploy/package/old_termios.cpp
+        termios=(-E LD_PRELOAD="$build/old_termios.so")
+    fi
+    deploy/package/demo_test.sh "$packages/panelgate_$version-1_$architecture.deb" \
+        "${run[@]}" "${termios[@]}"
 }
 
 need
