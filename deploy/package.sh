@@ -4,11 +4,12 @@
 # a folder of that architecture's libraries, kept in ${XDG_CACHE_HOME:-~/.cache}/panelgate. The same
 # sources of the same time (SOURCE_DATE_EPOCH, else the last commit's) make the same package.
 # --test runs the unit tests of the pure modules and the demo as well, by qemu where it has to.
-# Wants what deploy/install_packages.sh build package brings, and the network for the folder.
+# Wants what deploy/install_packages.sh build package brings, and the network for the folder; from
+# PANELGATE_MIRROR ("deb http://MIRROR/debian bookworm main"), else from where apt has its packages.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
-usage() { sed -n '2,7s/^# //p' "$0" >&2; exit 64; }
+usage() { sed -n '2,8s/^# //p' "$0" >&2; exit 64; }
 die() { echo "package: $*" >&2; exit 1; }
 say() { echo "== $*"; }
 
@@ -57,7 +58,7 @@ libraries() {
     printf '%s\n' libstdc++-12-dev libc6-dev libgtest-dev libgmock-dev
 }
 
-# From the mirror that apt uses here. A changed list makes a new one.
+# A changed list makes a new one.
 make_sysroot() {
     local list mirror=()
     list=$(libraries | sort -u | paste -sd,)
@@ -68,6 +69,7 @@ make_sysroot() {
     say "libraries of Debian 12 for $architecture"
     mkdir -p "$(dirname "$sysroot")"
     [ ! -e /etc/apt/sources.list.d/debian.sources ] || mirror=(/etc/apt/sources.list.d/debian.sources)
+    [ -z "${PANELGATE_MIRROR-}" ] || mirror=("$PANELGATE_MIRROR")
     rm -rf "$sysroot.part"
     mmdebstrap --quiet --variant=extract --architectures="$architecture" --include="$list" \
         --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr \
