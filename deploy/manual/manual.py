@@ -65,6 +65,11 @@ def mdoc(text):
     return re.sub(r"(?m)^([.'])", r"\\&\1", text)
 
 
+def prose(text):
+    """The same, each sentence on a line of its own."""
+    return mdoc(re.sub(r"([.:]) (?=[A-Z])", r"\1\n", text))
+
+
 def left_side(left):
     """An option as `help` writes it, as mdoc's macros."""
     if not left.startswith("-"):
@@ -79,7 +84,7 @@ def left_side(left):
 
 
 def section(command):
-    lines = [f".Ss {command.name}", mdoc(command.about[0].upper() + command.about[1:] + ".")]
+    lines = [f".Ss {command.name}", prose(command.about[0].upper() + command.about[1:] + ".")]
     entries = [(left, right) for left, right in command.entries if "--help" not in left]
     if entries:
         lines.append(".Bl -tag -width Ds")
@@ -87,10 +92,10 @@ def section(command):
             default = re.search(r"=(\S+)", left)
             right += f" (default: {default[1]})" if default else ""
             lines.append(".It " + left_side(re.sub(r"=\S+", "", left)))
-            lines += [mdoc(right)] if right else []
+            lines += [prose(right)] if right else []
         lines.append(".El")
     if command.notes:
-        lines += [".Pp", mdoc(" ".join(command.notes))]
+        lines += [".Pp", prose(" ".join(command.notes))]
     return lines
 
 

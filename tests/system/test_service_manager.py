@@ -70,6 +70,16 @@ class ServiceManager(unittest.TestCase):
             told = manager.wait_for("STOPPING")
             self.assertGreaterEqual(int(told["EXTEND_TIMEOUT_USEC"]), 10_000_000)
 
+    def test_it_is_told_of_a_reload_and_when_that_is_over_good_or_bad(self):
+        with managed(TWO_LINES) as (manager, program):
+            manager.wait_for("READY")
+            file = pathlib.Path(program.arguments[2])
+            for text in (TWO_LINES.replace("id: 2", "id: 3"), "lines: none"):
+                file.write_text(text)
+                program.process.send_signal(signal.SIGHUP)
+                self.assertGreater(int(manager.wait_for("RELOADING")["MONOTONIC_USEC"]), 0)
+                self.assertIn(" lines up, listening on ", manager.wait_for("READY")["STATUS"])
+
     def test_an_abstract_socket_is_told_too(self):
         with managed(TWO_LINES, f"@panelgate-{os.getpid()}") as (manager, _):
             self.assertEqual(manager.wait_for("READY")["READY"], "1")
