@@ -22,6 +22,8 @@ struct CheckOptions {
     bool allow_overload = false;
 };
 ExitCode check(const std::string& file, const CheckOptions& options);
+/// Prints a JSON Schema of the configuration.
+ExitCode schema();
 /// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
 /// default where there is none that can be read.
 ExitCode health(const std::string& file, const std::string& http);

@@ -39,6 +39,7 @@ class CommandLine {
         add_profiles();
         add_health();
         add_reload();
+        add_schema();
         add_help();
     }
 
@@ -209,6 +210,12 @@ class CommandLine {
             "is talking, nothing was found, or the scan was interrupted (what was found is "
             "printed).");
         command->callback([this] { code_ = scan(scan_); });
+    }
+
+    void add_schema() {
+        CLI::App* command =
+            cli_.add_subcommand("schema", "print a JSON Schema of the configuration, for editors");
+        command->callback([this] { code_ = schema(); });
     }
 
     void add_address() {
