@@ -53,6 +53,8 @@ struct ScanOptions {
     bool speak = false;  ///< although another master is talking
 };
 ExitCode scan(const ScanOptions& options);
+/// `file`: another gateway's configuration, "-" for standard input.
+ExitCode import_conf(const std::string& file);
 /// Lists all, or describes one; `dir` as of address().
 ExitCode profiles(const std::string& name, const std::string& dir);
 

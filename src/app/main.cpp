@@ -39,6 +39,7 @@ class CommandLine {
         add_profiles();
         add_health();
         add_reload();
+        add_import();
         add_schema();
         add_help();
     }
@@ -212,6 +213,15 @@ class CommandLine {
         command->callback([this] { code_ = scan(scan_); });
     }
 
+    void add_import() {
+        CLI::App* command = cli_.add_subcommand(
+            "import", "make a configuration of another gateway's: of mbusd's mbusd.conf");
+        command->add_option("FILE", imported_, "its configuration, - for standard input")
+            ->required();
+        command->footer("Exit codes: 0 fine; 66 the file cannot be read; 78 it has faults.");
+        command->callback([this] { code_ = import_conf(imported_); });
+    }
+
     void add_schema() {
         CLI::App* command =
             cli_.add_subcommand("schema", "print a JSON Schema of the configuration, for editors");
@@ -275,6 +285,7 @@ class CommandLine {
     CheckOptions check_;
     std::vector<std::string> links_;
     ScanOptions scan_;
+    std::string imported_;
     std::string profile_;
     std::string notation_;
     std::string name_;
