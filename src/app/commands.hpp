@@ -53,6 +53,13 @@ struct ScanOptions {
     bool speak = false;  ///< although another master is talking
 };
 ExitCode scan(const ScanOptions& options);
+/// Where a configuration is written.
+struct OutputFile {
+    std::string file;    ///< empty: standard output
+    bool force = false;  ///< over one that is there
+};
+/// `yaml` of the options is not asked.
+ExitCode init(const ScanOptions& options, const OutputFile& output);
 /// `file`: another gateway's configuration, "-" for standard input.
 ExitCode import_conf(const std::string& file);
 /// Lists all, or describes one; `dir` as of address().

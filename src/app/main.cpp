@@ -41,6 +41,7 @@ class CommandLine {
         add_reload();
         add_import();
         add_schema();
+        add_init();
         add_help();
     }
 
@@ -193,9 +194,8 @@ class CommandLine {
         command->callback([this] { code_ = simulate(file_, links_, http_); });
     }
 
-    void add_scan() {
-        CLI::App* command = cli_.add_subcommand(
-            "scan", "find stations, serial settings and panel profiles on a line; only ever reads");
+    /// What `scan` and `init` look for.
+    void add_search(CLI::App* command) {
         command->add_option("DEVICE", scan_.device, "a serial device, or tcp://HOST:PORT")
             ->required();
         command->add_option("--baud", scan_.baud, "rates to try, such as 9600,38400");
@@ -203,14 +203,33 @@ class CommandLine {
         command->add_option("--stations", scan_.stations,
                             "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
         add_profiles_dir(command, scan_.profiles);
-        command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->add_flag("--speak", scan_.speak, "scan although another master is talking");
+    }
+
+    void add_scan() {
+        CLI::App* command = cli_.add_subcommand(
+            "scan", "find stations, serial settings and panel profiles on a line; only ever reads");
+        add_search(command);
+        command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->footer(
             "Exit codes: 0 something was found; 64 usage; 69 the device cannot be used, another "
             "master\n"
             "is talking, nothing was found, or the scan was interrupted (what was found is "
             "printed).");
         command->callback([this] { code_ = scan(scan_); });
+    }
+
+    void add_init() {
+        CLI::App* command = cli_.add_subcommand(
+            "init", "scan a line, and write a configuration of it with comments");
+        add_search(command);
+        command->add_option("-o,--output", output_.file, "write this file, not standard output");
+        command->add_flag("--force", output_.force, "write over a file that is there");
+        command->footer(
+            "Exit codes: 0 it is written; 64 usage, or the file is there; 69 as of scan: nothing "
+            "was\nfound, the device cannot be used, another master is talking, the scan was "
+            "interrupted; 70 the\nfile cannot be written.");
+        command->callback([this] { code_ = init(scan_, output_); });
     }
 
     void add_import() {
@@ -285,6 +304,7 @@ class CommandLine {
     CheckOptions check_;
     std::vector<std::string> links_;
     ScanOptions scan_;
+    OutputFile output_;
     std::string imported_;
     std::string profile_;
     std::string notation_;

@@ -29,14 +29,16 @@ class CommandLine(unittest.TestCase):
         self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n$")
         text = self.expect(0, "--help").stdout
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
-                        "health", "schema", "import", "scan"):
+                        "health", "schema", "import", "init", "scan"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
             self.assertIn("Usage", self.expect(0, command, "--help").stdout)
 
     def test_wrong_usage_ends_with_64_and_says_why(self):
         for arguments in ([], ["fly"], ["run", "--fly"], ["check", "--format", "xml"], ["address"],
                           ["health", "--http", "nowhere"], ["health", "--http", "127.0.0.1:0"],
-                          ["health", "now"], ["schema", "now"], ["import"],
+                          ["health", "now"], ["schema", "now"], ["import"], ["init"],
+                          ["init", "sim"], ["init", "/dev/ttyS0", "--baud", "fast"],
+                          ["init", "/dev/null", "-o", str(ROOT / "README.md")], ["address", "autonics-gplp-s"], ["demo", "--http", "nowhere"],
                           ["profiles", "autonics-gplp"], ["address", "nobody", "UB1"],
                           ["address", "autonics-gplp-s", "XY12"]):
             with self.subTest(arguments=arguments):
