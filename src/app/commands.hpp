@@ -22,6 +22,8 @@ struct CheckOptions {
     bool allow_overload = false;
 };
 ExitCode check(const std::string& file, const CheckOptions& options);
+/// Prints a JSON Schema of the configuration.
+ExitCode schema();
 /// Is the gateway ready? `http`: "ADDR:PORT" of its REST, or empty: what `file` says, and the
 /// default where there is none that can be read.
 ExitCode health(const std::string& file, const std::string& http);
@@ -51,6 +53,15 @@ struct ScanOptions {
     bool speak = false;  ///< although another master is talking
 };
 ExitCode scan(const ScanOptions& options);
+/// Where a configuration is written.
+struct OutputFile {
+    std::string file;    ///< empty: standard output
+    bool force = false;  ///< over one that is there
+};
+/// `yaml` of the options is not asked.
+ExitCode init(const ScanOptions& options, const OutputFile& output);
+/// `file`: another gateway's configuration, "-" for standard input.
+ExitCode import_conf(const std::string& file);
 /// Lists all, or describes one; `dir` as of address().
 ExitCode profiles(const std::string& name, const std::string& dir);
 

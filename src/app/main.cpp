@@ -39,6 +39,9 @@ class CommandLine {
         add_profiles();
         add_health();
         add_reload();
+        add_import();
+        add_schema();
+        add_init();
         add_help();
     }
 
@@ -191,9 +194,8 @@ class CommandLine {
         command->callback([this] { code_ = simulate(file_, links_, http_); });
     }
 
-    void add_scan() {
-        CLI::App* command = cli_.add_subcommand(
-            "scan", "find stations, serial settings and panel profiles on a line; only ever reads");
+    /// What `scan` and `init` look for.
+    void add_search(CLI::App* command) {
         command->add_option("DEVICE", scan_.device, "a serial device, or tcp://HOST:PORT")
             ->required();
         command->add_option("--baud", scan_.baud, "rates to try, such as 9600,38400");
@@ -201,14 +203,48 @@ class CommandLine {
         command->add_option("--stations", scan_.stations,
                             "addresses to ask, such as 1-31 (the default) or 5,17,20-31");
         add_profiles_dir(command, scan_.profiles);
-        command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->add_flag("--speak", scan_.speak, "scan although another master is talking");
+    }
+
+    void add_scan() {
+        CLI::App* command = cli_.add_subcommand(
+            "scan", "find stations, serial settings and panel profiles on a line; only ever reads");
+        add_search(command);
+        command->add_flag("--yaml", scan_.yaml, "print a configuration of the line instead");
         command->footer(
             "Exit codes: 0 something was found; 64 usage; 69 the device cannot be used, another "
             "master\n"
             "is talking, nothing was found, or the scan was interrupted (what was found is "
             "printed).");
         command->callback([this] { code_ = scan(scan_); });
+    }
+
+    void add_init() {
+        CLI::App* command = cli_.add_subcommand(
+            "init", "scan a line, and write a configuration of it with comments");
+        add_search(command);
+        command->add_option("-o,--output", output_.file, "write this file, not standard output");
+        command->add_flag("--force", output_.force, "write over a file that is there");
+        command->footer(
+            "Exit codes: 0 it is written; 64 usage, or the file is there; 69 as of scan: nothing "
+            "was\nfound, the device cannot be used, another master is talking, the scan was "
+            "interrupted; 70 the\nfile cannot be written.");
+        command->callback([this] { code_ = init(scan_, output_); });
+    }
+
+    void add_import() {
+        CLI::App* command = cli_.add_subcommand(
+            "import", "make a configuration of another gateway's: of mbusd's mbusd.conf");
+        command->add_option("FILE", imported_, "its configuration, - for standard input")
+            ->required();
+        command->footer("Exit codes: 0 fine; 66 the file cannot be read; 78 it has faults.");
+        command->callback([this] { code_ = import_conf(imported_); });
+    }
+
+    void add_schema() {
+        CLI::App* command =
+            cli_.add_subcommand("schema", "print a JSON Schema of the configuration, for editors");
+        command->callback([this] { code_ = schema(); });
     }
 
     void add_address() {
@@ -268,6 +304,8 @@ class CommandLine {
     CheckOptions check_;
     std::vector<std::string> links_;
     ScanOptions scan_;
+    OutputFile output_;
+    std::string imported_;
     std::string profile_;
     std::string notation_;
     std::string name_;

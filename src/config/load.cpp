@@ -110,6 +110,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     yaml::resolve_merge_keys(tree, loading.problems);
     drop_extensions(tree);
     const std::vector<yaml::Node> unused = apply_templates(loading, tree);
+    if (yaml::Description* description = loading.problems.description()) description->begin(tree);
     MapReader root(tree, loading.problems, "the configuration");
     if (tree.kind != yaml::Node::Kind::map) return;
     loading.config.profiles = load_profiles(loading, root);
@@ -229,9 +230,11 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
     yaml::expand_variables(tree, environment, unset);
     refuse_control_characters(tree, unset);
     yaml::Problems found(problems.file());
+    found.describe(problems.description());
     Config config;
     Loading loading{files, found, config, {}};
     load_tree(loading, tree);
+    if (yaml::Description* description = problems.description()) description->forget();
     tell(unset, found, problems);
     if (!problems.empty()) return std::nullopt;
     return config;

@@ -15,18 +15,13 @@ using arbiter::StationSettings;
 using yaml::MapReader;
 using yaml::Node;
 
-bool is_word(MapReader& in, std::string_view key, std::string_view word) {
-    const Node* node = in.child(key);
-    return node != nullptr && node->kind == Node::Kind::scalar && node->scalar == word;
-}
-
 std::string at_least(Duration duration) {
     return yaml::format_duration(std::chrono::ceil<std::chrono::microseconds>(duration));
 }
 
 void load_response_timeout(MapReader& in, StationSettings& settings) {
     constexpr std::string_view kKey = "response_timeout";
-    if (is_word(in, kKey, "adaptive")) {
+    if (in.is_word(kKey, "adaptive")) {
         settings.adaptive_timeout = true;  // up to the line's own, or the default
     } else if (const auto timeout = in.duration(kKey, 1ms, 2min)) {
         settings.response_timeout = *timeout;
@@ -52,7 +47,7 @@ Duration shortest_gap(const SerialFormat& serial) { return wire_time(serial, 7) 
 
 /// Nothing = auto. Where the wire does not begin at the gateway, any gap will do.
 void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
-    if (is_word(in, "frame_gap", "auto")) {
+    if (in.is_word("frame_gap", "auto")) {
         timing.frame_gap.reset();
         return;
     }
@@ -124,12 +119,12 @@ Duration automatic_hole(const Line& line) {
 }
 
 void load_reply_hole(MapReader& in, Duration& hole) {
-    if (is_word(in, "reply_hole", "auto")) return;
+    if (in.is_word("reply_hole", "auto")) return;
     hole = in.duration("reply_hole", 1ms, 10s).value_or(hole);
 }
 
 void load_late_window(Loading& loading, MapReader& in, StationSettings& settings) {
-    if (is_word(in, "late_window", "auto")) {
+    if (in.is_word("late_window", "auto")) {
         settings.late_window.reset();
     } else if (const auto window = in.duration("late_window", 0ms, 10min)) {
         settings.late_window = window;

@@ -275,6 +275,17 @@ void load_functions(MapReader& in, PanelProfile& profile) {
     if (in.problems().list().size() == before) check_functions(profile, *list, in.problems());
 }
 
+Catalogue read_shipped() {
+    Catalogue catalogue;
+    for (const auto& [name, text] : shipped_profiles()) {
+        Problems problems("config/profiles/" + std::string(name) + ".yaml");
+        auto profile = load_profile(text, std::string(name), problems);
+        if (!profile) throw std::logic_error(problems.text());
+        catalogue.add(std::move(*profile));
+    }
+    return catalogue;
+}
+
 }  // namespace
 
 std::optional<PanelProfile> load_profile(std::string_view text, std::string name,
@@ -306,14 +317,8 @@ std::optional<PanelProfile> load_profile(std::string_view text, std::string name
 }
 
 Catalogue Catalogue::shipped() {
-    Catalogue catalogue;
-    for (const auto& [name, text] : shipped_profiles()) {
-        Problems problems("config/profiles/" + std::string(name) + ".yaml");
-        auto profile = load_profile(text, std::string(name), problems);
-        if (!profile) throw std::logic_error(problems.text());
-        catalogue.add(std::move(*profile));
-    }
-    return catalogue;
+    static const Catalogue kShipped = read_shipped();  // they cannot change: read once
+    return kShipped;
 }
 
 void Catalogue::add(PanelProfile profile) {

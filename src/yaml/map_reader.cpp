@@ -98,6 +98,9 @@ const Node* MapReader::find(std::string_view key) {
 bool MapReader::has(std::string_view key) { return find(key) != nullptr; }
 
 bool MapReader::require(std::string_view key) {
+    KeyShape shape;
+    shape.required = true;
+    describe(key, std::move(shape));
     if (has(key)) return true;
     if (is_mistyped(key)) return false;
     // What is no map at all has been told already.
@@ -127,7 +130,19 @@ const Node* MapReader::scalar(std::string_view key, std::string_view wanted) {
     return nullptr;
 }
 
+void MapReader::describe(std::string_view key, KeyShape shape) {
+    if (Description* description = problems_->description())
+        description->tell(*node_, key, std::move(shape));
+}
+
+const Node* MapReader::below(std::string_view key, const Node* node) {
+    Description* description = problems_->description();
+    if (description != nullptr && node != nullptr) description->tell_below(*node_, key, *node);
+    return node;
+}
+
 std::optional<std::string> MapReader::text(std::string_view key) {
+    describe(key, KeyShape::Kind::text);
     const Node* node = scalar(key, "a text");
     if (node == nullptr) return std::nullopt;
     if (node->scalar.empty() || node->comma) {
@@ -144,6 +159,11 @@ std::optional<std::string> MapReader::required_text(std::string_view key) {
 
 std::optional<std::int64_t> MapReader::integer(std::string_view key, std::int64_t min,
                                                std::int64_t max) {
+    KeyShape shape;
+    shape.kind = KeyShape::Kind::integer;
+    shape.min = min;
+    shape.max = max;
+    describe(key, std::move(shape));
     const std::string wanted =
         "a whole number from " + std::to_string(min) + " to " + std::to_string(max);
     const Node* node = scalar(key, wanted);
@@ -166,6 +186,7 @@ std::optional<std::int64_t> MapReader::required_integer(std::string_view key, st
 }
 
 std::optional<double> MapReader::number(std::string_view key) {
+    describe(key, KeyShape::Kind::number);
     const Node* node = scalar(key, "a number");
     if (node == nullptr) return std::nullopt;
     double value = 0;
@@ -185,6 +206,7 @@ std::optional<double> MapReader::number(std::string_view key) {
 }
 
 std::optional<bool> MapReader::boolean(std::string_view key) {
+    describe(key, KeyShape::Kind::boolean);
     const Node* node = scalar(key, "true or false");
     if (node == nullptr) return std::nullopt;
     constexpr std::array<std::string_view, 3> kTrue{"true", "True", "TRUE"};
@@ -197,6 +219,11 @@ std::optional<bool> MapReader::boolean(std::string_view key) {
 }
 
 std::optional<Duration> MapReader::duration(std::string_view key, Duration min, Duration max) {
+    KeyShape shape;
+    shape.kind = KeyShape::Kind::duration;
+    shape.shortest = min;
+    shape.longest = max;
+    describe(key, std::move(shape));
     const Node* node = scalar(key, "a duration such as 300ms");
     if (node == nullptr) return std::nullopt;
     const auto value = parse_duration(node->scalar);
@@ -213,6 +240,10 @@ std::optional<Duration> MapReader::duration(std::string_view key, Duration min, 
 std::optional<std::size_t> MapReader::choice_index(std::string_view key,
                                                    std::span<const std::string_view> words,
                                                    const Hint& hint) {
+    KeyShape shape;
+    shape.kind = KeyShape::Kind::word;
+    shape.words.assign(words.begin(), words.end());
+    describe(key, std::move(shape));
     const Node* node = scalar(key, join(words));
     if (node == nullptr) return std::nullopt;
     for (std::size_t i = 0; i < words.size(); ++i) {
@@ -225,15 +256,24 @@ std::optional<std::size_t> MapReader::choice_index(std::string_view key,
     return std::nullopt;
 }
 
+bool MapReader::is_word(std::string_view key, std::string_view word) {
+    KeyShape shape;
+    shape.words.emplace_back(word);
+    describe(key, std::move(shape));
+    const Node* node = find(key);
+    return node != nullptr && node->kind == Node::Kind::scalar && node->scalar == word;
+}
+
 const Node* MapReader::child(std::string_view key) {
     const Node* node = find(key);
     return node == nullptr || node->kind == Node::Kind::null ? nullptr : node;
 }
 
 const Node* MapReader::map(std::string_view key, std::string_view example) {
+    describe(key, KeyShape::Kind::map);
     const Node* node = child(key);
     parents_.emplace_back(key);
-    if (node == nullptr || node->kind == Node::Kind::map) return node;
+    if (node == nullptr || node->kind == Node::Kind::map) return below(key, node);
     const std::string text = text_hint(*node, '{') + none_hint(key, example, *node);
     const bool is_list = node->kind == Node::Kind::sequence && !node->items.empty() &&
                          std::ranges::all_of(node->items, [](const Node& item) {
@@ -246,9 +286,10 @@ const Node* MapReader::map(std::string_view key, std::string_view example) {
 }
 
 const Node* MapReader::sequence(std::string_view key, std::string_view example) {
+    describe(key, KeyShape::Kind::list);
     const Node* node = child(key);
     parents_.emplace_back(key);
-    if (node == nullptr || node->kind == Node::Kind::sequence) return node;
+    if (node == nullptr || node->kind == Node::Kind::sequence) return below(key, node);
     problem(key, wrong(key, "a list" + such_as(example), *node) + list_hint(*node, example));
     return nullptr;
 }

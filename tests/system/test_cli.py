@@ -29,14 +29,16 @@ class CommandLine(unittest.TestCase):
         self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n$")
         text = self.expect(0, "--help").stdout
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
-                        "health"):
+                        "health", "schema", "import", "init", "scan"):
             self.assertRegex(text, rf"(?m)^\s+{command}\b")
             self.assertIn("Usage", self.expect(0, command, "--help").stdout)
 
     def test_wrong_usage_ends_with_64_and_says_why(self):
         for arguments in ([], ["fly"], ["run", "--fly"], ["check", "--format", "xml"], ["address"],
                           ["health", "--http", "nowhere"], ["health", "--http", "127.0.0.1:0"],
-                          ["health", "now"], ["address", "autonics-gplp-s"], ["demo", "--http", "nowhere"],
+                          ["health", "now"], ["schema", "now"], ["import"], ["init"],
+                          ["init", "sim"], ["init", "/dev/ttyS0", "--baud", "fast"],
+                          ["init", "/dev/null", "-o", str(ROOT / "README.md")], ["address", "autonics-gplp-s"], ["demo", "--http", "nowhere"],
                           ["profiles", "autonics-gplp"], ["address", "nobody", "UB1"],
                           ["address", "autonics-gplp-s", "XY12"]):
             with self.subTest(arguments=arguments):
@@ -286,6 +288,32 @@ class Files(unittest.TestCase):
                                capture_output=True, check=False)
         told = json.loads(ended.stdout.decode("utf-8"))
         self.assertTrue(told["errors"][0]["file"].endswith("caf\ufffd.yaml"))
+
+    def test_import_makes_a_configuration_that_check_takes(self):
+        conf = self.file.with_name("mbusd.conf")
+        conf.write_text("# mbusd\ndevice = /dev/ttyS5\nspeed = 9600\nmode = 8e1\nport = 1502\n"
+                        "address = 127.0.0.1\npause = 100\n")
+        made = run("import", str(conf))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertEqual(made.stderr.count("\n"), 1)
+        self.assertTrue(made.stderr.startswith(f"{conf}:7: pause = 100: "), made.stderr)
+        self.file.write_text(made.stdout)
+        checked = run("check", "-c", str(self.file), "--format", "json")
+        self.assertEqual((checked.returncode, checked.stderr), (0, ""))
+        plan = json.loads(checked.stdout)
+        self.assertEqual((plan["lines"][0]["device"], plan["modbus_tcp"][0]["listen"]),
+                         ("/dev/ttyS5", "127.0.0.1:1502"))
+
+    def test_import_says_where_a_file_is_wrong(self):
+        conf = self.file.with_name("mbusd.conf")
+        conf.write_text("speed 9600\nport = many\n")
+        ended = run("import", str(conf))
+        self.assertEqual((ended.returncode, ended.stdout), (BAD_CONFIG, ""))
+        self.assertIn(f"{conf}:1:1: a line must be NAME = VALUE", ended.stderr)
+        self.assertIn(f"{conf}:2:8: port must be a whole number", ended.stderr)
+        gone = run("import", str(conf) + "x")
+        self.assertEqual(gone.returncode, NO_INPUT)
+        self.assertIn("No such file", gone.stderr)
 
     def test_a_token_that_is_a_pipe_is_an_error_and_holds_nobody_up(self):
         pipe = self.file.with_name("pipe")

@@ -7,6 +7,8 @@
 
 namespace panelgate::yaml {
 
+class Description;
+
 /// A place in a file, 1-based, in characters, as editors count.
 struct Mark {
     int line = 1;
@@ -40,6 +42,10 @@ class Problems {
     bool empty() const { return list_.empty(); }
     const std::vector<Problem>& list() const { return list_; }
     const std::string& file() const { return file_; }
+    /// Where those who read write down what they ask for; nullptr, as a rule: nowhere. Outlives
+    /// this.
+    void describe(Description* description) { description_ = description; }
+    Description* description() const { return description_; }
     /// This file's first, then those of other files; sorted by line and column, one line each, with
     /// its excerpt behind it. Of many, the first kMaxTold and how many there are more.
     std::string text() const;
@@ -47,6 +53,7 @@ class Problems {
   private:
     std::string file_;
     std::vector<Problem> list_;
+    Description* description_ = nullptr;
 };
 
 struct Entry;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
+#include "panelgate/yaml/description.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::yaml {
@@ -73,6 +74,9 @@ class MapReader {
                                             std::span<const std::string_view> words,
                                             const Hint& hint = {});
 
+    /// The value is this word, which stands for itself beside what another getter takes: auto.
+    bool is_word(std::string_view key, std::string_view word);
+
     /// The value itself, of any kind but null; nullptr when absent or null.
     const Node* child(std::string_view key);
     /// As child(), and another kind is a problem, told with an example such as "{mode: off}".
@@ -96,6 +100,13 @@ class MapReader {
     void finish();
 
   private:
+    void describe(std::string_view key, KeyShape shape);
+    void describe(std::string_view key, KeyShape::Kind kind) {
+        KeyShape shape;
+        shape.kind = kind;
+        describe(key, std::move(shape));
+    }
+    const Node* below(std::string_view key, const Node* node);
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
     bool require(std::string_view key);

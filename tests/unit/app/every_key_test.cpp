@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "difference.hpp"
+#include "panelgate/config/describe.hpp"
 #include "support/yaml_text.hpp"
 #include "unit/config/memory_files.hpp"
 
@@ -30,6 +31,31 @@ std::optional<config::Config> load(const std::string& text) {
     yaml::Problems problems("x.yaml");
     return config::load(text, files(), problems);
 }
+
+/// One of each map, where any key may be left out or have its default.
+constexpr const char* kPlain = R"(lines:
+  - name: a
+    device: /dev/ttyS1
+    serial: {parity: odd}
+    rs485: {mode: rts}
+    timing: {broadcast_turnaround: 90ms}
+    queue: {deadline: 1s}
+    offline: {after: 2}
+    simulate: {echo: true}
+    stations:
+      - id: 1
+        simulate: {dead: true}
+        poll: [{read: "400001"}]
+        points: [{name: p, at: "400001", type: u32}]
+modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"}]
+serial_masters:
+  - {name: plc, device: /dev/ttyS2, serial: {parity: odd}, rs485: {mode: rts}}
+http: {anonymous: none}
+mqtt: {broker: "mqtt://b:1883", topic: x}
+relays: [{from: a-1/400001, to: a-1/400101, on_change: true}]
+log: {level: warn, format: json}
+realtime: {priority: 20, lock_memory: true}
+)";
 
 std::string text_of(const fs::path& path) {
     std::ifstream in(path);
@@ -67,11 +93,15 @@ serial_masters:
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
 http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
+mqtt: {broker: "mqtts://b:8883", topic: x, format: json, qos: 1, client_id: x, username: x, store: 200,
+       password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
+       certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
 realtime: {priority: 20, lock_memory: true}
 )";
 
 constexpr const char* kWords =
+    "points mqtts://c "
     "1 2 3 7 0.2 8 16 20ms 2s 1s none even on off kernel rts low rtu ascii tcp take "
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
@@ -137,6 +167,51 @@ TEST(EveryKey, OfAConfigurationMakesADifference) {
     }
     EXPECT_GE(keys.size(), 120U);
     for (const auto& [key, differs] : keys) EXPECT_TRUE(differs) << key;
+}
+
+std::string generic_path(const std::string& path, const std::string& key) {
+    return path.empty() ? key : path + '/' + key;
+}
+
+/// The maps whose keys have this path before them; "" is the top.
+void find_maps(yaml::Node& node, const std::string& path, const std::string& wanted,
+               std::vector<yaml::Node*>& found) {
+    if (node.kind == yaml::Node::Kind::map && path == wanted) found.push_back(&node);
+    for (yaml::Node& item : node.items) find_maps(item, path, wanted, found);
+    for (yaml::Entry& entry : node.entries)
+        find_maps(entry.value, generic_path(path, entry.key), wanted, found);
+}
+
+/// `base` with the key taken out of the first map that can have it, or with this value there.
+std::optional<config::Config> load_with(const char* base, const std::string& path,
+                                        const std::string& value) {
+    yaml::Problems problems("x.yaml");
+    yaml::Node tree = yaml::parse(base, problems);
+    const std::size_t cut = path.rfind('/');
+    std::vector<yaml::Node*> maps;
+    find_maps(tree, "", cut == path.npos ? "" : path.substr(0, cut), maps);
+    if (maps.empty()) return std::nullopt;
+    const std::string key = path.substr(cut == path.npos ? 0 : cut + 1);
+    std::erase_if(maps[0]->entries, [&](const yaml::Entry& entry) { return entry.key == key; });
+    yaml::Node scalar;
+    scalar.kind = yaml::Node::Kind::scalar;
+    scalar.scalar = value;
+    if (!value.empty()) maps[0]->entries.push_back({key, {}, scalar});
+    return load(yaml_text(tree));
+}
+
+TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
+    for (const config::KeyText& text : config::key_texts()) {
+        if (text.otherwise.empty()) continue;
+        const std::string path(text.path);
+        auto with = load_with(kPlain, path, std::string(text.otherwise));
+        const char* base = with ? kPlain : kFurther;  // some belong to ASCII only
+        if (!with) with = load_with(base, path, std::string(text.otherwise));
+        const auto without = load_with(base, path, "");
+        ASSERT_TRUE(without && with) << path;
+        EXPECT_TRUE(differences(*without, *with).empty())
+            << path << ": " << to_string(differences(*without, *with)[0]);
+    }
 }
 
 }  // namespace

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "panelgate/profile/load_profile.hpp"
+#include "panelgate/scan/result.hpp"
+
+namespace panelgate::app {
+
+/// What the first configuration of a line is made of.
+struct Found {
+    std::string device;        ///< an absolute path, or tcp://HOST:PORT
+    std::string profiles_dir;  ///< an absolute path, or ""
+    const scan::Result& result;
+    const profile::Catalogue& profiles;
+};
+
+/// A configuration of what a scan has found, with comments that explain it and examples of points
+/// that only have to be uncommented. Complete and valid when a station was found (found_any()).
+std::string starter_yaml(const Found& found);
+
+}  // namespace panelgate::app

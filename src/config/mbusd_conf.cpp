@@ -1,0 +1,289 @@
+#include "panelgate/config/mbusd_conf.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <span>
+#include <utility>
+
+#include "loader.hpp"
+#include "mbusd_lines.hpp"
+#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "panelgate/yaml/quote.hpp"
+
+namespace panelgate::config {
+namespace {
+
+/// mbusd's settings, with its defaults (cfg.c, cfg_init(); README).
+struct Mbusd {
+    std::string device = "/dev/ttyS0";
+    std::int64_t speed = 19200;
+    std::string mode = "8N1";
+    std::string rs485 = "{mode: off}";
+    std::string address = "0.0.0.0";
+    std::int64_t port = 502;
+    std::int64_t connections = 32;
+    std::int64_t retries = 3;
+    std::int64_t wait = 500;  ///< ms
+    bool replies_to_broadcasts = false;
+    std::string level = "info";
+};
+
+std::string lower(std::string_view text) {
+    std::string made(text);
+    std::ranges::transform(made, made.begin(), [](unsigned char c) { return std::tolower(c); });
+    return made;
+}
+
+/// What a comment may hold whatever the file was written in.
+std::string as_ascii(std::string text) {
+    std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
+    return text;
+}
+
+/// In single quotes nothing means anything, but a variable.
+std::string quoted(std::string_view text) {
+    std::string made = "'";
+    for (const char c : text) made += c == '\'' ? "''" : c == '$' ? "$$" : std::string(1, c);
+    return made + '\'';
+}
+
+/// Of an address in text, IPv6 with brackets or without.
+std::optional<Endpoint> endpoint_of(const std::string& address, std::int64_t port) {
+    const std::string end = ':' + std::to_string(port);
+    const bool bare = address.find(':') != address.npos && address[0] != '[';
+    return parse_endpoint(bare ? '[' + address + ']' + end : address + end);
+}
+
+class Reader {
+  public:
+    explicit Reader(yaml::Problems& problems) : problems_(problems) {}
+
+    void take(const MbusdLine& line) {
+        line_ = &line;
+        constexpr auto kKeys = std::to_array<std::pair<std::string_view, void (Reader::*)()>>(
+            {{"device", &Reader::device},
+             {"speed", &Reader::speed},
+             {"mode", &Reader::mode},
+             {"enable_rs485", &Reader::enable_rs485},
+             {"trx_control", &Reader::trx_control},
+             {"trx_sysfile", &Reader::trx_sysfile},
+             {"address", &Reader::address},
+             {"port", &Reader::port},
+             {"maxconn", &Reader::maxconn},
+             {"timeout", &Reader::timeout},
+             {"retries", &Reader::retries},
+             {"pause", &Reader::pause},
+             {"wait", &Reader::wait},
+             {"replyonbroadcast", &Reader::replyonbroadcast},
+             {"loglevel", &Reader::loglevel},
+             {"logfile", &Reader::logfile},
+             {"daemon", &Reader::daemon},
+             {"enable_rmtaddr_in_log", &Reader::rmtaddr}});
+        std::vector<std::string_view> names;
+        for (const auto& [name, read] : kKeys) {
+            names.push_back(name);
+            if (name != line.name) continue;
+            if (line.value.empty() && name != "trx_sysfile" && name != "logfile")
+                wrong("has no value; leave the line out for the default");
+            else
+                (this->*read)();
+            return;
+        }
+        problems_.add(line.mark, "mbusd has no setting " + yaml::quote(line.name) +
+                                     did_you_mean(line.name, names, "settings"));
+    }
+
+    const Mbusd& mbusd() const { return mbusd_; }
+    const std::vector<std::string>& notes() const { return notes_; }
+    const std::vector<std::string>& comments() const { return comments_; }
+
+  private:
+    void wrong(const std::string& what) {
+        problems_.add(line_->value_mark, line_->name + ' ' + what);
+    }
+    void wrong_value(const std::string& wanted) {
+        wrong("must be " + wanted + ", not " + yaml::quote(line_->value));
+    }
+    /// What has no counterpart, and why.
+    void note(const std::string& why) {
+        const std::string told = as_ascii(line_->name + " = " + line_->value) + ": " + why;
+        comments_.push_back(told);
+        notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
+    }
+    std::int64_t integer(std::int64_t otherwise, std::int64_t min, std::int64_t max) {
+        const auto value = yaml::parse_integer(line_->value);
+        if (value && *value >= min && *value <= max) return *value;
+        wrong_value("a whole number from " + std::to_string(min) + " to " + std::to_string(max));
+        return otherwise;
+    }
+    bool yes_or_no() {
+        constexpr std::array<std::string_view, 5> kYes{"yes", "y", "true", "on", "1"};
+        constexpr std::array<std::string_view, 5> kNo{"no", "n", "false", "off", "0"};
+        const std::string typed = lower(line_->value);
+        const bool yes = std::ranges::find(kYes, typed) != kYes.end();
+        if (!yes && std::ranges::find(kNo, typed) == kNo.end()) wrong_value("yes or no");
+        return yes;
+    }
+
+    void device() {
+        const std::string& path = mbusd_.device = line_->value;
+        const bool is_tty = path.starts_with("/dev/tty");
+        const bool more = is_tty && path.find_first_of(":,;# ") != path.npos;
+        if (path[0] != '/' || more || as_ascii(path) != path)
+            wrong_value("the absolute path of a device alone, such as /dev/ttyS0");
+    }
+    void speed() { mbusd_.speed = integer(mbusd_.speed, 50, 4'000'000); }
+    void mode() {
+        const std::string& typed = line_->value;
+        constexpr std::string_view kParities = "nNeEoO";
+        const bool right = typed.size() == 3 && typed[0] == '8' &&
+                           kParities.find(typed[1]) != kParities.npos &&
+                           (typed[2] == '1' || typed[2] == '2');
+        if (right)
+            mbusd_.mode = typed;
+        else
+            wrong_value("8 data bits, parity n, e or o, and 1 or 2 stop bits, such as 8n1");
+    }
+    void enable_rs485() {
+        if (yes_or_no()) mbusd_.rs485 = "{mode: kernel}";
+    }
+    void trx_control() {
+        constexpr std::array<std::string_view, 6> kWords{"addc",  "rts",     "rts_0",
+                                                         "rts_1", "sysfs_0", "sysfs_1"};
+        const std::string typed = lower(line_->value);
+        if (std::ranges::find(kWords, typed) == kWords.end()) {
+            wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
+        } else if (typed.starts_with("rts")) {
+            mbusd_.rs485 = std::string("{mode: rts, rts_on_send: ") +
+                           (typed == "rts_0" ? "low" : "high") + '}';
+        } else if (typed.starts_with("sysfs")) {
+            note(
+                "a GPIO that is switched through a file is late by what the machine is busy; the "
+                "driver does it to the bit: bind it to the UART (device tree: rts-gpios, "
+                "linux,rs485-enabled-at-boot-time) and write rs485: {mode: kernel}");
+        }
+    }
+    void trx_sysfile() {
+        if (!line_->value.empty())
+            note(
+                "see trx_control = sysfs_0 and sysfs_1: nothing is "
+                "switched through files");
+    }
+    void address() {
+        if (endpoint_of(line_->value, 1))
+            mbusd_.address = line_->value;
+        else
+            wrong_value("an IP address such as 0.0.0.0 or 127.0.0.1");
+    }
+    void port() { mbusd_.port = integer(mbusd_.port, 1, 65535); }
+    void maxconn() { mbusd_.connections = integer(mbusd_.connections, 1, 65535); }
+    void timeout() {
+        integer(0, 0, 1'000'000);
+        note(
+            "connections are not closed for being idle; TCP keep-alive finds those whose client "
+            "is gone within 90 s");
+    }
+    void retries() {
+        mbusd_.retries = integer(mbusd_.retries, 0, 15);
+        if (mbusd_.retries > 10) note("10 is the most");
+        mbusd_.retries = std::min<std::int64_t>(mbusd_.retries, 10);
+    }
+    void pause() {
+        integer(100, 0, 10'000);
+        note(
+            "between two requests is t3.5, as the standard says, and nothing else; panels that "
+            "need more get timing: {frame_gap: " +
+            line_->value + "ms}, which costs its share of every second");
+    }
+    void wait() { mbusd_.wait = integer(mbusd_.wait, 1, 120'000); }
+    void replyonbroadcast() { mbusd_.replies_to_broadcasts = yes_or_no(); }
+    void loglevel() {
+        constexpr std::array<const char*, 4> kLevels{"error", "warn", "info", "debug"};
+        mbusd_.level =
+            kLevels[static_cast<std::size_t>(std::min<std::int64_t>(integer(2, 0, 9), 3))];
+    }
+    void logfile() { note("the log goes to standard error: under systemd to the journal"); }
+    void daemon() {
+        yes_or_no();
+        note("run it as a service: deploy/ has a unit for systemd");
+    }
+    void rmtaddr() {
+        yes_or_no();
+        note("the log and the status always name clients by their addresses");
+    }
+
+    yaml::Problems& problems_;
+    const MbusdLine* line_ = nullptr;
+    Mbusd mbusd_;
+    std::vector<std::string> notes_;
+    std::vector<std::string> comments_;
+};
+
+std::string serial_text(const Mbusd& mbusd) {
+    const int parity = std::tolower(static_cast<unsigned char>(mbusd.mode[1]));
+    const char* word = parity == 'n' ? "none" : parity == 'e' ? "even" : "odd";
+    return "{baud: " + std::to_string(mbusd.speed) + ", data_bits: 8, parity: " + word +
+           ", stop_bits: " + mbusd.mode[2] + '}';
+}
+
+/// All tries have to fit; the default where they do.
+std::string deadline_text(const Mbusd& mbusd) {
+    constexpr std::int64_t kDefault = 2000;
+    const std::int64_t needed = (mbusd.retries + 1) * (mbusd.wait + 100) + 100;
+    if (needed <= kDefault) return "";
+    constexpr std::int64_t kMost = 600;  // 10 min
+    const std::int64_t seconds = std::min((needed + 999) / 1000, kMost);
+    return "    queue: {deadline: " + std::to_string(seconds) +
+           "s}   # all tries fit into it; clients have to wait for longer\n";
+}
+
+std::string listen_text(const Mbusd& mbusd) {
+    const auto at = endpoint_of(mbusd.address, mbusd.port);
+    return at ? endpoint_text(at->address, at->port) : "";
+}
+
+std::string line_text(const Mbusd& mbusd) {
+    return "lines:\n  - name: line1\n    device: " + quoted(mbusd.device) +
+           "\n    serial: " + serial_text(mbusd) + "\n    rs485: " + mbusd.rs485 +
+           "\n    timing: {response_timeout: " + std::to_string(mbusd.wait) +
+           "ms}\n    retries: " + std::to_string(mbusd.retries) +
+           "   # of reads; mbusd repeats writes, too: here a station says retry_writes: true\n" +
+           deadline_text(mbusd) +
+           "    # stations:   # none are needed: all addresses pass. Listed, they have names, "
+           "points,\n"
+           "    #   - {id: 1, name: press, profile: autonics-gplp-s}   # limits: panelgate init\n";
+}
+
+std::string servers_text(const Mbusd& mbusd) {
+    std::string text = "modbus_tcp:\n  - listen: '" + listen_text(mbusd) +
+                       "'\n    broadcast: " + (mbusd.replies_to_broadcasts ? "reply" : "silent") +
+                       "\n    max_connections: " + std::to_string(mbusd.connections) + '\n';
+    if (mbusd.port != 8080)
+        text +=
+            "http:   # status, metrics and a dashboard, which mbusd has not\n"
+            "  listen: 127.0.0.1:8080\n";
+    return text;
+}
+
+std::string yaml_of(const Mbusd& mbusd, const std::vector<std::string>& comments) {
+    std::string text = "# made of an mbusd.conf by panelgate import\n" + line_text(mbusd) +
+                       servers_text(mbusd) + "log: {level: " + mbusd.level + "}\n";
+    if (!comments.empty()) text += "\n# Without a counterpart:\n";
+    for (const std::string& comment : comments) text += "# " + comment + '\n';
+    return text;
+}
+
+}  // namespace
+
+std::optional<Imported> import_mbusd(std::string_view text, yaml::Problems& problems) {
+    Reader reader(problems);
+    for (const MbusdLine& line : mbusd_lines(text, problems)) reader.take(line);
+    if (!problems.empty()) return std::nullopt;
+    return Imported{yaml_of(reader.mbusd(), reader.comments()), reader.notes()};
+}
+
+}  // namespace panelgate::config

@@ -1,0 +1,102 @@
+"""`panelgate init`: a configuration of what a scan has found, which check takes and run runs."""
+import json
+import os
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import config
+import harness
+from harness import read_registers, run
+from test_scan import simulated
+
+PANELS = "{id: 31, profile: autonics-gplp-s}, {id: 20, profile: panasonic-gt}"
+SEARCH = ("--baud", "38400", "--parity", "none", "--stations", "19-21,31")
+
+
+def init(*arguments):
+    return subprocess.run([harness.PANELGATE, "init", *arguments], stdin=subprocess.DEVNULL,
+                          capture_output=True, text=True, timeout=120, check=False)
+
+
+def check(file):
+    return run("check", "-c", str(file), "--format", "json")
+
+
+class Init(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.file = pathlib.Path(folder.name) / "panelgate.yaml"
+
+    def test_writes_what_check_takes_and_run_runs(self):
+        with simulated(config.line("left", stations=PANELS)) as links:
+            made = init(links["left"], *SEARCH, "-o", str(self.file))
+            self.assertEqual((made.returncode, made.stdout), (0, ""), made.stderr)
+            self.assertIn(f"wrote {self.file} with 2 station(s)", made.stderr)
+            checked = check(self.file)
+            self.assertEqual(checked.returncode, 0, checked.stderr)
+            line = json.loads(checked.stdout)["lines"][0]
+            self.assertEqual({s["id"]: s["profile"] for s in line["stations"]},
+                             {31: "autonics-gplp-s", 20: "panasonic-gt"})
+            self.assertEqual(line["serial"], "38400 8N1")
+            # As it is, but for ports that others on this machine may have.
+            text = re.sub(r"127\.0\.0\.1:\d+", "127.0.0.1:0", self.file.read_text())
+            self.file.write_text(text.replace("127.0.0.1:0/", "127.0.0.1:8080/"))
+            with harness.Program("run", "-c", str(self.file)) as program:
+                with program.client() as client:
+                    self.assertEqual(client.ask(31, read_registers(0, 2)),
+                                     b"\x03\x04\x00\x0a\x00\x14")
+
+    def test_prints_it_and_never_writes_over_a_file_without_force(self):
+        self.file.write_text("mine\n")
+        refused = init("/dev/null", "-o", str(self.file))
+        self.assertEqual((refused.returncode, self.file.read_text()), (64, "mine\n"))
+        self.assertIn("is there already", refused.stderr)
+        with simulated(config.line("left", stations=PANELS)) as links:
+            printed = init(links["left"], *SEARCH)
+            self.assertEqual(printed.returncode, 0, printed.stderr)
+            forced = init(links["left"], *SEARCH, "-o", str(self.file), "--force")
+            self.assertEqual(forced.returncode, 0, forced.stderr)
+        self.assertEqual(self.file.read_text(), printed.stdout)
+
+    def test_examples_of_points_are_valid_as_they_are(self):
+        with simulated(config.line("left", stations=PANELS)) as links:
+            text = init(links["left"], *SEARCH).stdout
+        self.file.write_text(re.sub(r"(?m)^        # (points:|  - )", r"        \1", text))
+        checked = check(self.file)
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+        for station in json.loads(checked.stdout)["lines"][0]["stations"]:
+            self.assertGreaterEqual(len(station["points"]), 1)
+
+    def test_over_tcp(self):
+        with tempfile.TemporaryDirectory() as folder:
+            lines = pathlib.Path(folder) / "lines.yaml"
+            lines.write_text(config.gateway(config.line("left", stations=PANELS), http=None))
+            with harness.Program("simulate", "-c", str(lines),
+                                 "--line", "left=tcp://127.0.0.1:0") as program:
+                port = program.log.wait_for(r"rtu_over_tcp=127\.0\.0\.1:(\d+)").group(1)
+                device = f"tcp://127.0.0.1:{port}"
+                made = init(device, "--stations", "19-21,31", "-o", str(self.file))
+        self.assertEqual(made.returncode, 0, made.stderr)
+        text = self.file.read_text()
+        self.assertIn(f'device: "{device}"', text)
+        self.assertIn("supposed from the panels", text)
+        self.assertEqual(check(self.file).returncode, 0)
+
+    def test_where_nothing_answers_nothing_is_written(self):
+        master, slave = os.openpty()
+        try:
+            ended = init(os.ttyname(slave), "--baud", "115200", "--parity", "none",
+                         "--stations", "1", "-o", str(self.file))
+        finally:
+            os.close(master)
+            os.close(slave)
+        self.assertEqual((ended.returncode, self.file.exists()), (69, False), ended.stderr)
+        self.assertIn("nothing to write", ended.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,52 @@
+#include "panelgate/config/describe.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace panelgate::config {
+namespace {
+
+using testing::ElementsAre;
+using yaml::KeyShape;
+
+const KeyShape& shape(const std::string& path) {
+    static const std::vector<KeyShape> kKeys = describe();
+    const auto found = std::ranges::find(kKeys, path, &KeyShape::path);
+    if (found == kKeys.end()) throw std::out_of_range("no key " + path);
+    return *found;
+}
+
+TEST(Describe, KnowsWhatTheLoaderAsksFor) {
+    EXPECT_EQ(shape("lines/stations/id").kind, KeyShape::Kind::integer);
+    EXPECT_TRUE(shape("lines/stations/id").required);
+    EXPECT_EQ(shape("lines/stations/id").max, 247);
+    EXPECT_EQ(shape("lines/timing/response_timeout").kind, KeyShape::Kind::duration);
+    EXPECT_THAT(shape("lines/timing/response_timeout").words, ElementsAre("adaptive"));
+    EXPECT_EQ(shape("lines/timing/response_timeout").shortest, Duration(1ms));
+    for (const char* key : {"frame_gap", "late_window", "reply_hole"}) {
+        const KeyShape& timing = shape("lines/timing/" + std::string(key));
+        EXPECT_EQ(timing.kind, KeyShape::Kind::duration) << key;
+        EXPECT_THAT(timing.words, ElementsAre("auto")) << key;
+    }
+    EXPECT_THAT(shape("http/tokens/role").words, ElementsAre("viewer", "operator"));
+    EXPECT_EQ(shape("http/tokens/role").kind, KeyShape::Kind::word);
+    EXPECT_TRUE(shape("http/tokens/role").required);
+    EXPECT_FALSE(shape("log/level").required);
+    EXPECT_EQ(shape("modbus_tcp/units").kind, KeyShape::Kind::map);
+}
+
+TEST(Describe, HasATextForEachKeyAndNoOther) {
+    std::set<std::string> keys{"templates", "lines/stations/template"};  // before the loader's keys
+    for (const KeyShape& key : describe()) EXPECT_TRUE(keys.insert(key.path).second) << key.path;
+    std::set<std::string> texts;
+    for (const KeyText& text : key_texts())
+        EXPECT_TRUE(texts.insert(std::string(text.path)).second) << text.path;
+    EXPECT_EQ(texts, keys);
+}
+
+}  // namespace
+}  // namespace panelgate::config

@@ -1,0 +1,112 @@
+#include "panelgate/config/mbusd_conf.hpp"
+
+#include <gmock/gmock.h>
+
+#include <string>
+
+#include "memory_files.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Imported imported_of(const std::string& text) {
+    yaml::Problems problems("mbusd.conf");
+    const auto imported = import_mbusd(text, problems);
+    EXPECT_TRUE(imported) << problems.text();
+    return imported.value_or(Imported{});
+}
+
+Config load(const Imported& imported) {
+    yaml::Problems problems("made.yaml");
+    auto config = config::load(imported.yaml, MemoryFiles({}), problems);
+    EXPECT_TRUE(config) << problems.text() << imported.yaml;
+    return std::move(config).value();
+}
+
+std::string faults(const std::string& text) {
+    yaml::Problems problems("mbusd.conf");
+    EXPECT_FALSE(import_mbusd(text, problems));
+    return problems.text();
+}
+
+TEST(MbusdConf, OfNothingHasTheDefaultsOfMbusd) {
+    const Imported imported = imported_of("# nothing\n\n   # at all\n");
+    const Config config = load(imported);
+    EXPECT_EQ(config.lines[0].device.device, "/dev/ttyS0");
+    EXPECT_EQ(to_string(config.lines[0].device.serial), "19200 8N1");
+    EXPECT_EQ(config.modbus_tcp[0].name(), "0.0.0.0:502");
+    EXPECT_EQ(config.modbus_tcp[0].broadcast, tcp_server::BroadcastMode::silent);
+    EXPECT_EQ(config.modbus_tcp[0].max_connections, 32U);
+    EXPECT_EQ(config.lines[0].arbiter.unlisted.retries, 3);
+    EXPECT_EQ(config.lines[0].arbiter.queue.deadline, Duration(3s)) << "four tries of 500 ms";
+    EXPECT_THAT(imported.notes, IsEmpty());
+}
+
+TEST(MbusdConf, TakesOverWhatHasACounterpart) {
+    const Config config = load(imported_of(
+        "device = /dev/serial/x 'y$\nspeed=38400\n mode\t=\t8E2 \r\ntrx_control = RTS_0\n"
+        "address = ::1\nport = 8080\nmaxconn = 7\nretries = 0\nwait = 900\n"
+        "replyonbroadcast = Yes\nloglevel = 0\n"));
+    const Line& line = config.lines[0];
+    EXPECT_EQ(line.device.device, "/dev/serial/x 'y$");
+    EXPECT_EQ(to_string(line.device.serial), "38400 8E2");
+    EXPECT_EQ(line.device.rs485.mode, line::Rs485::Mode::rts);
+    EXPECT_FALSE(line.device.rs485.rts_high_on_send);
+    EXPECT_EQ(config.modbus_tcp[0].name(), "[::1]:8080");
+    EXPECT_EQ(config.modbus_tcp[0].max_connections, 7U);
+    EXPECT_EQ(config.modbus_tcp[0].broadcast, tcp_server::BroadcastMode::reply);
+    EXPECT_EQ(line.arbiter.unlisted.response_timeout, Duration(900ms));
+    EXPECT_EQ(line.arbiter.unlisted.retries, 0);
+    EXPECT_EQ(line.arbiter.queue.deadline, Duration(2s));
+    EXPECT_EQ(config.log.level, rt::LogLevel::error);
+    EXPECT_FALSE(config.http) << "its port is taken";
+}
+
+TEST(MbusdConf, SwitchesTheTransceiverAsTheDriverOrRtsDid) {
+    EXPECT_EQ(load(imported_of("enable_rs485 = yes")).lines[0].device.rs485.mode,
+              line::Rs485::Mode::kernel);
+    const auto rts = load(imported_of("trx_control = rts")).lines[0].device.rs485;
+    EXPECT_EQ(rts.mode, line::Rs485::Mode::rts);
+    EXPECT_TRUE(rts.rts_high_on_send);
+    EXPECT_EQ(load(imported_of("trx_control = addc")).lines[0].device.rs485.mode,
+              line::Rs485::Mode::off);
+}
+
+TEST(MbusdConf, SaysWhatHasNoCounterpartInCommentsAndNotes) {
+    const Imported imported = imported_of(
+        "pause = 100\ntimeout = 60\nlogfile = /var/log/\xe9.log\ntrx_control = sysfs_1\n"
+        "trx_sysfile = /sys/class/gpio/gpio5/value\nretries = 15\n");
+    const Config config = load(imported);
+    EXPECT_EQ(config.lines[0].arbiter.unlisted.retries, 10);
+    ASSERT_EQ(imported.notes.size(), 6U);
+    EXPECT_THAT(imported.notes[0], testing::StartsWith("mbusd.conf:1: pause = 100: between two"));
+    EXPECT_THAT(imported.notes[2], HasSubstr("/var/log/?.log: the log goes to standard error"));
+    for (const std::string& note : imported.notes)
+        EXPECT_THAT(imported.yaml, HasSubstr("\n# " + note.substr(note.find(": ") + 2) + '\n'));
+}
+
+TEST(MbusdConf, TellsAllFaultsWithTheirPlaces) {
+    EXPECT_EQ(
+        faults("device\nspeed = fast\n  mode = 7n1\nadress = 1\nport =\ntrx_control = gpio\n"),
+        "mbusd.conf:1:1: a line must be NAME = VALUE such as speed = 19200, or a comment that "
+        "begins with '#', not 'device'\n"
+        "mbusd.conf:2:9: speed must be a whole number from 50 to 4000000, not 'fast'\n"
+        "mbusd.conf:3:10: mode must be 8 data bits, parity n, e or o, and 1 or 2 stop bits, "
+        "such as 8n1, not '7n1'\n"
+        "mbusd.conf:4:1: mbusd has no setting 'adress'; did you mean 'address'?\n"
+        "mbusd.conf:5:7: port has no value; leave the line out for the default\n"
+        "mbusd.conf:6:15: trx_control must be addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1, "
+        "not 'gpio'\n");
+    EXPECT_THAT(faults("device = ttyS0"), HasSubstr("1:10: device must be the absolute path"));
+    EXPECT_THAT(faults("device = /dev/ttyS0:9600"), HasSubstr("device must be"));
+    EXPECT_THAT(faults("address = plc.example"), HasSubstr("address must be an IP address"));
+    EXPECT_THAT(faults("replyonbroadcast = maybe"), HasSubstr("must be yes or no"));
+    EXPECT_THAT(faults("logfile = a\x01"), HasSubstr("control characters"));
+    EXPECT_THAT(faults("= 5"), HasSubstr("a line must be NAME = VALUE"));
+}
+
+}  // namespace
+}  // namespace panelgate::config
