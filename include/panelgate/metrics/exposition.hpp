@@ -29,7 +29,6 @@ struct Snapshot {
     std::optional<web::Counters> http;
     std::optional<mqtt::Counters> mqtt;  ///< nothing: there is no broker
     std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
-    std::optional<mqtt::Counters> mqtt;
     std::string version;
     ProcessFacts process;
     rt::Counters runtime;
