@@ -9,6 +9,7 @@
 #include <utility>
 #include <variant>
 
+#include "build_info.hpp"
 #include "panelgate/rt/log.hpp"
 #include "prepare.hpp"
 #include "reloader.hpp"
@@ -248,6 +249,8 @@ bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points,
     snapshot.mqtt = northbound_.counters();
     if (reloads_->barred(false).empty()) snapshot.reloads = reloads_->counters();
     snapshot.version = PANELGATE_VERSION;
+    snapshot.commit = build_commit();
+    snapshot.compiler = build_compiler();
     snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
     snapshot.runtime.loop_lag = lag_.seconds();
     return false;

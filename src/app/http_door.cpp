@@ -3,15 +3,38 @@
 #include <optional>
 
 #include "load.hpp"
+#include "panelgate/config/real_files.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "reachable.hpp"
 
 namespace panelgate::app {
 namespace {
 
+config::Endpoint usual() {
+    const web::Settings settings;
+    return {settings.address, settings.port};
+}
+
+/// The `listen` of `http` in a file whatever else is wrong with it; nothing where it has none.
+std::optional<config::Endpoint> listen_in(const std::string& file) {
+    const auto text = config::RealFiles::read_any(path_of(file));
+    if (!text) return std::nullopt;
+    yaml::Problems ignored(file);
+    const yaml::Node tree = yaml::parse(*text, ignored);
+    for (const yaml::Entry& top : tree.entries) {
+        if (top.key != "http") continue;
+        for (const yaml::Entry& entry : top.value.entries) {
+            const auto door =
+                entry.key == "listen" ? config::parse_endpoint(entry.value.scalar) : std::nullopt;
+            if (door && door->port != 0) return door;
+        }
+    }
+    return std::nullopt;
+}
+
 std::variant<config::Endpoint, NoDoor> door_of(const std::string& file) {
     const std::optional<config::Config> config = read_quietly(file);
-    const web::Settings usual;
-    if (!config) return config::Endpoint{usual.address, usual.port};
+    if (!config) return listen_in(file).value_or(usual());
     if (config->http && config->http->port != 0)
         return config::Endpoint{config->http->address, config->http->port};
     return NoDoor{file +

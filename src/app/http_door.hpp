@@ -14,8 +14,8 @@ struct NoDoor {
     ExitCode code = kNotReady;
 };
 /// Where the gateway's HTTP listens, its address one that can be connected to: `http` (ADDR:PORT),
-/// or, when that is "", what the file says. A file that is not there or has faults says the
-/// default: a gateway that runs has read another one.
+/// or, when that is "", what the file says, faults or not; where it does not say it, the default: a
+/// gateway that runs has read another one.
 std::variant<config::Endpoint, NoDoor> http_door(const std::string& file, const std::string& http);
 
 }  // namespace panelgate::app

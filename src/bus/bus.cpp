@@ -312,6 +312,7 @@ void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
+    if (entry.deed) entry.deed->transaction = result.transactions.last();
     account.add(entry.station, entry.function, entry.deed, outcome, took);
     clients.answered(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);

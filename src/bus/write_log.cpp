@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/function.hpp"
@@ -31,14 +32,15 @@ std::string place_of(const modbus::Request& request) {
 
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
     if (request.poll || request.request.is_read()) return std::nullopt;
-    return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu())};
+    return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu()),
+                0};
 }
 
 std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
     if (modbus::is_pure_read(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu)};
+    return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu), 0};
 }
 
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {
@@ -48,20 +50,14 @@ void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, 
     const std::string who = deed.client.substr(0, deed.client.rfind(':'));
     const std::string subject = settings.name + '/' + name + ' ' + deed.place + ' ' + who;
     const std::string ended(label(outcome));
-    if (deed.place.empty())
-        return rt::log_deed("write", subject,
-                            {{"line", settings.name},
-                             {"station", name},
-                             {"client", deed.client},
-                             {"pdu", deed.pdu},
-                             {"outcome", ended}});
-    rt::log_deed("write", subject,
-                 {{"line", settings.name},
-                  {"station", name},
-                  {"client", deed.client},
-                  {"at", deed.place},
-                  {"pdu", deed.pdu},
-                  {"outcome", ended}});
+    std::vector<rt::LogField> fields{
+        {"line", settings.name}, {"station", name}, {"client", deed.client}};
+    if (!deed.place.empty()) fields.push_back({"at", deed.place});
+    fields.push_back({"pdu", deed.pdu});
+    fields.push_back({"outcome", ended});
+    const std::string transaction = std::to_string(deed.transaction);
+    if (deed.transaction != 0) fields.push_back({"transaction", transaction});
+    rt::log_deed("write", subject, fields);
 }
 
 }  // namespace panelgate::bus

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "panelgate/arbiter/client_names.hpp"
+#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/outcome.hpp"
 #include "panelgate/bus/bus.hpp"
@@ -15,6 +16,8 @@ struct Deed {
     std::string client;
     std::string place;  ///< "holding-registers/100", or empty
     std::string pdu;    ///< hex; the first bytes of a long one
+    /// The line's last one that was made for it, as in the trace; 0: none was.
+    arbiter::Transaction transaction = 0;
 };
 
 /// Nothing for what changes nothing and for what no client wants (polls, relays).

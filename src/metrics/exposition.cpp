@@ -306,8 +306,12 @@ void add_reloads(Families& out, const Snapshot& snapshot) {
 }
 
 void add_process(Families& out, const Snapshot& snapshot) {
-    Family build = make_gauge("panelgate_build_info", "1, with the version as a label.");
-    build.gauge({{"version", snapshot.version}}, 1);
+    Family build = make_gauge("panelgate_build_info",
+                              "1, with the version and what it was built from as labels.");
+    Labels built{{"version", snapshot.version}};
+    if (!snapshot.commit.empty()) built.push_back({"commit", snapshot.commit});
+    if (!snapshot.compiler.empty()) built.push_back({"compiler", snapshot.compiler});
+    build.gauge(std::move(built), 1);
     out.push_back(build.take());
 
     Family dropped = make_counter("panelgate_log_lines_dropped_total",

@@ -188,11 +188,9 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
                 LogThrottle::kIncidents);
 }
 
-void log_deed(std::string_view event, std::string_view subject,
-              std::initializer_list<LogField> fields) {
+void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
-    put_at_pace(LogLevel::info, event, subject, std::span(fields.begin(), fields.size()),
-                LogThrottle::kDeeds);
+    put_at_pace(LogLevel::info, event, subject, fields, LogThrottle::kDeeds);
 }
 
 struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {

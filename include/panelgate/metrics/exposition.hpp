@@ -27,9 +27,11 @@ struct Snapshot {
     std::deque<points::PointSample> points;  ///< many: growing moves none of them
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
-    std::optional<mqtt::Counters> mqtt;  ///< nothing: there is no broker
+    std::optional<mqtt::Counters> mqtt;             ///< nothing: there is no broker
     std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
     std::string version;
+    std::string commit;    ///< empty: not told
+    std::string compiler;  ///< the same
     ProcessFacts process;
     rt::Counters runtime;
 };

@@ -47,8 +47,7 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
                std::initializer_list<LogField> fields);
 /// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
 /// times at once, then once a minute; the last one always.
-void log_deed(std::string_view event, std::string_view subject,
-              std::initializer_list<LogField> fields);
+void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields);
 
 /// For tests: while it lives, lines go to it, without their time, instead of to stderr, and nothing
 /// that was said before makes it leave one out. One at a time.

@@ -95,6 +95,7 @@ class Panelgate:
                                  preexec_fn=pin) as program:
                 program.port = program.modbus_port() if "modbus_tcp:" in text else None
                 program.pid = program.process.pid
+                program.file = file
                 yield program
 
 
