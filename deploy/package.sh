@@ -89,7 +89,7 @@ configure() {
         -DPANELGATE_DEPENDS="${2-}" >"$build.log" 2>&1 || { tail -n 20 "$build.log" >&2; exit 1; }
 }
 
-make() { cmake --build "$build" --target "$@" -- -d stats >"$build.log" 2>&1 || {
+make() { cmake --build "$build" --target "$@" -- -k 0 >"$build.log" 2>&1 || {
     grep -v '^\[' "$build.log" | tail -n 40 >&2; exit 1; }; }
 
 # Which packages, since which version, the program's libraries are of; nothing runs for it. dpkg knows

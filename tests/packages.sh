@@ -3,7 +3,8 @@
 # Takes a package through its life in a Debian of its own: installed, started as its unit says,
 # reloaded, upgraded, removed, installed again, purged. Without systemd as the first process, so the
 # unit's command is run by hand, as the package's user. Cut off from all networks. Needs root and what
-# deploy/install_packages.sh package brings; ends with 77 where something is missing.
+# deploy/install_packages.sh package brings; ends with 77 where something is missing. A package of
+# another architecture runs by qemu, after deploy/package.sh ARCH --test has made what that needs.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
@@ -25,6 +26,9 @@ for tool in mmdebstrap unshare setpriv curl python3 ip arch-test; do
 done
 arch-test "$architecture" >/dev/null 2>&1 ||
     skip "this machine runs no $architecture (qemu-user-static, and binfmt_misc mounted)"
+
+termios=build/package-$architecture/old_termios.so
+[ "$architecture" = "$here" ] || [ -e "$termios" ] || skip "there is no $termios: deploy/package.sh $architecture --test"
 
 # Itself again with mounts and a network of its own; the Debian is made before, as that wants a mirror.
 if [ -z "${PACKAGES_ROOT-}" ]; then
@@ -66,6 +70,8 @@ prepare() {
     dpkg-deb -R "$package" "$root.next"
     sed -i 's/^Version: .*$/&+next/' "$root.next/DEBIAN/control"
     dpkg-deb --root-owner-group -b "$root.next" "$root/next.deb" >/dev/null
+    preload=
+    [ "$architecture" = "$here" ] || { cp "$termios" "$root/termios.so"; preload=/termios.so; }
 }
 
 is_in_place() {
@@ -96,7 +102,8 @@ PYTHON
 start() {
     local command
     read -ra command < <(sed -n 's/^ExecStart=//p' "$root/lib/systemd/system/panelgate.service")
-    NOTIFY_SOCKET=/run/notify chroot "$root" setpriv --reuid panelgate --regid panelgate --init-groups \
+    NOTIFY_SOCKET=/run/notify chroot "$root" env ${preload:+LD_PRELOAD=$preload} \
+        setpriv --reuid panelgate --regid panelgate --init-groups \
         --no-new-privs --inh-caps -all --bounding-set -all "${command[@]}" >"$log" 2>&1 &
     gateway=$!
     within told READY=1

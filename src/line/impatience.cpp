@@ -10,7 +10,10 @@ namespace {
 
 timespec to_timespec(Duration d) {
     const auto whole = std::chrono::floor<std::chrono::seconds>(d);
-    return {whole.count(), (d - whole).count()};
+    timespec time{};
+    time.tv_sec = static_cast<decltype(time.tv_sec)>(whole.count());
+    time.tv_nsec = static_cast<decltype(time.tv_nsec)>((d - whole).count());
+    return time;
 }
 
 }  // namespace
