@@ -134,7 +134,7 @@ class Log(unittest.TestCase):
             self.assertIn(program.log.text().count(" info write "), range(20, 40))
             program.stop()
             last = program.log.finished_text().split(" info write ")[-1]
-            self.assertRegex(last, r"pdu=0603e80063 outcome=ok left_out=\d+")  # 99
+            self.assertRegex(last, r"pdu=0603e80063 outcome=ok transaction=\d+ left_out=\d+")  # 99
 
     def test_a_json_log_has_nothing_but_json_also_when_the_program_cannot_start(self):
         with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as taken:
