@@ -51,7 +51,7 @@ modbus_tcp: [{listen: "127.0.0.1:502", framing: tcp}, {listen: "127.0.0.1:503"}]
 serial_masters:
   - {name: plc, device: /dev/ttyS2, serial: {parity: odd}, rs485: {mode: rts}}
 http: {anonymous: none}
-mqtt: {broker: "mqtt://b:1883", topic: x}
+mqtt: {broker: "mqtt://b:1883", topic: x, format: json}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true}]
 log: {level: warn, format: json}
 realtime: {priority: 20, lock_memory: true}
@@ -93,7 +93,7 @@ serial_masters:
      broadcast: silent, on_failure: silence, echo: auto, response_timeout: 2s}
   - {name: hmi, device: /dev/ttyS3, lines: [a], framing: rtu}
 http: {tokens: [{name: ops, role: operator, file: /run/secrets/ops}]}
-mqtt: {broker: "mqtts://b:8883", topic: x, format: json, qos: 1, client_id: x, username: x, store: 200,
+mqtt: {broker: "mqtts://b:8883", topic: x, qos: 1, client_id: x, username: x, store: 200,
        password_file: /run/secrets/ops, keep_alive: 60s, write: none, ca: /run/secrets/ops,
        certificate: /run/secrets/ops, key: /run/secrets/ops}
 relays: [{from: a-1/400001, to: a-1/400101, on_change: true, refresh: 60s}]
@@ -101,7 +101,7 @@ realtime: {priority: 20, lock_memory: true}
 )";
 
 constexpr const char* kWords =
-    "points mqtts://c "
+    "0 points sparkplug mqtts://c "
     "1 2 3 7 0.2 8 16 20ms 2s 1s none even on off kernel rts low rtu ascii tcp take "
     "refuse read_only high_first master line station pass deny silent exception "
     "viewer operator warn json u16 i16 BADC UW120 GDT220 UB190 400009 400109 "
@@ -151,7 +151,7 @@ bool makes_a_difference(const yaml::Node& tree, yaml::Node& value, const config:
 TEST(EveryKey, OfAConfigurationMakesADifference) {
     std::map<std::string, bool> keys;
     const fs::path example = fs::path(SOURCE_ROOT) / "config/panelgate.example.yaml";
-    for (const std::string& text : {std::string(kFurther), text_of(example)}) {
+    for (const std::string& text : {std::string(kFurther), std::string(kPlain), text_of(example)}) {
         yaml::Problems problems("x.yaml");
         yaml::Node tree = yaml::parse(text, problems);
         const auto before = load(text);
