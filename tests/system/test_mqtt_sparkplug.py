@@ -120,8 +120,8 @@ class Sparkplug(unittest.TestCase):
         """A write of the host, and what is read of a value that moves."""
         host.command("spBv1.0/hall/DCMD/box/press", name="level", type="Double", value=21.5)
         latest = lambda name: View(self, host.told()).values[("press", name)][-1]
-        until(lambda: latest("level")[0] == 21.5)
-        self.assertEqual(latest("level")[2]["properties"]["Quality"]["value"], 192)
+        until(lambda: latest("level")[0] == 21.5
+              and latest("level")[2]["properties"]["Quality"]["value"] == 192)
         self.assertEqual(program.values("/api/v1/stations/press/devices/UW100"), [215])
         host.command("spBv1.0/hall/DCMD/box/press", name="level", type="Double", value=500.0)
         until(lambda: 'panelgate_mqtt_writes_total{outcome="refused"} 1\n' in program.get("/metrics")[1])
