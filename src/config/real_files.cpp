@@ -25,7 +25,8 @@ namespace {
 bool is_mounted_for_one(const std::string& path) {
     struct statfs system{};
     if (statfs(path.c_str(), &system) != 0) return false;
-    const bool in_memory = system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC;
+    const auto type = static_cast<unsigned>(system.f_type);
+    const bool in_memory = type == TMPFS_MAGIC || type == RAMFS_MAGIC;
     return in_memory && (system.f_flags & ST_RDONLY) != 0;
 }
 

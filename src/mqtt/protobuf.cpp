@@ -1,5 +1,7 @@
 #include "protobuf.hpp"
 
+#include <cstddef>
+
 namespace panelgate::mqtt {
 namespace {
 
@@ -90,8 +92,9 @@ std::optional<ProtobufField> ProtobufReader::next() {
     field.has_length = wire == kLength;
     if (!field.has_length) return field;
     if (field.value > text_.size()) return broken();
-    field.bytes = text_.substr(0, field.value);
-    text_.remove_prefix(field.value);
+    const auto size = static_cast<std::size_t>(field.value);
+    field.bytes = text_.substr(0, size);
+    text_.remove_prefix(size);
     return field;
 }
 

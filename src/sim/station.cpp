@@ -25,7 +25,7 @@ using Motion = Simulation::Motion;
 
 /// What register `index` (0..6) of a clock shows: second, minute, hour, day, month, year, weekday.
 std::uint16_t clock_field(std::int64_t wall, std::uint32_t index) {
-    const std::time_t seconds = wall;
+    const auto seconds = static_cast<std::time_t>(wall);  // 32 bits on armhf, until 2038
     std::tm t{};
     gmtime_r(&seconds, &t);
     const int fields[] = {t.tm_sec,     t.tm_min,        t.tm_hour, t.tm_mday,
