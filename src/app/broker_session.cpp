@@ -87,6 +87,8 @@ void BrokerSession::take_over(const BrokerSession& before) {
 }
 
 void BrokerSession::start() {
+    for (std::size_t i = 0; i < places_.size(); ++i)
+        if (auto state = seen(i)) publisher_.know(i, std::move(*state));
     client_.start();
     sweep();
 }
@@ -117,17 +119,21 @@ mqtt::State BrokerSession::state_of(const Station& station, const points::Point&
     return state;
 }
 
-/// Lines tell of themselves (on_bus_event()).
-void BrokerSession::look(std::size_t subject) {
+/// Nothing of lines: they tell of themselves (on_bus_event()).
+std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
     const Place& place = places_[subject];
-    if (place.station == nullptr) return;
-    if (place.point != nullptr) return offer(subject, state_of(*place.station, *place.point));
+    if (place.station == nullptr) return std::nullopt;
+    if (place.point != nullptr) return state_of(*place.station, *place.point);
     const Health health = place.station->bus->station_status(place.station->id).state;
     mqtt::State state;
     state.value = health != Health::offline;
     state.text = label(health);
     state.time = rt::wall_now();
-    offer(subject, std::move(state));
+    return state;
+}
+
+void BrokerSession::look(std::size_t subject) {
+    if (auto state = seen(subject)) offer(subject, std::move(*state));
 }
 
 /// What becomes stale or bad by time alone, a part of the plant at a time.

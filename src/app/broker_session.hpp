@@ -54,6 +54,7 @@ class BrokerSession {
     };
     struct Order;
 
+    std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
     void sweep();
     mqtt::State state_of(const Station& station, const points::Point& point) const;

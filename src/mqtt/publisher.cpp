@@ -35,6 +35,10 @@ void Publisher::take_over(const Publisher& before) {
         if (here[change.subject]) store_.add(*here[change.subject], change.state);
 }
 
+void Publisher::know(std::size_t subject, State state) {
+    if (!states_[subject]) states_[subject] = std::move(state);
+}
+
 bool Publisher::offer(std::size_t subject, State state) {
     std::optional<State>& known = states_[subject];
     if (known && known->same_as(state)) return false;

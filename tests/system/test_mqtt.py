@@ -196,8 +196,9 @@ class Mqtt(unittest.TestCase):
             until(lambda: metric(program, "stored") == 0 and metric(program, "published_total") > 5)
             program.rest("PUT", "/api/v1/stations/press/points/level", {"value": 21.5})
             with Listener(broker) as listener:
-                level = listener.wait_for(f"{TOPIC}/press/level", lambda body: body["value"] == 21.5)
-                self.assertEqual((level["quality"], level["unit"]), ("good", "celsius"))
+                level = listener.wait_for(f"{TOPIC}/press/level", lambda body: (
+                    (body["value"], body["quality"]) == (21.5, "good")))
+                self.assertEqual(level["unit"], "celsius")
                 self.assertRegex(level["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
                 mode = listener.wait_for(f"{TOPIC}/press/mode")
                 self.assertEqual((mode["value"], mode["label"]), (0, "stopped"))

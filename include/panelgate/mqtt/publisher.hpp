@@ -28,6 +28,9 @@ class Publisher {
     const Subjects& subjects() const { return *subjects_; }
     /// Before anything is offered: what another one knows, and has not told, of what is here too.
     void take_over(const Publisher& before);
+    /// What is known of a subject before there is a connection, if nothing was: births tell it, and
+    /// it takes no room.
+    void know(std::size_t subject, State state);
     /// What is known of a subject now. Nothing new: nothing is sent. True: it was.
     bool offer(std::size_t subject, State state);
     /// Its state is sent once more.

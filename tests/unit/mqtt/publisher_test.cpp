@@ -46,6 +46,15 @@ TEST_F(MqttPublisher, SaysNothingWithoutAConnection) {
     EXPECT_EQ(publisher_.store().size(), 2U);
 }
 
+TEST_F(MqttPublisher, WhatWasBeforeTakesNoRoomAndIsToldByTheBirth) {
+    publisher_.know(3, good(std::int64_t{7}));
+    publisher_.know(3, good(std::int64_t{8}));  // that is known better
+    EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{7})));
+    EXPECT_EQ(publisher_.store().size(), 0U);
+    publisher_.connected();
+    EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("7"));
+}
+
 TEST_F(MqttPublisher, TellsChangesOnly) {
     EXPECT_TRUE(publisher_.offer(3, good(std::int64_t{1})));
     EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{1}, kNoon + std::chrono::seconds(1))));
