@@ -1,4 +1,5 @@
 #include <boost/asio/io_context.hpp>
+#include <csignal>
 #include <cstddef>
 #include <functional>
 #include <iostream>
@@ -136,6 +137,7 @@ bool listen_on(const std::string& text, Settings& settings) {
 }  // namespace
 
 ExitCode run(const std::string& file, bool simulate, bool watch) {
+    std::signal(SIGHUP, SIG_IGN);  // what it would be read again for is being read
     if (watch && file == "-") {
         std::cerr << "panelgate: --watch needs a file: standard input is read only once\n";
         return kUsage;

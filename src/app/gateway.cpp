@@ -126,6 +126,20 @@ void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
     }
 }
 
+/// What was asked on a wire under another name is owed to nobody here: until it can no longer come,
+/// the wire rests (P1).
+void Gateway::rest_wires(const config::Config& config, const Lines& lines) {
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const std::string wire = wire_of(config.lines[i]);
+        const config::Line* before = find_same(*scene_->config, config.lines[i]);
+        if (before != nullptr && wire_of(*before) == wire) continue;
+        for (const auto& [name, other] : lines_) {
+            if (other != lines[i] && other->wires().contains(wire))
+                lines[i]->bus().rest_until(other->bus().clear_at());
+        }
+    }
+}
+
 void Gateway::retire_lines(const Lines& lines) {
     for (std::size_t i = 0; i < scene_->lines.size(); ++i) {
         const auto& line = scene_->lines[i];
@@ -159,6 +173,7 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     servers_.open(*config, draft, {directory, [this] { return providers(); }});
     // Nothing below fails.
     const bool kept_nothing = line_histories_ == nullptr;
+    rest_wires(*config, lines);
     retire_lines(lines);
     apply_lines(*config, lines);
     show(make_scene(std::move(config), std::move(lines)));

@@ -76,6 +76,7 @@ class Gateway {
                    const std::vector<std::size_t>& wants);
     Lines lines_of(const config::Config& config);
     void apply_lines(const config::Config& config, const Lines& lines);
+    void rest_wires(const config::Config& config, const Lines& lines);
     void retire_lines(const Lines& lines);
     void show(const std::shared_ptr<Scene>& scene);
     web::Providers providers();

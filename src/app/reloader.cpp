@@ -1,5 +1,9 @@
 #include "reloader.hpp"
 
+#include <malloc.h>
+
+#include <algorithm>
+#include <ranges>
 #include <system_error>
 #include <utility>
 
@@ -16,6 +20,7 @@ namespace {
 using rt::LogLevel;
 
 constexpr const char* kStopping = "the gateway is stopping";
+constexpr std::size_t kLogged = 100;   ///< changes; the verdict has all
 constexpr std::size_t kWaiting = 256;  ///< who may wait for a reload
 
 double unix_now() {
@@ -32,7 +37,7 @@ void tell(const web::ReloadVerdict& verdict) {
         rt::log(LogLevel::error, "configuration",
                 {{"error", yaml::format({fault.file, {fault.line, fault.column}, fault.text})}});
     }
-    for (const std::string& change : verdict.changes)
+    for (const std::string& change : verdict.changes | std::views::take(kLogged))
         rt::log(LogLevel::info, "configuration changed", {{"change", change}});
     for (const std::string& warning : verdict.warnings)
         rt::log(LogLevel::warn, "configuration", {{"warning", warning}});
@@ -46,6 +51,24 @@ void tell(const web::ReloadVerdict& verdict) {
              {"rollback", verdict.rollback ? "true" : "false"},
              {"changes", std::to_string(verdict.changes.size())},
              {"why", verdict.why}});
+}
+
+/// Without the lines that the other one has, too: of a large plant most are the same, and to list
+/// all that they hold takes more memory than they do.
+config::Config but_equal_lines(const config::Config& config, const config::Config& other) {
+    config::Config made;
+    made.profiles = config.profiles;
+    made.relays = config.relays;
+    made.modbus_tcp = config.modbus_tcp;
+    made.serial_masters = config.serial_masters;
+    made.http = config.http;
+    made.mqtt = config.mqtt;
+    made.log = config.log;
+    made.realtime = config.realtime;
+    for (const config::Line& line : config.lines) {
+        if (std::ranges::find(other.lines, line) == other.lines.end()) made.lines.push_back(line);
+    }
+    return made;
 }
 
 }  // namespace
@@ -63,10 +86,21 @@ struct Reloader::Job {
     void compare();
 };
 
+/// The way back leads to no token that is no longer one.
+std::shared_ptr<const config::Config> with_tokens_of(const config::Config& config,
+                                                     const config::Config& running) {
+    config::Config made = config;
+    if (made.http && running.http) {
+        made.http->tokens = running.http->tokens;
+        made.http->anonymous = std::min(made.http->anonymous, running.http->anonymous);
+    }
+    return std::make_shared<const config::Config>(std::move(made));
+}
+
 /// In the worker: all that takes long.
 void Reloader::Job::read() try {
     if (rollback) {
-        next = rollback;
+        next = with_tokens_of(*rollback, *running);
     } else {
         Loaded loaded = read_file(file);
         for (const yaml::Problem& problem : loaded.problems)
@@ -89,7 +123,8 @@ void Reloader::Job::read() try {
 }
 
 void Reloader::Job::compare() {
-    for (const Change& change : differences(*running, *next))
+    for (const Change& change :
+         differences(but_equal_lines(*running, *next), but_equal_lines(*next, *running)))
         verdict.changes.push_back(to_string(change));
     if (next->realtime != running->realtime) verdict.later.emplace_back("realtime");
     verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
@@ -166,6 +201,8 @@ void Reloader::end(const std::shared_ptr<Job>& job) {
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);
+    // Reading takes many times what is kept, and nobody else would give it back.
+    worker_.run([] { ::malloc_trim(0); }, [] {});
     if (!waiting_.empty()) begin();
 }
 

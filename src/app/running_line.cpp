@@ -1,7 +1,9 @@
 #include "running_line.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <variant>
 
@@ -33,7 +35,16 @@ bool plays_alike(const config::Line& before, const config::Line& now) {
                               });
 }
 
+constexpr std::size_t kWires = 64;
+
 }  // namespace
+
+std::string wire_of(const config::Line& line) {
+    if (line.kind != config::Line::Kind::serial) return line.device.device;
+    std::error_code unknown;
+    const auto path = std::filesystem::weakly_canonical(line.device.device, unknown);
+    return unknown ? line.device.device : path.string();
+}
 
 bool is_same_wire(const config::Line& before, const config::Line& now, bool simulate) {
     return before.kind == now.kind && before.device == now.device &&
@@ -72,6 +83,8 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
 /// And the panels at its other end, where they are simulated.
 std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
     line::Settings device = line.device;
+    if (wires_.size() >= kWires) wires_.clear();  // those before are long clear
+    if (!is_simulated(line, simulate_)) wires_.insert(wire_of(line));
     simulated_.reset();
     if (is_simulated(line, simulate_)) {
         simulated_ = simulate_line(executor_, clock_, line);
@@ -106,9 +119,16 @@ void RunningLine::apply(const config::Line& before, const config::Line& now) {
         auto wire = make_wire(now);
         if (simulated_) simulated_->start();
         bus_->apply(settings_of(now), std::move(wire), std::move(far_end));
+        if (wire_of(before) != wire_of(now)) forget_points();
     }
     apply_points(now);
     if (!std::exchange(running_, true) && poller_) poller_->start();
+}
+
+/// They were those of other panels.
+void RunningLine::forget_points() {
+    if (poller_) poller_->apply({});
+    heard_.clear();
 }
 
 /// One poller a line. What it reads answers clients too, where a station's max_age allows it.

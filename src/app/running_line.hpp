@@ -7,6 +7,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
@@ -29,6 +31,8 @@ struct LineWatch {
         points;
 };
 
+/// What it is on, whatever the line is called: its device through links, or the far end.
+std::string wire_of(const config::Line& line);
 /// The line goes on as it is: nothing that has to be right before the first byte is another.
 bool is_same_wire(const config::Line& before, const config::Line& now, bool simulate);
 
@@ -53,6 +57,8 @@ class RunningLine {
     const bus::LineBus& bus() const { return *bus_; }
     const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
     bool listens() const { return listens_; }
+    /// Its device, and those that it may still be waited for on; through links.
+    const std::set<std::string>& wires() const { return wires_; }
     /// What is known of its points; nothing without any. The configuration outlives it, not this.
     std::optional<points::StationPoints> points_of(const config::Station& station) const;
 
@@ -60,6 +66,7 @@ class RunningLine {
     bus::Settings settings_of(const config::Line& line);
     std::unique_ptr<line::Line> make_wire(const config::Line& line);
     void apply_points(const config::Line& line);
+    void forget_points();
     void on_event(const std::string& line, const bus::BusEvent& event);
     void hear(const std::string& line, const tap::Transaction& heard);
 
@@ -74,6 +81,7 @@ class RunningLine {
     std::shared_ptr<sim::SimulatedBus> simulated_;                ///< null for a real device
     std::unique_ptr<bus::LineBus> bus_;                           ///< tells those above to its end
     std::unique_ptr<points::Poller> poller_;  ///< null where nothing was ever polled
+    std::set<std::string> wires_;
     bool running_ = false;
 };
 

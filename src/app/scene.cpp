@@ -1,6 +1,9 @@
 #include "scene.hpp"
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string_view>
 #include <utility>
 
 #include "panelgate/tcp_server/unit_map.hpp"
@@ -17,8 +20,11 @@ std::shared_ptr<Scene> make_scene(std::shared_ptr<const config::Config> config,
         const config::Line& line = scene->config->lines[i];
         RunningLine& runs = *scene->lines[i];
         scene->plant.add(line, runs.bus(), runs.simulated());
-        for (const config::Station& station : line.stations)
-            scene->plant.at(line.name, station.id).points = runs.points_of(station);
+    }
+    std::size_t at = 0;  // the plant has the stations in this order
+    for (std::size_t i = 0; i < scene->lines.size(); ++i) {
+        for (const config::Station& station : scene->config->lines[i].stations)
+            scene->plant.stations()[at++].points = scene->lines[i]->points_of(station);
     }
     for (const tcp_server::Settings& settings : scene->config->modbus_tcp)
         scene->plant.add_units(tcp_server::UnitMap(settings, scene->plant.listener_lines()));
@@ -30,11 +36,17 @@ void keep_histories(Scene& scene, const Scene* before, LineHistories& lines) {
     for (const Station& station : scene.plant.stations())
         points += station.points ? station.points->points().size() : 0;
     const Duration width = points::StationHistory::width_for(points);
+    using Key = std::pair<std::string_view, std::uint8_t>;
+    std::map<Key, const Station*> known;
+    if (before != nullptr) {
+        for (const Station& station : std::as_const(before->plant).stations())
+            if (station.history) known.emplace(Key(station.line, station.id), &station);
+    }
     for (Station& station : scene.plant.stations()) {
         if (!station.points) continue;
         station.history.emplace(station.points->points(), width);
-        const Station* was = before ? before->plant.find(station.line, station.id) : nullptr;
-        if (was != nullptr && was->history) station.history->adopt(*was->history);
+        const auto was = known.find(Key(station.line, station.id));
+        if (was != known.end()) station.history->adopt(*was->second->history);
     }
     std::vector<const bus::LineBus*> buses;
     for (const auto& line : scene.lines) buses.push_back(&line->bus());

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/tcp_server/unit_map.hpp"
 
@@ -72,14 +73,23 @@ Servers::Modbus* Servers::find(const tcp_server::Settings& settings) {
     return found == listeners_.end() ? nullptr : &*found;
 }
 
-/// By somebody who stands; whether it leaves or not.
-bool Servers::is_taken(const std::string& address, std::uint16_t port) const {
-    const auto there = [&](const auto& settings) {
-        return port != 0 && settings.port == port && settings.address == address;
+/// By somebody who will leave: the same port, of an address that has to do with this one.
+bool Servers::is_left_to(const Door& door, const config::Config& config) const {
+    const auto meets = [&](const auto& settings) {
+        const bool overlap = settings.address == door.address ||
+                             config::is_any_address(settings.address) ||
+                             config::is_any_address(door.address);
+        return door.port != 0 && settings.port == door.port && overlap;
     };
-    return std::ranges::any_of(listeners_,
-                               [&](const Modbus& one) { return there(one.settings); }) ||
-           (http_ && there(http_->settings));
+    const auto leaves = [&](const Modbus& one) {
+        return std::ranges::none_of(config.modbus_tcp, [&](const tcp_server::Settings& wanted) {
+            return one.settings.is_same_door(wanted);
+        });
+    };
+    const bool http_leaves = http_ && !(config.http && http_->settings.is_same_door(*config.http));
+    return (http_leaves && meets(http_->settings)) ||
+           std::ranges::any_of(
+               listeners_, [&](const Modbus& one) { return leaves(one) && meets(one.settings); });
 }
 
 void Servers::open(const config::Config& config, const Plant& plant, const Web& web) try {
@@ -93,7 +103,7 @@ void Servers::open_new(const config::Config& config, const Plant& plant, const W
     fresh_ = {};
     std::vector<Door> now;
     const auto add = [&](Door door) {
-        (is_taken(door.address, door.port) ? fresh_.late : now).push_back(std::move(door));
+        (is_left_to(door, config) ? fresh_.late : now).push_back(std::move(door));
     };
     for (const tcp_server::Settings& configured : config.modbus_tcp) {
         const tcp_server::Settings settings = completed(configured, config);

@@ -75,7 +75,7 @@ class Servers {
                                    const config::Config& config) const;
     Modbus make(const tcp_server::Settings& settings, const Plant& plant);
     Modbus* find(const tcp_server::Settings& settings);
-    bool is_taken(const std::string& address, std::uint16_t port) const;
+    bool is_left_to(const Door& door, const config::Config& config) const;
     void open_new(const config::Config& config, const Plant& plant, const Web& web);
     void leave(Modbus modbus);
     void leave(Http http, Duration longest);

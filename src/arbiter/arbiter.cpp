@@ -107,7 +107,22 @@ void Arbiter::cancel(TimePoint now, Client client) {
     step(now);
 }
 
+TimePoint Arbiter::clear_at(TimePoint now) const {
+    TimePoint clear = std::max(now, stations_.clear_at(now, settings_.may_stall));
+    clear = std::max({clear, rest_, quiet_.free_at(Duration::zero())});
+    if (!active_) return clear;
+    const TimePoint sent = active_->timing().sent;
+    if (active_->is_broadcast()) return std::max(clear, sent + settings_.broadcast_turnaround);
+    return std::max(clear, sent + stations_.latest_reply(active_->group().station));
+}
+
+void Arbiter::rest_until(TimePoint until) {
+    rest_ = std::max(rest_, until);
+    quiet_.rest_until(rest_);
+}
+
 void Arbiter::on_line_left() {
+    rest_ = std::max(rest_, quiet_.free_at(Duration::zero()));
     held_ = true;
     up_ = false;
     resetting_ = false;
@@ -122,6 +137,7 @@ void Arbiter::on_line_up(TimePoint now) {
     proved_ = now;
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
+    quiet_.rest_until(rest_);
     stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, now);
     pace_ = {};
@@ -142,6 +158,7 @@ void Arbiter::on_line_down(TimePoint now) {
         const Group& group = attempt.group();
         if (attempt.is_broadcast()) {
             schedule_.on_broadcast(attempt.timing().sent, group.request.pdu());
+            rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
             stations_.of(group.station).owe(now, group.request.pdu(), attempt.timing().sent);
         }
@@ -283,6 +300,7 @@ void Arbiter::start(TimePoint now, Group group) {
     timing.steady = timing.steady && (settings_.paced || pace_.kept());
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
+        if (group.attempts == 1) group.repeatable = station.settings().retry_writes;
         station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));
         if (group.attempts == 1)
             group.first_silence =

@@ -223,7 +223,7 @@ bool Station::on_given_up(TimePoint now, Fault fault) {
 bool Station::may_retry(const Group& group) const {
     if (group.abandoned() || health_.offline() || failing() || stranger()) return false;
     if (suspect() && !group.first_silence) return false;
-    const bool harmless = group.request.is_read() || settings_.retry_writes;
+    const bool harmless = group.request.is_read() || (settings_.retry_writes && group.repeatable);
     const int failed = group.attempts - (group.doubted.empty() ? 0 : 1);
     return harmless && failed <= settings_.retries;
 }

@@ -89,6 +89,21 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     return !may_wake || !budget.allows(now) || !station.take_half_open(now);
 }
 
+TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {
+    TimePoint clear{};
+    for (const auto& [id, station] : stations_) {
+        if (!station.owes()) continue;
+        clear = std::max(clear, station.rested());
+        if (may_stall) clear = std::max(clear, now + station.latest_reply());
+    }
+    return clear;
+}
+
+Duration Stations::latest_reply(std::uint8_t id) const {
+    const Station* found = find(id);
+    return found == nullptr ? 2 * settings(id).response_timeout : found->latest_reply();
+}
+
 StationHealth Stations::health(std::uint8_t id) const {
     const Station* found = find(id);
     return found == nullptr ? StationHealth(offline_) : found->health();

@@ -259,6 +259,10 @@ std::optional<Incident> Bus::incident(std::uint64_t id) {
     return state_->book.incidents().fetch(id);
 }
 
+TimePoint Bus::clear_at() const { return state_->arbiter.clear_at(state_->clock.now()); }
+
+void Bus::rest_until(TimePoint until) { state_->arbiter.rest_until(until); }
+
 bool Bus::idle() const { return state_->arbiter.idle(); }
 
 LineReport Bus::report() const {

@@ -23,11 +23,13 @@ bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
     return route.to_memory.changes(*write.items, target).value_or(false);
 }
 
-/// The same registers are copied between the same panels.
+/// The same registers are copied between the same panels, however often.
 bool is_same(const RelayRoute& one, const RelayRoute& other) {
-    return one.relay == other.relay && one.from == other.from && one.to == other.to &&
-           one.from_station == other.from_station && one.to_station == other.to_station &&
-           one.to_has_multiple == other.to_has_multiple;
+    return one.relay.name() == other.relay.name() && one.relay.count == other.relay.count &&
+           one.relay.from == other.relay.from && one.relay.to == other.relay.to &&
+           one.relay.on_change == other.relay.on_change && one.from == other.from &&
+           one.to == other.to && one.from_station == other.from_station &&
+           one.to_station == other.to_station && one.to_has_multiple == other.to_has_multiple;
 }
 
 /// Why an answer is none; empty when it is one.
@@ -219,7 +221,12 @@ void Relays::State::apply(std::vector<RelayRoute> routes) {
             before, [&](const EntryPtr& entry) { return entry && is_same(entry->route, route); });
         if (found != before.end()) {
             entries.push_back(std::move(*found));
+            const bool other_pace = entries.back()->route.relay.every != route.relay.every;
             entries.back()->route = std::move(route);
+            if (other_pace && running && !entries.back()->open) {
+                entries.back()->due = clock.now();
+                arm(*entries.back());
+            }
         } else {
             entries.push_back(std::make_shared<Entry>(clock, std::move(route)));
             if (running) begin(*entries.back(), clock.now());

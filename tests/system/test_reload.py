@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import signal
+import struct
 import subprocess
 import tempfile
 import threading
@@ -14,6 +15,7 @@ import unittest
 import config
 import harness
 from harness import read_registers
+from rtu_bus import Pieces, RtuBus
 from test_points import until
 
 ROUNDS = int(os.environ.get("PANELGATE_RELOADS", "40"))
@@ -221,6 +223,58 @@ class Reload(unittest.TestCase):
             self.assertEqual((code, out), (78, ""))
             self.assertRegex(told, r"panelgate.yaml:1:8: .*")
             self.assertEqual(command("--rollback")[0], 0)
+            self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
+
+    def test_p1_a_device_under_another_name_gives_nobody_the_reply_of_before(self):
+        def panel(frame):  # slow at one place, or it says which place it was asked for
+            address = struct.unpack(">H", frame[2:4])[0]
+            reply = harness.rtu(1, struct.pack(">BBH", 3, 2, address))
+            return Pieces([(0.35 if address == 10 else 0.0, reply)])
+
+        def line(name, link):
+            return config.gateway(
+                config.line(name, link, "{id: 1}", timing="{response_timeout: 200ms}", retries=0,
+                            echo="off"), http=config.OPERATOR)
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            with RtuBus(link, {1: panel}), Running(line("one", link)) as running:
+                client = harness.Client(running.program.modbus_port())
+                running.program.log.wait_for("line up")
+                self.assertEqual(client.ask(1, read_registers(10)), b"\x83\x0b")
+                self.assertEqual(running.reload(line("other", link))[1]["outcome"], "applied")
+                for address in range(50, 60):
+                    reply = client.ask(1, read_registers(address))
+                    self.assertIn(reply, (struct.pack(">BBH", 3, 2, address), b"\x83\x0a"))
+
+    def test_points_of_another_device_are_not_those_of_before(self):
+        slow = METER.replace("every: 50ms", "every: 60min")
+
+        def text(device):
+            return config.gateway(config.line("steady", device, slow), http=config.OPERATOR)
+        path = "/api/v1/stations/meter/points/level"
+        with Running(text("sim")) as running:
+            until(lambda: running.program.get(path)[1]["quality"] == "good")
+            running.reload(text("/dev/there-is-none"))
+            self.assertEqual(running.program.get(path)[1]["quality"], "bad")
+
+    def test_a_listener_may_be_opened_for_more_and_for_fewer_on_its_port(self):
+        with Running(plant(other())) as running:
+            port = running.program.modbus_port()  # free again when this one is moved
+            for host in ("0.0.0.0", "127.0.0.1", "0.0.0.0"):
+                running.reload(plant(other(), modbus=f'listen: "127.0.0.2:{port}"'))
+                text = plant(other(), modbus=f'listen: "{host}:{port}"')
+                self.assertEqual(running.reload(text)[1]["outcome"], "applied", host)
+                client = harness.Client(port)
+                self.assertEqual(client.ask(1, read_registers(100))[0], 3)
+                text = plant(other(IO), modbus=f'listen: "{host}:{port}"')
+                self.assertEqual(running.reload(text)[1]["outcome"], "applied", host)
+
+    def test_what_is_asked_for_in_a_body_is_heeded(self):
+        with Running(plant(other())) as running:
+            running.reload(plant(other(IO)))
+            for body, status in (({"rolback": True}, 400), ({"rollback": 1}, 400),
+                                 ({"rollback": True}, 200)):
+                self.assertEqual(running.program.rest("POST", "/api/v1/reload", body)[0], status)
             self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
 
     def test_p1_p3_two_hundred_reloads_and_nobody_on_an_unchanged_line_notices(self):

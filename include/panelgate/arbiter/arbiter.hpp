@@ -64,6 +64,11 @@ class Arbiter {
     /// on_line_down. What is accepted waits.
     void hold() { held_ = true; }
     bool is_waiting() const { return active_.has_value(); }  ///< for what is on the wire
+    /// From when on nothing on its wire is owed, rests or is under way any more, whoever asks next.
+    /// By what is known now: nothing may be asked here meanwhile.
+    TimePoint clear_at(TimePoint now) const;
+    /// Nothing starts before then: somebody else has used the wire.
+    void rest_until(TimePoint until);
     /// After hold(), not while is_waiting(): the line is closed, another one will be opened.
     void on_line_left();
 
@@ -168,6 +173,7 @@ class Arbiter {
     Ledger ledger_;
     ClientNames names_;
     std::optional<Attempt> active_;
+    TimePoint rest_{};    ///< of the wire, also across a line that is opened anew
     TimePoint proved_{};  ///< what was sent before has passed: a later one was answered
     bool up_ = false;
     bool held_ = false;       ///< between two lines, or about to be

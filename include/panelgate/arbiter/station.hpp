@@ -54,6 +54,8 @@ class Station {
     bool owes() const { return !owed_.empty(); }
     /// From then on another request may go there; until then only the very same.
     TimePoint rested() const { return not_before_; }
+    /// Of a request: how long after it has left a reply may still come.
+    Duration latest_reply() const { return settings_.response_timeout + late_.value(); }
     /// When its next probe may go: as a rule it is the request that is owed.
     TimePoint probe_due() const {
         const TimePoint next = health_.next_probe();

@@ -54,6 +54,12 @@ class Stations {
         if (waited) slowest_.add(*waited);
     }
 
+    /// From when on nothing is owed that could still come; `may_stall`: on a way that holds things
+    /// back, as from now on.
+    TimePoint clear_at(TimePoint now, bool may_stall) const;
+    /// Behind a request: within its timeout, and so much later as it may be late.
+    Duration latest_reply(std::uint8_t id) const;
+
     StationHealth health(std::uint8_t id) const;
     Duration response_timeout(std::uint8_t id) const;
     /// The station is offline, and this is not to be its probe. Of a stranger any request may be.

@@ -78,6 +78,8 @@ class Bus final : public LineBus {
     std::optional<Incident> incident(std::uint64_t id) override;
     void name_client(ClientId client, std::string name) override;
 
+    TimePoint clear_at() const override;
+    void rest_until(TimePoint until) override;
     LineReport report() const override;
     /// Nothing waits, nothing is on the wire.
     bool idle() const;

@@ -26,6 +26,10 @@ class LineBus : public BusClient {
     /// the one before is closed. Null, the same line goes on: only where is_same_wire().
     virtual void apply(Settings settings, std::unique_ptr<line::Line> line,
                        std::shared_ptr<void> far_end) = 0;
+    /// From when on nothing that was asked on its wire can still be answered there (P1).
+    virtual TimePoint clear_at() const { return {}; }
+    /// Nothing is asked before then.
+    virtual void rest_until(TimePoint until) { static_cast<void>(until); }
     virtual LineReport report() const = 0;
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "answer.hpp"
+#include "body.hpp"
 #include "handlers.hpp"
 #include "panelgate/web/api/reload_source.hpp"
 #include "panelgate/web/http/query.hpp"
@@ -66,6 +67,18 @@ json::object describe(const ReloadVerdict& verdict) {
     return object;
 }
 
+/// By the query, or by a body.
+Parsed<bool> is_rollback(const HttpRequest& request) {
+    const auto query = query_flag(request, "rollback");
+    if (!query || request.body.empty()) return query;
+    const auto body = parse_object(request.body, {"rollback"});
+    if (!body) return body.error();
+    const json::value* flag = body->if_contains("rollback");
+    if (flag == nullptr) return query;
+    if (!flag->is_bool()) return problem(400, "rollback must be true or false");
+    return *query || flag->as_bool();
+}
+
 HttpResponse answer_of(const ReloadVerdict& verdict) {
     switch (verdict.outcome) {
         case ReloadOutcome::applied:
@@ -95,7 +108,7 @@ Handling get_reload(HttpRequest, const Api* api) {
 }
 
 Handling post_reload(HttpRequest request, const Api* api) {
-    const auto rollback = query_flag(request, "rollback");
+    const auto rollback = is_rollback(request);
     if (!rollback) co_return to_response(rollback.error());
     ReloadSource* source = api->providers.reload;
     const std::string why =

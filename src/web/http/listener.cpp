@@ -36,7 +36,7 @@ void HttpListener::apply(std::shared_ptr<const Site> site) {
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
         if (!allowed_.allows(session->peer())) {
-            session->abandon();
+            session->stop(shared_->site->settings.request_timeout);
         } else if (others_may) {
             session->end_events();
         }

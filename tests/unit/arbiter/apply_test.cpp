@@ -102,6 +102,48 @@ TEST_F(ApplyTest, P7WhoWaitsForALineThatDoesNotOpenIsToldSo) {
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::line_down);
 }
 
+TEST_F(ApplyTest, P1AWireThatSomebodyElseHasUsedRestsForAsLongAsHeIsOwed) {
+    bus.submit(17, read_at(1), 1);
+    bus.run_to_end_of_request();
+    const TimePoint sent = bus.now();
+    EXPECT_GE(bus.arbiter().clear_at(sent), sent + 1s) << "timeout and late window";
+    bus.line_down();
+    const TimePoint clear = bus.arbiter().clear_at(bus.now());
+    EXPECT_GE(clear, sent + 1s);
+    BusScript other{settings};
+    other.line_down();
+    other.arbiter().rest_until(clear);
+    other.line_up();
+    other.submit(18, kRead, 1);
+    ASSERT_TRUE(other.next_sent());
+    EXPECT_GE(other.sent.back().at, clear);
+}
+
+TEST_F(ApplyTest, P1TheTurnaroundOfABroadcastHoldsOnAnotherLineToo) {
+    settings.broadcast_turnaround = 800ms;
+    BusScript script{settings};
+    script.submit(0, kWrite, 1, PriorityClass::write);
+    const TimePoint sent = script.now();
+    script.run_for(50ms);
+    EXPECT_GE(script.arbiter().clear_at(script.now()), sent + 800ms);
+    script.arbiter().hold();
+    script.arbiter().on_line_left();
+    script.line_up();
+    script.submit(17, kRead, 1);
+    ASSERT_TRUE(script.next_sent());
+    EXPECT_GE(script.sent.back().at, sent + 800ms);
+}
+
+TEST_F(ApplyTest, P2AWriteThatHasBegunIsRepeatedOnlyIfThatWasAllowedThen) {
+    const Ticket write = bus.submit(17, kWrite, 1, PriorityClass::write);
+    bus.run_to_end_of_request();
+    station(0).retry_writes = true;
+    bus.apply(settings);
+    bus.run_for(5s);
+    EXPECT_TRUE(bus.answered(write));
+    EXPECT_EQ(bus.sent.size(), 1u);
+}
+
 TEST_F(ApplyTest, AStationThatIsListedNoLongerIsAskedAsTheOthers) {
     settings.stations.pop_back();
     settings.unlisted.response_timeout = 50ms;

@@ -250,6 +250,7 @@ TEST_F(RelaysTest, P2ARelayThatStaysWritesNothingAgainWhenAnotherComes) {
     run_until([&] { return relays->status()[1].reads > 10; });
     EXPECT_EQ(relays->status()[1].writes, 1u);
     EXPECT_EQ(to.requests.size(), 2u);
+    every = 2ms;
     relays->apply({route_to(300, true)});
     EXPECT_EQ(relays->status().size(), 1u);
     run_until([&] { return status().reads > 20; });

@@ -28,8 +28,8 @@ class HttpListener : public std::enable_shared_from_this<HttpListener> {
     /// On an error (address in use, not an address…) nothing is open.
     boost::system::error_code open();
     /// Serves this from the next request on; what runs ends on the one before. Who may not be
-    /// connected any more is cut off, and streams of events end where tokens are others: their
-    /// clients come again. Only with settings.is_same_door().
+    /// connected any more gets its answer and is closed, and streams of events end where tokens are
+    /// others: their clients come again. Only with settings.is_same_door().
     void apply(std::shared_ptr<const Site> site);
     /// The port that is listened on; 0 before open().
     std::uint16_t port() const;
