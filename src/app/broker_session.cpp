@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::size_t kSwept = 500;  ///< subjects a look: well below a millisecond
 constexpr Duration kSweep = 1s;
+constexpr Duration kRebirth = 1s;  ///< from one to the next: hosts may ask as often as they like
 constexpr const char* kName = "mqtt";
 
 mqtt::Settings completed(mqtt::Settings settings) {
@@ -44,7 +45,10 @@ mqtt::Subjects subjects_of(const Plant& plant) {
 
 /// A write that has gone to its bus.
 struct BrokerSession::Order {
-    mqtt::WriteCommand command;
+    std::string station;
+    std::string point;
+    std::string topic;  ///< that it came by
+    std::string id;
     profile::ProfileRef profile;
     web::PointOrder order;
 };
@@ -55,8 +59,8 @@ BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& c
       settings_(completed(*scene->config->mqtt)),
       publisher_(settings_, subjects_of(scene->plant)),
       alarm_(clock.make_alarm()),
-      client_id_(bus::next_client_id()),
-      alive_(std::make_shared<BrokerSession*>(this)),
+      rebirth_alarm_(clock.make_alarm()),
+      writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
       client_(std::move(executor), clock, settings_, publisher_,
               [this](const mqtt::Command& command) { on_command(command); }) {
     show(std::move(scene));
@@ -81,9 +85,12 @@ void BrokerSession::show(std::shared_ptr<const Scene> scene) {
     }
 }
 
-void BrokerSession::take_over(const BrokerSession& before) {
+void BrokerSession::take_over(BrokerSession& before) {
     publisher_.take_over(before.publisher_);
     counters_ = before.counters();
+    if (settings_.broker() != before.settings_.broker()) return;  // who has asked is not here
+    writes_ = std::move(before.writes_);
+    writes_->session = this;
 }
 
 void BrokerSession::start() {
@@ -95,11 +102,13 @@ void BrokerSession::start() {
 
 void BrokerSession::stop() {
     alarm_->cancel();
+    rebirth_alarm_->cancel();
     client_.stop();
+    if (!writes_) return;
     for (const Place& place : places_)
         if (place.station != nullptr && place.point == nullptr)
-            place.station->bus->cancel(client_id_);
-    alive_.reset();
+            place.station->bus->cancel(writes_->client);
+    writes_.reset();
 }
 
 void BrokerSession::offer(std::size_t subject, mqtt::State state) {
@@ -176,13 +185,20 @@ void BrokerSession::on_points(const Station& station, const std::vector<std::siz
 
 void BrokerSession::on_command(const mqtt::Command& command) {
     if (std::holds_alternative<mqtt::Rebirth>(command)) {
-        publisher_.rebirth();
-        client_.wake();
+        if (std::exchange(rebirth_waits_, true)) return;
+        rebirth_alarm_->arm(std::max(clock_.now(), next_rebirth_), [this] { on_rebirth(); });
     } else if (const auto* bad = std::get_if<mqtt::BadCommand>(&command)) {
         refuse(bad->topic, bad->id, web::problem(400, bad->why));
     } else {
         write(std::get<mqtt::WriteCommand>(command));
     }
+}
+
+void BrokerSession::on_rebirth() {
+    rebirth_waits_ = false;
+    next_rebirth_ = clock_.now() + kRebirth;
+    publisher_.rebirth();
+    client_.wake();
 }
 
 void BrokerSession::refuse(const std::string& topic, const std::string& id,
@@ -200,7 +216,7 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     const Place& place = places_[command.point];
     const Station& station = *place.station;
     const std::string topic = publisher_.topic_of(command.point);
-    if (writing_ >= settings_.writes)
+    if (writes_->open >= settings_.writes)
         return refuse(topic, command.id, web::problem(503, "too many writes are under way"));
     const profile::ProfileRef profile = station.configured->profile;
     auto order = web::order_of(*station.bus, station.id, *profile, *place.point, command.value);
@@ -209,26 +225,29 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
         return refuse(topic, command.id, order.error());
     }
     bus::Request request = order->request;
-    request.client = client_id_;
-    station.bus->name_client(client_id_, kName);
-    ++writing_;
-    auto open = std::make_shared<const Order>(Order{command, profile, std::move(*order)});
-    station.bus->transact(std::move(request), [alive = std::weak_ptr<BrokerSession*>(alive_),
-                                               made = std::move(open)](const bus::Answer& answer) {
-        if (const auto self = alive.lock()) (*self)->finish(*made, answer);
+    request.client = writes_->client;
+    station.bus->name_client(writes_->client, kName);
+    ++writes_->open;
+    auto made = std::make_shared<const Order>(
+        Order{station.name, place.point->name, topic, command.id, profile, std::move(*order)});
+    station.bus->transact(std::move(request), [writes = std::weak_ptr<Writes>(writes_),
+                                               made = std::move(made)](const bus::Answer& answer) {
+        const auto open = writes.lock();
+        if (!open) return;
+        --open->open;
+        open->session->finish(*made, answer);
     });
 }
 
 void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
-    --writing_;
-    const std::string topic = publisher_.topic_of(order.command.point);
     const auto told = web::told(order.order, answer, *order.profile);
-    if (!told) publisher_.repeat(order.command.point);
-    if (!told && answer.refusal) return refuse(topic, order.command.id, told.error());
+    const auto point = publisher_.subjects().find_point(order.station, order.point);
+    if (!told && point) publisher_.repeat(*point);
+    if (!told && answer.refusal) return refuse(order.topic, order.id, told.error());
     ++(told ? counters_.writes_ok : counters_.writes_failed);
     json::object body{{"ok", static_cast<bool>(told)}};
     for (const auto& [name, value] : told ? *told : web::json_of(told.error())) body[name] = value;
-    publisher_.answer({topic, order.command.id, web::json_text(body)});
+    publisher_.answer({order.topic, order.id, web::json_text(body)});
     client_.wake();
 }
 

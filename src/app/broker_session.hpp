@@ -33,8 +33,9 @@ class BrokerSession {
     bool fits(const Scene& scene) const;
     /// What it tells of is looked up in this scene from now on; fits(scene).
     void show(std::shared_ptr<const Scene> scene);
-    /// Before start(): tells what another one has not told any more.
-    void take_over(const BrokerSession& before);
+    /// Before start(): tells what another one, which is stopped next, has not told any more. At the
+    /// same broker its writes are this one's from now on.
+    void take_over(BrokerSession& before);
 
     void start();
     void stop();
@@ -53,6 +54,12 @@ class BrokerSession {
         const points::Point* point = nullptr;
     };
     struct Order;
+    /// Those under way. Passed on from session to session, for answers that come later.
+    struct Writes {
+        BrokerSession* session;  ///< that is told what becomes of them
+        bus::ClientId client;
+        std::size_t open = 0;
+    };
 
     std::optional<mqtt::State> seen(std::size_t subject) const;
     void look(std::size_t subject);
@@ -60,6 +67,7 @@ class BrokerSession {
     mqtt::State state_of(const Station& station, const points::Point& point) const;
     void offer(std::size_t subject, mqtt::State state);
     void on_command(const mqtt::Command& command);
+    void on_rebirth();
     void write(const mqtt::WriteCommand& command);
     void refuse(const std::string& topic, const std::string& id, const web::Problem& why);
     void finish(const Order& order, const bus::Answer& answer);
@@ -73,10 +81,11 @@ class BrokerSession {
     mqtt::Publisher publisher_;
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;
-    std::size_t writing_ = 0;  ///< writes under way
-    mqtt::Counters counters_;  ///< of writes, and of sessions before
-    bus::ClientId client_id_;
-    std::shared_ptr<BrokerSession*> alive_;  ///< for answers that come later
+    std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the one that others have joined
+    TimePoint next_rebirth_{};                  ///< not before
+    bool rebirth_waits_ = false;
+    mqtt::Counters counters_;         ///< of writes, and of sessions before
+    std::shared_ptr<Writes> writes_;  ///< null once they are another's
     mqtt::Client client_;
 };
 

@@ -11,8 +11,8 @@ void Northbound::show(const std::shared_ptr<const Scene>& scene) {
     if (session_ && session_->fits(*scene)) return session_->show(scene);
     std::unique_ptr<BrokerSession> next;
     if (scene->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, scene);
-    if (session_) session_->stop();
     if (session_ && next) next->take_over(*session_);
+    if (session_) session_->stop();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
 }

@@ -67,6 +67,12 @@ std::vector<std::string> JsonTopics::subscriptions() const {
     return {settings_.topic + "/+/+/set"};
 }
 
+std::vector<std::string> JsonTopics::retained() const {
+    std::vector<std::string> topics{status({}).topic};
+    for (std::size_t i = 0; i < subjects_.size(); ++i) topics.push_back(name_of(i));
+    return topics;
+}
+
 std::optional<Message> JsonTopics::before(std::size_t, const States&, std::uint64_t, WallTime now) {
     return status(web::json_text(json::object{{"state", "online"}, {"time", rfc3339(now)}}));
 }

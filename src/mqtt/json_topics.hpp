@@ -15,6 +15,7 @@ class JsonTopics final : public Wording {
     Message will() override;
     Message farewell(WallTime now) override;
     std::vector<std::string> subscriptions() const override;
+    std::vector<std::string> retained() const override;
     std::size_t steps_before() const override { return 1; }
     std::size_t steps_behind() const override { return subjects_.size(); }
     std::optional<Message> before(std::size_t step, const States& states, std::uint64_t next_change,

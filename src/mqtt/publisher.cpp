@@ -1,5 +1,6 @@
 #include "panelgate/mqtt/publisher.hpp"
 
+#include <set>
 #include <utility>
 
 #include "json_topics.hpp"
@@ -7,6 +8,8 @@
 
 namespace panelgate::mqtt {
 namespace {
+
+constexpr std::uint64_t kFirstCleared = std::uint64_t{1} << 63;
 
 std::unique_ptr<Wording> make_wording(const Settings& settings, const Subjects& subjects) {
     if (settings.format == Format::sparkplug)
@@ -33,6 +36,21 @@ void Publisher::take_over(const Publisher& before) {
     }
     for (const Change& change : before.store_.changes())
         if (here[change.subject]) store_.add(*here[change.subject], change.state);
+    if (settings_.broker() != before.settings_.broker()) return;
+    results_ = before.results_;
+    awaited_ = before.connected_ || before.awaited_;
+    clear_what_went(before);
+}
+
+/// All of the one before; of those before it what the store's limit allows.
+void Publisher::clear_what_went(const Publisher& before) {
+    const std::vector<std::string> told = before.wording_->retained();
+    std::set<std::string> went(told.begin(), told.end());
+    const std::size_t most = went.size() + settings_.store;
+    for (const auto& [number, topic] : before.cleared_)
+        if (went.size() < most) went.insert(topic);
+    for (const std::string& topic : wording_->retained()) went.erase(topic);
+    for (const std::string& topic : went) cleared_.emplace(kFirstCleared + cleared_.size(), topic);
 }
 
 void Publisher::know(std::size_t subject, State state) {
@@ -52,28 +70,52 @@ void Publisher::repeat(std::size_t subject) {
 }
 
 void Publisher::answer(const WriteResult& result) {
-    if (!connected_ || results_.size() >= settings_.results) return;
+    if ((!connected_ && !awaited_) || results_.size() >= settings_.results) return;
     if (auto message = wording_->result(result)) results_.push_back(std::move(*message));
 }
 
 void Publisher::connected() {
     connected_ = true;
+    awaited_ = false;
+    again_ = false;
     before_ = 0;
     behind_ = 0;
+    next_cleared_ = kFirstCleared;
 }
 
 void Publisher::disconnected() {
-    connected_ = false;
     store_.lost();
-    results_.clear();  // who has asked has gone as well
+    if (connected_) results_.clear();  // who has asked has gone as well
+    connected_ = false;
+}
+
+void Publisher::rebirth() {
+    if (before_ < wording_->steps_before()) {
+        again_ = before_ > 0;
+    } else {
+        before_ = 0;
+    }
+}
+
+void Publisher::delivered(std::uint64_t change) {
+    store_.delivered(change);
+    cleared_.erase(change);
 }
 
 std::optional<Message> Publisher::next_before(WallTime now) {
     while (before_ < wording_->steps_before()) {
         auto message = wording_->before(before_++, states_, store_.next_number(), now);
+        if (before_ == wording_->steps_before() && std::exchange(again_, false)) before_ = 0;
         if (message) return message;
     }
     return std::nullopt;
+}
+
+std::optional<Publisher::Outgoing> Publisher::next_cleared() {
+    const auto found = cleared_.lower_bound(next_cleared_);
+    if (found == cleared_.end()) return std::nullopt;
+    next_cleared_ = found->first + 1;
+    return Outgoing{{found->second, "", 1, true}, found->first};
 }
 
 std::optional<Message> Publisher::next_behind() {
@@ -87,6 +129,7 @@ std::optional<Message> Publisher::next_behind() {
 std::optional<Publisher::Outgoing> Publisher::next(WallTime now) {
     if (!connected_) return std::nullopt;
     if (auto message = next_before(now)) return Outgoing{std::move(*message)};
+    if (auto cleared = next_cleared()) return cleared;
     while (const Change* change = store_.next()) {
         auto message = wording_->change(*change, states_, store_.next_number(), now);
         if (!message) {

@@ -18,6 +18,7 @@ class Sparkplug final : public Wording {
     Message will() override;
     Message farewell(WallTime now) override;
     std::vector<std::string> subscriptions() const override;
+    std::vector<std::string> retained() const override { return {}; }
     std::size_t steps_before() const override { return 1 + devices_.size(); }
     std::size_t steps_behind() const override { return 0; }
     std::optional<Message> before(std::size_t step, const States& states, std::uint64_t next_change,

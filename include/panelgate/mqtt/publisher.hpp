@@ -3,8 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -27,6 +29,8 @@ class Publisher {
 
     const Subjects& subjects() const { return *subjects_; }
     /// Before anything is offered: what another one knows, and has not told, of what is here too.
+    /// At the same broker also the answers that wait, and what it has retained there and is none
+    /// of this one's is cleared.
     void take_over(const Publisher& before);
     /// What is known of a subject before there is a connection, if nothing was: births tell it, and
     /// it takes no room.
@@ -35,7 +39,8 @@ class Publisher {
     bool offer(std::size_t subject, State state);
     /// Its state is sent once more.
     void repeat(std::size_t subject);
-    /// Told after what waits; beyond Settings::results they are lost.
+    /// Told after what waits; beyond Settings::results, and without a connection, they are lost.
+    /// One that is taken over from counts until the first of its own stands.
     void answer(const WriteResult& result);
 
     /// A connection is to be made; its will.
@@ -45,8 +50,8 @@ class Publisher {
     void connected();
     /// It has gone: what the broker has not acknowledged is sent again.
     void disconnected();
-    /// A host has asked for it.
-    void rebirth() { before_ = 0; }
+    /// A host has asked for it: everything is told; if that is under way, once more behind it.
+    void rebirth();
     Message farewell(WallTime now) { return wording_->farewell(now); }
 
     struct Outgoing {
@@ -56,7 +61,7 @@ class Publisher {
     /// Nothing: nothing is to be said. Whoever sends sees to it that at most Settings::in_flight
     /// are not acknowledged.
     std::optional<Outgoing> next(WallTime now);
-    void delivered(std::uint64_t change) { store_.delivered(change); }
+    void delivered(std::uint64_t change);
 
     std::vector<Command> commands(std::string_view topic, std::string_view payload,
                                   bool retained) const {
@@ -69,6 +74,8 @@ class Publisher {
   private:
     std::optional<Message> next_before(WallTime now);
     std::optional<Message> next_behind();
+    std::optional<Outgoing> next_cleared();
+    void clear_what_went(const Publisher& before);
 
     Settings settings_;
     std::unique_ptr<const Subjects> subjects_;  ///< the wording refers to it
@@ -76,7 +83,12 @@ class Publisher {
     States states_;
     Store store_;
     std::deque<Message> results_;
+    /// Topics that are cleared, until the broker has it, by numbers that no change ever has.
+    std::map<std::uint64_t, std::string> cleared_;
+    std::uint64_t next_cleared_ = 0;  ///< those below are on their way
     bool connected_ = false;
+    bool awaited_ = false;    ///< who has asked before take_over() still waits for answers
+    bool again_ = false;      ///< a rebirth behind this one
     std::size_t before_ = 0;  ///< steps that are done
     std::size_t behind_ = 0;
 };

@@ -49,6 +49,9 @@ class Wording {
     /// What is subscribed to, all with quality of service 0: nothing comes twice, or late.
     virtual std::vector<std::string> subscriptions() const = 0;
 
+    /// The topics that the broker keeps the last message of, told or not.
+    virtual std::vector<std::string> retained() const = 0;
+
     /// How many steps a birth has, before the changes that are kept, and behind them.
     virtual std::size_t steps_before() const = 0;
     virtual std::size_t steps_behind() const = 0;

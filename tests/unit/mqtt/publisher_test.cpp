@@ -151,5 +151,79 @@ TEST_F(MqttPublisher, AnswersAreBoundedAndEndWithTheConnection) {
     EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("t/status"));
 }
 
+TEST_F(MqttPublisher, AnswersThatWaitGoWithTheirSessionToTheNext) {
+    publisher_.connected();
+    take_all(publisher_);
+    publisher_.answer({"t/a", "", "{}"});
+    Publisher next(settings(), small_plant());
+    next.take_over(publisher_);
+    next.disconnected();  // the broker cannot be reached yet
+    next.answer({"t/b", "", "{}"});
+    next.connected();
+    EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status", "t/a/result", "t/b/result"));
+    next.disconnected();
+    next.answer({"t/c", "", "{}"});  // nobody is there
+    next.connected();
+    EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status"));
+}
+
+TEST_F(MqttPublisher, AnotherBrokerIsToldNoAnswersOfThisOne) {
+    publisher_.connected();
+    publisher_.answer({"t/a", "", "{}"});
+    Settings other = settings();
+    other.port = 1884;
+    Publisher next(other, Subjects());
+    next.take_over(publisher_);
+    next.connected();
+    EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status"));
+}
+
+Subjects press_without_name() {
+    Subjects subjects;
+    subjects.add_line("floor1");
+    subjects.add_station("press");
+    for (const char* name : {"level", "mode"}) {
+        points::Point point;
+        point.name = name;
+        subjects.add_point(point);
+    }
+    return subjects;
+}
+
+TEST_F(MqttPublisher, WhatIsConfiguredNoMoreIsClearedOnce) {
+    Publisher next(settings(), press_without_name());
+    next.take_over(publisher_);
+    next.connected();
+    EXPECT_THAT(topics(take_all(next)),
+                ElementsAre("t/status", "t/oven/level", "t/press/name", "t/station/oven/state"));
+    next.disconnected();  // before the broker has it
+    next.connected();
+    const auto all = take_all(next);
+    ASSERT_EQ(all.size(), 4U);
+    EXPECT_EQ(all[1].message, (Message{"t/oven/level", "", 1, true}));
+    for (const Publisher::Outgoing& one : all) next.delivered(one.change);
+    next.disconnected();
+    next.connected();
+    EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status"));
+}
+
+TEST_F(MqttPublisher, WhatIsNotClearedYetIsClearedByTheNextUnlessItIsBack) {
+    Publisher next(settings(), press_without_name());
+    next.take_over(publisher_);
+    Settings moved = settings();
+    moved.topic = "u";
+    Publisher elsewhere(moved, Subjects());
+    elsewhere.take_over(next);
+    elsewhere.connected();
+    EXPECT_THAT(topics(take_all(elsewhere)),
+                ElementsAre("u/status", "t/line/floor1/state", "t/oven/level", "t/press/level",
+                            "t/press/mode", "t/press/name", "t/station/oven/state",
+                            "t/station/press/state", "t/status"));
+    Publisher back(settings(), small_plant());
+    back.take_over(next);
+    back.connected();
+    EXPECT_THAT(topics(take_all(back)), ElementsAre("t/status"));
+}
+
 }  // namespace
 }  // namespace panelgate::mqtt

@@ -141,6 +141,21 @@ TEST_F(MqttSparkplug, ARebirthTellsEverythingAgainUnderTheSameDeath) {
               "12120a05626453657118fad195ffbc312004580012");
 }
 
+TEST_F(MqttSparkplug, RebirthsDuringOneAreOneMore) {
+    publisher_.will();
+    publisher_.connected();
+    std::vector<std::string> births;
+    for (int i = 0; i < 2; ++i) {
+        publisher_.rebirth();  // at first nothing is told yet
+        births.push_back(publisher_.next(kNoon)->message.topic);
+        publisher_.rebirth();
+    }
+    for (const std::string& topic : topics(take_all(publisher_))) births.push_back(topic);
+    EXPECT_THAT(births, ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/press",
+                                    "spBv1.0/g/DBIRTH/n/oven", "spBv1.0/g/NBIRTH/n",
+                                    "spBv1.0/g/DBIRTH/n/press", "spBv1.0/g/DBIRTH/n/oven"));
+}
+
 TEST_F(MqttSparkplug, EachConnectionHasItsDeath) {
     EXPECT_EQ(hex(publisher_.will().payload).substr(32), "00");
     EXPECT_EQ(hex(publisher_.will().payload).substr(32), "01");
