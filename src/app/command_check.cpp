@@ -88,11 +88,12 @@ void print_changes(const std::string& file, const config::Config& config,
 /// Of a file with faults `lines` and its like are not there.
 void print_json(const std::string& file, const Loaded& loaded, const Judged& judged,
                 const Compared& compared) {
-    json::object all{{"valid", loaded.config && judged.errors.empty()}};
+    const bool valid = loaded.config && judged.errors.empty() && compared.loaded.code == kFine;
+    json::object all{{"valid", valid}};
     json::array warnings;
     if (loaded.config) {
         all = inventory_json(*loaded.config);
-        all["valid"] = judged.errors.empty();
+        all["valid"] = valid;
         json::array& lines = all["lines"].as_array();
         for (std::size_t i = 0; i < judged.lines.size(); ++i)
             add_plan(lines[i].as_object(), judged.lines[i]);
@@ -116,7 +117,7 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
 ExitCode check(const std::string& file, const CheckOptions& options) {
     const Loaded loaded = load_file(file);
     Compared compared{options.before, {}};
-    if (!compared.file.empty()) compared.loaded = load_file(compared.file);
+    if (!compared.file.empty()) compared.loaded = load_file(compared.file, "--diff");
     Judged judged;
     if (loaded.config) {
         judged = judge(*loaded.config, options.allow_overload);

@@ -46,13 +46,13 @@ Loaded read_text(std::string_view text, const std::string& name) {
     return loaded;
 }
 
-Loaded load_file(const std::string& typed) {
+Loaded load_file(const std::string& typed, const std::string& option) {
     const std::string path = path_of(typed);
     Loaded loaded = read_file(path);
     if (loaded.code == kNoInput) {
         std::cerr << "panelgate: cannot read " << path << ": "
                   << loaded.problems.front().message.substr(kCannotRead.size())
-                  << " (give another file with -c)\n";
+                  << " (give another file with " << option << ")\n";
     }
     std::cerr << loaded.told;
     return loaded;

@@ -28,7 +28,8 @@ Loaded read_text(std::string_view text, const std::string& name);
 /// Reads and checks a file, and tells nobody but whoever calls.
 Loaded read_file(const std::string& path);
 /// Reads and checks a file, `-` for standard input. Its warnings are told by whoever uses it.
-Loaded load_file(const std::string& typed);
+/// `option`: who named it, and may name another one.
+Loaded load_file(const std::string& typed, const std::string& option = "-c");
 /// The same for text; `name` stands in messages.
 Loaded load_text(std::string_view text, const std::string& name);
 /// What a file holds; nothing, and nothing told, when it cannot be read or has faults.

@@ -171,8 +171,12 @@ class CommandLine {
         add_file(command);
         command->add_option("--format", format_, "text or json")
             ->check(CLI::IsMember({"text", "json"}));
-        command->add_option("--diff", check_.before,
-                            "say what changes from this file, in place of all that there is");
+        command
+            ->add_option("--diff", check_.before,
+                         "say what changes from this file, in place of all that there is")
+            ->check([](const std::string& file) {
+                return file.empty() ? "give a file that is compared with" : std::string();
+            });
         command->add_flag("--allow-overload", check_.allow_overload,
                           "a line that is planned to be busy for more than 100 % of its time is a "
                           "warning, not an error");

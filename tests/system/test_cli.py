@@ -262,8 +262,15 @@ class Files(unittest.TestCase):
         told = json.loads(one.stdout)
         self.assertNotIn("changes", told)
         self.assertEqual({error["file"] for error in told["errors"]}, {str(old)})
-        gone = run("check", "-c", str(self.file), "--diff", str(old) + "x")
-        self.assertEqual(gone.returncode, NO_INPUT)
+        self.assertFalse(told["valid"])
+        gone = run("check", "-c", str(self.file), "--diff", str(old) + "x", "--format", "json")
+        self.assertEqual((gone.returncode, json.loads(gone.stdout)["valid"]), (NO_INPUT, False))
+        self.assertIn(f"cannot read {old}x: ", gone.stderr)
+        self.assertIn("(give another file with --diff)", gone.stderr)
+        for nothing in (["--diff", ""], ["--diff="]):
+            none = run("check", "-c", str(self.file), *nothing)
+            self.assertEqual((none.returncode, none.stdout), (USAGE, ""))
+            self.assertIn("--diff", none.stderr)
 
     def test_check_tells_errors_as_json_too(self):
         self.file.write_text(good().replace("device: sim", "devise: sim")
