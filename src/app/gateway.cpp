@@ -61,7 +61,7 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
       northbound_(executor_, clock_) {
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
-        lines_.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
+        known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
     show(make_scene(std::move(config), std::move(lines)));
     relays_ = std::make_unique<points::Relays>(clock_, routes_of(*scene_));
     relay_listener_ = relays_->write_listener();
@@ -70,6 +70,10 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
         rt::log_about(relay.name, ok ? rt::LogLevel::info : rt::LogLevel::warn, "relay",
                       {{"relay", relay.name}, {"state", text_of(relay)}});
     });
+}
+
+Gateway::KnownLines::~KnownLines() {
+    for (const auto& [name, line] : lines) line->dispose();
 }
 
 LineWatch Gateway::watch() {
@@ -104,10 +108,11 @@ void Gateway::on_points(const std::string& line, std::uint8_t id,
 Gateway::Lines Gateway::lines_of(const config::Config& config) {
     Lines lines;
     for (const config::Line& line : config.lines) {
-        const auto found = lines_.find({line.name, line.listens});
-        lines.push_back(found != lines_.end() ? found->second
-                                              : std::make_shared<RunningLine>(
-                                                    executor_, clock_, line, simulate_, watch()));
+        const auto found = known_.lines.find({line.name, line.listens});
+        lines.push_back(
+            found != known_.lines.end()
+                ? found->second
+                : std::make_shared<RunningLine>(executor_, clock_, line, simulate_, watch()));
     }
     return lines;
 }
@@ -116,7 +121,7 @@ void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         const config::Line& now = config.lines[i];
         const config::Line* before = find_same(*scene_->config, now);
-        if (lines_.emplace(std::pair(now.name, now.listens), lines[i]).second) {
+        if (known_.lines.emplace(std::pair(now.name, now.listens), lines[i]).second) {
             lines[i]->start();
         } else if (before == nullptr) {
             lines[i]->apply(now, now);
@@ -133,7 +138,7 @@ void Gateway::rest_wires(const config::Config& config, const Lines& lines) {
         const std::string wire = wire_of(config.lines[i]);
         const config::Line* before = find_same(*scene_->config, config.lines[i]);
         if (before != nullptr && wire_of(*before) == wire) continue;
-        for (const auto& [name, other] : lines_) {
+        for (const auto& [name, other] : known_.lines) {
             if (other != lines[i] && other->wires().contains(wire))
                 lines[i]->bus().rest_until(other->bus().clear_at());
         }

@@ -93,7 +93,11 @@ class Gateway {
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
     /// Those of earlier configurations too, closed: whoever still knows one gets an answer, and it
     /// is taken up again under its name. By name and mode.
-    std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines_;
+    /// Requests that were cut off may keep a scene, and so its lines, for longer than this lives.
+    struct KnownLines {
+        ~KnownLines();
+        std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines;
+    } known_;
     std::unique_ptr<Discoveries> discoveries_;       ///< null until there is `http:`
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;

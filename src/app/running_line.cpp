@@ -110,6 +110,12 @@ void RunningLine::stop() {
     if (simulated_) simulated_->stop();
 }
 
+void RunningLine::dispose() {
+    poller_.reset();
+    bus_.reset();
+    simulated_.reset();
+}
+
 /// What is polled changes behind the bus: nothing is asked for in the old way then.
 void RunningLine::apply(const config::Line& before, const config::Line& now) {
     if (running_ && is_same_wire(before, now, simulate_)) {

@@ -50,6 +50,8 @@ class RunningLine {
 
     void start();
     void stop();
+    /// The end: nothing of it is there any more. Whoever still holds it may only let it go.
+    void dispose();
     /// Goes on as this; `before` is what it was. Opens it again after stop().
     void apply(const config::Line& before, const config::Line& now);
 

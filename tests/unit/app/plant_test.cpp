@@ -39,6 +39,7 @@ class PlantTest : public testing::Test {
     test::FakeBus bus2{io.get_executor()};
     config::Line floor1 = line("floor1", {station(31, "press"), station(5, "mixer")});
     config::Line floor2 = line("floor2", {station(5, "oven"), station(7, "meter")});
+    test::ManualClock clock;  // of what the plant keeps
     Plant plant;
 };
 
@@ -103,7 +104,6 @@ TEST_F(PlantTest, ListenersSeeItsLines) {
 
 TEST_F(PlantTest, ASimulatedLineHasNoDevice) {
     EXPECT_EQ(plant.lines()[0].device, "/dev/floor1");
-    test::ManualClock clock;
     const auto played = std::make_shared<sim::SimulatedBus>(
         io.get_executor(), clock, sim::Settings{}, std::vector<sim::Station>{});
     const config::Line played_line = line("played", {station(1, "filler")});
