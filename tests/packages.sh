@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # tests/packages.sh [PACKAGE.deb]   (default: what deploy/package.sh has made for this machine)
 # Takes a package through its life in a Debian of its own: installed, started as its unit says,
-# reloaded, upgraded, removed, installed again, purged. Without systemd as the first process, so the
-# unit's command is run by hand, as the package's user. Cut off from all networks. Needs root and what
+# reloaded, upgraded, removed, installed again, purged. Without systemd as the first process (that is
+# tests/service.sh), so the unit's command is run by hand, as the package's user. Cut off from all networks. Needs root and what
 # deploy/install_packages.sh package brings; ends with 77 where something is missing. A package of
 # another architecture runs by qemu, after deploy/package.sh ARCH --test has made what that needs.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
+. tests/support/debian.sh
 
 skip() { echo "packages.sh: skipped, $*"; exit 77; }
 fail() { echo "packages.sh: $*" >&2; [ ! -e "$log" ] || cat "$log" >&2; exit 1; }
@@ -34,13 +35,7 @@ termios=build/package-$architecture/old_termios.so
 if [ -z "${PACKAGES_ROOT-}" ]; then
     work=$(mktemp -d)
     trap 'rm -rf "$work"' EXIT
-    needed=$(dpkg-deb -f "$package" Depends Pre-Depends |
-        sed 's/^[A-Za-z-]*://; s/([^)]*)//g; s/ //g' | paste -sd,)
-    mirror=()
-    [ ! -e /etc/apt/sources.list.d/debian.sources ] || mirror=(/etc/apt/sources.list.d/debian.sources)
-    say "a Debian 12 of $architecture"
-    mmdebstrap --quiet --mode=root --variant=minbase --architectures="$architecture" \
-        --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr --include="$needed" bookworm "$work/root" "${mirror[@]}"
+    make_debian "$package" "$work/root"
     PACKAGES_ROOT=$work/root unshare --mount --net "$0" "$package"
     exit
 fi
@@ -67,9 +62,7 @@ prepare() {
     mount --rbind /dev "$root/dev"
     ip link set lo up
     cp "$package" "$root/first.deb"
-    dpkg-deb -R "$package" "$root.next"
-    sed -i 's/^Version: .*$/&+next/' "$root.next/DEBIAN/control"
-    dpkg-deb --root-owner-group -b "$root.next" "$root/next.deb" >/dev/null
+    next_version "$package" "$root/next.deb"
     preload=
     [ "$architecture" = "$here" ] || { cp "$termios" "$root/termios.so"; preload=/termios.so; }
 }

@@ -255,6 +255,7 @@ mqtt::Counters BrokerSession::counters() const {
     mqtt::Counters all = client_.counters();
     all.published += counters_.published;
     all.dropped += counters_.dropped;
+    all.results_dropped += counters_.results_dropped;
     all.reconnects += counters_.reconnects;
     all.writes_ok = counters_.writes_ok;
     all.writes_refused = counters_.writes_refused;

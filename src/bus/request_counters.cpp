@@ -9,7 +9,8 @@ namespace panelgate::bus {
 
 namespace {
 
-bool is_there(Health state) {
+std::optional<bool> is_there(Health state) {
+    if (state == Health::unknown) return {};
     return state == Health::online || state == Health::heard || state == Health::suspect;
 }
 

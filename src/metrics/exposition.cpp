@@ -243,13 +243,15 @@ void add_findings(Families& out, const Snapshot& snapshot) {
 }
 
 void add_station_state(Families& out, const Snapshot& snapshot) {
-    Family up = make_gauge("panelgate_station_up", "1 while a configured station answers.");
+    Family up =
+        make_gauge("panelgate_station_up",
+                   "1 while a configured station answers; absent while nobody has asked it.");
     Family success =
         make_gauge("panelgate_station_last_success_timestamp_seconds",
                    "When a configured station last answered; absent while it never did.");
     each_station(snapshot, [&](const LineReport& line, const StationReport& station) {
         if (!station.configured) return;
-        up.gauge(of_station(line, station), station.up ? 1 : 0);
+        if (station.up) up.gauge(of_station(line, station), *station.up ? 1 : 0);
         if (station.last_success_unix > 0) {
             success.gauge(of_station(line, station), station.last_success_unix);
         }

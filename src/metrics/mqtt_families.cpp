@@ -38,6 +38,9 @@ void add_mqtt(Families& out, const Snapshot& snapshot) {
     add_counter(out, "panelgate_mqtt_dropped_total",
                 "Changes lost because the broker was away for longer than the store lasts.",
                 mqtt.dropped);
+    add_counter(out, "panelgate_mqtt_results_dropped_total",
+                "Answers to writes lost because too many waited for the broker.",
+                mqtt.results_dropped);
     add_counter(out, "panelgate_mqtt_reconnects_total",
                 "Connections to the broker after the first.", mqtt.reconnects);
     add_writes(out, mqtt);

@@ -263,6 +263,7 @@ Counters Client::counters() const {
     counters.stored = state_->publisher.store().size();
     counters.published = state_->published;
     counters.dropped = state_->publisher.store().dropped();
+    counters.results_dropped = state_->publisher.results_dropped();
     counters.reconnects = state_->reconnects;
     return counters;
 }

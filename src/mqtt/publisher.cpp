@@ -9,7 +9,9 @@
 namespace panelgate::mqtt {
 namespace {
 
+// Numbers that no change ever has
 constexpr std::uint64_t kFirstCleared = std::uint64_t{1} << 63;
+constexpr std::uint64_t kFirstResult = std::uint64_t{1} << 62;
 
 std::unique_ptr<Wording> make_wording(const Settings& settings, const Subjects& subjects) {
     if (settings.format == Format::sparkplug)
@@ -24,7 +26,9 @@ Publisher::Publisher(const Settings& settings, Subjects subjects)
       subjects_(std::make_unique<const Subjects>(std::move(subjects))),
       wording_(make_wording(settings_, *subjects_)),
       states_(subjects_->size()),
-      store_(settings.store) {}
+      store_(settings.store),
+      results_(kFirstResult),
+      cleared_(kFirstCleared) {}
 
 Publisher::~Publisher() = default;
 
@@ -37,8 +41,7 @@ void Publisher::take_over(const Publisher& before) {
     for (const Change& change : before.store_.changes())
         if (here[change.subject]) store_.add(*here[change.subject], change.state);
     if (settings_.broker() != before.settings_.broker()) return;
-    results_ = before.results_;
-    awaited_ = before.connected_ || before.awaited_;
+    for (const auto& [number, message] : before.results_.messages()) results_.add(message);
     clear_what_went(before);
 }
 
@@ -47,10 +50,10 @@ void Publisher::clear_what_went(const Publisher& before) {
     const std::vector<std::string> told = before.wording_->retained();
     std::set<std::string> went(told.begin(), told.end());
     const std::size_t most = went.size() + settings_.store;
-    for (const auto& [number, topic] : before.cleared_)
-        if (went.size() < most) went.insert(topic);
+    for (const auto& [number, message] : before.cleared_.messages())
+        if (went.size() < most) went.insert(message.topic);
     for (const std::string& topic : wording_->retained()) went.erase(topic);
-    for (const std::string& topic : went) cleared_.emplace(kFirstCleared + cleared_.size(), topic);
+    for (const std::string& topic : went) cleared_.add({topic, "", 1, true});
 }
 
 void Publisher::know(std::size_t subject, State state) {
@@ -70,22 +73,26 @@ void Publisher::repeat(std::size_t subject) {
 }
 
 void Publisher::answer(const WriteResult& result) {
-    if ((!connected_ && !awaited_) || results_.size() >= settings_.results) return;
-    if (auto message = wording_->result(result)) results_.push_back(std::move(*message));
+    auto message = wording_->result(result);
+    if (!message) return;
+    if (results_.size() >= settings_.results) {
+        ++results_dropped_;
+    } else {
+        results_.add(std::move(*message));
+    }
 }
 
 void Publisher::connected() {
     connected_ = true;
-    awaited_ = false;
     again_ = false;
     before_ = 0;
     behind_ = 0;
-    next_cleared_ = kFirstCleared;
 }
 
 void Publisher::disconnected() {
     store_.lost();
-    if (connected_) results_.clear();  // who has asked has gone as well
+    results_.lost();
+    cleared_.lost();
     connected_ = false;
 }
 
@@ -99,7 +106,8 @@ void Publisher::rebirth() {
 
 void Publisher::delivered(std::uint64_t change) {
     store_.delivered(change);
-    cleared_.erase(change);
+    results_.delivered(change);
+    cleared_.delivered(change);
 }
 
 std::optional<Message> Publisher::next_before(WallTime now) {
@@ -109,13 +117,6 @@ std::optional<Message> Publisher::next_before(WallTime now) {
         if (message) return message;
     }
     return std::nullopt;
-}
-
-std::optional<Publisher::Outgoing> Publisher::next_cleared() {
-    const auto found = cleared_.lower_bound(next_cleared_);
-    if (found == cleared_.end()) return std::nullopt;
-    next_cleared_ = found->first + 1;
-    return Outgoing{{found->second, "", 1, true}, found->first};
 }
 
 std::optional<Message> Publisher::next_behind() {
@@ -129,7 +130,7 @@ std::optional<Message> Publisher::next_behind() {
 std::optional<Publisher::Outgoing> Publisher::next(WallTime now) {
     if (!connected_) return std::nullopt;
     if (auto message = next_before(now)) return Outgoing{std::move(*message)};
-    if (auto cleared = next_cleared()) return cleared;
+    if (auto cleared = cleared_.next()) return Outgoing{std::move(cleared->second), cleared->first};
     while (const Change* change = store_.next()) {
         auto message = wording_->change(*change, states_, store_.next_number(), now);
         if (!message) {
@@ -140,11 +141,7 @@ std::optional<Publisher::Outgoing> Publisher::next(WallTime now) {
         store_.sent();
         return Outgoing{std::move(*message), number};
     }
-    if (!results_.empty()) {
-        Outgoing result{std::move(results_.front())};
-        results_.pop_front();
-        return result;
-    }
+    if (auto result = results_.next()) return Outgoing{std::move(result->second), result->first};
     if (auto message = next_behind()) return Outgoing{std::move(*message)};
     return std::nullopt;
 }

@@ -82,13 +82,14 @@ class Helper:
 
 
 class Program:
-    """A running panelgate; a context manager that ends it and fails when it crashed."""
+    """A running panelgate; a context manager that ends it and fails when it crashed. `under`: a
+    command that becomes it."""
     ends_with = 0  # its exit code
 
-    def __init__(self, *arguments, **options):
+    def __init__(self, *arguments, under=(), **options):
         self.arguments = arguments
         self.process = subprocess.Popen(
-            [PANELGATE, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            [*under, PANELGATE, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, text=True, errors="replace", **options)
         self.out = Output(self.process.stdout)
         self.log = Output(self.process.stderr)

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +27,7 @@ struct StationReport {
     Histogram request_duration;
     arbiter::StationCounters wire;
     bool configured = false;
-    bool up = false;
+    std::optional<bool> up;        ///< whether it answers; none while nobody has asked it
     double last_success_unix = 0;  ///< seconds since 1970; 0 = never
 };
 

@@ -2,14 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "panelgate/mqtt/kept.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/mqtt/store.hpp"
 #include "panelgate/mqtt/subjects.hpp"
@@ -29,8 +28,8 @@ class Publisher {
 
     const Subjects& subjects() const { return *subjects_; }
     /// Before anything is offered: what another one knows, and has not told, of what is here too.
-    /// At the same broker also the answers that wait, and what it has retained there and is none
-    /// of this one's is cleared.
+    /// At the same broker also the answers that it may not have, and what it has retained there and
+    /// is none of this one's is cleared.
     void take_over(const Publisher& before);
     /// What is known of a subject before there is a connection, if nothing was: births tell it, and
     /// it takes no room.
@@ -39,9 +38,10 @@ class Publisher {
     bool offer(std::size_t subject, State state);
     /// Its state is sent once more.
     void repeat(std::size_t subject);
-    /// Told after what waits; beyond Settings::results, and without a connection, they are lost.
-    /// One that is taken over from counts until the first of its own stands.
+    /// Told after what waits, until the broker has it; beyond Settings::results it is lost, and
+    /// counted.
     void answer(const WriteResult& result);
+    std::uint64_t results_dropped() const { return results_dropped_; }
 
     /// A connection is to be made; its will.
     Message will() { return wording_->will(); }
@@ -74,7 +74,6 @@ class Publisher {
   private:
     std::optional<Message> next_before(WallTime now);
     std::optional<Message> next_behind();
-    std::optional<Outgoing> next_cleared();
     void clear_what_went(const Publisher& before);
 
     Settings settings_;
@@ -82,12 +81,10 @@ class Publisher {
     std::unique_ptr<Wording> wording_;
     States states_;
     Store store_;
-    std::deque<Message> results_;
-    /// Topics that are cleared, until the broker has it, by numbers that no change ever has.
-    std::map<std::uint64_t, std::string> cleared_;
-    std::uint64_t next_cleared_ = 0;  ///< those below are on their way
+    Kept results_;
+    std::uint64_t results_dropped_ = 0;
+    Kept cleared_;  ///< topics
     bool connected_ = false;
-    bool awaited_ = false;    ///< who has asked before take_over() still waits for answers
     bool again_ = false;      ///< a rebirth behind this one
     std::size_t before_ = 0;  ///< steps that are done
     std::size_t behind_ = 0;

@@ -35,7 +35,7 @@ struct Settings {
 
     std::size_t store = 10'000;    ///< changes that wait for the broker; more than in_flight
     std::size_t in_flight = 64;    ///< messages that the broker has not acknowledged
-    std::size_t results = 64;      ///< answers to writes that wait to be sent
+    std::size_t results = 1024;    ///< answers to writes that the broker does not have
     std::size_t batch = 64;        ///< messages that are sent before others have their turn
     std::size_t payload = 4096;    ///< bytes of what is taken from the broker
     std::size_t metrics = 64;      ///< of one command of a Sparkplug host

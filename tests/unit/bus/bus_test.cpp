@@ -372,7 +372,8 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
     EXPECT_EQ(report.stations[0].requests.at(kOtherFunctions)[Outcome::damaged], 1u);
     EXPECT_EQ(report.stations[1].station, "press");
     EXPECT_EQ(report.stations[1].requests.at(3)[Outcome::ok], 1u);
-    EXPECT_TRUE(report.stations[1].up);
+    EXPECT_EQ(report.stations[1].up, true);
+    EXPECT_EQ(report.stations[2].up, std::nullopt);
 }
 
 }  // namespace

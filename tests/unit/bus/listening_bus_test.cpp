@@ -77,7 +77,7 @@ TEST_F(ListeningBusTest, TellsWhatPassesBy) {
     EXPECT_NEAR(to_milliseconds(counts.think), 4, 0.001);
     const StationReport report = report_of("press");
     EXPECT_EQ(report.requests.at(3)[Outcome::ok], 1u);
-    EXPECT_TRUE(report.up);
+    EXPECT_EQ(report.up, true);
     EXPECT_GT(report.last_success_unix, 0);
     EXPECT_NEAR(report.wire.turnaround.sum, 0.004, 1e-6);
     const auto trace = bus->trace(10).frames;
@@ -91,7 +91,7 @@ TEST_F(ListeningBusTest, TellsWhatPassesBy) {
 TEST_F(ListeningBusTest, SaysWhoDoesNotAnswerItsMaster) {
     for (int i = 0; i < 4; ++i) say(300ms, 17, kRead);
     EXPECT_EQ(bus->station_status(17).state, Health::offline);
-    EXPECT_FALSE(report_of("press").up);
+    EXPECT_EQ(report_of("press").up, false);
     EXPECT_EQ(report_of("press").requests.at(3)[Outcome::timeout], 3u);
     say(4ms, 17, kReply);
     EXPECT_EQ(bus->station_status(17).state, Health::heard);

@@ -76,14 +76,14 @@ TEST(Exposition, CountsWhatTheHttpServerAnsweredAndWhoGuessed) {
 TEST(Exposition, TellsOfTheBrokerWhereThereIsOne) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
-    snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1};
-    expect_lines(
-        exposition(snapshot),
-        {"panelgate_mqtt_connected 1", "panelgate_mqtt_stored 5",
-         "panelgate_mqtt_published_total 100", "panelgate_mqtt_dropped_total 7",
-         "panelgate_mqtt_reconnects_total 2", "panelgate_mqtt_writes_total{outcome=\"ok\"} 3",
-         "panelgate_mqtt_writes_total{outcome=\"refused\"} 4",
-         "panelgate_mqtt_writes_total{outcome=\"failed\"} 1"});
+    snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1, 6};
+    expect_lines(exposition(snapshot),
+                 {"panelgate_mqtt_connected 1", "panelgate_mqtt_stored 5",
+                  "panelgate_mqtt_published_total 100", "panelgate_mqtt_dropped_total 7",
+                  "panelgate_mqtt_results_dropped_total 6", "panelgate_mqtt_reconnects_total 2",
+                  "panelgate_mqtt_writes_total{outcome=\"ok\"} 3",
+                  "panelgate_mqtt_writes_total{outcome=\"refused\"} 4",
+                  "panelgate_mqtt_writes_total{outcome=\"failed\"} 1"});
 }
 
 TEST(Exposition, GivesTheCountersOfAStationExactly) {
@@ -197,6 +197,15 @@ TEST(Exposition, P10LeavesOutTheLastSuccessOfAStationThatNeverAnswered) {
     Snapshot snapshot = filled();
     snapshot.lines[0].stations[0].last_success_unix = 0;
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("last_success")));
+}
+
+TEST(Exposition, P10LeavesOutTheStateOfAStationThatNobodyHasAsked) {
+    Snapshot snapshot = filled();
+    snapshot.lines[0].stations[0].up.reset();
+    EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_up{")));
+    snapshot.lines[0].stations[0].up = false;
+    EXPECT_THAT(exposition(snapshot),
+                HasSubstr(R"(panelgate_station_up{line="floor1",station="press"} 0)"));
 }
 
 TEST(Exposition, HasNoStateForStationsThatAreNotConfigured) {
