@@ -79,11 +79,17 @@ make_sysroot() {
     mv "$sysroot.part" "$sysroot"
 }
 
+# What CMake has found in another folder of libraries it would go on with.
+forget_other_libraries() {
+    [ ! -e "$build/CMakeCache.txt" ] || grep -q "^PANELGATE_SYSROOT:[A-Z]*=$sysroot$" "$build/CMakeCache.txt" ||
+        rm -rf "$build"
+}
+
 # What only another architecture warns of stops no package.
 configure() {
     mkdir -p "$build"
     cmake -S . -B "$build" -G Ninja -DCMAKE_TOOLCHAIN_FILE="$PWD/deploy/package/toolchain.cmake" \
-        -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE=-O2 -DCMAKE_INSTALL_PREFIX=/usr \
+        -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_FLAGS_RELEASE=-O2 -DCMAKE_INSTALL_PREFIX=/usr -DCMAKE_SKIP_RPATH=ON \
         -DPANELGATE_TRIPLE="$triple" -DPANELGATE_SYSROOT="$sysroot" -DPANELGATE_EMULATOR="$emulator" \
         -DPANELGATE_MACHINE_FLAGS="$flags" -DPANELGATE_TESTS="$1" -DPANELGATE_PACKAGE=ON -DPANELGATE_WERROR=OFF \
         -DPANELGATE_ARCHITECTURE="$architecture" -DPANELGATE_DOCUMENTS="$build/documents" \
@@ -104,7 +110,7 @@ depends() {
     cp -r "$sysroot/var/lib/dpkg" "$folder/dpkg"
     sed -i "s,^/lib/,/usr/lib/,; s,^,$sysroot," "$folder"/dpkg/info/*.list
     (cd "$folder" && DEB_HOST_ARCH=$architecture dpkg-shlibdeps --warnings=0 --admindir="$folder/dpkg" \
-        -l"$sysroot/usr/lib/$triple" -O -edebian/panelgate/panelgate) >"$folder/needed"
+        -l"$sysroot/usr/lib/$triple" -O -edebian/panelgate/panelgate) >"$folder/needed" || return
     sed -n 's/^shlibs:Depends=//p' "$folder/needed"
     rm -r "$folder"
 }
@@ -151,10 +157,11 @@ run_tests() {
 need
 make_sysroot
 say "panelgate for $architecture"
+forget_other_libraries
 configure OFF
 make panelgate
 documents
-needed=$(depends)
+needed=$(depends) || die "the packages that the program needs are not known"
 configure OFF "$needed"
 pack
 say "build/packages/panelgate_$version-1_$architecture.deb ($(stat -c %s "$packages/panelgate_$version-1_$architecture.deb") bytes): $needed"

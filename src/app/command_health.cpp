@@ -18,7 +18,7 @@ ExitCode health(const std::string& file, const std::string& http) {
     if (const auto* none = std::get_if<NoDoor>(&door)) {
         std::cerr << "panelgate: " << (none->code == kUsage ? "" : "not ready: ") << none->why
                   << '\n';
-        return none->code;
+        return none->code == kUsage ? kUsage : kNotReady;
     }
     const auto& [address, port] = std::get<config::Endpoint>(door);
     const std::string why = ask_whether_ready(address, port, kPatience);

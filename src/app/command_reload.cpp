@@ -96,6 +96,9 @@ ExitCode reload(const ReloadOptions& options) {
     std::string why = said.text.empty() ? said.silence() : said.status();
     if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
     std::cerr << "panelgate: not reloaded: http://" << place << ": " << why << '\n';
+    if (said.text.empty() && options.http.empty())
+        std::cerr << "  (if it runs with another `http: listen` than " << options.file
+                  << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
     return kNotReady;
 }
 

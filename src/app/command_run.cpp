@@ -17,12 +17,13 @@
 #include "load.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/config/reachable.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/rt/punctual.hpp"
 #include "panelgate/rt/service_manager.hpp"
 #include "prepare.hpp"
-#include "reachable.hpp"
+
 #include "reloader.hpp"
 #include "run_loop.hpp"
 
@@ -99,8 +100,8 @@ ExitCode serve(config::Config config, const Service& service,
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
     const std::string url =
-        "http://" + endpoint_text(reachable(config.http->address), gateway.http_port());
-    const std::string host = reachable(config.modbus_tcp[0].address);
+        "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+    const std::string host = config::reachable(config.modbus_tcp[0].address);
     const std::string port = std::to_string(gateway.modbus_port());
     std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "
               << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n"

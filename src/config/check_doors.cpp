@@ -1,6 +1,7 @@
 #include "check_doors.hpp"
 
 #include <algorithm>
+#include <boost/asio/ip/address.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -9,7 +10,9 @@
 
 #include "panelgate/config/broadcasts.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/config/reachable.hpp"
 #include "panelgate/config/settings.hpp"
+#include "panelgate/rt/access_list.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -161,7 +164,19 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
                                      "`, or a secret of the container platform in /run/secrets");
 }
 
+/// `panelgate health`, and with it the image's HEALTHCHECK, asks from where the listener is.
+void warn_of_health(Loading& loading, const Node& node, const web::Settings& http) {
+    const std::string own = reachable(http.address);
+    if (rt::AccessList(http.allow).allows(boost::asio::ip::make_address(own))) return;
+    loading.warn(
+        mark_of(node, "allow"),
+        "this machine itself (" + own +
+            ") is not let in, so `panelgate health` and `panelgate reload` cannot ask; add " + own +
+            (is_ipv6(own) ? "/128" : "/32"));
+}
+
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
+    warn_of_health(loading, node, http);
     const bool open = is_any_address(http.address) && lets_all_in(http.allow);
     if (open && http.anonymous == web::Role::operator_) {
         loading.warn(mark_of(node, "anonymous"),

@@ -99,14 +99,23 @@ class Health(unittest.TestCase):
         self.file.write_text(config.gateway(config.line(), http=None))
         self.assertIn("has no http", self.ask("-c", str(self.file), code=1))
 
-    def test_without_a_configuration_that_can_be_read_it_asks_port_8080(self):
-        for text in (None, "lines: [\n"):
-            if text:
+    def test_nobody_is_asked_by_a_guess(self):
+        faulty = config.gateway(config.line(), http="{listen: nowhere}")
+        for text in (None, "", "lines: [\n", faulty, config.gateway(config.line(), http=None) + "x: 1\n"):
+            if text is not None:
                 self.file.write_text(text)
-            ended = harness.run("health", "-c", str(self.file))
-            self.assertIn(ended.returncode, (0, 1))  # somebody else's gateway may be there
-            if ended.returncode:
-                self.assertIn("http://127.0.0.1:8080/readyz", ended.stderr)
+            told = self.ask("-c", str(self.file), code=1)
+            self.assertIn(str(self.file), told)
+            self.assertIn("--http ADDR:PORT", told)
+
+    def test_a_file_with_faults_says_where_its_gateway_listens_all_the_same(self):
+        with harness.configured(config.gateway(config.line(), modbus=None)) as program:
+            port = program.http_port()
+            for faulty in ("lines: [\nhttp:\n  listen: 127.0.0.1:{}\n",
+                           "http: {{listen: '127.0.0.1:{}', anonymous: everybody}}\nlines: []\n",
+                           "nonsense: 1\nhttp: {{listen: 127.0.0.1:{}}}\n"):
+                self.file.write_text(faulty.format(port))
+                self.ask("-c", str(self.file))
 
     def test_what_comes_instead_is_told(self):
         told = self.not_ready(b"HTTP/1.1 503 Service Unavailable\r\nA: b\r\n\r\nnot ready: http\r\n")

@@ -1,8 +1,8 @@
-#include "reachable.hpp"
+#include "panelgate/config/reachable.hpp"
 
 #include <gtest/gtest.h>
 
-namespace panelgate::app {
+namespace panelgate::config {
 namespace {
 
 TEST(Reachable, AllAddressesOfTheMachineAreReachedOnLoopback) {
@@ -17,4 +17,4 @@ TEST(Reachable, OneAddressIsReachedAtItself) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::config

@@ -4,12 +4,12 @@
 
 #include "panelgate/config/endpoint.hpp"
 
-namespace panelgate::app {
+namespace panelgate::config {
 
 /// Where a program on this machine reaches a listener: that of all addresses on loopback.
 inline std::string reachable(const std::string& address) {
-    if (!config::is_any_address(address)) return address;
-    return config::is_ipv6(address) ? "::1" : "127.0.0.1";
+    if (!is_any_address(address)) return address;
+    return is_ipv6(address) ? "::1" : "127.0.0.1";
 }
 
-}  // namespace panelgate::app
+}  // namespace panelgate::config
