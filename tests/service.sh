@@ -39,6 +39,7 @@ trap clean_up EXIT
 make_debian "$package" "$work/root" systemd-sysv,dbus,curl,procps
 cp "$package" "$work/root/first.deb"
 next_version "$package" "$work/root/next.deb"
+next_version "$work/root/next.deb" "$work/root/other.deb" other
 
 say "boot"
 systemd-nspawn --directory "$work/root" --boot --private-network --register=no --keep-unit \
@@ -112,7 +113,7 @@ say "port 502 and a token, without a user's rights"
 inside mkdir -p /etc/credstore
 echo a-token-of-the-service | inside sh -c 'umask 077; cat >/etc/credstore/panelgate-operator'
 sed -e 's/127\.0\.0\.1:1502/127.0.0.1:502/' \
-    -e 's|anonymous: operator|anonymous: none, tokens: [{name: ops, role: operator, file: "${CREDENTIALS_DIRECTORY:-/etc/credstore}/panelgate-operator"}]|' \
+    -e 's|anonymous: operator.*|anonymous: none\n  tokens: [{name: ops, role: operator, file: "${CREDENTIALS_DIRECTORY:-/etc/credstore}/panelgate-operator"}]|' \
     "$work/good" >"$file"
 must inside panelgate check -c /etc/panelgate/panelgate.yaml >"$work/console"
 must inside systemctl restart panelgate
@@ -124,11 +125,16 @@ cp "$work/good" "$file"
 must inside systemctl restart panelgate
 lives
 
-say "upgrade: the new one runs, with the file that somebody has changed"
+say "upgrade: the same program reloads, another one is started"
+echo "# ours" >>"$file"
 first=$(show MainPID)
 must inside dpkg -i /next.deb >"$work/console" 2>&1
 lives
+must is MainPID "$first"
+must inside dpkg -i /other.deb >"$work/console" 2>&1
+lives
 must_not is MainPID "$first"
+must grep -q "^# ours" "$file"
 
 say "remove and purge"
 must inside dpkg -r panelgate >"$work/console" 2>&1

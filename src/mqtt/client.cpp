@@ -154,6 +154,7 @@ void Client::State::digest() {
     const Connection::Happened happened = connection->take();
     if (!happened.refused.empty()) return lost("the broker refuses: " + happened.refused);
     if (happened.accepted) accepted();
+    if (!happened.delivered.empty()) pauses.succeeded();  // it keeps us, and takes what we say
     for (const int id : happened.delivered)
         for (const std::uint64_t change : open.delivered(id)) publisher.delivered(change);
     take_commands(happened.received);
@@ -162,7 +163,6 @@ void Client::State::digest() {
 void Client::State::accepted() {
     accept_by.reset();
     connected = true;
-    pauses.succeeded();
     if (accepted_once) ++reconnects;
     accepted_once = true;
     rt::log(rt::LogLevel::info, "mqtt connected",

@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "panelgate/base/utf8.hpp"
 #include "protobuf.hpp"
 
 namespace panelgate::mqtt {
@@ -150,6 +151,9 @@ void read_field(const ProtobufField& field, HeardMetric& heard) {
         case metric::kBoolean:
             heard.value = field.value != 0;
             break;
+        case metric::kIsNull:
+            heard.is_null = field.value != 0;
+            break;
         case metric::kString:
             heard.value = std::string(field.bytes);
             break;
@@ -162,7 +166,10 @@ std::optional<HeardMetric> parse_metric(std::string_view text) {
     HeardMetric heard;
     ProtobufReader in(text);
     while (const auto field = in.next()) read_field(*field, heard);
-    if (!in.ok()) return std::nullopt;
+    const auto* text_value = heard.value ? std::get_if<std::string>(&*heard.value) : nullptr;
+    if (!in.ok() || !is_utf8(heard.name) || (text_value != nullptr && !is_utf8(*text_value)))
+        return std::nullopt;
+    if (heard.is_null) heard.value.reset();
     return heard;
 }
 

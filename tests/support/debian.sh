@@ -12,12 +12,13 @@ make_debian() {
         --hook-dir=/usr/share/mmdebstrap/hooks/merged-usr --include="$needed${3+,$3}" bookworm "$2" "${mirror[@]}"
 }
 
-# next_version PACKAGE FILE: the same as a later version.
+# next_version PACKAGE FILE [other]: the same as a later version; `other`: with another program.
 next_version() {
     local folder
     folder=$(mktemp -d)
     dpkg-deb -R "$1" "$folder"
     sed -i 's/^Version: .*$/&+next/' "$folder/DEBIAN/control"
+    [ -z "${3-}" ] || echo >>"$folder/usr/bin/panelgate"
     dpkg-deb --root-owner-group -b "$folder" "$2" >/dev/null
     rm -rf "$folder"
 }

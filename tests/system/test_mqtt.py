@@ -9,6 +9,7 @@ import socket
 import subprocess
 import tempfile
 import threading
+import time
 import unittest
 
 import config
@@ -129,6 +130,40 @@ class Listener:
         return [json.loads(payload) for name, payload, _ in self.received if name == topic]
 
 
+class Rude:
+    """A broker that takes each connection and ends it with the first message; a context manager."""
+
+    def __init__(self):
+        self.came = []  # by the clock
+        self._changed = threading.Condition()
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._server.close()
+
+    def _serve(self):
+        with contextlib.suppress(OSError):
+            while True:
+                peer, _ = self._server.accept()
+                with self._changed:
+                    self.came.append(time.monotonic())
+                    self._changed.notify_all()
+                with peer, contextlib.suppress(OSError):
+                    peer.recv(4096)
+                    peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+                    peer.recv(1)
+
+    def pauses(self, count):
+        with self._changed:
+            assert self._changed.wait_for(lambda: len(self.came) > count, harness.PATIENCE), self.came
+            return [after - before for before, after in zip(self.came, self.came[1:])]
+
+
 def plant(broker, *stations, more="", line=None):
     """A gateway with these stations that knows this broker."""
     mqtt = f"{{broker: 'mqtt://127.0.0.1:{broker.port}', topic: {TOPIC}, client_id: gateway{more}}}"
@@ -190,6 +225,11 @@ def first_told(messages):
 @unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
                                       "(deploy/install_packages.sh test)")
 class Mqtt(unittest.TestCase):
+    def test_a_broker_that_ends_each_connection_is_tried_ever_more_seldom(self):
+        with Rude() as broker, harness.configured(plant(broker)):
+            first, _, third = broker.pauses(3)[:3]
+        self.assertGreater(third, 2 * first)
+
     def test_values_are_there_for_who_comes_later(self):
         with Broker() as broker, harness.configured(plant(broker)) as program:
             program.log.wait_for("mqtt connected")

@@ -239,6 +239,31 @@ TEST(MqttSparkplugPayload, WhatAHostSendsMeansWhatItsTypeSays) {
     EXPECT_EQ(value_of(heard, DataType::int32), points::Value(std::uint64_t{0xFFFFFFFE}));
 }
 
+std::string payload_of(ProtobufWriter& metric) {
+    return ProtobufWriter().bytes(2, metric.take()).take();
+}
+
+TEST(MqttSparkplugPayload, WhatIsNullHasNoValue) {
+    ProtobufWriter behind, before;
+    behind.bytes(1, "mode").varint(10, 9).varint(7, 1);
+    before.bytes(1, "mode").varint(7, 1).varint(10, 9);
+    for (ProtobufWriter* one : {&behind, &before}) {
+        const auto heard = parse_sparkplug(payload_of(*one), 1);
+        ASSERT_TRUE(heard);
+        EXPECT_EQ(heard->front().value, std::nullopt);
+    }
+}
+
+TEST(MqttSparkplugPayload, TextIsUtf8) {
+    ProtobufWriter good, bad, unnamed;
+    good.bytes(1, "name").bytes(15, "\xc3\xa4");
+    bad.bytes(1, "name").bytes(15, "\xff\xfe");
+    unnamed.bytes(1, "\xff").varint(10, 9);
+    EXPECT_TRUE(parse_sparkplug(payload_of(good), 1));
+    EXPECT_FALSE(parse_sparkplug(payload_of(bad), 1));
+    EXPECT_FALSE(parse_sparkplug(payload_of(unnamed), 1));
+}
+
 TEST(MqttSparkplugPayload, HasALimitOfMetrics) {
     const std::vector<Metric> three(3);
     const std::string payload = sparkplug_payload(kNoon, three, {});
