@@ -70,6 +70,16 @@ TEST(Starter, HasExamplesOfPointsThatOnlyNeedToBeUncommented) {
         EXPECT_FALSE(one.points.empty()) << one.profile->name;
 }
 
+TEST(Starter, WhoAnsweredLateIsGivenMoreTime) {
+    scan::Result result;
+    result.format = kFormat;
+    result.stations = {station(5, {{"generic", "a"}}), station(6, {{"generic", "a"}})};
+    result.stations[0].evidence.late = 1;
+    const config::Config config = load(starter(result));
+    EXPECT_EQ(config.lines[0].arbiter.stations[0].response_timeout, 2s);
+    EXPECT_EQ(config.lines[0].arbiter.stations[1].response_timeout, 500ms);
+}
+
 TEST(Starter, OfARemoteLineSaysThatItsFormatIsSupposed) {
     scan::Result result;
     result.remote = true;
