@@ -19,8 +19,6 @@ using points::Type;
 using yaml::MapReader;
 using yaml::Node;
 
-constexpr Duration kSlowest = 24h;
-
 std::vector<std::string_view> type_words() {
     std::vector<std::string_view> words;
     for (const Type type : points::kTypes) words.push_back(label(type));
@@ -267,7 +265,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     if (point.writable && station.listens) in.problem("writable", kListens);
     load_labels(in, point);
     load_no_value(in, point);
-    point.every = in.duration("every", 1ms, kSlowest).value_or(1s);
+    point.every = in.duration("every", 1ms, points::kSlowest).value_or(1s);
     if (item) check_area(in, point, *item->area, *station.profile);
     warn_of_idle_keys(loading, in, point);
     in.finish();
@@ -281,7 +279,7 @@ void load_poll(Loading& loading, const Node& node, Station& station) {
     poll.read = in.text("read").value_or("");
     constexpr std::int64_t kLargest = 2040;  // the largest read of any panel: GT, ARCT1F501E 1.3.1
     poll.count = static_cast<std::uint32_t>(in.integer("count", 1, kLargest).value_or(1));
-    poll.every = in.duration("every", 1ms, kSlowest).value_or(1s);
+    poll.every = in.duration("every", 1ms, points::kSlowest).value_or(1s);
     if (item) {
         poll.table = item->area->table;
         poll.address = item->address;

@@ -153,9 +153,9 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
     const auto to = load_end(loading, in, "to");
     Relay relay;
     relay.count = static_cast<std::uint32_t>(in.integer("count", 1, 2040).value_or(1));
-    relay.every = in.duration("every", 1ms, 24h).value_or(relay.every);
+    relay.every = in.duration("every", 1ms, points::kSlowest).value_or(relay.every);
     relay.on_change = in.boolean("on_change").value_or(false);
-    relay.refresh = in.duration("refresh", 1s, 24h).value_or(relay.refresh);
+    relay.refresh = in.duration("refresh", 1s, points::kSlowest).value_or(relay.refresh);
     if (in.has("refresh") && !relay.on_change) {
         loading.warn(in.mark("refresh"),
                      "refresh has no effect without on_change: true: this relay writes every turn");

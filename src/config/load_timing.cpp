@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <optional>
@@ -7,6 +6,7 @@
 
 #include "load_stations.hpp"
 #include "panelgate/base/serial_format.hpp"
+#include "panelgate/profile/frame_gap.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -63,13 +63,6 @@ void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
                                 yaml::format_duration(*gap));
 }
 
-/// Manuals speak of RTU.
-Duration asked_gap(const SerialFormat& serial, const profile::PanelProfile& profile) {
-    if (serial.mode == SerialMode::ascii) return {};
-    const double characters = profile.timing.frame_gap_characters;
-    return std::chrono::duration_cast<Duration>(characters * character_time(serial));
-}
-
 void warn_of_gap(Loading& loading, yaml::Mark mark, Duration gap, Duration asked,
                  const std::string& who) {
     loading.warn(mark, "frame_gap " + yaml::format_duration(gap) + " is less than the " +
@@ -96,8 +89,8 @@ bool was_warned(const LineInWork& work, const Station& station, Duration gap, Du
 void check_gap(Loading& loading, const LineInWork& work, const Station& station,
                const Timing& timing, std::optional<yaml::Mark> own, yaml::Mark place) {
     const SerialFormat& serial = work.line.device.serial;
-    const Duration asked = asked_gap(serial, *station.profile);
-    const Duration wanted = std::max(silent_interval(serial), asked);
+    const Duration asked = profile::asked_gap(serial, *station.profile);
+    const Duration wanted = profile::automatic_gap(serial, *station.profile);
     const Duration gap = timing.frame_gap.value_or(wanted);
     if (!work.serial_known || gap >= wanted || serial.mode == SerialMode::ascii) return;
     if (!own && was_warned(work, station, gap, asked)) return;
@@ -184,10 +177,9 @@ StationSettings load_station_timing(Loading& loading, MapReader& in, const LineI
     }
     station.think_time = timing.think_time;
     check_gap(loading, work, station, timing, own_gap, in.mark("timing"));
-    const SerialFormat& serial = work.line.device.serial;
-    const Duration automatic =
-        std::max(silent_interval(serial), asked_gap(serial, *station.profile));
-    timing.settings.frame_gap = timing.frame_gap.value_or(automatic);
+    station.automatic_gap = !timing.frame_gap;
+    timing.settings.frame_gap = timing.frame_gap.value_or(
+        profile::automatic_gap(work.line.device.serial, *station.profile));
     return timing.settings;
 }
 

@@ -30,6 +30,7 @@ struct Station {
     bool listens = false;       ///< its line is only listened to
     bool guard = false;         ///< what the profile rules out is refused without using the bus
     Duration think_time = 1ms;  ///< what a plan assumes of its panel; nothing waits for it
+    bool automatic_gap = true;  ///< its `frame_gap` is not set and would follow another rate
     bool translate = true;      ///< what its panel lacks goes out as what does the same
     sim::Misbehaviour faults;   ///< of the simulated panel
     std::vector<points::Point> points;

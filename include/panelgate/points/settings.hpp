@@ -10,6 +10,7 @@
 
 namespace panelgate::points {
 
+inline constexpr Duration kSlowest = 24h;        ///< any interval
 inline constexpr std::size_t kMaxPoints = 4096;  ///< of one station
 inline constexpr std::size_t kMaxPolls = 256;    ///< of one station
 inline constexpr std::size_t kMaxRelays = 256;

@@ -101,6 +101,8 @@ TEST(ConfigTiming, AStationOverridesTheTimingOfItsLine) {
     EXPECT_EQ(stations[1].retries, 0);
     EXPECT_TRUE(stations[1].retry_writes);
     EXPECT_EQ(stations[1].frame_gap, Duration(3ms));
+    EXPECT_TRUE(line.stations[0].automatic_gap);
+    EXPECT_FALSE(line.stations[1].automatic_gap);
     EXPECT_FALSE(line.stations[0].read_only);
     EXPECT_TRUE(line.stations[1].read_only);
 }
@@ -114,6 +116,9 @@ TEST(ConfigTiming, TheAutomaticFrameGapIsWhatThePanelAsksOrTheStandardWhicheverI
     EXPECT_EQ(slow.arbiter.stations[1].frame_gap, silent_interval(format));
     const Line fast = line_of("    device: sim\n    serial: {baud: 38400, parity: none}\n" + gt);
     EXPECT_EQ(fast.arbiter.stations[0].frame_gap, Duration(1750us));
+    EXPECT_TRUE(fast.stations[0].automatic_gap);
+    const Line set = line_of("    device: sim\n    timing: {frame_gap: 5ms}\n" + gt);
+    EXPECT_FALSE(set.stations[0].automatic_gap) << "its line says so";
 }
 
 }  // namespace
