@@ -16,7 +16,7 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     made.profile = station.profile;
     made.response_timeout = settings.response_timeout;
     made.think_time = station.think_time;
-    made.gap = settings.frame_gap.value_or(silent_interval(line.device.serial));
+    if (!station.automatic_gap) made.frame_gap = settings.frame_gap;
     made.memory = memory_of(station.profile);
     const auto wants = points::wants_of(station.points, station.polls);
     for (std::size_t i = 0; i < wants.size() && !line.listens; ++i) {
@@ -40,7 +40,7 @@ plan::Relay relay_of(const plan::Line& line, const points::Relay& relay) {
     plan::Relay made;
     made.name = relay.name();
     made.every = relay.every;
-    made.writes_every = relay.on_change ? std::max(relay.every, relay.refresh) : relay.every;
+    if (relay.on_change) made.refresh = relay.refresh;
     made.from = end_of(line, relay.from, relay.count);
     made.to = end_of(line, relay.to, relay.count);
     made.single = made.to && relay.count == 1 &&

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "capacity.hpp"
+#include "panelgate/plan/highest_rate.hpp"
 
 namespace panelgate::app {
 namespace {
@@ -33,9 +34,12 @@ json::object relay_json(const plan::RelayLoad& relay) {
             {"most_percent", percent(relay.most)}};
 }
 
-json::object highest_rate_json(const plan::LinePlan& plan) {
-    json::object made{{"once_ms", milliseconds(plan.once)}};
-    if (const auto times = plan.times_as_often()) made["times_as_often"] = rounded(*times);
+json::object highest_rate_json(const Capacity& capacity) {
+    json::object made{{"once_ms", milliseconds(capacity.plan.once)}};
+    if (const auto highest = plan::highest_rate(capacity.line, capacity.plan)) {
+        made["times_as_often"] = rounded(highest->times);
+        made["limited_by"] = highest->changing ? "most_percent" : "load_percent";
+    }
     return made;
 }
 
@@ -61,7 +65,9 @@ void add_plan(json::object& line, const Capacity& capacity) {
     for (const plan::RelayLoad& relay : plan.relays) relays.push_back(relay_json(relay));
     json::array advice;
     for (const plan::Advice& one : capacity.advice)
-        advice.push_back(json::object{{"what", one.what}, {"load_percent", percent(one.load)}});
+        advice.push_back(json::object{{"what", one.what},
+                                      {"load_percent", percent(one.load)},
+                                      {"most_percent", percent(one.most)}});
     line["load_percent"] = percent(plan.load);
     line["most_percent"] = percent(plan.most);
     line["verdict"] = word(plan::verdict(plan));
@@ -72,7 +78,7 @@ void add_plan(json::object& line, const Capacity& capacity) {
                                         {"load_percent", percent(plan.dead->load)},
                                         {"holds_ms", milliseconds(plan.dead->holds)}};
     }
-    line["highest_rate"] = highest_rate_json(plan);
+    line["highest_rate"] = highest_rate_json(capacity);
     line["headroom"] =
         json::object{{"load_percent", percent(std::max(0.0, plan::kFull - plan.load))},
                      {"reads_per_second", rounded(plan.free_reads())}};

@@ -3,12 +3,15 @@
 
 #include "capacity.hpp"
 #include "panelgate/base/number_text.hpp"
+#include "panelgate/plan/highest_rate.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
 namespace {
 
 using yaml::format_duration;
+
+constexpr const char* kChanging = " while values change";
 
 std::string rounded(double value) { return number_text(std::round(value * 10) / 10); }
 std::string percent(double load) { return rounded(100 * load) + " %"; }
@@ -24,7 +27,7 @@ std::string text_of(const plan::RelayLoad& relay) {
     std::string text = "  relay " + relay.relay + ": " + std::string(label(relay.request)) +
                        " of " + relay.station + " every " + format_duration(relay.every) + ": " +
                        milliseconds(relay.wire) + ", " + percent(relay.load);
-    if (relay.most > relay.load) text += ", " + percent(relay.most) + " while values change";
+    if (relay.most > relay.load) text += ", " + percent(relay.most) + kChanging;
     return text + '\n';
 }
 
@@ -34,19 +37,27 @@ std::string text_of(const plan::OneDead& dead) {
            milliseconds(dead.holds) + ", once\n";
 }
 
-std::string headroom_of(const plan::LinePlan& plan) {
+std::string headroom_of(const Capacity& capacity) {
+    const plan::LinePlan& plan = capacity.plan;
     std::string text = "  left for clients: " + percent(std::max(0.0, plan::kFull - plan.load)) +
                        ", " + rounded(plan.free_reads()) + " reads of " +
                        std::to_string(plan::kClientRead) + " registers a second\n";
-    if (const auto times = plan.times_as_often()) {
-        text += "  highest rate: all of this " + rounded(*times) + " times as often, up to " +
-                percent(plan::kHigh) + "; once through takes " + milliseconds(plan.once) + '\n';
+    if (const auto highest = plan::highest_rate(capacity.line, plan)) {
+        text += "  highest rate: all of this " + rounded(highest->times) +
+                " times as often, up to " +
+                (highest->changing ? percent(plan::kFull) + kChanging : percent(plan::kHigh)) +
+                "; once through takes " + milliseconds(plan.once) + '\n';
     }
     return text;
 }
 
-std::string text_of(const plan::Advice& advice) {
-    return advice.what + " brings " + percent(advice.load);
+/// What it is judged by first: certain, or while values change.
+std::string text_of(const plan::Advice& advice, bool changing) {
+    std::string text = advice.what + " brings ";
+    if (changing) return text + percent(advice.most) + kChanging;
+    text += percent(advice.load);
+    if (advice.most > advice.load) text += " (" + percent(advice.most) + kChanging + ')';
+    return text;
 }
 
 }  // namespace
@@ -55,28 +66,33 @@ std::string plan_text(const Capacity& capacity) {
     const plan::LinePlan& plan = capacity.plan;
     std::string text = "plan of line " + plan.line + ", " + to_string(capacity.line.serial) + ": " +
                        percent(plan.load) + " of its time";
-    if (plan.most > plan.load) text += ", " + percent(plan.most) + " while values change";
+    if (plan.most > plan.load) text += ", " + percent(plan.most) + kChanging;
     text += '\n';
     for (const plan::Poll& poll : plan.polls) text += text_of(poll);
     for (const plan::RelayLoad& relay : plan.relays) text += text_of(relay);
     if (plan.dead) text += text_of(*plan.dead);
-    text += headroom_of(plan);
+    text += headroom_of(capacity);
+    const bool changing = plan::is_high_by_changes(plan);
     for (const plan::Advice& advice : capacity.advice)
-        text += "  advice: " + text_of(advice) + '\n';
+        text += "  advice: " + text_of(advice, changing) + '\n';
     return text;
 }
 
 std::string overload_text(const Capacity& capacity) {
     const plan::LinePlan& plan = capacity.plan;
-    const bool sure = plan.load > plan::kHigh;
+    const bool changing = plan::is_high_by_changes(plan);
     std::string text = "line " + plan.line + " is planned to be busy for " +
-                       percent(sure ? plan.load : plan.most) + " of its time at " +
+                       percent(changing ? plan.most : plan.load) + " of its time at " +
                        to_string(capacity.line.serial);
-    if (!sure) text += " while values change that relays copy";
-    text += plan::verdict(plan) == plan::Verdict::overload
-                ? ": polls will be late for ever"
-                : ": above " + percent(plan::kHigh) + " clients wait long";
-    for (const plan::Advice& advice : capacity.advice) text += "; " + text_of(advice);
+    if (plan::verdict(plan) == plan::Verdict::overload) {
+        text += ": polls will be late for ever";
+    } else if (changing) {
+        text += std::string(kChanging) +
+                " that relays copy: they will arrive late, and clients wait long";
+    } else {
+        text += ": above " + percent(plan::kHigh) + " clients wait long";
+    }
+    for (const plan::Advice& advice : capacity.advice) text += "; " + text_of(advice, changing);
     return text;
 }
 

@@ -43,6 +43,7 @@ void add_polls(const Station& station, const Planned& planned, std::vector<Poll>
         poll.station = station.name;
         poll.read = notation_of(station, read);
         poll.count = read.span.count;
+        poll.asked = read.wants;
         poll.every = read.every;
         poll.wire = points::read_cost(planned.limits, read.span.table, read.span.count);
         poll.load = share(poll.wire, poll.every);
@@ -60,7 +61,7 @@ RelayLoad read_of(const Line& line, const Relay& relay) {
 
 RelayLoad write_of(const Line& line, const Relay& relay) {
     const Station& station = line.stations[relay.to->station];
-    RelayLoad made{relay.name, station.name, RelayLoad::Request::write, relay.writes_every, {}, 0,
+    RelayLoad made{relay.name, station.name, RelayLoad::Request::write, relay.writes_every(), {}, 0,
                    0};
     const modbus::Span& span = relay.to->span;
     const points::PlanLimits limits = limits_of(line, station);
@@ -79,8 +80,8 @@ double share_of_extra(Duration wire, std::size_t reads, Duration every) {
 /// Nothing where no poll of the target shows what is written.
 std::optional<RelayLoad> rereads_of(const Station& station, const Planned& planned,
                                     const Relay& relay) {
-    RelayLoad made{relay.name, station.name, RelayLoad::Request::reread, relay.writes_every, {}, 0,
-                   0};
+    RelayLoad made{
+        relay.name, station.name, RelayLoad::Request::reread, relay.writes_every(), {}, 0, 0};
     std::size_t reads = 0;
     for (const points::PlannedRead& read : planned.reads) {
         if (points::spares(station.memory, relay.to->span, read.span)) continue;
@@ -88,7 +89,7 @@ std::optional<RelayLoad> rereads_of(const Station& station, const Planned& plann
         ++reads;
     }
     if (reads == 0) return std::nullopt;
-    made.load = share_of_extra(made.wire, reads, relay.writes_every);
+    made.load = share_of_extra(made.wire, reads, relay.writes_every());
     made.most = share_of_extra(made.wire, reads, relay.every);
     return made;
 }
@@ -104,7 +105,7 @@ double load_of(const LinePlan& plan, const std::string& station) {
 /// The first silence costs a response timeout (P4), with the request and the gap around it.
 Duration silence_of(const Line& line, const Station& station) {
     return frame_time(line.serial, modbus::kReadRequestAdu) + station.response_timeout +
-           station.gap;
+           gap_of(line, station);
 }
 
 std::optional<OneDead> worst_case(const Line& line, const LinePlan& plan) {
@@ -135,11 +136,6 @@ Duration client_read(const Line& line) {
 
 }  // namespace
 
-std::optional<double> LinePlan::times_as_often() const {
-    if (load <= 0) return std::nullopt;
-    return kHigh / load;
-}
-
 double LinePlan::free_reads() const {
     return std::max(0.0, kFull - load) / to_seconds(client_read);
 }
@@ -160,6 +156,8 @@ Verdict verdict(const LinePlan& plan) {
     if (plan.load > kFull) return Verdict::overload;
     return plan.load > kHigh || plan.most > kFull ? Verdict::high : Verdict::fine;
 }
+
+bool is_high_by_changes(const LinePlan& plan) { return plan.load <= kHigh && plan.most > kFull; }
 
 LinePlan make_plan(const Line& line) {
     LinePlan plan;

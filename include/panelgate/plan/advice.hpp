@@ -8,12 +8,16 @@
 
 namespace panelgate::plan {
 
+inline constexpr double kWorthwhile = 0.01;  ///< what brings less is no advice
+
 struct Advice {
     std::string what;  ///< "serial: {baud: 38400}"
     double load = 0;   ///< of the line, then
+    double most = 0;   ///< … while all values change that relays wait for
 };
 
-/// What to change on a line whose load is not fine, each by itself. `plan` is the line's.
+/// What to change on a line whose load is not fine, each by itself, what brings the most first:
+/// of the load that is certain, or of `most` where only that is too much. `plan` is the line's.
 std::vector<Advice> advise(const Line& line, const LinePlan& plan);
 
 }  // namespace panelgate::plan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -26,7 +27,8 @@ struct Station {
     const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
     Duration response_timeout = 500ms;
     Duration think_time = 1ms;
-    Duration gap = 1750us;  ///< silence behind its replies
+    /// Silence behind its replies, where it is set; nothing: what its rate and its profile ask for.
+    std::optional<Duration> frame_gap;
     std::vector<Asked> asked;
     points::SharedMemory memory{};  ///< what is read again behind a write
 };
@@ -38,12 +40,15 @@ struct Relay {
         modbus::Span span;
     };
     std::string name;
-    Duration every = 1s;         ///< it reads, and writes what has changed; above 0
-    Duration writes_every = 1s;  ///< … and writes at least, changed or not; above 0
+    Duration every = 1s;  ///< it reads, and writes; above 0
+    /// It writes only what has changed, and all of it once so often; nothing: it always writes.
+    std::optional<Duration> refresh;
     std::optional<End> from;
     std::optional<End> to;
     bool single = false;  ///< it writes by 05 or 06
 
+    /// It writes so often at least, changed or not.
+    Duration writes_every() const { return refresh ? std::max(every, *refresh) : every; }
     /// On this line it can be told whether `other` goes on where this one ends.
     bool continues_in(const Relay& other) const;
 };
@@ -56,9 +61,14 @@ struct Line {
     std::vector<Relay> relays;
 };
 
+/// Silence behind the replies of one of its stations.
+Duration gap_of(const Line& line, const Station& station);
 /// What bounds a station's reads, and what they cost, on this line.
 points::PlanLimits limits_of(const Line& line, const Station& station);
-/// The same line at another rate. Gaps that come of the characters follow.
+/// The same line at another rate. Gaps that are set stay.
 Line at_rate(const Line& line, int baud);
+/// The same line with every interval so many times as long (above 0), up to points::kSlowest;
+/// `refresh` is none.
+Line at_intervals(const Line& line, double times);
 
 }  // namespace panelgate::plan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -23,6 +24,7 @@ struct Poll {
     std::string station;
     std::string read;  ///< the first item in the panel's notation
     std::uint32_t count = 1;
+    std::vector<std::size_t> asked;  ///< what it serves: indices into its Station::asked
     Duration every{};
     Duration wire{};  ///< request, both gaps, think time, reply
     double load = 0;
@@ -61,16 +63,16 @@ struct LinePlan {
     Duration once{};              ///< everything, one after the other
     Duration client_read = 1ms;   ///< of kClientRead registers, of the slowest station
 
-    /// So many times as often everything could be asked, up to kHigh; nothing of an idle line.
-    std::optional<double> times_as_often() const;
     /// Reads of kClientRead registers a second that the wire has time for besides.
     double free_reads() const;
 };
 
 enum class Verdict : std::uint8_t { fine, high, overload };
 std::string_view label(RelayLoad::Request request);
-/// Of the load that is certain; what relays may add makes it `high` at most.
+/// Of the load that is certain; what relays may add makes it `high` at most, above kFull.
 Verdict verdict(const LinePlan& plan);
+/// The verdict is not `fine` for what relays may add alone: `most` is what is too much.
+bool is_high_by_changes(const LinePlan& plan);
 
 LinePlan make_plan(const Line& line);
 

@@ -32,7 +32,7 @@ TEST_F(LinePlanTest, APollCostsItsFramesItsSilencesAndTheThinkTime) {
 TEST_F(LinePlanTest, ALongerGapIsKeptBehindTheReplyOnly) {
     ask(add("press"), 0, 10, 1s);
     const Duration usual = make_plan(line).once;
-    line.stations[0].gap += 20ms;
+    line.stations[0].frame_gap = silent_interval(line.serial) + 20ms;
     EXPECT_EQ(make_plan(line).once, usual + 20ms);
 }
 
@@ -65,7 +65,7 @@ TEST_F(LinePlanTest, ARelayLoadsTheLinesOfItsEnds) {
 TEST_F(LinePlanTest, AWriteThatWaitsForChangesIsCertainOnlyOnceARefresh) {
     add("from");
     add("to");
-    copy(0, 4, 1s).writes_every = 60s;
+    copy(0, 4, 1s).refresh = 60s;
     const LinePlan plan = make_plan(line);
     const RelayLoad& write = plan.relays[1];
     EXPECT_EQ(write.every, 60s);
@@ -79,7 +79,7 @@ TEST_F(LinePlanTest, PollsThatAWriteMakesOldAreReadAgain) {
     to.memory.shown_as = [](const modbus::Span& written) { return std::vector{written}; };
     ask(to, 0, 4, 10s);
     ask(to, 500, 4, 10s);
-    copy(0, 4, 1s).writes_every = 20s;
+    copy(0, 4, 1s).refresh = 20s;
     const LinePlan plan = make_plan(line);
     ASSERT_THAT(plan.relays, SizeIs(3));
     const RelayLoad& again = plan.relays[2];
@@ -87,7 +87,8 @@ TEST_F(LinePlanTest, PollsThatAWriteMakesOldAreReadAgain) {
     EXPECT_EQ(again.wire, plan.polls[1].wire) << "one of the two";
     EXPECT_NEAR(again.load, to_seconds(again.wire) / 20, 1e-9);
     EXPECT_NEAR(again.most, to_seconds(again.wire), 1e-9);
-    line.relays[0].every = line.relays[0].writes_every = 50ms;
+    line.relays[0].every = 50ms;
+    line.relays[0].refresh.reset();
     EXPECT_NEAR(make_plan(line).relays[2].load, to_seconds(again.wire) * 4, 1e-9)
         << "four a second at most";
 }
@@ -107,13 +108,11 @@ TEST_F(LinePlanTest, P4TheWorstDeadStationIsTheOneThatWasAskedLeast) {
 TEST_F(LinePlanTest, WhatIsLeftIsForClients) {
     Station& press = add("press");
     const LinePlan idle = make_plan(line);
-    EXPECT_FALSE(idle.times_as_often());
     EXPECT_NEAR(idle.free_reads(), 1 / to_seconds(idle.client_read), 1e-9);
     ask(press, 0, 10, 2 * idle.client_read);
     const LinePlan half = make_plan(line);
     EXPECT_NEAR(half.load, 0.5, 1e-6);
     EXPECT_NEAR(half.free_reads(), idle.free_reads() / 2, 1e-3);
-    EXPECT_NEAR(half.times_as_often().value(), 1.6, 1e-5);
 }
 
 TEST_F(LinePlanTest, WhatIsTooMuchIsTold) {
@@ -132,7 +131,7 @@ TEST_F(LinePlanTest, WhatIsTooMuchIsTold) {
 TEST_F(LinePlanTest, ChangesAloneAreNoOverload) {
     add("from");
     add("to");
-    copy(0, 50, 150ms).writes_every = 60s;
+    copy(0, 50, 150ms).refresh = 60s;
     const LinePlan plan = make_plan(line);
     EXPECT_GT(plan.most, 1);
     EXPECT_LT(plan.load, 1);
@@ -146,15 +145,30 @@ TEST_F(LinePlanTest, ALineWithoutStationsIsIdle) {
     EXPECT_GT(plan.free_reads(), 10);
 }
 
-TEST_F(LinePlanTest, AnotherRateTakesTheGapsOfCharactersAlong) {
+TEST_F(LinePlanTest, AnotherRateTakesTheGapsAlongThatAreNotSet) {
     add("standard");
-    add("panasonic").gap = wire_time(line.serial, 4);
-    add("slow").gap = 20ms;
+    add("panasonic", "panasonic-gt");
+    add("slow").frame_gap = 20ms;
+    add("quick").frame_gap = 100us;
     const Line quick = at_rate(line, 19200);
-    EXPECT_EQ(quick.stations[0].gap, silent_interval(quick.serial));
-    EXPECT_NEAR(to_seconds(quick.stations[1].gap), 4 * 10.0 / 19200, 1e-7);
-    EXPECT_EQ(quick.stations[2].gap, 20ms);
-    EXPECT_EQ(at_rate(line, 115200).stations[1].gap, 1750us);
+    const auto gap = [&](std::size_t station) { return gap_of(quick, quick.stations[station]); };
+    EXPECT_EQ(gap(0), silent_interval(quick.serial));
+    EXPECT_NEAR(to_seconds(gap(1)), 4 * 10.0 / 19200, 1e-7);
+    EXPECT_EQ(gap(2), 20ms);
+    EXPECT_EQ(gap(3), 100us);
+    const Line quickest = at_rate(line, 115200);
+    EXPECT_EQ(gap_of(quickest, quickest.stations[1]), 1750us);
+}
+
+TEST_F(LinePlanTest, OtherIntervalsLeaveTheRefreshAndEndAtADay) {
+    ask(add("from"), 0, 1, 13h);
+    add("to");
+    copy(0, 4, 1s).refresh = 2s;
+    const Line rarer = at_intervals(line, 3);
+    EXPECT_EQ(rarer.stations[0].asked[0].want.every, 24h);
+    EXPECT_EQ(rarer.relays[0].every, 3s);
+    EXPECT_EQ(rarer.relays[0].writes_every(), 3s);
+    EXPECT_EQ(rarer.relays[0].refresh, 2s);
 }
 
 }  // namespace

@@ -21,7 +21,6 @@ class PlantLine {
         Station& station = line.stations.emplace_back();
         station.name = name;
         station.profile = shipped.find(profile);
-        station.gap = silent_interval(line.serial);
         return station;
     }
 
@@ -33,7 +32,7 @@ class PlantLine {
     Relay& copy(std::uint32_t first, std::uint32_t count, Duration every) {
         Relay& relay = line.relays.emplace_back();
         relay.name = "copy" + std::to_string(first);
-        relay.every = relay.writes_every = every;
+        relay.every = every;
         relay.from = Relay::End{0, {kRegisters, first, count}};
         relay.to = Relay::End{1, {kRegisters, first + 500, count}};
         return relay;
