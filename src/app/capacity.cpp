@@ -52,6 +52,7 @@ plan::Line line_of(const config::Config& config, const config::Line& line) {
     plan::Line made;
     made.name = line.name;
     made.serial = line.device.serial;
+    made.deadline = line.arbiter.queue.deadline;
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         made.stations.push_back(station_of(line, line.stations[i], line.arbiter.stations[i]));
     for (const points::Relay& relay : config.relays) {
@@ -70,6 +71,7 @@ std::vector<Capacity> capacities(const config::Config& config) {
         made.line = line_of(config, line);
         made.plan = plan::make_plan(made.line);
         made.advice = plan::advise(made.line, made.plan);
+        made.warnings = plan::warnings(made.line, made.plan);
     }
     return all;
 }

@@ -9,6 +9,7 @@
 #include "panelgate/plan/advice.hpp"
 #include "panelgate/plan/line.hpp"
 #include "panelgate/plan/line_plan.hpp"
+#include "panelgate/plan/warnings.hpp"
 
 namespace panelgate::app {
 
@@ -17,6 +18,7 @@ struct Capacity {
     plan::Line line;
     plan::LinePlan plan;
     std::vector<plan::Advice> advice;
+    std::vector<std::string> warnings;  ///< of requests that cannot do at any load
 };
 
 /// Of each line, in the order of the configuration, which outlives them. A line that is only

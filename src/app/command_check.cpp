@@ -3,6 +3,7 @@
 #include <boost/json/object.hpp>
 #include <cstddef>
 #include <iostream>
+#include <iterator>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -59,6 +60,7 @@ struct Judged {
 Judged judge(const config::Config& config, bool allow_overload) {
     Judged judged{capacities(config), {}, {}};
     for (const Capacity& capacity : judged.lines) {
+        std::ranges::copy(capacity.warnings, std::back_inserter(judged.warnings));
         const plan::Verdict verdict = plan::verdict(capacity.plan);
         if (verdict == plan::Verdict::fine) continue;
         const bool error = verdict == plan::Verdict::overload && !allow_overload;

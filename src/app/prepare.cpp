@@ -30,6 +30,8 @@ std::vector<Notice> prepare(config::Config& config) {
     for (const std::string& warning : config.warnings)
         notices.push_back({"configuration", warning});
     for (const Capacity& line : capacities(config)) {
+        for (const std::string& warning : line.warnings)
+            notices.push_back({"planned requests", warning});
         if (plan::verdict(line.plan) != plan::Verdict::fine)
             notices.push_back({"planned load", overload_text(line)});
     }

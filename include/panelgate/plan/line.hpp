@@ -59,6 +59,7 @@ struct Line {
     SerialFormat serial;
     std::vector<Station> stations;
     std::vector<Relay> relays;
+    Duration deadline = 2s;  ///< of a request, from its arrival to its answer
 };
 
 /// Silence behind the replies of one of its stations.
