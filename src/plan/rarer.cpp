@@ -1,7 +1,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "changes.hpp"
 #include "panelgate/base/number_text.hpp"
@@ -27,17 +30,16 @@ struct Dearest {
 };
 
 Dearest dearest_of(const LinePlan& plan) {
-    Dearest dearest;
+    std::map<std::pair<std::string, std::vector<std::size_t>>, Dearest> reads;
     for (const Poll& poll : plan.polls) {
-        Dearest sum{&poll, {}, 0};
-        for (const Poll& other : plan.polls) {
-            if (other.station != poll.station || other.asked != poll.asked) continue;
-            sum.wire += other.wire;
-            sum.load += other.load;
-        }
-        if (sum.load > dearest.load) dearest = sum;
+        Dearest& sum = reads[{poll.station, poll.asked}];
+        if (sum.first == nullptr) sum.first = &poll;
+        sum.wire += poll.wire;
+        sum.load += poll.load;
     }
-    return dearest;
+    const auto dearest =
+        std::ranges::max_element(reads, {}, [](const auto& entry) { return entry.second.load; });
+    return dearest == reads.end() ? Dearest() : dearest->second;
 }
 
 /// What a read serves, as a range of one station's items.
@@ -122,7 +124,7 @@ std::string exceptions_of(const Line& line) {
 
 std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan) {
     const Dearest dearest = dearest_of(plan);
-    if (dearest.first == nullptr) return std::nullopt;
+    if (dearest.load <= 0) return std::nullopt;
     const Duration now = dearest.first->every;
     const Duration rarest = std::min<Duration>(kRarest * now, points::kSlowest);
     const double left = left_for(dearest, plan);

@@ -56,7 +56,11 @@ class Check(unittest.TestCase):
         self.assertGreater(line["most_percent"], line["load_percent"])
         self.assertEqual((line["verdict"], line["advice"]), ("fine", []))
         self.assertEqual(line["one_dead"]["station"], "mixer")
-        self.assertAlmostEqual(line["highest_rate"]["times_as_often"], 80 / line["load_percent"], 1)
+        # a little more than in proportion: the refresh stays
+        times = line["highest_rate"]["times_as_often"]
+        polled = line["load_percent"] - parts[-1]["load_percent"]
+        self.assertAlmostEqual(times, (80 - parts[-1]["load_percent"]) / polled, 1)
+        self.assertEqual(line["highest_rate"]["limited_by"], "load_percent")
         self.assertAlmostEqual(line["headroom"]["load_percent"], 100 - line["load_percent"], 2)
 
     def test_the_text_says_the_same(self):
@@ -96,6 +100,58 @@ class Check(unittest.TestCase):
             [line] = self.plan(followed)["lines"]
             self.assertEqual(line["verdict"], "fine")
             self.assertAlmostEqual(line["load_percent"], load, 2)
+
+    def test_advice_keeps_a_gap_that_is_set_and_what_is_read_again(self):
+        def text(baud=1200, every=100):
+            stations = (press("press", 31, f"{20 * every}ms") + ", {id: 5, name: mixer, profile: "
+                        f"generic, poll: [{{read: 400001, count: 60, every: {20 * every}ms}}]}}")
+            return config.gateway(
+                config.line(baud=baud, device="tcp://127.0.0.1:9", stations=stations,
+                            timing="{frame_gap: 20ms}"),
+                relays=f"[{{from: press/400101, count: 4, to: mixer/400201, every: {every}ms}}]")
+        [line] = self.plan(text(), code=BAD_CONFIG)["lines"]
+        told = {one["what"]: one["load_percent"] for one in line["advice"]}
+        baud = next(what for what in told if what.startswith("serial"))
+        times = next(what for what in told if what.startswith("all intervals"))
+        loads = list(told.values())
+        self.assertEqual(loads, sorted(loads))
+        [quicker] = self.plan(text(baud=int(re.search(r"\d+", baud)[0])), "--allow-overload")["lines"]
+        self.assertAlmostEqual(quicker["load_percent"], told[baud], 2)
+        factor = float(re.search(r"[\d.]+", times)[0])
+        [rarer] = self.plan(text(every=round(100 * factor)))["lines"]
+        self.assertEqual(rarer["verdict"], "fine")
+        self.assertAlmostEqual(rarer["load_percent"], told[times], 2)
+
+    def test_what_is_too_much_while_values_change_is_told_in_that_figure(self):
+        def text(baud):
+            return config.gateway(
+                config.line("a", stations="{id: 1, name: x}"),
+                config.line("b", baud=baud, stations="{id: 2, name: y}"),
+                relays="[{from: x/400001, count: 100, to: y/400001, every: 1s, on_change: true}]")
+        told = self.check(text(1200)).stderr
+        self.assertRegex(told, r"warning: line b is planned to be busy for 186.* while values "
+                               r"change.*baud: 2400.* brings 9[34][\d.]* % while values change")
+        line = self.plan(text(1200))["lines"][1]
+        self.assertLess(line["highest_rate"]["times_as_often"], 1)
+        self.assertEqual(line["highest_rate"]["limited_by"], "most_percent")
+        followed = self.plan(text(2400))["lines"][1]
+        self.assertEqual(followed["verdict"], "fine")
+        [promised] = [one for one in line["advice"] if "baud: 2400" in one["what"]]
+        self.assertAlmostEqual(followed["most_percent"], promised["most_percent"], 2)
+        self.assertAlmostEqual(followed["load_percent"], promised["load_percent"], 2)
+
+    def test_polls_that_cannot_do_are_warnings(self):
+        slow = "{id: 1, name: x, timing: {think_time: 3s}, poll: [{read: 400001, every: 60s}]}"
+        long = ("{id: 1, name: x, poll: [{read: 400001, count: 100, every: 60s}, "
+                "{read: 400201, count: 50, every: 60s}]}")
+        for text, wanted in ((config.line(stations=slow), "would time out"),
+                             (config.line(baud=1200, stations=long), "queue: {deadline: 3s}")):
+            plan = self.plan(config.gateway(text))
+            self.assertTrue(plan["valid"])
+            [said] = [w for w in plan["warnings"] if w.startswith("line ") and wanted in w]
+            self.assertIn(f"warning: {said}", self.check(config.gateway(text)).stderr)
+        with harness.configured(config.gateway(config.line(stations=slow))) as program:
+            program.log.wait_for(r" warn .*planned requests.*would time out")
 
     def test_more_than_there_is_is_an_error_unless_it_is_wanted(self):
         text = config.gateway(config.line(baud=9600, stations=press("press", 31, "50ms")))
