@@ -92,8 +92,11 @@ int tenths_of(const Line& line, int first) {
     const auto enough = [&](int tenths) { return is_enough(at_intervals(line, tenths / 10.0)); };
     int low = first - 1;
     int high = first;
-    while (high <= kMostTenths && !enough(high)) high = 2 * std::exchange(low, high);
-    if (high > kMostTenths) return 0;
+    while (!enough(high)) {
+        if (high >= kMostTenths) return 0;
+        low = high;
+        high = std::min(2 * high, kMostTenths);
+    }
     while (high - low > 1) {
         const int middle = (low + high) / 2;
         (enough(middle) ? high : low) = middle;
@@ -145,7 +148,7 @@ std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan)
 
 std::optional<Change> all_rarer(const Line& line, const LinePlan& plan) {
     const double least = std::max(plan.load / kHigh, plan.most / kFull);  // nothing shrinks faster
-    if (least > kMostTenths / 10.0) return std::nullopt;
+    if (least * 10 > kMostTenths) return std::nullopt;
     const int tenths = tenths_of(line, std::max(11, static_cast<int>(std::ceil(least * 10))));
     if (tenths == 0) return std::nullopt;
     Line made = at_intervals(line, tenths / 10.0);

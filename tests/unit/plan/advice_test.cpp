@@ -159,6 +159,18 @@ TEST_F(AdviceTest, ARefreshIsNoInterval) {
     EXPECT_EQ(verdict(make_plan(line)), Verdict::fine);
 }
 
+TEST_F(AdviceTest, AFactorOfManyHundredsIsFoundToo) {
+    add("from");
+    add("to");
+    ask(line.stations[0], 0, 125, 600us);
+    copy(500, 20, 50ms).refresh = 60s;  // it stays
+    const Advice all = find("all intervals ");
+    ASSERT_THAT(all.what, Not(IsEmpty()));
+    EXPECT_GT(factor(all), make_plan(line).load / kHigh);
+    EXPECT_GT(factor(all), 500);
+    EXPECT_LE(all.load, kHigh);
+}
+
 TEST_F(AdviceTest, AGapThatIsSetIsKeptAtAnotherRate) {
     line.serial.baud = 1200;
     add("press").frame_gap = 20ms;  // below t3.5, as tcp:// lines may have it
