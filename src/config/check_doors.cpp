@@ -1,7 +1,6 @@
 #include "check_doors.hpp"
 
 #include <algorithm>
-#include <boost/asio/ip/address.hpp>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -12,7 +11,6 @@
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/reachable.hpp"
 #include "panelgate/config/settings.hpp"
-#include "panelgate/rt/access_list.hpp"
 
 namespace panelgate::config {
 namespace {
@@ -167,7 +165,10 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
 /// `panelgate health`, and with it the image's HEALTHCHECK, asks from where the listener is.
 void warn_of_health(Loading& loading, const Node& node, const web::Settings& http) {
     const std::string own = reachable(http.address);
-    if (rt::AccessList(http.allow).allows(boost::asio::ip::make_address(own))) return;
+    const auto holds = [&](const Network& network) {
+        return is_in(own, network.address, network.prefix);
+    };
+    if (http.allow.empty() || std::ranges::any_of(http.allow, holds)) return;
     loading.warn(
         mark_of(node, "allow"),
         "this machine itself (" + own +

@@ -22,7 +22,7 @@ sys.path.insert(0, str(HERE.parents[1] / "system"))
 import config  # noqa: E402
 import harness  # noqa: E402
 from prometheus_server import Prometheus  # noqa: E402
-from test_mqtt import Broker  # noqa: E402
+from mqtt_side import Broker  # noqa: E402
 
 
 def kilobytes(pid, key):

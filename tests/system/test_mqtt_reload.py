@@ -5,7 +5,7 @@ import time
 import unittest
 
 import harness
-from test_mqtt import (BROKER, Broker, COUNTER, FAST, Listener, LOCKED, metric, paho, plant, PRESS,
+from mqtt_side import (BROKER, Broker, COUNTER, FAST, Listener, LOCKED, metric, paho, plant, PRESS,
                        TOPIC)
 from test_points import until
 

@@ -11,7 +11,7 @@ import signal
 import unittest
 
 import harness
-from test_mqtt import BROKER, Broker, Truth, changes, metric, plant
+from mqtt_side import BROKER, Broker, Truth, changes, metric, plant
 from test_points import until
 
 NPM = os.environ.get("SPARKPLUG_NPM", "")

@@ -30,5 +30,7 @@ struct Cidr {
 std::optional<Cidr> parse_cidr(std::string_view text);
 /// "192.168.0.0/24" for 192.168.0.5/24; "" when the address is the first of its network.
 std::string network_of(const Cidr& cidr);
+/// Whether this network has the address, IPv4 as IPv6 too; what is no address is in none.
+bool is_in(const std::string& address, const std::string& network, unsigned prefix);
 
 }  // namespace panelgate::config

@@ -51,5 +51,16 @@ TEST(Cidr, RefusesEverythingElse) {
         EXPECT_FALSE(parse_cidr(text)) << text;
 }
 
+TEST(Endpoint, AnAddressIsInANetworkWhateverTheirSpelling) {
+    EXPECT_TRUE(is_in("127.0.0.1", "127.0.0.0", 8));
+    EXPECT_TRUE(is_in("127.0.0.1", "::", 0));
+    EXPECT_TRUE(is_in("127.0.0.1", "::ffff:127.0.0.0", 104));
+    EXPECT_TRUE(is_in("::1", "::1", 128));
+    EXPECT_FALSE(is_in("127.0.0.1", "128.0.0.0", 8));
+    EXPECT_FALSE(is_in("::1", "0.0.0.0", 0));
+    EXPECT_FALSE(is_in("::2", "::1", 128));
+    EXPECT_FALSE(is_in("here", "0.0.0.0", 0));
+}
+
 }  // namespace
 }  // namespace panelgate::config
