@@ -1,8 +1,9 @@
 #include "schema_json.hpp"
 
-#include <array>
+#include <algorithm>
 #include <boost/json/array.hpp>
 #include <boost/json/parse.hpp>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
@@ -16,40 +17,50 @@ namespace panelgate::app {
 namespace {
 
 namespace json = boost::json;
+using yaml::KeyRule;
 using yaml::KeyShape;
 using Kind = KeyShape::Kind;
-
-/// What the loader looks at itself, where its reader knows no more than "a number" or "a map".
-constexpr auto kFurther = std::to_array<std::pair<std::string_view, std::string_view>>({
-    {"lines/serial/data_bits", R"({"enum": [7, 8]})"},
-    {"serial_masters/serial/data_bits", R"({"enum": [7, 8]})"},
-    {"lines/stations/points/labels",
-     R"({"patternProperties": {"^-?[0-9]+$": {"$ref": "#/$defs/text"}}})"},
-    {"lines/stations/points/no_value",
-     R"({"items": {"anyOf": [{"type": "integer"}, {"$ref": "#/$defs/variable"}]}})"},
-    {"modbus_tcp/units", R"({"patternProperties": {"^[0-9]{1,3}$": {"$ref": "#/$defs/text"}}})"},
-    {"serial_masters/units",
-     R"({"patternProperties": {"^[0-9]{1,3}$": {"$ref": "#/$defs/text"}}})"},
-    {"modbus_tcp/diagnostics_unit", R"({"type": "null"})"},
-});
 
 /// Scalars are taken as they are written, so a text may look like a number.
 constexpr std::string_view kDefinitions = R"({
     "variable": {"type": "string", "pattern": "\\$\\{"},
-    "text": {"type": ["string", "number", "boolean"]},
-    "duration": {"type": "string", "pattern": "^[0-9]+(us|ms|s|min)$|\\$\\{"}
+    "text": {"type": ["string", "number", "boolean"], "minLength": 1}
 })";
 
 json::object reference(std::string_view name) { return {{"$ref", "#/$defs/" + std::string(name)}}; }
 
-json::array words_of(const KeyShape& shape) {
-    json::array words;
-    for (const std::string& word : shape.words) words.emplace_back(word);
-    return words;
+json::array words_of(const std::vector<std::string>& words) {
+    json::array made;
+    for (const std::string& word : words) made.emplace_back(word);
+    return made;
 }
 
 json::object integer_of(const KeyShape& shape) {
     return {{"type", "integer"}, {"minimum", shape.min}, {"maximum", shape.max}};
+}
+
+json::object number_of(const KeyShape& shape) {
+    json::object made{{"type", "number"}};
+    if (shape.least) made["minimum"] = *shape.least;
+    if (shape.most) made["maximum"] = *shape.most;
+    if (shape.never) made["not"] = json::object{{"const", *shape.never}};
+    return made;
+}
+
+std::string duration_name(const KeyShape& shape) {
+    return "duration-" + yaml::format_duration(shape.shortest) + '-' +
+           yaml::format_duration(shape.longest);
+}
+
+/// Of the key, or of what stands in its list or map.
+json::object text_of(const KeyShape& shape) {
+    if (shape.holds_integers) return {{"type", "integer"}};
+    if (shape.pattern.empty() && shape.longest_text == 0) return reference("text");
+    json::object made{{"type", "string"}, {"minLength", 1}};
+    if (shape.may_be_number) made["type"] = json::array{"string", "number", "boolean"};
+    if (!shape.pattern.empty()) made["pattern"] = shape.pattern;
+    if (shape.longest_text != 0) made["maxLength"] = shape.longest_text;
+    return made;
 }
 
 /// What a scalar may be, besides a variable.
@@ -58,28 +69,53 @@ json::object scalar_of(const KeyShape& shape) {
         case Kind::integer:
             return integer_of(shape);
         case Kind::number:
-            return {{"type", "number"}};
+            return number_of(shape);
         case Kind::boolean:
             return {{"type", "boolean"}};
         case Kind::word:
-            return {{"enum", words_of(shape)}};
+            return {{"enum", words_of(shape.words)}};
         case Kind::duration:
-            return reference("duration");
+            return reference(duration_name(shape));
         case Kind::text:
         case Kind::map:
         case Kind::list:
             break;
     }
-    return reference("text");
+    return text_of(shape);
+}
+
+json::object or_variable(json::object one) {
+    return {{"anyOf", json::array{std::move(one), reference("variable")}}};
 }
 
 json::object any_of(const KeyShape& shape) {
     json::array choices{scalar_of(shape)};
     if (shape.kind != Kind::word && !shape.words.empty())
-        choices.push_back(json::object{{"enum", words_of(shape)}});
+        choices.push_back(json::object{{"enum", words_of(shape.words)}});
     choices.push_back(reference("variable"));
+    if (shape.may_be_null.value_or(false)) choices.push_back(json::object{{"type", "null"}});
     return {{"anyOf", std::move(choices)}};
 }
+
+/// Of a map or a list.
+json::value type_of(const KeyShape& shape, std::string_view type) {
+    if (!shape.may_be_null.value_or(true)) return json::value(std::string(type));
+    return json::array{json::value(std::string(type)), "null"};
+}
+
+json::object required(std::string_view key) {
+    return {{"required", json::array{json::value(std::string(key))}}};
+}
+
+/// `key` has one of the words.
+json::object has_word(std::string_view key, json::array words) {
+    json::object made = required(key);
+    made["properties"] = json::object{{key, json::object{{"enum", std::move(words)}}}};
+    return made;
+}
+
+/// What is missing may come from a merge.
+json::array or_merge(json::object one) { return {std::move(one), required("<<")}; }
 
 json::value as_json(const KeyShape& shape, std::string_view written) {
     const bool plain =
@@ -98,26 +134,64 @@ std::string description_of(const KeyShape& shape, const config::KeyText& told) {
 
 class Schema {
   public:
-    Schema() {
-        for (const KeyShape& shape : config::describe()) shapes_.emplace(shape.path, shape);
+    Schema() : described_(config::describe()) {
+        for (const KeyShape& shape : described_.keys) shapes_.emplace(shape.path, shape);
         for (const config::KeyText& text : config::key_texts()) texts_.emplace(text.path, text);
     }
 
     json::object whole() const {
         json::object top = map_at("");
-        json::object& keys = top["properties"].as_object();
-        keys["templates"] = templates();
+        top["properties"].as_object()["templates"] = templates();
         top["patternProperties"] = json::object{{"^x-", true}};
-        top["anyOf"] = with_merge(json::array{"lines"});
+        top["allOf"].as_array().push_back(serves());
         json::object made{{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                           {"title", "configuration of panelgate"},
-                          {"$defs", json::parse(kDefinitions)}};
+                          {"$defs", definitions()}};
         for (auto& [key, value] : top) made[key] = std::move(value);
         made["type"] = "object";
         return made;
     }
 
   private:
+    json::object definitions() const {
+        json::object made = json::parse(kDefinitions).as_object();
+        for (const auto& [path, shape] : shapes_) {
+            if (shape.kind == Kind::duration)
+                made[duration_name(shape)] = json::object{
+                    {"type", "string"},
+                    {"pattern", yaml::duration_pattern(shape.shortest, shape.longest)}};
+        }
+        return made;
+    }
+
+    static json::object serves() {
+        json::array any;
+        for (const std::string_view key : config::serving_keys()) {
+            json::object one = required(key);
+            const json::array nothing{nullptr, json::array{}};
+            const json::object is_nothing{{"enum", nothing}};
+            one["properties"] = json::object{{key, json::object{{"not", is_nothing}}}};
+            any.push_back(std::move(one));
+        }
+        any.push_back(required("<<"));
+        return {{"anyOf", std::move(any)}};
+    }
+
+    json::object as_schema(const KeyRule& rule) const {
+        if (rule.needs)
+            return {{"if", has_word(rule.key, words_of(rule.words))},
+                    {"then", json::object{{"anyOf", or_merge(required(rule.other))}}}};
+        std::vector<std::string> wrong;
+        for (const std::string& word : shapes_.at(rule.map + '/' + rule.other).words) {
+            if (std::ranges::find(rule.words, word) == rule.words.end()) wrong.push_back(word);
+        }
+        json::object is_wrong = has_word(rule.other, words_of(wrong));
+        json::object right{{"not", std::move(is_wrong)}};
+        if (!rule.absent_will_do) right["required"] = json::array{json::value(rule.other)};
+        return {{"if", required(rule.key)},
+                {"then", json::object{{"anyOf", or_merge(std::move(right))}}}};
+    }
+
     /// The keys right below; "" is the top.
     std::vector<const KeyShape*> below(std::string_view path) const {
         std::vector<const KeyShape*> found;
@@ -129,41 +203,53 @@ class Schema {
         return found;
     }
 
-    json::object map_at(std::string_view path) const {
+    /// `part`: of a map whose keys may stand elsewhere, too, so that none of them is needed.
+    enum class Part : std::uint8_t { whole, some };
+    json::object map_at(std::string_view path, Part part = Part::whole) const {
         json::object keys{{"<<", true}};
-        json::array required;
+        json::array needed;
         for (const KeyShape* shape : below(path)) {
             const std::string key = shape->path.substr(shape->path.rfind('/') + 1);
             keys[key] = schema_of(*shape);
-            if (shape->required) required.emplace_back(key);
+            if (shape->required) needed.emplace_back(key);
         }
         if (path == "lines/stations") keys["template"] = template_key();
         json::object made{{"type", json::array{"object", "null"}},
                           {"properties", std::move(keys)},
                           {"additionalProperties", false}};
-        if (!required.empty()) made["anyOf"] = with_merge(std::move(required));
+        json::array all;
+        if (!needed.empty() && part == Part::whole)
+            all.push_back(
+                json::object{{"anyOf", or_merge(json::object{{"required", std::move(needed)}})}});
+        for (const KeyRule& rule : described_.rules) {
+            if (rule.map == path) all.push_back(as_schema(rule));
+        }
+        if (!all.empty()) made["allOf"] = std::move(all);
         return made;
     }
 
-    /// What is missing may come from a merge.
-    static json::array with_merge(json::array required) {
-        return {json::object{{"required", std::move(required)}},
-                json::object{{"required", json::array{"<<"}}}};
+    json::object map_of(const KeyShape& shape) const {
+        json::object made = map_at(shape.path);
+        made["type"] = type_of(shape, "object");
+        if (!shape.keys.empty())
+            made["patternProperties"] = json::object{{shape.keys, or_variable(text_of(shape))}};
+        return made;
     }
 
-    json::object list_at(const std::string& path) const {
-        json::object item = map_at(path);
-        const bool of_maps = !below(path).empty();
+    json::object list_of(const KeyShape& shape) const {
+        const bool of_maps = !below(shape.path).empty();
+        json::object item = of_maps ? map_at(shape.path) : or_variable(text_of(shape));
         if (of_maps) item["type"] = "object";
-        return {{"type", json::array{"array", "null"}},
-                {"items", of_maps ? item : reference("text")}};
+        json::object made{{"type", type_of(shape, "array")}, {"items", std::move(item)}};
+        if (shape.fewest != 0) made["minItems"] = shape.fewest;
+        if (shape.most_entries != 0) made["maxItems"] = shape.most_entries;
+        return made;
     }
 
     json::object schema_of(const KeyShape& shape) const {
-        json::object made = shape.kind == Kind::map    ? map_at(shape.path)
-                            : shape.kind == Kind::list ? list_at(shape.path)
+        json::object made = shape.kind == Kind::map    ? map_of(shape)
+                            : shape.kind == Kind::list ? list_of(shape)
                                                        : any_of(shape);
-        add_further(made, shape.path);
         const auto told = texts_.find(shape.path);
         if (told == texts_.end()) return made;
         const std::string text = description_of(shape, told->second);
@@ -173,35 +259,24 @@ class Schema {
         return made;
     }
 
-    static void add_further(json::object& made, std::string_view path) {
-        for (const auto& [known, text] : kFurther) {
-            if (known != path) continue;
-            json::value further = json::parse(json::string_view(text.data(), text.size()));
-            if (made.contains("anyOf")) {
-                json::array& choices = made["anyOf"].as_array();
-                if (further.as_object().contains("enum")) choices.erase(choices.begin());
-                choices.push_back(std::move(further));
-            } else {
-                for (auto& [key, value] : further.as_object()) made[key] = value;
-            }
-        }
-    }
-
     json::object template_key() const {
         return {{"$ref", "#/$defs/text"},
                 {"description", texts_.at("lines/stations/template").text}};
     }
 
     json::object templates() const {
-        json::object body = map_at("lines/stations");
-        body.erase("anyOf");
+        json::object body = map_at("lines/stations", Part::some);
+        body["type"] = "object";
         for (const char* key : {"id", "name", "template"})
             body["properties"].as_object().erase(key);
         return {{"type", json::array{"object", "null"}},
-                {"additionalProperties", std::move(body)},
+                {"properties", json::object{{"<<", true}}},
+                {"patternProperties", json::object{{config::name_pattern(), std::move(body)}}},
+                {"additionalProperties", false},
                 {"description", texts_.at("templates").text}};
     }
 
+    config::Described described_;
     std::map<std::string, KeyShape> shapes_;
     std::map<std::string_view, config::KeyText> texts_;
 };

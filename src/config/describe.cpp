@@ -53,12 +53,12 @@ struct Tokens final : Files {
 
 }  // namespace
 
-std::vector<yaml::KeyShape> describe() {
+Described describe() {
     yaml::Description description;
     yaml::Problems problems("specimen");
     problems.describe(&description);
     if (!load(kSpecimen, Tokens(), problems)) throw std::logic_error(problems.text());
-    return description.keys();
+    return {description.keys(), description.rules()};
 }
 
 }  // namespace panelgate::config

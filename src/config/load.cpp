@@ -13,6 +13,7 @@
 #include "loader.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/config/describe.hpp"
 #include "panelgate/config/profiles_dir.hpp"
 #include "panelgate/yaml/merge_keys.hpp"
 #include "panelgate/yaml/quote.hpp"
@@ -31,6 +32,8 @@ constexpr std::array<std::pair<std::string_view, rt::LogLevel>, 5> kLevels{
      {"trace", rt::LogLevel::trace}}};
 constexpr std::array<std::pair<std::string_view, rt::LogFormat>, 2> kFormats{
     {{"text", rt::LogFormat::text}, {"json", rt::LogFormat::json}}};
+
+constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
 
 void load_log(Loading& loading, MapReader& root) {
     const yaml::Node* node = root.map("log", "{level: info}");
@@ -98,6 +101,16 @@ bool is_http(std::string_view key) {
     });
 }
 
+constexpr std::array<std::string_view, 4> kServing{"modbus_tcp", "http", "serial_masters", "mqtt"};
+
+bool serves(MapReader& root) {
+    return std::ranges::any_of(kServing, [&](std::string_view key) {
+        const yaml::Node* node = root.child(key);
+        return node != nullptr &&
+               (node->kind != yaml::Node::Kind::sequence || !node->items.empty());
+    });
+}
+
 /// Whoever is given a station may keep its profile.
 void keep_profiles(Config& config) {
     for (Line& line : config.lines) {
@@ -124,22 +137,18 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     load_log(loading, root);
     load_realtime(loading, root);
     load_relays(loading, root);
-    const yaml::Node* listeners = root.child("modbus_tcp");
-    const bool is_empty = listeners == nullptr || (listeners->kind == yaml::Node::Kind::sequence &&
-                                                   listeners->items.empty());
     const bool mistyped = root.is_mistyped("modbus_tcp") || root.is_mistyped("http") ||
                           std::ranges::any_of(tree.entries, [](const yaml::Entry& entry) {
                               return is_http(entry.key);
                           });
-    const bool has_other = root.child("http") != nullptr ||
-                           root.child("serial_masters") != nullptr || root.child("mqtt") != nullptr;
-    if (is_empty && !has_other && !mistyped)
+    if (!serves(root) && !mistyped)
         loading.problems.add({1, 1},
                              "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
                              "[{listen: 127.0.0.1:502}]");
     root.elsewhere(kElsewhere);
     root.has("templates");  // known, though nothing of it is left
     root.finish();
+    if (loading.problems.empty() && loading.config.lines.empty()) refuse_no_lines(loading, root);
     if (loading.problems.empty()) warn_of_doors(loading, tree);
 }
 
@@ -163,13 +172,21 @@ void tell(const yaml::Problems& unset, const yaml::Problems& found, yaml::Proble
 
 }  // namespace
 
+std::span<const std::string_view> serving_keys() { return kServing; }
+
 bool is_name(std::string_view text) {
-    constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-";
-    return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
+    return !text.empty() && text.find_first_not_of(kNameLetters) == std::string_view::npos;
 }
+
+std::string pattern_of(std::string_view letters) {
+    return '^' + ('[' + std::string(letters)) + "]+$";
+}
+
+std::string name_pattern() { return pattern_of(kNameLetters); }
 
 std::optional<std::string> load_name(MapReader& in, bool required) {
     auto name = required ? in.required_text("name") : in.text("name");
+    in.looks_like("name", name_pattern(), true);
     if (!name || is_name(*name)) return name;
     in.problem("name",
                "name must be of a-z, 0-9 and '-', not " + yaml::quote(*name) + name_hint(*name));
@@ -213,6 +230,7 @@ std::optional<bool> load_read_only(MapReader& in) {
 }
 
 void refuse_empty(MapReader& in, std::string_view key, std::string_view instead) {
+    in.may_be_null(key, false);
     if (!in.has(key) || in.child(key) != nullptr || in.is_mistyped(key)) return;
     in.problem(key, std::string(key) + " has no value; " + std::string(instead));
 }

@@ -1,6 +1,7 @@
 #include "load_framing.hpp"
 
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -59,6 +60,7 @@ void load_framing(MapReader& in, tcp_server::Settings& settings) {
         in.choice<BroadcastMode>("broadcast", kBroadcasts).value_or(settings.broadcast);
     settings.retransmissions = in.choice<Retransmissions>("retransmissions", kRetransmissions)
                                    .value_or(settings.retransmissions);
+    in.belongs("ascii_lower_case", "framing", std::span(&kFramingWords[2], 1));
     if (in.has("ascii_lower_case") && settings.framing != Framing::ascii)
         in.problem("ascii_lower_case", "only a listener with framing: ascii reads hex digits");
     if (settings.framing != Framing::tcp) refuse_in_serial_modes(in, settings);

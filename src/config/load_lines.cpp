@@ -85,8 +85,10 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
             "receive_during_send belongs to rs485 mode kernel: with rts the adapter's wiring "
             "decides it");
     }
+    constexpr std::array<std::string_view, 2> kSwitched{"kernel", "rts"};
     for (const std::string_view key :
          {"rts_on_send", "delay_before_send", "delay_after_send", "receive_during_send"}) {
+        in.belongs(key, "mode", kSwitched);
         if (rs485.mode == Mode::off && in.has(key)) {
             in.problem(key, std::string(key) + " belongs to rs485 mode kernel or rts");
         }
@@ -133,6 +135,7 @@ bool check_comment(MapReader& in, const std::string& device) {
 
 void load_device(Loading& loading, MapReader& in, Line& line) {
     line.device.device = in.required_text("device").value_or("");
+    in.looks_like("device", "^(/|tcp://.+:[0-9]+$|sim$)");
     if (check_comment(in, line.device.device)) return;
     for (const Line& other : loading.config.lines) {
         if (line.device.device == "sim" || line.device.device.empty()) break;
@@ -286,6 +289,7 @@ Line load_line(Loading& loading, const Node& node) {
 bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode mode) {
     Line line;  // what a port has is a part of it
     line.device.device = port.device = in.required_text("device").value_or("");
+    in.looks_like("device", "^/");
     if (!port.device.empty() && port.device[0] != '/') {
         const bool remote = port.device.starts_with("tcp://");
         in.problem("device", "device must be a serial device such as /dev/ttyUSB1, not " +
@@ -301,13 +305,20 @@ bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode
     return serial_known;
 }
 
+void refuse_no_lines(Loading& loading, MapReader& root) {
+    loading.problems.add(root.mark("lines"),
+                         "a configuration needs at least one line in 'lines', such as lines: " +
+                             std::string(kListExample));
+}
+
 void load_lines(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("lines", kListExample);
+    root.needed("lines");
+    root.may_be_null("lines", false);
+    root.entries("lines", 1, 0);
     if (list == nullptr && root.is_mistyped("lines")) return;
     if (list == nullptr || list->items.empty()) {
-        loading.problems.add(root.mark("lines"),
-                             "a configuration needs at least one line in 'lines', such as lines: " +
-                                 std::string(kListExample));
+        refuse_no_lines(loading, root);
         return;
     }
     for (const Node& node : list->items) loading.config.lines.push_back(load_line(loading, node));

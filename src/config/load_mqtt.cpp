@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -49,6 +50,7 @@ bool parse_broker(std::string_view text, mqtt::Settings& settings) {
 
 void load_broker(MapReader& in, mqtt::Settings& settings) {
     const auto text = in.required_text("broker");
+    in.looks_like("broker", "^mqtts?://.");
     if (!text || parse_broker(*text, settings)) return;
     in.problem("broker",
                "broker must be mqtt://HOST:PORT, or mqtts://HOST:PORT with TLS, such as "
@@ -61,6 +63,8 @@ void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
                std::string_view kind, std::string& part) {
     constexpr std::size_t kLongest = 128;
     const auto text = in.text(key);
+    in.looks_like(key, "^(?![/$])(?!.*//)(?!.*/$)[^" + std::string(forbidden) + "]+$", true);
+    in.no_longer(key, kLongest);
     if (!text) return;
     const bool odd_end = text->starts_with('/') || text->ends_with('/') || text->starts_with('$');
     if (odd_end || text->size() > kLongest || text->find_first_of(forbidden) != text->npos ||
@@ -113,8 +117,10 @@ void load_tls(Loading& loading, MapReader& in, mqtt::Settings& settings) {
 }
 
 void load_format(MapReader& in, mqtt::Settings& settings) {
+    static constexpr std::string_view kJson = "json";
+    static constexpr std::string_view kSparkplug = "sparkplug";
     constexpr std::array<std::pair<std::string_view, mqtt::Format>, 2> kFormats{
-        {{"json", mqtt::Format::json}, {"sparkplug", mqtt::Format::sparkplug}}};
+        {{kJson, mqtt::Format::json}, {kSparkplug, mqtt::Format::sparkplug}}};
     settings.format = in.choice<mqtt::Format>("format", kFormats).value_or(settings.format);
     load_part(in, "topic", "+#",
               "a topic such as plant/panelgate, without + and #, without $ in front or / at an end",
@@ -122,6 +128,9 @@ void load_format(MapReader& in, mqtt::Settings& settings) {
     load_part(in, "group", "+#/", "one level of a topic, without +, # and /", settings.group);
     load_part(in, "node", "+#/", "one level of a topic, without +, # and /", settings.node);
     if (const auto qos = in.integer("qos", 0, 1)) settings.qos = static_cast<int>(*qos);
+    in.belongs("group", "format", std::span(&kSparkplug, 1));
+    in.belongs("node", "format", std::span(&kSparkplug, 1));
+    in.belongs("qos", "format", std::span(&kJson, 1), true);
     const bool sparkplug = settings.format == mqtt::Format::sparkplug;
     if (sparkplug && in.has("qos"))
         in.problem("qos", "Sparkplug prescribes the quality of service; remove qos");
@@ -134,6 +143,7 @@ void load_format(MapReader& in, mqtt::Settings& settings) {
 void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
     constexpr std::size_t kLongest = 128;
     settings.client_id = in.text("client_id").value_or("");
+    in.no_longer("client_id", kLongest);
     if (settings.client_id.size() > kLongest)
         in.problem("client_id", "client_id must have at most 128 characters");
     settings.username = in.text("username").value_or("");

@@ -51,7 +51,9 @@ void load_type(MapReader& in, Point& point) {
         }
     }
     const auto length = in.integer("length", 1, 250);
-    if (point.type == Type::string && !in.has("length"))
+    const std::array<std::string_view, 1> string{label(Type::string)};
+    in.belongs("length", "type", string);
+    if (in.lacks("type", label(Type::string), "length") && point.type == Type::string)
         in.problem("type", "a string needs its length: add length: 1 to 250 characters");
     if (point.type != Type::string && length)
         in.problem("length", "length is for type: string only");
@@ -76,6 +78,7 @@ double exact_number(MapReader& in, std::string_view key, double otherwise) {
 
 void load_scale(MapReader& in, Point& point) {
     point.scale = exact_number(in, "scale", 1);
+    in.never("scale", 0);
     point.offset = exact_number(in, "offset", 0);
     const bool number = point.type != Type::boolean && point.type != Type::string;
     for (const std::string_view key : {"scale", "offset", "min", "max"}) {
@@ -138,6 +141,7 @@ std::string labels_example(const Node* typed) {
 
 void load_labels(MapReader& in, Point& point) {
     const Node* labels = in.map("labels", labels_example(in.child("labels")));
+    in.keyed_by("labels", yaml::kIntegerPattern);
     if (labels == nullptr) return;
     if (!is_integer(point.type)) {
         in.problem("labels",
@@ -155,6 +159,8 @@ void load_labels(MapReader& in, Point& point) {
 
 void load_no_value(MapReader& in, Point& point) {
     const Node* list = in.sequence("no_value");
+    in.holds_integers("no_value");
+    in.entries("no_value", 0, points::kMaxNoValues);
     if (list == nullptr) return;
     if (point.type == Type::boolean || point.type == Type::string) {
         in.problem("no_value",
@@ -208,9 +214,10 @@ void check_area(MapReader& in, const Point& point, const profile::Area& area,
     }
 }
 
+constexpr std::string_view kNameLetters = "abcdefghijklmnopqrstuvwxyz0123456789_-";
+
 bool is_point_name(std::string_view text) {
-    constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789-_";
-    return !text.empty() && text.find_first_not_of(kLetters) == std::string_view::npos;
+    return !text.empty() && text.find_first_not_of(kNameLetters) == std::string_view::npos;
 }
 
 /// None, when a variable brings nothing.
@@ -243,6 +250,8 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     MapReader in(node, loading.problems, "a point", "{name: temperature, at: UW100}");
     Point point;
     point.name = in.required_text("name").value_or("");
+    static const std::string kPattern = pattern_of(kNameLetters);
+    in.looks_like("name", kPattern, true);
     if (!point.name.empty() && !is_point_name(point.name))
         in.problem("name", "name must be of a-z, 0-9, '-' and '_', not " + yaml::quote(point.name) +
                                name_hint(point.name));
@@ -300,6 +309,7 @@ template <class Load>
 void load_list(Loading& loading, MapReader& in, std::string_view key, std::string_view example,
                std::size_t most, const Load& load) {
     const Node* list = in.sequence(key, example);
+    in.entries(key, 0, most);
     if (list == nullptr) return;
     if (list->items.size() > most) {
         in.problem(key, "at most " + std::to_string(most) + ' ' + std::string(key) +

@@ -40,6 +40,7 @@ const Station* find_station(const Config& config, std::string_view name) {
 /// STATION/NOTATION
 std::optional<End> load_end(Loading& loading, MapReader& in, std::string_view key) {
     const auto text = in.required_text(key);
+    in.looks_like(key, "^[^/]+/.");
     if (!text) return std::nullopt;
     const std::size_t slash = text->find('/');
     if (slash == text->npos || slash == 0 || slash + 1 == text->size()) {
@@ -180,6 +181,7 @@ void load_relay(Loading& loading, const Node& node, std::vector<Route>& routes) 
 
 void load_relays(Loading& loading, MapReader& root) {
     const Node* list = root.sequence("relays", "[{from: press/UW100, to: oven/GDT200}]");
+    root.entries("relays", 0, points::kMaxRelays);
     if (list == nullptr) return;
     if (list->items.size() > points::kMaxRelays) {
         root.problem("relays", "at most " + std::to_string(points::kMaxRelays) + " relays, not " +

@@ -19,6 +19,7 @@ using yaml::Node;
 void load_data_bits(MapReader& in, SerialFormat& format) {
     const bool ascii = format.mode == SerialMode::ascii;
     const auto bits = in.integer("data_bits", 0, 99).value_or(ascii ? 7 : 8);
+    in.within("data_bits", 7, 8);
     format.data_bits = bits == 7 && ascii ? 7 : 8;
     if (bits == format.data_bits) return;
     in.problem("data_bits", bits == 7 ? "RTU needs 8 data bits; 7 is for ASCII mode"
@@ -41,6 +42,8 @@ void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* di
         {{"refuse", modbus::HexDigits::upper_only}, {"take", modbus::HexDigits::any_case}}};
     format.mode = in.choice<SerialMode>("mode", kSerialModeWords).value_or(format.mode);
     *digits = in.choice<modbus::HexDigits>("ascii_lower_case", kLowerCase).value_or(*digits);
+    constexpr std::array<std::string_view, 1> kAscii{"ascii"};
+    in.belongs("ascii_lower_case", "mode", kAscii);
     if (in.has("ascii_lower_case") && format.mode != SerialMode::ascii)
         in.problem("ascii_lower_case", "only a line with mode: ascii has hex digits");
 }

@@ -67,6 +67,7 @@ void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
 }
 
 void check_units(MapReader& in, const Settings& settings) {
+    in.keyed_by("units", '^' + yaml::integer_pattern(1, modbus::kMaxStation) + '$');
     for (const auto& [unit, target] : settings.access.units) {
         if (unit != 0 && unit <= modbus::kMaxStation) continue;
         in.problem("units",

@@ -12,6 +12,7 @@
 #include "load_hosts.hpp"
 #include "load_tokens.hpp"
 #include "loader.hpp"
+#include "panelgate/config/describe.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/quote.hpp"
 
@@ -21,9 +22,24 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
+const std::string& endpoint_pattern() {
+    static const std::string kPattern =
+        "^([0-9]{1,3}(\\.[0-9]{1,3}){3}|\\[[0-9A-Fa-f:.]+\\]):" + yaml::integer_pattern(0, 65535) +
+        '$';
+    return kPattern;
+}
+
+const std::string& network_pattern() {
+    static const std::string kPattern = "^([0-9.]+(/" + yaml::integer_pattern(0, 32) +
+                                        ")?|[0-9A-Fa-f.]*:[0-9A-Fa-f:.]*(/" +
+                                        yaml::integer_pattern(0, 128) + ")?)$";
+    return kPattern;
+}
+
 template <class Settings>
 void load_listen(MapReader& in, Settings& settings) {
     const auto text = in.text("listen");
+    in.looks_like("listen", endpoint_pattern());
     if (!text) return;
     const auto endpoint = parse_endpoint(*text);
     if (!endpoint) {
@@ -61,6 +77,8 @@ void warn_of_refusals(Loading& loading, yaml::Mark mark, const Line& line) {
 
 void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* list = in.sequence("lines");
+    in.looks_like("lines", name_pattern(), true);
+    in.entries("lines", 1, 0);
     if (list == nullptr) {
         for (const Line& line : loading.config.lines) {
             if (!line.listens) settings.lines.push_back(line.name);
@@ -143,6 +161,8 @@ std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& 
 
 void load_units(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     const Node* map = in.map("units", "{101: floor1/31}");
+    in.keyed_by("units", '^' + yaml::integer_pattern(0, 255) + '$');
+    in.looks_like("units", "^[^/]+/.");
     if (map == nullptr) return;
     for (const yaml::Entry& entry : map->entries) {
         const auto unit = yaml::parse_integer(entry.key);
@@ -193,6 +213,7 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
 
 /// The gateway's own unit must not hide a station; a default one gives way to an alias.
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
+    in.may_be_null("diagnostics_unit", true);
     if (!in.has("diagnostics_unit")) return;
     settings.diagnostics_unit.reset();
     const Node* given = in.child("diagnostics_unit");
@@ -221,6 +242,8 @@ void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& set
 
 void load_allow(Loading& loading, MapReader& in, std::vector<Network>& allow) {
     const Node* list = in.sequence("allow");
+    in.looks_like("allow", network_pattern());
+    in.entries("allow", 1, 0);
     if (list == nullptr) return;
     for (const Node& item : list->items) {
         const auto cidr = parse_cidr(item.scalar);

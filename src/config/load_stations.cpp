@@ -109,18 +109,12 @@ void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults
     faults.dead = in.boolean("dead").value_or(false);
     faults.slow = in.duration("slow", 0ms, 10min).value_or(0ms);
     faults.late_by = in.duration("late_by", 0ms, 10min).value_or(0ms);
-    const auto share = [&](std::string_view key, double& value) {
-        value = in.number(key).value_or(0);
-        if (value >= 0 && value <= 1) return;
-        in.problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
-        value = 0;
-    };
-    share("late", faults.late);
-    share("drop", faults.drop);
-    share("damage", faults.damage);
-    share("truncate", faults.truncate);
-    share("foreign_id", faults.foreign_id);
-    share("duplicate", faults.duplicate);
+    faults.late = in.share("late").value_or(0);
+    faults.drop = in.share("drop").value_or(0);
+    faults.damage = in.share("damage").value_or(0);
+    faults.truncate = in.share("truncate").value_or(0);
+    faults.foreign_id = in.share("foreign_id").value_or(0);
+    faults.duplicate = in.share("duplicate").value_or(0);
     in.finish();
 }
 

@@ -30,6 +30,8 @@ struct Loading {
 
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
+/// A regular expression of texts of these letters, a '-' among them the last.
+std::string pattern_of(std::string_view letters);
 /// The key `name`; nothing when it is absent or not a name (then a problem).
 std::optional<std::string> load_name(yaml::MapReader& in, bool required);
 /// "; write big-press" for "Big Press"; "" when nothing of it is left.
@@ -44,7 +46,10 @@ std::string did_you_mean(std::string_view typed, std::span<const std::string_vie
 /// problem that ends with `instead`. Call it when all keys have been read.
 void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view instead);
 
+/// Without lines it tells so, but where a key is likely to be meant as `lines`: then
+/// refuse_no_lines() has to be called when finish() found nothing wrong with that key.
 void load_lines(Loading& loading, yaml::MapReader& root);
+void refuse_no_lines(Loading& loading, yaml::MapReader& root);
 void load_relays(Loading& loading, yaml::MapReader& root);
 void load_modbus_tcp(Loading& loading, yaml::MapReader& root);
 void load_serial_masters(Loading& loading, yaml::MapReader& root);

@@ -4,11 +4,14 @@
 #include <array>
 #include <cctype>
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include "loader.hpp"
 #include "mbusd_lines.hpp"
+#include "mbusd_number.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/config/endpoint.hpp"
 #include "panelgate/yaml/map_reader.hpp"
@@ -87,6 +90,7 @@ class Reader {
         for (const auto& [name, read] : kKeys) {
             names.push_back(name);
             if (name != line.name) continue;
+            tell_of_first(line);
             if (line.value.empty() && name != "trx_sysfile" && name != "logfile")
                 wrong("has no value; leave the line out for the default");
             else
@@ -95,6 +99,19 @@ class Reader {
         }
         problems_.add(line.mark, "mbusd has no setting " + yaml::quote(line.name) +
                                      did_you_mean(line.name, names, "settings"));
+    }
+
+    /// What the lines mean together, in whichever order they stood.
+    void finish() {
+        if (rts_) mbusd_.rs485 = rts_text_;
+        if (!kernel_) return;
+        mbusd_.rs485 = "{mode: kernel}";
+        if (!rts_) return;
+        line_ = &*rts_;
+        note(
+            "with enable_rs485 the driver switches the transceiver, and only that is taken over; "
+            "where RTS has to, write rs485: " +
+            rts_text_);
     }
 
     const Mbusd& mbusd() const { return mbusd_; }
@@ -108,6 +125,15 @@ class Reader {
     void wrong_value(const std::string& wanted) {
         wrong("must be " + wanted + ", not " + yaml::quote(line_->value));
     }
+    /// Of what stands twice mbusd takes the last.
+    void tell_of_first(const MbusdLine& line) {
+        const auto [first, added] = seen_.emplace(line.name, line);
+        if (added) return;
+        line_ = &first->second;
+        note("line " + std::to_string(line.mark.line) + " sets it again, and that one counts");
+        line_ = &line;
+        first->second = line;
+    }
     /// What has no counterpart, and why.
     void note(const std::string& why) {
         const std::string told = as_ascii(line_->name + " = " + line_->value) + ": " + why;
@@ -115,8 +141,11 @@ class Reader {
         notes_.push_back(problems_.file() + ':' + std::to_string(line_->mark.line) + ": " + told);
     }
     std::int64_t integer(std::int64_t otherwise, std::int64_t min, std::int64_t max) {
-        const auto value = yaml::parse_integer(line_->value);
-        if (value && *value >= min && *value <= max) return *value;
+        const auto number = mbusd_number(line_->value);
+        if (number && number->value >= min && number->value <= max) {
+            if (!number->plain) note("mbusd reads this as " + std::to_string(number->value));
+            return number->value;
+        }
         wrong_value("a whole number from " + std::to_string(min) + " to " + std::to_string(max));
         return otherwise;
     }
@@ -148,18 +177,18 @@ class Reader {
         else
             wrong_value("8 data bits, parity n, e or o, and 1 or 2 stop bits, such as 8n1");
     }
-    void enable_rs485() {
-        if (yes_or_no()) mbusd_.rs485 = "{mode: kernel}";
-    }
+    void enable_rs485() { kernel_ = yes_or_no(); }
     void trx_control() {
         constexpr std::array<std::string_view, 6> kWords{"addc",  "rts",     "rts_0",
                                                          "rts_1", "sysfs_0", "sysfs_1"};
         const std::string typed = lower(line_->value);
+        rts_.reset();
         if (std::ranges::find(kWords, typed) == kWords.end()) {
             wrong_value("addc, rts_0, rts_1 (or rts), sysfs_0 or sysfs_1");
         } else if (typed.starts_with("rts")) {
-            mbusd_.rs485 = std::string("{mode: rts, rts_on_send: ") +
-                           (typed == "rts_0" ? "low" : "high") + '}';
+            rts_ = *line_;
+            rts_text_ = std::string("{mode: rts, rts_on_send: ") +
+                        (typed == "rts_0" ? "low" : "high") + '}';
         } else if (typed.starts_with("sysfs")) {
             note(
                 "a GPIO that is switched through a file is late by what the machine is busy; the "
@@ -182,7 +211,7 @@ class Reader {
     void port() { mbusd_.port = integer(mbusd_.port, 1, 65535); }
     void maxconn() { mbusd_.connections = integer(mbusd_.connections, 1, 65535); }
     void timeout() {
-        integer(0, 0, 1'000'000);
+        if (integer(0, 0, 1'000'000) == 0) return;  // nor does mbusd close any then
         note(
             "connections are not closed for being idle; TCP keep-alive finds those whose client "
             "is gone within 90 s");
@@ -193,11 +222,12 @@ class Reader {
         mbusd_.retries = std::min<std::int64_t>(mbusd_.retries, 10);
     }
     void pause() {
-        integer(100, 0, 10'000);
+        const std::int64_t pause = integer(100, 0, 10'000);
+        if (pause == 0) return;  // no more than t3.5, as here
         note(
             "between two requests is t3.5, as the standard says, and nothing else; panels that "
             "need more get timing: {frame_gap: " +
-            line_->value + "ms}, which costs its share of every second");
+            std::to_string(pause) + "ms}, which costs its share of every second");
     }
     void wait() { mbusd_.wait = integer(mbusd_.wait, 1, 120'000); }
     void replyonbroadcast() { mbusd_.replies_to_broadcasts = yes_or_no(); }
@@ -219,6 +249,10 @@ class Reader {
     yaml::Problems& problems_;
     const MbusdLine* line_ = nullptr;
     Mbusd mbusd_;
+    bool kernel_ = false;
+    std::optional<MbusdLine> rts_;  ///< that has RTS switched
+    std::string rts_text_;          ///< what it means
+    std::map<std::string, MbusdLine> seen_;
     std::vector<std::string> notes_;
     std::vector<std::string> comments_;
 };
@@ -272,7 +306,7 @@ std::string servers_text(const Mbusd& mbusd) {
 std::string yaml_of(const Mbusd& mbusd, const std::vector<std::string>& comments) {
     std::string text = "# made of an mbusd.conf by panelgate import\n" + line_text(mbusd) +
                        servers_text(mbusd) + "log: {level: " + mbusd.level + "}\n";
-    if (!comments.empty()) text += "\n# Without a counterpart:\n";
+    if (!comments.empty()) text += "\n# Without a counterpart, or not as it was written:\n";
     for (const std::string& comment : comments) text += "# " + comment + '\n';
     return text;
 }
@@ -282,6 +316,7 @@ std::string yaml_of(const Mbusd& mbusd, const std::vector<std::string>& comments
 std::optional<Imported> import_mbusd(std::string_view text, yaml::Problems& problems) {
     Reader reader(problems);
     for (const MbusdLine& line : mbusd_lines(text, problems)) reader.take(line);
+    reader.finish();
     if (!problems.empty()) return std::nullopt;
     return Imported{yaml_of(reader.mbusd(), reader.comments()), reader.notes()};
 }

@@ -7,7 +7,7 @@
 namespace panelgate::config {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\f\v";
+constexpr std::string_view kBlanks = " \t\f\v";
 
 std::string_view without_blanks(std::string_view text) {
     const std::size_t first = text.find_first_not_of(kBlanks);
@@ -50,10 +50,13 @@ void take_line(std::string_view whole, int number, std::vector<MbusdLine>& lines
 
 std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems) {
     std::vector<MbusdLine> lines;
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
     for (int number = 1; !text.empty(); ++number) {
-        const std::size_t end = std::min(text.find('\n'), text.size());
+        const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
         take_line(text.substr(0, end), number, lines, problems);
-        text.remove_prefix(std::min(end + 1, text.size()));
+        text.remove_prefix(end);
+        text.remove_prefix(text.starts_with("\r\n") ? 2 : text.empty() ? 0 : 1);
     }
     return lines;
 }

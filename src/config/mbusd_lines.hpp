@@ -17,7 +17,8 @@ struct MbusdLine {
 };
 
 /// A line that begins with '#' is a comment, as is nothing else: what stands behind a value is part
-/// of it. Lines that are none are added to `problems`.
+/// of it. A line ends with LF, CR or both; a byte order mark before the first is skipped. Lines
+/// that are none are added to `problems`.
 std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems);
 
 }  // namespace panelgate::config

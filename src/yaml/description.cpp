@@ -19,15 +19,19 @@ const std::string* Description::path_of(const Node& map) const {
     return found == paths_.end() ? nullptr : &found->second;
 }
 
-void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
+KeyShape* Description::shape(const Node& map, std::string_view key) {
     const std::string* path = path_of(map);
-    if (path == nullptr) return;
-    shape.path = joined(*path, key);
-    const auto known = std::ranges::find(keys_, shape.path, &KeyShape::path);
-    if (known == keys_.end()) {
-        keys_.push_back(std::move(shape));
-        return;
-    }
+    if (path == nullptr) return nullptr;
+    const std::string whole = joined(*path, key);
+    const auto found = std::ranges::find(keys_, whole, &KeyShape::path);
+    if (found != keys_.end()) return &*found;
+    keys_.emplace_back().path = whole;
+    return &keys_.back();
+}
+
+void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
+    KeyShape* known = this->shape(map, key);
+    if (known == nullptr) return;
     known->required = known->required || shape.required;
     for (std::string& word : shape.words) {
         if (std::ranges::find(known->words, word) == known->words.end())
@@ -39,6 +43,13 @@ void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
     known->max = shape.max;
     known->shortest = shape.shortest;
     known->longest = shape.longest;
+}
+
+void Description::tell_rule(const Node& map, KeyRule rule) {
+    const std::string* path = path_of(map);
+    if (path == nullptr) return;
+    rule.map = *path;
+    rules_.push_back(std::move(rule));
 }
 
 void Description::tell_below(const Node& map, std::string_view key, const Node& value) {

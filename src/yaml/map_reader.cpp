@@ -9,7 +9,6 @@
 #include "hints.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "panelgate/yaml/quote.hpp"
-#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
 namespace {
@@ -49,12 +48,6 @@ std::string list_hint(const Node& node, std::string_view example) {
 
 std::string two_values(const Node& node) {
     return quote(node.scalar) + " is two values in { }; put a text that holds a ',' in quotes";
-}
-
-/// {id 5, name: press}
-bool lacks_colon(const Entry& entry, std::string_view key) {
-    return entry.value.kind == Node::Kind::null && entry.key.size() > key.size() + 1 &&
-           entry.key.starts_with(std::string(key) + ' ');
 }
 
 /// Nobody counts 1440 minutes.
@@ -102,24 +95,17 @@ bool MapReader::require(std::string_view key) {
     shape.required = true;
     describe(key, std::move(shape));
     if (has(key)) return true;
-    if (is_mistyped(key)) return false;
+    if (is_mistyped(key)) {
+        excused_.emplace_back(key);
+        return false;
+    }
     // What is no map at all has been told already.
-    if (node_->kind == Node::Kind::map)
-        problems_->add(node_->mark, what_ + " needs '" + std::string(key) + '\'');
+    if (node_->kind == Node::Kind::map) problems_->add(node_->mark, needs(key));
     return false;
 }
 
-bool MapReader::is_mistyped(std::string_view key) const {
-    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
-        const Entry& entry = node_->entries[i];
-        if (entry.key == key || std::ranges::find(known_, entry.key) != known_.end()) continue;
-        const Entry* parent = shallow_parent(i);
-        if (nearest(entry.key, std::span(&key, 1)) == key || lacks_colon(entry, key) ||
-            entry.key.starts_with(std::string(key) + ':') ||
-            (parent != nullptr && parent->key == key))
-            return true;
-    }
-    return false;
+std::string MapReader::needs(std::string_view key) const {
+    return what_ + " needs '" + std::string(key) + '\'';
 }
 
 const Node* MapReader::scalar(std::string_view key, std::string_view wanted) {
@@ -306,87 +292,6 @@ void MapReader::problem(std::string_view key, std::string message) {
         if (entry.key == key) message += origin_hint(entry.value, message);
     }
     problems_->add(mark(key), std::move(message));
-}
-
-/// Of a key in the column of one that should have it: `serial:` and `baud: 9600` on the next line.
-const Entry* MapReader::shallow_parent(std::size_t entry) const {
-    const Mark own = node_->entries[entry].mark;
-    constexpr std::size_t kFar = 20;  // keys; a file may be nothing but unknown ones
-    const std::size_t end = entry > kFar ? entry - kFar : 0;
-    while (entry-- > end) {
-        const Entry& above = node_->entries[entry];
-        if (above.mark.line >= own.line || above.mark.column != own.column) return nullptr;
-        if (std::ranges::find(parents_, above.key) != parents_.end())
-            return above.value.kind == Node::Kind::null ? &above : nullptr;
-        if (std::ranges::find(known_, above.key) != known_.end()) return nullptr;
-    }
-    return nullptr;
-}
-
-std::string MapReader::is_unknown(std::string_view key) const {
-    return "unknown key " + quote(key) + " in " + what_;
-}
-
-std::string MapReader::unknown(std::size_t entry) const {
-    const std::string& key = node_->entries[entry].key;
-    const std::vector<std::string_view> known(known_.begin(), known_.end());
-    const std::string message = is_unknown(key);
-    const std::string blank = blank_hint(key);
-    if (!blank.empty()) return message + blank;
-    for (const std::string_view word : known) {
-        if (lacks_colon(node_->entries[entry], word))
-            return message + "; a ':' is missing: write " + std::string(word) + ": " +
-                   key.substr(word.size() + 1);
-    }
-    if (const Entry* parent = shallow_parent(entry))
-        return message + "; below " + quote(parent->key) + " (line " +
-               std::to_string(parent->mark.line) +
-               ") it must stand deeper: type 2 blanks before it";
-    const Entry& typed = node_->entries[entry];
-    if (const std::string place = place_of(typed, true); !place.empty()) return message + place;
-    const std::string near = nearest(key, known);
-    if (!near.empty()) return message + "; did you mean '" + near + "'?";
-    if (const std::string place = place_of(typed, false); !place.empty()) return message + place;
-    std::string list;
-    for (const std::string_view word : known)
-        list += (list.empty() ? "" : ", ") + std::string(word);
-    return message + "; known keys are " + list;
-}
-
-std::string MapReader::place_of(const Entry& entry, bool exactly) const {
-    for (const Elsewhere& place : elsewhere_) {
-        const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
-        if (entry.key != place.key && !near) continue;
-        const std::string key(place.key);
-        if (!place.instead.empty()) return "; " + std::string(place.instead);
-        if (place.map.empty())
-            return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
-                   std::string(place.owner) + (near ? "?" : "");
-        const Node& value = entry.value;
-        std::string shown = nearest(value.scalar, place.words);
-        if (shown.empty())
-            shown = value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
-        return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
-    }
-    return "";
-}
-
-void MapReader::refuse(std::string_view key, const std::string& why) {
-    for (const Entry& entry : node_->entries) {
-        if (entry.key == key) problems_->add(entry.value.mark, std::string(key) + ' ' + why);
-    }
-    refused_.push_back(key);
-}
-
-void MapReader::finish() {
-    std::size_t told = 0;
-    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
-        const Entry& entry = node_->entries[i];
-        if (std::ranges::find(refused_, entry.key) != refused_.end()) continue;
-        if (std::ranges::find(known_, entry.key) != known_.end()) continue;
-        // Nobody reads more of them, and what was meant takes a while to find.
-        problems_->add(entry.mark, ++told > kMaxTold ? is_unknown(entry.key) : unknown(i));
-    }
 }
 
 }  // namespace panelgate::yaml

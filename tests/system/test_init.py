@@ -3,6 +3,8 @@ import json
 import os
 import pathlib
 import re
+import select
+import signal
 import subprocess
 import tempfile
 import unittest
@@ -10,7 +12,7 @@ import unittest
 import config
 import harness
 from harness import read_registers, run
-from test_scan import simulated
+from test_scan import drain, simulated, six, terminal
 
 PANELS = "{id: 31, profile: autonics-gplp-s}, {id: 20, profile: panasonic-gt}"
 SEARCH = ("--baud", "38400", "--parity", "none", "--stations", "19-21,31")
@@ -85,6 +87,35 @@ class Init(unittest.TestCase):
         self.assertIn(f'device: "{device}"', text)
         self.assertIn("supposed from the panels", text)
         self.assertEqual(check(self.file).returncode, 0)
+
+    def test_says_on_stderr_that_an_interrupted_scan_is_incomplete(self):
+        with simulated(six("left")) as links, terminal() as (ours, theirs):
+            process = subprocess.Popen(
+                [harness.PANELGATE, "init", links["left"], "-o", str(self.file)],
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=theirs, text=True)
+            seen = ""
+            # Those that were quick have been looked at, the others are asked with patience.
+            while (not re.search(r"(?s)looking at.* found: 38400 8N1, station", seen)
+                   and process.poll() is None):
+                if select.select([ours], [], [], 0.1)[0]:
+                    seen += os.read(ours, 4096).decode()
+            process.send_signal(signal.SIGINT)
+            told = drain(ours, process)
+            process.communicate(timeout=harness.PATIENCE)
+        self.assertEqual(process.returncode, 69, told)
+        self.assertTrue(self.file.exists(), told)
+        self.assertIn("# Incomplete", self.file.read_text())
+        self.assertIn("incomplete: interrupted; what was not reached is missing in it", told)
+
+    def test_what_cannot_be_written_is_told_before_anything_is_asked(self):
+        (self.file.parent / "file").touch()
+        for file in (self.file.parent / "none" / "x.yaml", self.file.parent / "file" / "x.yaml",
+                     self.file.parent, f"{self.file.parent}/none/"):
+            with self.subTest(file=file), terminal() as (ours, theirs):
+                ended = init(os.ttyname(theirs), "--force", "-o", str(file))
+                self.assertEqual((ended.returncode, ended.stdout), (70, ""), ended.stderr)
+                self.assertIn(f"cannot write {file}: ", ended.stderr)
+                self.assertEqual(select.select([ours], [], [], 0)[0], [], "a byte was sent")
 
     def test_where_nothing_answers_nothing_is_written(self):
         master, slave = os.openpty()

@@ -96,6 +96,39 @@ class Schema(unittest.TestCase):
             refused += 1
         self.assertGreaterEqual(refused, 60)
 
+    def test_refuses_what_a_schema_can_know(self):
+        line = {"name": "a", "device": "sim"}
+        http = {"listen": "127.0.0.1:80"}
+
+        def point(**keys):
+            station = {"id": 1, "points": [{"name": "p", "at": "400001", **keys}]}
+            return {"lines": [{**line, "stations": [station]}], "http": http}
+
+        self.assertEqual(self.faults({"lines": [line], "http": http}), [])
+        self.assertEqual(self.faults(point(type="string", length=8)), [])
+        for wrong in (
+                {"lines": [], "http": http}, {"lines": None, "http": http},
+                {"lines": [line]}, {"lines": [line], "http": None}, {"lines": [line], "mqtt": None},
+                {"lines": [line], "modbus_tcp": []},
+                {"lines": [{**line, "name": "A"}], "http": http},
+                {"lines": [{**line, "device": "ttyUSB0"}], "http": http},
+                {"lines": [{**line, "timing": {"response_timeout": "0ms"}}], "http": http},
+                {"lines": [{**line, "timing": {"response_timeout": "3min"}}], "http": http},
+                {"lines": [{**line, "stations": [{"id": 1, "simulate": {"late": 2}}]}],
+                 "http": http},
+                *({"lines": [line], "http": {key: value}}
+                  for key, value in (("allow", []), ("allow", None), ("hosts", []),
+                                     ("tokens", None), ("listen", 8080), ("listen", ":8080"))),
+                {"lines": [line], "modbus_tcp": [{"lines": []}]},
+                {"lines": [line], "modbus_tcp": [{"units": None}]},
+                {"lines": [line], "modbus_tcp": [{"units": {"256": "a/1"}}]},
+                {"lines": [line], "mqtt": {"broker": "h"}},
+                {"lines": [line], "http": http, "templates": {"t": None}},
+                {"lines": [line], "http": http, "templates": {"T": {}}},
+                point(scale=0), point(type="string"), point(length=8), point(name="P")):
+            with self.subTest(wrong=wrong):
+                self.assertNotEqual(self.faults(wrong), [])
+
     def test_tells_an_editor_what_a_key_means_and_what_it_is_by_default(self):
         line = self.schema["properties"]["lines"]["items"]["properties"]
         self.assertEqual(line["retries"]["default"], 1)
@@ -105,7 +138,8 @@ class Schema(unittest.TestCase):
         self.assertIn({"enum": ["adaptive"]}, timeout["anyOf"])
         self.assertEqual(line["serial"]["properties"]["parity"]["anyOf"][0],
                          {"enum": ["none", "even", "odd"]})
-        body = self.schema["properties"]["templates"]["additionalProperties"]["properties"]
+        (template,) = self.schema["properties"]["templates"]["patternProperties"].values()
+        body = template["properties"]
         self.assertNotIn("id", body)
         self.assertIn("points", body)
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -10,7 +11,16 @@ namespace panelgate::config {
 
 /// Every key that load() asks for, as it asks: what a configuration may have. Not what stands
 /// before that: templates, a station's `template`, `x-` keys, merges, variables.
-std::vector<yaml::KeyShape> describe();
+struct Described {
+    std::vector<yaml::KeyShape> keys;
+    std::vector<yaml::KeyRule> rules;
+};
+Described describe();
+
+/// Of a template's name, as KeyShape::pattern.
+std::string name_pattern();
+/// Of these keys one at least is there, and neither null nor an empty list.
+std::span<const std::string_view> serving_keys();
 
 /// What is to be said of a key.
 struct KeyText {

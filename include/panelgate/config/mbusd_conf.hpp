@@ -11,7 +11,7 @@ namespace panelgate::config {
 
 /// What a configuration of mbusd (0.5.3, its conf/mbusd.conf.example and cfg.c) means here.
 struct Imported {
-    std::string yaml;  ///< load() takes it; its comments say what has no counterpart, and why
+    std::string yaml;  ///< load() takes it; its comments say what is not taken over as it is
     /// The same, a sentence each: "FILE:LINE: pause = 100: ...".
     std::vector<std::string> notes;
 };

@@ -53,6 +53,8 @@ class MapReader {
     std::optional<std::int64_t> required_integer(std::string_view key, std::int64_t min,
                                                  std::int64_t max);
     std::optional<double> number(std::string_view key);
+    /// A number from 0 to 1.
+    std::optional<double> share(std::string_view key);
     /// `true` or `false`, also as True and TRUE, nothing else (no yes, no on).
     std::optional<bool> boolean(std::string_view key);
     /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a
@@ -83,6 +85,30 @@ class MapReader {
     const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key, std::string_view example = {});
 
+    // What the caller looks at itself, for who writes down what is asked (Description). Call it
+    // where the value is judged; what is told of one key counts together.
+
+    /// A text, or those in a list or map, matches this regular expression (ECMA 262); `number`: one
+    /// that YAML takes for a number may.
+    void looks_like(std::string_view key, std::string_view pattern, bool number = false);
+    void no_longer(std::string_view key, std::size_t characters);
+    /// The same of the keys of a map that has no words for them.
+    void keyed_by(std::string_view key, std::string_view pattern);
+    /// Of a list: raw numbers.
+    void holds_integers(std::string_view key);
+    /// Less than what integer() was asked for.
+    void within(std::string_view key, std::int64_t min, std::int64_t max);
+    void never(std::string_view key, double number);
+    void may_be_null(std::string_view key, bool may);
+    void needed(std::string_view key);
+    /// `most` 0: no limit.
+    void entries(std::string_view key, std::size_t fewest, std::size_t most);
+    /// `key` has this word and `other` is absent, which it needs then.
+    bool lacks(std::string_view key, std::string_view word, std::string_view other);
+    /// `key` belongs to these words of `other`; `absent`: and to none.
+    void belongs(std::string_view key, std::string_view other,
+                 std::span<const std::string_view> words, bool absent = false);
+
     /// Keys that stand in another map: finish() says where. Must outlive this.
     void elsewhere(std::span<const Elsewhere> keys) { elsewhere_ = keys; }
 
@@ -106,10 +132,12 @@ class MapReader {
         shape.kind = kind;
         describe(key, std::move(shape));
     }
+    KeyShape* shape(std::string_view key);
     const Node* below(std::string_view key, const Node* node);
     const Node* find(std::string_view key);
     const Node* scalar(std::string_view key, std::string_view wanted);
     bool require(std::string_view key);
+    std::string needs(std::string_view key) const;
     const Entry* shallow_parent(std::size_t entry) const;
     std::string is_unknown(std::string_view key) const;
     std::string unknown(std::size_t entry) const;
@@ -120,6 +148,7 @@ class MapReader {
     std::string what_;
     std::vector<std::string> known_;
     std::vector<std::string_view> refused_;
+    std::vector<std::string> excused_;  ///< required, absent, and likely to be mistyped
     std::vector<std::string> parents_;  ///< of these, those with a map or a list
     std::span<const Elsewhere> elsewhere_;
 };
@@ -128,6 +157,11 @@ class MapReader {
 /// Units: us, ms, s, min.
 std::optional<Duration> parse_duration(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
+/// A regular expression (ECMA 262) of just the texts of these durations, or integers, as the
+/// functions above take them; 0 <= min <= max. That of integers is a part, without ^ and $.
+inline constexpr std::string_view kIntegerPattern = "^(0|-?[1-9][0-9]*)$";
+std::string duration_pattern(Duration min, Duration max);
+std::string integer_pattern(std::int64_t min, std::int64_t max);
 /// "; a blank is missing after '101:'; write 101: floor1/31" for a key that is a number, a colon
 /// and its value; else "".
 std::string number_blank_hint(std::string_view key);

@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using yaml::KeyShape;
 
 const KeyShape& shape(const std::string& path) {
-    static const std::vector<KeyShape> kKeys = describe();
+    static const std::vector<KeyShape> kKeys = describe().keys;
     const auto found = std::ranges::find(kKeys, path, &KeyShape::path);
     if (found == kKeys.end()) throw std::out_of_range("no key " + path);
     return *found;
@@ -39,9 +39,31 @@ TEST(Describe, KnowsWhatTheLoaderAsksFor) {
     EXPECT_EQ(shape("modbus_tcp/units").kind, KeyShape::Kind::map);
 }
 
+TEST(Describe, KnowsWhatTheLoaderLooksAtItself) {
+    EXPECT_EQ(shape("lines").fewest, 1U);
+    EXPECT_EQ(shape("lines").may_be_null, false);
+    EXPECT_TRUE(shape("lines").required);
+    EXPECT_EQ(shape("http/allow").fewest, 1U);
+    EXPECT_EQ(shape("http/tokens").may_be_null, false);
+    EXPECT_EQ(shape("lines/stations/name").pattern, "^[abcdefghijklmnopqrstuvwxyz0123456789-]+$");
+    EXPECT_TRUE(shape("lines/stations/name").may_be_number);
+    EXPECT_FALSE(shape("http/listen").may_be_number);
+    EXPECT_EQ(shape("lines/stations/simulate/late").most, 1.0);
+    EXPECT_EQ(shape("lines/stations/points/scale").never, 0.0);
+    EXPECT_EQ(shape("lines/serial/data_bits").min, 7);
+    EXPECT_EQ(shape("modbus_tcp/diagnostics_unit").may_be_null, true);
+    EXPECT_NE(shape("serial_masters/units").keys, shape("modbus_tcp/units").keys);
+    const auto rules = describe().rules;
+    EXPECT_TRUE(std::ranges::any_of(rules, [](const yaml::KeyRule& rule) {
+        return rule.needs && rule.map == "lines/stations/points" && rule.key == "type" &&
+               rule.other == "length";
+    }));
+}
+
 TEST(Describe, HasATextForEachKeyAndNoOther) {
     std::set<std::string> keys{"templates", "lines/stations/template"};  // before the loader's keys
-    for (const KeyShape& key : describe()) EXPECT_TRUE(keys.insert(key.path).second) << key.path;
+    for (const KeyShape& key : describe().keys)
+        EXPECT_TRUE(keys.insert(key.path).second) << key.path;
     std::set<std::string> texts;
     for (const KeyText& text : key_texts())
         EXPECT_TRUE(texts.insert(std::string(text.path)).second) << text.path;

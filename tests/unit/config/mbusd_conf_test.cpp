@@ -88,6 +88,66 @@ TEST(MbusdConf, SaysWhatHasNoCounterpartInCommentsAndNotes) {
         EXPECT_THAT(imported.yaml, HasSubstr("\n# " + note.substr(note.find(": ") + 2) + '\n'));
 }
 
+TEST(MbusdConf, TellsOfRtsThatTheDriverSwitchesAlreadyInWhicheverOrder) {
+    const std::string rts = "trx_control = rts_0\n";
+    const std::string kernel = "enable_rs485 = yes\n";
+    for (const std::string& text : {rts + kernel, kernel + rts}) {
+        const Imported imported = imported_of(text);
+        EXPECT_EQ(load(imported).lines[0].device.rs485.mode, line::Rs485::Mode::kernel) << text;
+        ASSERT_EQ(imported.notes.size(), 1U) << text;
+        EXPECT_THAT(imported.notes[0], HasSubstr("trx_control = rts_0: with enable_rs485 the"));
+        EXPECT_THAT(imported.notes[0], HasSubstr("{mode: rts, rts_on_send: low}"));
+    }
+    const Imported off = imported_of("enable_rs485 = no\n" + rts);
+    EXPECT_EQ(load(off).lines[0].device.rs485.mode, line::Rs485::Mode::rts);
+    EXPECT_THAT(off.notes, IsEmpty());
+}
+
+TEST(MbusdConf, OfASettingThatStandsTwiceTheLastCountsAndTheFirstIsTold) {
+    const Imported imported =
+        imported_of("speed = 9600\ntrx_control = rts\nspeed = 38400\ntrx_control = addc\n");
+    const Line line = load(imported).lines[0];
+    EXPECT_EQ(line.device.serial.baud, 38400);
+    EXPECT_EQ(line.device.rs485.mode, line::Rs485::Mode::off);
+    EXPECT_THAT(imported.notes,
+                testing::ElementsAre("mbusd.conf:1: speed = 9600: line 3 sets it again, and that "
+                                     "one counts",
+                                     "mbusd.conf:2: trx_control = rts: line 4 sets it again, and "
+                                     "that one counts"));
+}
+
+TEST(MbusdConf, AdvisesNothingWhereNothingIsLost) {
+    EXPECT_THAT(imported_of("pause = 0\ntimeout = 0\n").notes, IsEmpty());
+    EXPECT_THAT(
+        imported_of("pause = 0x14\n").notes,
+        testing::ElementsAre(HasSubstr("mbusd reads this as 20"), HasSubstr("{frame_gap: 20ms}")));
+}
+
+TEST(MbusdConf, ReadsNumbersAsMbusdDoesAndSaysSo) {
+    const Imported imported = imported_of("speed = 9600 # fast\nport = 0x1F6\nwait=+0764\n");
+    const Config config = load(imported);
+    EXPECT_EQ(config.lines[0].device.serial.baud, 9600);
+    EXPECT_EQ(config.modbus_tcp[0].port, 502);
+    EXPECT_EQ(config.lines[0].arbiter.unlisted.response_timeout, Duration(500ms));
+    EXPECT_THAT(imported.notes,
+                testing::ElementsAre("mbusd.conf:1: speed = 9600 # fast: mbusd reads this as 9600",
+                                     "mbusd.conf:2: port = 0x1F6: mbusd reads this as 502",
+                                     "mbusd.conf:3: wait = +0764: mbusd reads this as 500"));
+    for (const char* value : {"fast", "-1", "0x", "99999999999999999999", "4294967298", "#9"})
+        EXPECT_THAT(faults("port = " + std::string(value)), HasSubstr("1:8: port must be"));
+}
+
+TEST(MbusdConf, TakesFilesOfWindowsAndOfOldMacs) {
+    for (const std::string end : {"\n", "\r\n", "\r"}) {
+        const Imported imported =
+            imported_of("\xef\xbb\xbf# one" + end + end + "speed = 9600" + end + "port = 503");
+        EXPECT_EQ(load(imported).lines[0].device.serial.baud, 9600);
+        EXPECT_EQ(load(imported).modbus_tcp[0].port, 503);
+        EXPECT_THAT(faults("\xef\xbb\xbf#" + end + end + "adress = 1"),
+                    HasSubstr("mbusd.conf:3:1: mbusd has no setting"));
+    }
+}
+
 TEST(MbusdConf, TellsAllFaultsWithTheirPlaces) {
     EXPECT_EQ(
         faults("device\nspeed = fast\n  mode = 7n1\nadress = 1\nport =\ntrx_control = gpio\n"),

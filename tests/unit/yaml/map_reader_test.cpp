@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 
 #include <array>
+#include <cstdint>
+#include <regex>
 #include <string>
+#include <utility>
 
 namespace panelgate::yaml {
 namespace {
@@ -54,6 +57,14 @@ TEST(MapReader, TellsWhichRequiredKeyIsMissing) {
     EXPECT_EQ(s.problems(), "f:1:3: thing needs 'name'\nf:1:3: thing needs 'id'\n");
 }
 
+TEST(MapReader, TellsWhatIsMissingAlsoWhereAKeyLookedLikeIt) {
+    Subject s("node: 1\n");
+    EXPECT_EQ(s.read().required_text("mode"), std::nullopt);
+    EXPECT_EQ(s.read().text("node"), "1");
+    s.read().finish();
+    EXPECT_EQ(s.problems(), "f:1:1: thing needs 'mode'\n");
+}
+
 TEST(MapReader, ReadsWholeNumbersInRange) {
     Subject s("a: 0\nb: -5\nc: 4096\n");
     EXPECT_EQ(s.read().integer("a", 0, 9), 0);
@@ -90,6 +101,17 @@ TEST(MapReader, ReadsNumbersWithAFraction) {
               "f:6:4: f must be a number, not '1' in quotes; write 1 without\n"
               "f:7:4: g must be a number, not '1,5'; write 1.5\n"
               "f:8:4: h must be a number, not '-01' (no leading zeros)\n");
+}
+
+TEST(MapReader, ReadsSharesFromNothingToAll) {
+    Subject s("a: 0.25\nb: 1\nc: 1.5\nd: -0.1\ne: x\n");
+    EXPECT_EQ(s.read().share("a"), 0.25);
+    EXPECT_EQ(s.read().share("b"), 1);
+    for (const char* key : {"c", "d", "e", "absent"}) EXPECT_EQ(s.read().share(key), std::nullopt);
+    EXPECT_EQ(s.problems(),
+              "f:3:4: c must be a share from 0 to 1, such as 0.1 for 10 %\n"
+              "f:4:4: d must be a share from 0 to 1, such as 0.1 for 10 %\n"
+              "f:5:4: e must be a number, not 'x'\n");
 }
 
 TEST(MapReader, KnowsTrueAndFalseOnly) {
@@ -218,7 +240,8 @@ TEST(TextForms, ParseIntegersStrictly) {
     EXPECT_EQ(parse_integer("0"), 0);
     EXPECT_EQ(parse_integer("-12"), -12);
     EXPECT_EQ(parse_integer("9223372036854775807"), INT64_MAX);
-    for (const char* text : {"", "-", "+1", "01", "-01", "1 ", " 1", "1e3", "9223372036854775808"})
+    for (const char* text :
+         {"", "-", "+1", "01", "-01", "-0", "1 ", " 1", "1e3", "9223372036854775808"})
         EXPECT_EQ(parse_integer(text), std::nullopt) << text;
 }
 
@@ -228,6 +251,42 @@ TEST(TextForms, ParseDurationsStrictly) {
     for (const char* text : {"", "ms", "5", "5h", "5ns", "05ms", "-5ms", "5 ms", "5MS",
                              "999999999999s", "99999999999999999999s"})
         EXPECT_EQ(parse_duration(text), std::nullopt) << text;
+}
+
+TEST(TextForms, PatternsOfIntegersTakeTheRangeAndNothingElse) {
+    using Range = std::pair<std::int64_t, std::int64_t>;
+    for (const auto& [min, max] : {Range{0, 255}, Range{1, 247}, Range{0, 0}, Range{7, 7},
+                                   Range{9, 10}, Range{100, 996}, Range{999, 1001}}) {
+        const std::regex pattern('^' + integer_pattern(min, max) + '$');
+        for (std::int64_t i = 0; i <= 1010; ++i)
+            ASSERT_EQ(std::regex_search(std::to_string(i), pattern), i >= min && i <= max)
+                << i << " in " << integer_pattern(min, max);
+        for (const char* text : {"", "-1", "-0", "+1", "01", "1 ", "x"})
+            ASSERT_FALSE(std::regex_search(text, pattern)) << text;
+    }
+}
+
+TEST(TextForms, PatternsOfDurationsTakeWhatIsParsedAndInRange) {
+    using Range = std::pair<Duration, Duration>;
+    for (const auto& [min, max] : {Range{0ms, 10s}, Range{1ms, 2min}, Range{5s, 1h}, Range{1s, 24h},
+                                   Range{0ms, 100ms}, Range{10ms, 10min}}) {
+        const std::string typed_range = duration_pattern(min, max);
+        const std::regex pattern(typed_range);
+        for (const char* unit : {"us", "ms", "s", "min"}) {
+            for (const std::int64_t n :
+                 {0,       1,       2,       4,          5,         9,     10,    11,
+                  60,      99,      100,     101,        119,       120,   121,   999,
+                  1000,    1440,    1441,    3600,       3601,      86400, 86401, 100'000,
+                  100'001, 120'000, 120'001, 10'000'000, 10'000'001}) {
+                const std::string text = std::to_string(n) + unit;
+                const Duration typed = *parse_duration(text);
+                EXPECT_EQ(std::regex_search(text, pattern), typed >= min && typed <= max)
+                    << text << " in " << typed_range;
+            }
+        }
+        for (const char* text : {"", "5", "05s", "5 s", "5h", "-5s", "1.5s", "5s ", "1000000001us"})
+            EXPECT_FALSE(std::regex_search(text, pattern)) << text;
+    }
 }
 
 TEST(TextForms, FormatDurationsInTheLargestExactUnit) {
