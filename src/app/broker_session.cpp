@@ -100,15 +100,16 @@ void BrokerSession::start() {
     sweep();
 }
 
-void BrokerSession::stop() {
+std::unique_ptr<mqtt::Leaving> BrokerSession::stop() {
     alarm_->cancel();
     rebirth_alarm_->cancel();
-    client_.stop();
-    if (!writes_) return;
+    auto leaving = client_.stop();
+    if (!writes_) return leaving;
     for (const Place& place : places_)
         if (place.station != nullptr && place.point == nullptr)
             place.station->bus->cancel(writes_->client);
     writes_.reset();
+    return leaving;
 }
 
 void BrokerSession::offer(std::size_t subject, mqtt::State state) {

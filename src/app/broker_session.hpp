@@ -38,7 +38,8 @@ class BrokerSession {
     void take_over(BrokerSession& before);
 
     void start();
-    void stop();
+    /// What is given keeps the connection until the broker has heard of it; null: there is none.
+    std::unique_ptr<mqtt::Leaving> stop();
 
     /// Of the gateway's lines: what has happened.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);

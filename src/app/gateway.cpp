@@ -242,6 +242,12 @@ void Gateway::stop_accepting() {
     servers_.stop_accepting(longest_answer());
 }
 
+bool Gateway::drained() {
+    if (!servers_.drained()) return false;
+    northbound_.stop();
+    return northbound_.left();
+}
+
 std::string Gateway::status() const {
     return service_status(scene_->plant, servers_.standing(), servers_.missing());
 }

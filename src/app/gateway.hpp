@@ -53,8 +53,8 @@ class Gateway {
     const std::shared_ptr<const config::Config>& config() const { return scene_->config; }
     /// Stops accepting; what was accepted is answered within its deadline.
     void stop_accepting();
-    /// Nothing is owed to any client any more.
-    bool drained() { return servers_.drained(); }
+    /// Nothing is owed to any client any more, and the broker knows that this is the end.
+    bool drained();
     /// Connections to whom something is owed, once nothing more is accepted.
     std::size_t owing() const { return servers_.owing(); }
     /// The longest that a request which was accepted may take to its answer.

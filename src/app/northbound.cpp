@@ -12,7 +12,7 @@ void Northbound::show(const std::shared_ptr<const Scene>& scene) {
     std::unique_ptr<BrokerSession> next;
     if (scene->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, scene);
     if (session_ && next) next->take_over(*session_);
-    if (session_) session_->stop();
+    leave();
     session_ = std::move(next);
     if (session_ && running_) session_->start();
 }
@@ -24,7 +24,12 @@ void Northbound::start() {
 
 void Northbound::stop() {
     running_ = false;
-    if (session_) session_->stop();
+    leave();
+}
+
+void Northbound::leave() {
+    auto leaving = session_ ? session_->stop() : nullptr;
+    if (leaving) leaving_ = std::move(leaving);
 }
 
 void Northbound::on_bus_event(const std::string& line, const bus::BusEvent& event) {

@@ -24,7 +24,10 @@ class Northbound {
     /// the connection stays; else it is made anew, and what waited is kept.
     void show(const std::shared_ptr<const Scene>& scene);
     void start();
+    /// Says the last word. Harmless when it was said.
     void stop();
+    /// The broker has heard that last word, or it is not waited for any more.
+    bool left() const { return !leaving_ || leaving_->done(); }
 
     /// Of the lines of the scene.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
@@ -34,9 +37,12 @@ class Northbound {
     std::optional<mqtt::Counters> counters() const;
 
   private:
+    void leave();
+
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     std::unique_ptr<BrokerSession> session_;  ///< null without a broker
+    std::unique_ptr<mqtt::Leaving> leaving_;  ///< of the session before, or of the last
     bool running_ = false;
 };
 

@@ -242,17 +242,21 @@ void Client::start() {
     state_->dial();
 }
 
-void Client::stop() {
-    if (!std::exchange(state_->running, false)) return;
+std::unique_ptr<Leaving> Client::stop() {
+    if (!std::exchange(state_->running, false)) return nullptr;
     state_->alarm->cancel();
     state_->dialling.cancel();
-    if (state_->connected && state_->connection) {
+    std::unique_ptr<Leaving> leaving;
+    if (std::exchange(state_->connected, false) && state_->connection) {
         state_->connection->publish(state_->publisher.farewell(rt::wall_now()));
         state_->connection->disconnect();
+        leaving = std::make_unique<Leaving>(state_->executor, state_->descriptor->release(),
+                                            state_->clock, std::move(state_->connection),
+                                            state_->settings.leave_within);
     }
     state_->descriptor.reset();
     state_->connection.reset();
-    state_->connected = false;
+    return leaving;
 }
 
 void Client::wake() { state_->wake(); }

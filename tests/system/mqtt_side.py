@@ -3,6 +3,7 @@ import contextlib
 import json
 import pathlib
 import re
+import select
 import shutil
 import signal
 import socket
@@ -160,6 +161,49 @@ class Rude:
         with self._changed:
             assert self._changed.wait_for(lambda: len(self.came) > count, harness.PATIENCE), self.came
             return [after - before for before, after in zip(self.came, self.came[1:])]
+
+
+class Chatty:
+    """A broker of one connection that reads nothing any more once the last word may come, and goes on
+    writing; a context manager."""
+
+    def __init__(self):
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = self._server.getsockname()[1]
+        self._peer = None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    def close(self):
+        self._server.close()
+        if self._peer:
+            self._peer.close()
+
+    def take(self):
+        self._server.settimeout(harness.PATIENCE)
+        self._peer, _ = self._server.accept()
+        self._peer.recv(4096)
+        self._peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+
+    def write_until_it_ends(self):
+        """PINGRESPs, as long as the gateway is there: whether it ended without a reset, and all that
+        it has said."""
+        events = 0
+        poll = select.poll()
+        poll.register(self._peer, select.POLLRDHUP | select.POLLERR)
+        while not events:
+            with contextlib.suppress(BlockingIOError):
+                self._peer.send(b"\xd0\x00" * 32768, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
+            for _, happened in poll.poll(0):
+                events |= happened
+        said = b""
+        while not events & select.POLLERR and (part := self._peer.recv(65536)):
+            said += part
+        return not events & select.POLLERR, said
 
 
 def plant(broker, *stations, more="", line=None):

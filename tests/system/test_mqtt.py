@@ -8,7 +8,7 @@ import unittest
 
 import config
 import harness
-from mqtt_side import (BROKER, Broker, COUNTER, Listener, LOCKED, PRESS, Rude, TOPIC, Truth, changes,
+from mqtt_side import (BROKER, Broker, Chatty, COUNTER, Listener, LOCKED, PRESS, Rude, TOPIC, Truth, changes,
                        first_told, metric, paho, plant)
 from test_points import until
 
@@ -16,6 +16,17 @@ from test_points import until
 @unittest.skipUnless(BROKER and paho, "needs Debian's mosquitto and python3-paho-mqtt "
                                       "(deploy/install_packages.sh test)")
 class Mqtt(unittest.TestCase):
+    def test_a_broker_that_writes_all_the_time_hears_the_last_word(self):
+        with Chatty() as broker, harness.configured(plant(broker)) as program:
+            broker.take()
+            program.log.wait_for("mqtt connected")
+            program.process.send_signal(signal.SIGTERM)
+            well, said = broker.write_until_it_ends()
+            broker.close()
+            program.wait()
+        self.assertTrue(well)
+        self.assertRegex(said, rb'"state":"offline","time":.*\xe0\x00$')  # DISCONNECT
+
     def test_a_broker_that_ends_each_connection_is_tried_ever_more_seldom(self):
         with Rude() as broker, harness.configured(plant(broker)):
             first, _, third = broker.pauses(3)[:3]

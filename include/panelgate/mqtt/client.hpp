@@ -6,6 +6,7 @@
 #include <string>
 
 #include "panelgate/mqtt/counters.hpp"
+#include "panelgate/mqtt/leaving.hpp"
 #include "panelgate/mqtt/publisher.hpp"
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/rt/clock.hpp"
@@ -27,8 +28,9 @@ class Client {
     Client& operator=(const Client&) = delete;
 
     void start();
-    /// Takes leave of the broker, as far as that needs no waiting.
-    void stop();
+    /// Takes leave of the broker; what is given keeps the connection for that long. Null: there is
+    /// none.
+    std::unique_ptr<Leaving> stop();
     /// The publisher has something new.
     void wake();
 

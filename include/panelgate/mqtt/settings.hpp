@@ -40,6 +40,7 @@ struct Settings {
     std::size_t payload = 4096;    ///< bytes of what is taken from the broker
     std::size_t metrics = 64;      ///< of one command of a Sparkplug host
     std::size_t writes = 32;       ///< of the broker that are under way
+    Duration leave_within = 1s;    ///< the broker's closing behind the last word
     Duration accepted_in = 10s;    ///< the broker's answer to a connection
     Duration first_pause = 500ms;  ///< before the broker is tried again; doubled
     Duration longest_pause = 15s;
