@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "panelgate/arbiter/late_window.hpp"
 #include "wiring.hpp"
 
 namespace panelgate::app {
@@ -16,6 +17,10 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     made.profile = station.profile;
     made.response_timeout = settings.response_timeout;
     made.think_time = station.think_time;
+    made.repeats = settings.retries > 0;
+    if (line.arbiter.quarantine == arbiter::Quarantine::line)
+        made.line_rest =
+            arbiter::LateWindow(settings.late_window, settings.response_timeout).value();
     if (!station.automatic_gap) made.frame_gap = settings.frame_gap;
     made.memory = memory_of(station.profile);
     const auto wants = points::wants_of(station.points, station.polls);
@@ -52,6 +57,7 @@ plan::Line line_of(const config::Config& config, const config::Line& line) {
     plan::Line made;
     made.name = line.name;
     made.serial = line.device.serial;
+    made.listens = line.listens;
     made.deadline = line.arbiter.queue.deadline;
     for (std::size_t i = 0; i < line.stations.size(); ++i)
         made.stations.push_back(station_of(line, line.stations[i], line.arbiter.stations[i]));

@@ -79,9 +79,8 @@ void add_plan(json::object& line, const Capacity& capacity) {
                                         {"holds_ms", milliseconds(plan.dead->holds)}};
     }
     line["highest_rate"] = highest_rate_json(capacity);
-    line["headroom"] =
-        json::object{{"load_percent", percent(std::max(0.0, plan::kFull - plan.load))},
-                     {"reads_per_second", rounded(plan.free_reads())}};
+    line["headroom"] = json::object{{"load_percent", percent(plan.free_share())},
+                                    {"reads_per_second", rounded(plan.free_reads())}};
     line["advice"] = std::move(advice);
 }
 

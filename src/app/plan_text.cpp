@@ -39,8 +39,8 @@ std::string text_of(const plan::OneDead& dead) {
 
 std::string headroom_of(const Capacity& capacity) {
     const plan::LinePlan& plan = capacity.plan;
-    std::string text = "  left for clients: " + percent(std::max(0.0, plan::kFull - plan.load)) +
-                       ", " + rounded(plan.free_reads()) + " reads of " +
+    std::string text = "  left for clients: " + percent(plan.free_share()) + ", " +
+                       rounded(plan.free_reads()) + " reads of " +
                        std::to_string(plan::kClientRead) + " registers a second\n";
     if (const auto highest = plan::highest_rate(capacity.line, plan)) {
         text += "  highest rate: all of this " + rounded(highest->times) +
@@ -70,6 +70,7 @@ std::string plan_text(const Capacity& capacity) {
     text += '\n';
     for (const plan::Poll& poll : plan.polls) text += text_of(poll);
     for (const plan::RelayLoad& relay : plan.relays) text += text_of(relay);
+    if (plan.listens) return text + "  it only listens: nothing is ever sent there\n";
     if (plan.dead) text += text_of(*plan.dead);
     text += headroom_of(capacity);
     const bool changing = plan::is_high_by_changes(plan);

@@ -102,14 +102,18 @@ double load_of(const LinePlan& plan, const std::string& station) {
     return load;
 }
 
-/// The first silence costs a response timeout (P4), with the request and the gap around it.
+/// The first silence costs a response timeout (P4), with the request and the gap around it, and the
+/// rest where all have to wait for what may come late.
 Duration silence_of(const Line& line, const Station& station) {
-    return frame_time(line.serial, modbus::kReadRequestAdu) + station.response_timeout +
-           gap_of(line, station);
+    const Duration once = frame_time(line.serial, modbus::kReadRequestAdu) +
+                          station.response_timeout + gap_of(line, station);
+    if (station.line_rest == Duration::zero()) return once;
+    return once + station.line_rest + (station.repeats ? once : Duration::zero());
 }
 
 std::optional<OneDead> worst_case(const Line& line, const LinePlan& plan) {
     std::optional<OneDead> worst;
+    if (line.listens) return worst;
     Duration holds{};
     for (const Station& station : line.stations) {
         const double load = plan.load - load_of(plan, station.name) + kProbes;
@@ -136,9 +140,9 @@ Duration client_read(const Line& line) {
 
 }  // namespace
 
-double LinePlan::free_reads() const {
-    return std::max(0.0, kFull - load) / to_seconds(client_read);
-}
+double LinePlan::free_share() const { return listens ? 0 : std::max(0.0, kFull - load); }
+
+double LinePlan::free_reads() const { return free_share() / to_seconds(client_read); }
 
 std::string_view label(RelayLoad::Request request) {
     switch (request) {
@@ -162,6 +166,7 @@ bool is_high_by_changes(const LinePlan& plan) { return plan.load <= kHigh && pla
 LinePlan make_plan(const Line& line) {
     LinePlan plan;
     plan.line = line.name;
+    plan.listens = line.listens;
     std::vector<Planned> stations;
     for (const Station& station : line.stations) {
         stations.push_back(planned(line, station));

@@ -27,6 +27,10 @@ struct Station {
     const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
     Duration response_timeout = 500ms;
     Duration think_time = 1ms;
+    /// Of the whole line behind its first timeout (`quarantine: line`); then its request is repeated
+    /// before anybody else's, if it is.
+    Duration line_rest{};
+    bool repeats = true;
     /// Silence behind its replies, where it is set; nothing: what its rate and its profile ask for.
     std::optional<Duration> frame_gap;
     std::vector<Asked> asked;
@@ -60,6 +64,7 @@ struct Line {
     std::vector<Station> stations;
     std::vector<Relay> relays;
     Duration deadline = 2s;  ///< of a request, from its arrival to its answer
+    bool listens = false;    ///< nothing is ever sent there
 };
 
 /// Silence behind the replies of one of its stations.

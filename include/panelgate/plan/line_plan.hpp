@@ -59,10 +59,13 @@ struct LinePlan {
     std::vector<RelayLoad> relays;
     double load = 0;
     double most = 0;              ///< when all values change that relays wait for
-    std::optional<OneDead> dead;  ///< nothing without stations
+    std::optional<OneDead> dead;  ///< nothing without stations that are asked
+    bool listens = false;         ///< nothing is ever sent, for nobody
     Duration once{};              ///< everything, one after the other
     Duration client_read = 1ms;   ///< of kClientRead registers, of the slowest station
 
+    /// Of the time, for whoever asks besides.
+    double free_share() const;
     /// Reads of kClientRead registers a second that the wire has time for besides.
     double free_reads() const;
 };

@@ -43,6 +43,27 @@ relays:
 http: {listen: "127.0.0.1:8080"}
 )";
 
+constexpr const char* kResting = R"(lines:
+  - {name: a, device: sim, quarantine: line, timing: {late_window: 5s}, stations: [{id: 1, name: x}]}
+  - {name: b, device: sim, quarantine: line, timing: {response_timeout: 300ms}, stations: [{id: 2, name: y}]}
+  - {name: c, device: sim, stations: [{id: 3, name: z}]}
+  - {name: d, device: /dev/ttyS0, mode: listen, stations: [{id: 4, name: t}]}
+http: {listen: "127.0.0.1:8080"}
+)";
+
+TEST(Capacity, P4CountsTheRestOfAWholeLine) {
+    const std::vector<Capacity> all = capacities(load(kResting));
+    EXPECT_EQ(all[0].line.stations[0].line_rest, Duration(5s));
+    EXPECT_EQ(all[1].line.stations[0].line_rest, Duration(300ms));
+    EXPECT_EQ(all[2].line.stations[0].line_rest, Duration(0));
+}
+
+TEST(Capacity, OfALineThatListensItSaysOnlyThat) {
+    const std::vector<Capacity> all = capacities(load(kResting));
+    EXPECT_THAT(plan_text(all[3]), HasSubstr("it only listens"));
+    EXPECT_THAT(plan_text(all[3]), Not(HasSubstr("left for clients")));
+}
+
 TEST(Capacity, TakesFromAConfigurationWhatLoadsEachLine) {
     const config::Config config = load(kTwoLines);
     const std::vector<Capacity> all = capacities(config);

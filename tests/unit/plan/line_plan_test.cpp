@@ -105,6 +105,24 @@ TEST_F(LinePlanTest, P4TheWorstDeadStationIsTheOneThatWasAskedLeast) {
         << "press may fall silent as well";
 }
 
+TEST_F(LinePlanTest, P4WhereTheWholeLineRestsTheOthersWaitForThatToo) {
+    ask(add("press"), 0, 100, 500ms);
+    const Duration alone = make_plan(line).dead->holds;
+    line.stations[0].line_rest = 5s;
+    EXPECT_EQ(make_plan(line).dead->holds, 2 * alone + Duration(5s)) << "and is asked again";
+    line.stations[0].repeats = false;
+    EXPECT_EQ(make_plan(line).dead->holds, alone + Duration(5s));
+}
+
+TEST_F(LinePlanTest, OfALineThatListensNothingIsLeftAndNobodyHoldsItUp) {
+    add("press");
+    line.listens = true;
+    const LinePlan plan = make_plan(line);
+    EXPECT_FALSE(plan.dead);
+    EXPECT_EQ(plan.free_share(), 0);
+    EXPECT_EQ(plan.free_reads(), 0);
+}
+
 TEST_F(LinePlanTest, WhatIsLeftIsForClients) {
     Station& press = add("press");
     const LinePlan idle = make_plan(line);
