@@ -99,6 +99,11 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
     return ticket;
 }
 
+void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
+    for (const Job& job : schedule_.backlog().remove_if(match)) ledger_.finish(job, Fault::denied);
+    step(now);
+}
+
 void Arbiter::cancel(TimePoint now, Client client) {
     ledger_.on_client_gone(client);
     names_.forget(client);

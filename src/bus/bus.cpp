@@ -100,6 +100,8 @@ void Bus::State::act(arbiter::Finish& finish) {
     pending.erase(found);
     Answer result;
     result.pdu = std::move(finish.pdu);
+    if (!result.pdu && result.pdu.error() == Fault::denied)
+        result.refusal = rights.judge_write(entry.station);
     if (entry.sent_as != 0) {
         if (finish.transmitted)
             account.counters().translated(entry.station, entry.function, entry.sent_as);

@@ -20,7 +20,16 @@ void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other,
         return change_soon();
     }
     take(std::move(next));
-    drive.tell([this](TimePoint) { arbiter.apply(settings.arbiter); });
+    drive.tell([this](TimePoint now) {
+        arbiter.apply(settings.arbiter);
+        deny_what_is_forbidden(now);
+    });
+}
+
+void Bus::State::deny_what_is_forbidden(TimePoint now) {
+    arbiter.deny(now, [this](const arbiter::Job& job) {
+        return !job.request.is_read() && rights.judge_write(job.station);
+    });
 }
 
 void Bus::State::take(Settings next) {
@@ -52,9 +61,10 @@ void Bus::State::change_line() {
         take(std::move(made.settings));
         line = std::move(made.line);
         drive.use(*line);
-        drive.hear([this](TimePoint) {
+        drive.hear([this](TimePoint now) {
             arbiter.on_line_left();
             arbiter.apply(settings.arbiter);
+            deny_what_is_forbidden(now);
         });
         line->start(*this);
     });

@@ -58,6 +58,8 @@ struct Bus::State final : public line::Line::Events {
 
     void apply(Settings next, std::unique_ptr<line::Line> other, std::shared_ptr<void> far_end);
     void take(Settings next);
+    /// What has waited since before a change and may not be written any more is refused (P2).
+    void deny_what_is_forbidden(TimePoint now);
     void change_soon();
     void change_line();
     void transact(Request request, AnswerHandler handler);

@@ -13,6 +13,7 @@
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
+#include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/ledger.hpp"
 #include "panelgate/arbiter/pace.hpp"
 #include "panelgate/arbiter/quiet.hpp"
@@ -75,6 +76,9 @@ class Arbiter {
     /// Accepts a job (its deadline is set here), or a fault at once: busy, line_down, offline. An
     /// accepted job gets exactly one Finish.
     Result<Ticket> submit(TimePoint now, Job job);
+    /// What waits for its first turn and matches is finished as denied and never transmitted: the
+    /// rights have changed since it came.
+    void deny(TimePoint now, const JobQueue::Test& match);
     /// The client is gone: what it has waiting is finished as cancelled and never transmitted;
     /// what is on the wire is not sent again for it.
     void cancel(TimePoint now, Client client);

@@ -2,12 +2,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
 #include <functional>
 #include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
@@ -71,6 +73,24 @@ class BusTest : public testing::Test {
     std::vector<std::string> seen;  ///< why the line's state is not just that
     std::unique_ptr<Bus> bus;
 };
+
+TEST_F(BusTest, P2WhatWaitsIsNotWrittenOnceTheStationMayOnlyBeRead) {
+    bus->start();
+    std::vector<Answer> answers;
+    const auto asks = [&](std::uint8_t station, const Bytes& pdu) {
+        bus->transact({.station = station, .request = test::request_of(pdu), .client = 1},
+                      [&](Answer answer) { answers.push_back(std::move(answer)); });
+    };
+    for (const int station : {17, 17, 99, 17}) asks(static_cast<std::uint8_t>(station), kWrite);
+    asks(17, kRead);
+    settings.stations[17].access = Access::read_only;
+    bus->apply(settings, nullptr, nullptr);
+    ASSERT_TRUE(run_until([&] { return answers.size() == 5; }));
+    const Refusal now{Rule::read_only, "press", modbus::ExceptionCode::illegal_function};
+    EXPECT_EQ(std::ranges::count(answers, std::optional(now), &Answer::refusal), 3);
+    EXPECT_EQ(std::ranges::count(answers, true, &Answer::transmitted), 2)
+        << "another's, and a read";
+}
 
 TEST_F(BusTest, AGuardedStationIsNotAskedWhatItsProfileRulesOut) {
     bus->start();
