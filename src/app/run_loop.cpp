@@ -1,7 +1,9 @@
 #include "run_loop.hpp"
 
+#include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <csignal>
+#include <memory>
 #include <string>
 
 #include "panelgate/base/time.hpp"
@@ -101,10 +103,22 @@ class Loop {
     ExitCode code_ = kFine;
 };
 
+/// A signal that comes behind the last turn of the loop must not end by its default, with another
+/// exit code, what has ended. Never destroyed: whoever is destroyed last gives the default back.
+void keep_until_the_process_goes() {
+    struct Kept {
+        asio::io_context nobody_runs{1};
+        asio::signal_set signals{nobody_runs, SIGTERM, SIGINT, SIGHUP};
+    };
+    static const auto* kept = std::make_unique<Kept>().release();
+    static_cast<void>(kept);
+}
+
 }  // namespace
 
 SignalLoop::SignalLoop(asio::io_context& io)
     : io_(io), ends_(io, SIGTERM, SIGINT), reloads_(io, SIGHUP) {
+    keep_until_the_process_goes();
     std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
     std::signal(SIGUSR1, SIG_IGN);  // a habit of those who rotate logs; it would end the gateway
     std::signal(SIGUSR2, SIG_IGN);

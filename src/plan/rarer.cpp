@@ -75,6 +75,19 @@ Line with(const Line& line, const Scope& scope, Duration every) {
     return made;
 }
 
+/// "100ms", or "100ms to 130ms": what is asked more often than that now.
+std::string intervals_of(const Line& line, const Scope& scope, Duration every) {
+    Duration shortest = every;
+    Duration longest{};
+    for (const Asked& asked : line.stations[scope.station].asked) {
+        if (!scope.holds(asked) || asked.want.every >= every) continue;
+        shortest = std::min(shortest, asked.want.every);
+        longest = std::max(longest, asked.want.every);
+    }
+    const std::string text = format_duration(shortest);
+    return longest > shortest ? text + " to " + format_duration(longest) : text;
+}
+
 std::string text_of(const Poll& poll, const Scope& scope) {
     const std::string text = "read " + poll.station + ' ' + scope.first->notation;
     if (scope.first->want.span.first != scope.last->want.span.first)
@@ -140,7 +153,7 @@ std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan)
         Line made = with(line, scope, every);
         if (!is_enough(made)) continue;
         return Change{text_of(*dearest.first, scope) + " every " + format_duration(every) +
-                          " instead of " + format_duration(now),
+                          " instead of " + intervals_of(line, scope, every),
                       std::move(made)};
     }
     return std::nullopt;

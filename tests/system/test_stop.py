@@ -43,6 +43,13 @@ class Stop(unittest.TestCase):
             program.log.wait_for("reload outcome=unchanged")
             self.assertIsNone(program.process.poll())
 
+    def test_a_second_sigterm_right_behind_changes_nothing_where_nobody_is_owed_an_answer(self):
+        for _ in range(10):
+            with harness.configured(config.gateway(config.line())) as program:
+                program.process.send_signal(signal.SIGTERM)
+                while program.process.poll() is None:
+                    program.process.send_signal(signal.SIGTERM)
+
     def test_a_second_sigterm_ends_at_once_with_a_code_and_a_line_when_requests_are_cut(self):
         with awaited(None) as (program, _):
             program.process.terminate()

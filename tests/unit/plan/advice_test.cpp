@@ -232,6 +232,13 @@ TEST_F(AdviceTest, PointsOfOneReadAreToldFromTheFirstToTheLast) {
     EXPECT_LE(rarer.load, kHigh);
 }
 
+TEST_F(AdviceTest, PointsOfOneReadWithSeveralIntervalsAreToldWithAllOfThem) {
+    Station& press = add("press");
+    for (const std::uint32_t first : {8u, 0u}) ask(press, first, 2, 40ms);
+    ask(press, 4, 2, 45ms);
+    EXPECT_THAT(find("read press R0 to R8 every ").what, HasSubstr(" instead of 40ms to 45ms"));
+}
+
 TEST_F(AdviceTest, ABlockThatIsCutIsOne) {
     ask(add("press"), 0, 300, 500ms);
     EXPECT_THAT(find("read press R0 (300) every ").what, HasSubstr("instead of 500ms"));

@@ -124,7 +124,7 @@ void follow_merges(Line& line, std::string pairs) {
 Line followed(const Line& before, const std::string& what) {
     static const std::regex kRate(R"(serial: \{baud: (\d+)\} \(of all panels, too\))");
     static const std::regex kRead(
-        R"(read (\w+) R(\d+)(?: to R(\d+)| \(\d+\)) every (\d+\w+) instead of \d+\w+)");
+        R"(read (\w+) R(\d+)(?: to R(\d+)| \(\d+\)) every (\d+\w+) instead of \d+\w+(?: to \d+\w+)?)");
     static const std::regex kAll(
         R"(all intervals ([\d.]+) times as long(?: \((24h at most)?(?:, )?(?:refresh as it is)?\))?)");
     static const std::regex kMerge(R"(one relay instead of (.*))");
