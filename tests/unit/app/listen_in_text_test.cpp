@@ -24,5 +24,27 @@ TEST(ListenInText, OfOthersIsNotItsOwn) {
     EXPECT_EQ(http_listen_in("http:\n  relisten: 127.0.0.1:2\n"), "");
 }
 
+TEST(ListenInText, WhatIsDeeperIsNotItsOwn) {
+    EXPECT_EQ(http_listen_in("http: {tls: {listen: 127.0.0.1:1}}\n["), "");
+    EXPECT_EQ(http_listen_in("http: {tls: {listen: 127.0.0.1:1}, listen: 127.0.0.1:2}\n["),
+              "127.0.0.1:2");
+    EXPECT_EQ(http_listen_in("http:\n  tokens:\n    - listen: 127.0.0.1:1\n["), "");
+    EXPECT_EQ(http_listen_in("http:\n  tls:\n    listen: 127.0.0.1:1\n  listen: 127.0.0.1:2\n["),
+              "127.0.0.1:2");
+}
+
+TEST(ListenInText, OfTwoNoneIsTaken) {
+    EXPECT_EQ(http_listen_in("<<<<<<< ours\nhttp: {listen: 127.0.0.1:1}\n=======\n"
+                             "http: {listen: 127.0.0.1:2}\n>>>>>>> theirs\n"),
+              "");
+    EXPECT_EQ(http_listen_in("http: {listen: 127.0.0.1:1}\nhttp: {anonymous: none}\n"), "");
+    EXPECT_EQ(http_listen_in("http: {listen: 127.0.0.1:1}\nhttp: {listen: 127.0.0.1:1}\n"),
+              "127.0.0.1:1");
+}
+
+TEST(ListenInText, AByteOrderMarkIsSkipped) {
+    EXPECT_EQ(http_listen_in("\xEF\xBB\xBFhttp: {listen: 127.0.0.1:1}\n["), "127.0.0.1:1");
+}
+
 }  // namespace
 }  // namespace panelgate::app
