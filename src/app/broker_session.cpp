@@ -209,7 +209,7 @@ void BrokerSession::refuse(const std::string& topic, const std::string& id,
             {{"topic", web::excerpt(topic)}, {"why", why.detail}});
     json::object body{{"ok", false}};
     for (const auto& [name, value] : web::json_of(why)) body[name] = value;
-    publisher_.answer({topic, id, web::json_text(body)});
+    publisher_.answer({topic, id, web::json_text(body)}, true);
     client_.wake();
 }
 
@@ -219,6 +219,8 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     const std::string topic = publisher_.topic_of(command.point);
     if (writes_->open >= settings_.writes)
         return refuse(topic, command.id, web::problem(503, "too many writes are under way"));
+    if (!publisher_.has_room_for_answer(writes_->open))
+        return refuse(topic, command.id, web::problem(503, "too many answers wait for the broker"));
     const profile::ProfileRef profile = station.configured->profile;
     auto order = web::order_of(*station.bus, station.id, *profile, *place.point, command.value);
     if (!order) {
@@ -248,7 +250,7 @@ void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
     ++(told ? counters_.writes_ok : counters_.writes_failed);
     json::object body{{"ok", static_cast<bool>(told)}};
     for (const auto& [name, value] : told ? *told : web::json_of(told.error())) body[name] = value;
-    publisher_.answer({order.topic, order.id, web::json_text(body)});
+    publisher_.answer({order.topic, order.id, web::json_text(body)}, false);
     client_.wake();
 }
 

@@ -1,5 +1,6 @@
 #include "panelgate/mqtt/publisher.hpp"
 
+#include <algorithm>
 #include <set>
 #include <utility>
 
@@ -72,10 +73,11 @@ void Publisher::repeat(std::size_t subject) {
     if (states_[subject]) store_.add(subject, *states_[subject]);
 }
 
-void Publisher::answer(const WriteResult& result) {
+void Publisher::answer(const WriteResult& result, bool refused) {
     auto message = wording_->result(result);
     if (!message) return;
-    if (results_.size() >= settings_.results) {
+    const std::size_t kept = refused ? std::min(settings_.writes, settings_.results) : 0;
+    if (results_.size() + kept >= settings_.results) {
         ++results_dropped_;
     } else {
         results_.add(std::move(*message));

@@ -39,8 +39,13 @@ class Publisher {
     /// Its state is sent once more.
     void repeat(std::size_t subject);
     /// Told after what waits, until the broker has it; beyond Settings::results it is lost, and
-    /// counted.
-    void answer(const WriteResult& result);
+    /// counted. Of writes that were refused less find room, so that they take none from those that
+    /// were carried out.
+    void answer(const WriteResult& result, bool refused);
+    /// Whether the answer to one more write, besides so many that are under way, has a place (P2).
+    bool has_room_for_answer(std::size_t under_way) const {
+        return results_.size() + under_way < settings_.results;
+    }
     std::uint64_t results_dropped() const { return results_dropped_; }
 
     /// A connection is to be made; its will.

@@ -133,8 +133,8 @@ TEST_F(MqttJson, WithoutTheSwitchNobodyWrites) {
 TEST_F(MqttJson, ResultsSayWhichWriteTheyAreOf) {
     publisher_.connected();
     take_all(publisher_);
-    publisher_.answer({publisher_.topic_of(2), "7", R"({"ok":true})"});
-    publisher_.answer({publisher_.topic_of(2), "", R"({"ok":false})"});
+    publisher_.answer({publisher_.topic_of(2), "7", R"({"ok":true})"}, false);
+    publisher_.answer({publisher_.topic_of(2), "", R"({"ok":false})"}, false);
     const auto all = take_all(publisher_);
     ASSERT_EQ(all.size(), 2U);
     EXPECT_EQ(all[0].message,

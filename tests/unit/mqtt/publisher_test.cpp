@@ -142,22 +142,34 @@ TEST_F(MqttPublisher, AnotherPlantTakesOverWhatItHasToo) {
 TEST_F(MqttPublisher, AnswersAreBoundedAndWhatFindsNoRoomIsCounted) {
     publisher_.connected();
     take_all(publisher_);
-    for (std::size_t i = 0; i < settings().results + 3; ++i) publisher_.answer({"x", "", "{}"});
+    for (std::size_t i = 0; i < settings().results + 3; ++i)
+        publisher_.answer({"x", "", "{}"}, false);
     EXPECT_EQ(take_all(publisher_).size(), settings().results);
     EXPECT_EQ(publisher_.results_dropped(), 3U);
+}
+
+TEST_F(MqttPublisher, P2WhatWasRefusedTakesNoPlaceFromWhatWasCarriedOut) {
+    const std::size_t all = settings().results;
+    for (std::size_t i = 0; i < 2 * all; ++i) publisher_.answer({"refused", "", "{}"}, true);
+    EXPECT_TRUE(publisher_.has_room_for_answer(settings().writes - 1));
+    EXPECT_FALSE(publisher_.has_room_for_answer(settings().writes));
+    for (std::size_t i = 0; i < settings().writes; ++i)
+        publisher_.answer({"done", "", "{}"}, false);
+    EXPECT_EQ(publisher_.results_dropped(), all + settings().writes);
+    EXPECT_FALSE(publisher_.has_room_for_answer(0));
 }
 
 TEST_F(MqttPublisher, P2AnAnswerIsToldUntilTheBrokerHasIt) {
     publisher_.connected();
     take_all(publisher_);
-    publisher_.answer({"t/a", "", "{}"});
-    publisher_.answer({"t/b", "", "{}"});
+    publisher_.answer({"t/a", "", "{}"}, false);
+    publisher_.answer({"t/b", "", "{}"}, false);
     const auto first = publisher_.next(kNoon);
     ASSERT_TRUE(first && first->change != 0);
     take_all(publisher_);
     publisher_.delivered(first->change);
     publisher_.disconnected();  // before the broker has the second one
-    publisher_.answer({"t/c", "", "{}"});
+    publisher_.answer({"t/c", "", "{}"}, false);
     publisher_.connected();
     EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("t/status", "t/b/result", "t/c/result"));
 }
@@ -165,18 +177,18 @@ TEST_F(MqttPublisher, P2AnAnswerIsToldUntilTheBrokerHasIt) {
 TEST_F(MqttPublisher, AnswersThatWaitGoWithTheirSessionToTheNext) {
     publisher_.connected();
     take_all(publisher_);
-    publisher_.answer({"t/a", "", "{}"});
+    publisher_.answer({"t/a", "", "{}"}, false);
     Publisher next(settings(), small_plant());
     next.take_over(publisher_);
     next.disconnected();  // the broker cannot be reached yet
-    next.answer({"t/b", "", "{}"});
+    next.answer({"t/b", "", "{}"}, false);
     next.connected();
     EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status", "t/a/result", "t/b/result"));
 }
 
 TEST_F(MqttPublisher, AnotherBrokerIsToldNoAnswersOfThisOne) {
     publisher_.connected();
-    publisher_.answer({"t/a", "", "{}"});
+    publisher_.answer({"t/a", "", "{}"}, false);
     Settings other = settings();
     other.port = 1884;
     Publisher next(other, Subjects());
