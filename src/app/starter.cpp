@@ -85,7 +85,8 @@ std::string station_of(const scan::StationFinding& finding, const profile::Catal
     for (std::size_t i = 1; i < candidates.size(); ++i) text += ' ' + candidates[i].profile;
     text += "\n        access: read_write   # or read_only\n";
     if (finding.evidence.late > 0)
-        text += "        timing: {response_timeout: 2s}   # it answered late: 500 ms are too short\n";
+        text +=
+            "        timing: {response_timeout: 2s}   # it answered late: 500 ms are too short\n";
     if (finding.crc_order == modbus::CrcOrder::high_first)
         text += "        crc_order: high_first   # of the panel's firmware\n";
     const profile::PanelProfile* known = profiles.find(profile);

@@ -27,8 +27,8 @@ struct Station {
     const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
     Duration response_timeout = 500ms;
     Duration think_time = 1ms;
-    /// Of the whole line behind its first timeout (`quarantine: line`); then its request is repeated
-    /// before anybody else's, if it is.
+    /// Of the whole line behind its first timeout (`quarantine: line`); then its request is
+    /// repeated before anybody else's, if it is.
     Duration line_rest{};
     bool repeats = true;
     /// Silence behind its replies, where it is set; nothing: what its rate and its profile ask for.
