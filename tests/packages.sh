@@ -2,29 +2,20 @@
 # tests/packages.sh [PACKAGE.deb]   (default: what deploy/package.sh has made for this machine)
 # Takes a package through its life in a Debian of its own: installed, started as its unit says,
 # reloaded, upgraded, removed, installed again, purged. Without systemd as the first process (that is
-# tests/service.sh), so the unit's command is run by hand, as the package's user. Cut off from all networks. Needs root and what
-# deploy/install_packages.sh package brings; ends with 77 where something is missing. A package of
-# another architecture runs by qemu, after deploy/package.sh ARCH --test has made what that needs.
+# tests/service.sh), so the unit's command is run by hand, as the package's user. Cut off from all
+# networks. Needs root and what deploy/install_packages.sh package brings; ends with 77 where something
+# is missing. A package of another architecture runs by qemu, after deploy/package.sh ARCH --test has
+# made what that needs.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 . tests/support/debian.sh
 
-skip() { echo "packages.sh: skipped, $*"; exit 77; }
 fail() { echo "packages.sh: $*" >&2; [ ! -e "$log" ] || cat "$log" >&2; exit 1; }
-must() { "$@" || fail "failed: $*"; }
-must_not() { ! "$@" || fail "should have failed: $*"; }
-say() { echo "== $*"; }
 
 here=$(dpkg --print-architecture)
-package=${1-$(find build/packages -name "panelgate_*_$here.deb" 2>/dev/null | sort -V | tail -n 1)}
-[ -n "$package" ] || skip "there is no package: deploy/package.sh"
-[ -e "$package" ] || { echo "packages.sh: there is no $package" >&2; exit 66; }
-package=$(readlink -f "$package")
+find_package "$@"
 architecture=$(dpkg-deb -f "$package" Architecture)
-[ "$(id -u)" = 0 ] || skip "it needs root"
-for tool in mmdebstrap unshare setpriv curl python3 ip arch-test; do
-    command -v $tool >/dev/null || skip "there is no $tool here"
-done
+need_root_and mmdebstrap unshare setpriv curl python3 ip arch-test
 arch-test "$architecture" >/dev/null 2>&1 ||
     skip "this machine runs no $architecture (qemu-user-static, and binfmt_misc mounted)"
 
@@ -53,7 +44,6 @@ install() { inside dpkg -i "/$1" >"$log" 2>&1 || fail "dpkg -i $1"; }
 state() { inside dpkg-query -W -f '${db:Status-Abbrev}' panelgate 2>/dev/null || true; }
 is() { [ "$(state)" = "$1" ] || fail "it is '$(state)', not '$1'"; }
 told() { grep -q "$1" "$root.told"; }
-within() { local end=$((SECONDS + 60)); until "$@"; do [ $SECONDS -lt $end ] || fail "not within 60 s: $*"; done; }
 values() { curl -sf "$url/api/v1/stations/press/devices/UW0?count=5" | grep -q '"values":\[10,20,30,40,50\]'; }
 
 prepare() {

@@ -9,22 +9,12 @@ set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 . tests/support/debian.sh
 
-skip() { echo "service.sh: skipped, $*"; exit 77; }
 fail() { echo "service.sh: $*" >&2; inside journalctl --no-pager -n 40 >&2 || true; exit 1; }
-must() { "$@" || fail "failed: $*"; }
-must_not() { ! "$@" || fail "should have failed: $*"; }
-say() { echo "== $*"; }
 # A watchdog of 30 s and a machine that has much to do
-within() { local end=$((SECONDS + 120)); until "$@"; do [ $SECONDS -lt $end ] || fail "not within 120 s: $*"; sleep 0.2; done; }
+patience=120
 
-package=${1-$(find build/packages -name "panelgate_*_$(dpkg --print-architecture).deb" 2>/dev/null | sort -V | tail -n 1)}
-[ -n "$package" ] || skip "there is no package: deploy/package.sh"
-[ -e "$package" ] || { echo "service.sh: there is no $package" >&2; exit 66; }
-package=$(readlink -f "$package")
-[ "$(id -u)" = 0 ] || skip "it needs root"
-for tool in mmdebstrap systemd-nspawn nsenter; do
-    command -v $tool >/dev/null || skip "there is no $tool here"
-done
+find_package "$@"
+need_root_and mmdebstrap systemd-nspawn nsenter
 
 work=$(mktemp -d)
 container=

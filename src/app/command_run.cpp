@@ -23,7 +23,6 @@
 #include "panelgate/rt/punctual.hpp"
 #include "panelgate/rt/service_manager.hpp"
 #include "prepare.hpp"
-
 #include "reloader.hpp"
 #include "run_loop.hpp"
 

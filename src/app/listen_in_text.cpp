@@ -5,13 +5,14 @@
 #include <set>
 #include <vector>
 
+#include "panelgate/base/utf8.hpp"
+
 namespace panelgate::app {
 namespace {
 
 constexpr std::string_view kHttp = "http:";
 constexpr std::string_view kListen = "listen:";
 constexpr std::string_view kBlank = " \t";
-constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 bool is_one_of(std::string_view set, char c) { return set.find(c) != std::string_view::npos; }
 
@@ -74,7 +75,7 @@ std::optional<std::string> in_block(const std::vector<std::string_view>& lines, 
 }  // namespace
 
 std::string http_listen_in(std::string_view text) {
-    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+    text.remove_prefix(byte_order_mark(text));
     const std::vector<std::string_view> lines = lines_of(text);
     std::set<std::string> found;
     for (std::size_t i = 0; i < lines.size(); ++i) {

@@ -30,6 +30,11 @@ bool is_utf8(std::string_view text) {
     return true;
 }
 
+std::size_t byte_order_mark(std::string_view text) {
+    constexpr std::string_view kMark = "\xef\xbb\xbf";
+    return text.starts_with(kMark) ? kMark.size() : 0;
+}
+
 std::string as_utf8(std::string_view bytes) {
     std::string text;
     text.reserve(bytes.size());

@@ -15,6 +15,7 @@
 namespace panelgate::config {
 namespace {
 
+using yaml::format_milliseconds;
 using yaml::Mark;
 using yaml::Node;
 
@@ -38,11 +39,6 @@ std::optional<Mark> timeout_mark(const Node& body, const arbiter::StationSetting
 Mark deadline_mark(const Node& line) {
     const Node* deadline = find(find(&line, "queue"), "deadline");
     return deadline == nullptr ? line.mark : deadline->mark;
-}
-
-/// Whole milliseconds: a time on the wire has no shorter text.
-std::string text(Duration duration) {
-    return yaml::format_duration(std::chrono::ceil<std::chrono::milliseconds>(duration));
 }
 
 struct Wait {
@@ -76,11 +72,11 @@ void warn_of_read(Loading& loading, const Node& node, const Line& line, const Re
     const std::string noun = read.bits ? " bits" : " registers";
     const std::size_t most = most_items(serial, read.bits, line.arbiter.queue.deadline);
     loading.warn(deadline_mark(node),
-                 read.what + " (" + std::to_string(read.count) + noun + ") takes " + text(wire) +
-                     " on the wire at " + to_string(serial) +
+                 read.what + " (" + std::to_string(read.count) + noun + ") takes " +
+                     format_milliseconds(wire) + " on the wire at " + to_string(serial) +
                      " and can never be answered before the queue's deadline of " +
-                     text(line.arbiter.queue.deadline) + ": set queue: {deadline: " + text(enough) +
-                     "}" +
+                     format_milliseconds(line.arbiter.queue.deadline) +
+                     ": set queue: {deadline: " + format_milliseconds(enough) + "}" +
                      (most == 0 ? "" : ", or ask for at most " + std::to_string(most) + noun));
 }
 
@@ -90,11 +86,12 @@ void warn_of_deadline(Loading& loading, const Node& node, const Line& line) {
     const Duration deadline = line.arbiter.queue.deadline;
     const Wait wait = longest_wait(node, line);
     if (wait.timeout >= deadline) {
-        loading.warn(wait.mark, "response_timeout " + text(wait.timeout) +
-                                    " is not below the queue's deadline of " + text(deadline) +
-                                    ": no reply that late is ever waited for; raise "
-                                    "queue.deadline above " +
-                                    text(wait.timeout) + ", or lower response_timeout");
+        loading.warn(wait.mark,
+                     "response_timeout " + format_milliseconds(wait.timeout) +
+                         " is not below the queue's deadline of " + format_milliseconds(deadline) +
+                         ": no reply that late is ever waited for; raise "
+                         "queue.deadline above " +
+                         format_milliseconds(wait.timeout) + ", or lower response_timeout");
     }
     const std::optional<Read> poll = longest_poll(line);
     const std::optional<Read> read = longest_read(line);

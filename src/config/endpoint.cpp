@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "panelgate/base/network.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
@@ -27,19 +28,12 @@ bool is_mapped(const std::string& address) {
 }
 
 /// IPv4 as ::ffff:10.0.0.1; nothing on what is no address.
-std::optional<std::array<unsigned char, 16>> as_v6(const std::string& address) {
-    std::array<unsigned char, 16> bytes{};
+std::optional<AddressBytes> as_v6(const std::string& address) {
+    AddressBytes bytes{};
     if (inet_pton(AF_INET6, address.c_str(), bytes.data()) == 1) return bytes;
     bytes[10] = bytes[11] = 0xFF;
     if (inet_pton(AF_INET, address.c_str(), bytes.data() + 12) == 1) return bytes;
     return std::nullopt;
-}
-
-/// With zeros behind so many bits.
-std::array<unsigned char, 16> masked(std::array<unsigned char, 16> bytes, unsigned prefix) {
-    for (std::size_t bit = prefix; bit < 8 * bytes.size(); ++bit)
-        bytes.at(bit / 8) &= static_cast<unsigned char>(~(0x80U >> (bit % 8)));
-    return bytes;
 }
 
 }  // namespace
@@ -67,10 +61,12 @@ bool is_any_address(const std::string& address) {
 }
 
 std::string network_of(const Cidr& cidr) {
-    std::array<unsigned char, 16> typed{};
+    std::array<unsigned char, 16> bytes{};
     const int family = is_ipv6(cidr.address) ? AF_INET6 : AF_INET;
-    if (inet_pton(family, cidr.address.c_str(), typed.data()) != 1) return "";
-    const auto bytes = masked(typed, cidr.prefix);
+    if (inet_pton(family, cidr.address.c_str(), bytes.data()) != 1) return "";
+    const auto typed = bytes;
+    for (std::size_t bit = cidr.prefix; bit < 8 * bytes.size(); ++bit)
+        bytes.at(bit / 8) &= static_cast<unsigned char>(~(0x80U >> (bit % 8)));
     if (bytes == typed) return "";
     std::array<char, INET6_ADDRSTRLEN> text{};
     inet_ntop(family, bytes.data(), text.data(), text.size());
@@ -81,7 +77,7 @@ bool is_in(const std::string& address, const std::string& network, unsigned pref
     const auto one = as_v6(address);
     const auto other = as_v6(network);
     const unsigned bits = is_ipv6(network) ? prefix : prefix + 96;
-    return one && other && masked(*one, bits) == masked(*other, bits);
+    return one && other && same_prefix(*one, *other, bits);
 }
 
 std::optional<Cidr> parse_cidr(std::string_view text) {

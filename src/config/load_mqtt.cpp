@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "loader.hpp"
+#include "panelgate/base/utf8.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/yaml/quote.hpp"
 
@@ -87,7 +88,7 @@ std::string load_password(Loading& loading, MapReader& in) {
                    "and that this program may read");
         return "";
     }
-    if (text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
+    text->erase(0, byte_order_mark(*text));
     while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
     if (text->empty()) in.problem("password_file", "the password file is empty");
     if (!in.has("username"))

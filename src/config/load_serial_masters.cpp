@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -112,7 +111,7 @@ void warn_of_timeout(Loading& loading, MapReader& in, const Settings& settings) 
             who = station.name;
         });
     if (needed <= *settings.response_timeout) return;
-    const auto text = yaml::format_duration(std::chrono::ceil<std::chrono::milliseconds>(needed));
+    const auto text = yaml::format_milliseconds(needed);
     loading.warn(in.mark("response_timeout"),
                  "station '" + who + "' may take " + text +
                      " to answer on its line, and this master waits for " +

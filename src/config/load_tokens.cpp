@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "panelgate/base/utf8.hpp"
+
 namespace panelgate::config {
 namespace {
 
@@ -36,7 +38,7 @@ std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
         return "";
     }
     auto text = loading.files.read(*file);
-    if (text && text->starts_with("\xef\xbb\xbf")) text->erase(0, 3);
+    if (text) text->erase(0, byte_order_mark(*text));
     if (!text) {
         // Not the text: whoever took the token for its file has written that.
         in.problem("file", "cannot read the token file" + path_of(in.child("file")) +

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "panelgate/base/utf8.hpp"
 #include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
@@ -50,8 +51,7 @@ void take_line(std::string_view whole, int number, std::vector<MbusdLine>& lines
 
 std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems) {
     std::vector<MbusdLine> lines;
-    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-    if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+    text.remove_prefix(byte_order_mark(text));
     for (int number = 1; !text.empty(); ++number) {
         const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
         take_line(text.substr(0, end), number, lines, problems);

@@ -151,9 +151,6 @@ void read_field(const ProtobufField& field, HeardMetric& heard) {
         case metric::kBoolean:
             heard.value = field.value != 0;
             break;
-        case metric::kIsNull:
-            heard.is_null = field.value != 0;
-            break;
         case metric::kString:
             heard.value = std::string(field.bytes);
             break;
@@ -165,11 +162,15 @@ void read_field(const ProtobufField& field, HeardMetric& heard) {
 std::optional<HeardMetric> parse_metric(std::string_view text) {
     HeardMetric heard;
     ProtobufReader in(text);
-    while (const auto field = in.next()) read_field(*field, heard);
+    bool is_null = false;
+    while (const auto field = in.next()) {
+        if (field->number == metric::kIsNull) is_null = field->value != 0;
+        read_field(*field, heard);
+    }
     const auto* text_value = heard.value ? std::get_if<std::string>(&*heard.value) : nullptr;
     if (!in.ok() || !is_utf8(heard.name) || (text_value != nullptr && !is_utf8(*text_value)))
         return std::nullopt;
-    if (heard.is_null) heard.value.reset();
+    if (is_null) heard.value.reset();
     return heard;
 }
 

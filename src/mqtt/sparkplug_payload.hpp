@@ -50,7 +50,6 @@ struct HeardMetric {
     std::optional<std::uint32_t> type{};
     std::optional<points::Value> value{};  ///< nothing: null, or of a kind that no point has
     bool is_integer = false;               ///< its sign follows from the type
-    bool is_null = false;
 };
 /// Nothing when the text is no payload, or has more than `most` metrics.
 std::optional<std::vector<HeardMetric>> parse_sparkplug(std::string_view text, std::size_t most);

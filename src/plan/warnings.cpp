@@ -1,7 +1,6 @@
 #include "panelgate/plan/warnings.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <map>
 #include <utility>
 
@@ -11,12 +10,9 @@
 namespace panelgate::plan {
 namespace {
 
-constexpr std::size_t kNamed = 3;  // stations of one warning
+using yaml::format_milliseconds;
 
-/// Whole milliseconds: a time on the wire has no shorter text.
-std::string text(Duration duration) {
-    return yaml::format_duration(std::chrono::ceil<std::chrono::milliseconds>(duration));
-}
+constexpr std::size_t kNamed = 3;  // stations of one warning
 
 bool is_asked(const LinePlan& plan, const Station& station) {
     const auto is_its = [&](const auto& request) { return request.station == station.name; };
@@ -50,12 +46,12 @@ void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::s
     for (const auto& [times, names] : alike) {
         const auto& [think, timeout] = times;
         const Duration after = silent_interval(line.serial) + think;
-        told.push_back("line " + line.name + ": think_time " + yaml::format_duration(think) +
-                       " of " + named(names) + " makes replies begin " + text(after) +
-                       " after a request, above the response_timeout of " +
-                       yaml::format_duration(timeout) +
-                       ": each poll and relay there would time out; set response_timeout above " +
-                       text(after) + ", or think_time lower where the panel is quicker");
+        told.push_back(
+            "line " + line.name + ": think_time " + yaml::format_duration(think) + " of " +
+            named(names) + " makes replies begin " + format_milliseconds(after) +
+            " after a request, above the response_timeout of " + yaml::format_duration(timeout) +
+            ": each poll and relay there would time out; set response_timeout above " +
+            format_milliseconds(after) + ", or think_time lower where the panel is quicker");
     }
 }
 
@@ -102,8 +98,9 @@ void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::s
     const Duration both = longest[0].wire + before;
     if (both <= line.deadline) return;
     std::string warning = "line " + line.name + ": " + longest[0].what + " takes " +
-                          text(longest[0].wire) + " at " + to_string(line.serial);
-    if (longest.size() > 1) warning += ", and " + longest[1].what + ' ' + text(before);
+                          format_milliseconds(longest[0].wire) + " at " + to_string(line.serial);
+    if (longest.size() > 1)
+        warning += ", and " + longest[1].what + ' ' + format_milliseconds(before);
     warning += longest.size() > 1 ? ": one behind the other they miss" : ": it misses";
     warning += " the queue's deadline of " + yaml::format_duration(line.deadline) +
                "; set queue: {deadline: " + yaml::format_duration(rounded_up(both)) + '}';

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -108,6 +109,10 @@ std::string format_duration(Duration duration) {
             return std::to_string(duration / unit.length) + std::string(unit.name);
     }
     return std::to_string(duration.count()) + "ns";
+}
+
+std::string format_milliseconds(Duration duration) {
+    return format_duration(std::chrono::ceil<std::chrono::milliseconds>(duration));
 }
 
 }  // namespace panelgate::yaml

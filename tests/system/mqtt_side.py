@@ -129,6 +129,12 @@ class Listener:
         return [json.loads(payload) for name, payload, _ in self.received if name == topic]
 
 
+def take_in(peer):
+    """The broker accepts a connection of the gateway."""
+    peer.recv(4096)
+    peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+
+
 class Rude:
     """A broker that takes each connection and ends it with the first message; a context manager."""
 
@@ -153,8 +159,7 @@ class Rude:
                     self.came.append(time.monotonic())
                     self._changed.notify_all()
                 with peer, contextlib.suppress(OSError):
-                    peer.recv(4096)
-                    peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+                    take_in(peer)
                     peer.recv(1)
 
     def pauses(self, count):
@@ -186,8 +191,7 @@ class Chatty:
     def take(self):
         self._server.settimeout(harness.PATIENCE)
         self._peer, _ = self._server.accept()
-        self._peer.recv(4096)
-        self._peer.sendall(b"\x20\x02\x00\x00")  # CONNACK
+        take_in(self._peer)
 
     def write_until_it_ends(self):
         """PINGRESPs, as long as the gateway is there: whether it ended without a reset, and all that

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <boost/asio/ip/address.hpp>
 #include <cstdint>
 #include <vector>
@@ -20,8 +19,8 @@ class AccessList {
 
   private:
     struct Entry {
-        std::array<std::uint8_t, 16> address;  ///< IPv4 as v4-mapped
-        unsigned prefix;                       ///< 0..128
+        AddressBytes address;  ///< IPv4 as v4-mapped
+        unsigned prefix;       ///< 0..128
     };
     std::vector<Entry> allowed_;
 };

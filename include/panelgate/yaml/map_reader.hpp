@@ -167,5 +167,7 @@ std::string integer_pattern(std::int64_t min, std::int64_t max);
 std::string number_blank_hint(std::string_view key);
 /// In the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
 std::string format_duration(Duration duration);
+/// That of whole milliseconds, rounded up: a time on the wire has no shorter text.
+std::string format_milliseconds(Duration duration);
 
 }  // namespace panelgate::yaml
