@@ -139,12 +139,12 @@ void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
     held_ = false;
     resetting_ = false;
-    proved_ = now;
+    schedule_.on_way_opened(now);
+    if (settings_.may_stall) stations_.on_opened(now);
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
     quiet_.rest_until(rest_);
     stations_.on_back();
-    if (settings_.may_stall) stations_.on_proved(now, now);
     pace_ = {};
     echo_memory_.forget();
     step(now);
@@ -279,7 +279,7 @@ void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_.free_at(stations_.gap(quiet_.station()))) return false;
     if (strays_.pending()) judge_idle(now);  // it may tell that the line is not free
-    Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_, proved_);
+    Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_);
     if (next.new_way) {
         resetting_ = true;
         ledger_.reset("nothing was answered since a request: it may still be on its way");
@@ -306,7 +306,7 @@ void Arbiter::start(TimePoint now, Group group) {
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
         if (group.attempts == 1) group.repeatable = station.settings().retry_writes;
-        station.on_asked(now, group, settings_.may_stall && station.doubtful(proved_));
+        station.on_asked(now, group, schedule_.held_back(station));
         if (group.attempts == 1)
             group.first_silence =
                 !station.suspect() && !station.health().offline() && !stations_.spent(now, station);

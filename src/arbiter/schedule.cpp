@@ -72,7 +72,7 @@ TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) co
 }
 
 Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
-                              const EchoMemory& echo, TimePoint proved) {
+                              const EchoMemory& echo) {
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = backlog_.has_retries() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
@@ -87,8 +87,7 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
     if (due && now >= *due + kPatience) {
         if (auto group = next_probe(now, stations, quiet)) return {std::move(group), false};
     }
-    if (Next job = next_job(now, stations, quiet, echo, proved); job.group || job.new_way)
-        return job;
+    if (Next job = next_job(now, stations, quiet, echo); job.group || job.new_way) return job;
     if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
     if (due && now >= *due) return {next_probe(now, stations, quiet), false};
     return {};
@@ -144,8 +143,22 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
     };
 }
 
+/// P1: what its station owes may still be on its way. On the connection that it was sent on there
+/// is no telling: a new one is needed. Behind that an answer of its own tells, of any station; here
+/// a read for nobody is to have one.
+std::optional<Schedule::Next> Schedule::proof_before(const Job& job,
+                                                     const Stations& stations) const {
+    const Station* station = stations.find(job.station);
+    if (job.station == kBroadcast || station == nullptr || !held_back(*station))
+        return std::nullopt;
+    if (station->owes_since(way_.opened())) return Next{std::nullopt, true};
+    Group proof = read_for_nobody(job.station, station->proof());
+    proof.probe = true;
+    return Next{std::move(proof), false};
+}
+
 Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
-                                  const EchoMemory& echo, TimePoint proved) {
+                                  const EchoMemory& echo) {
     const JobQueue::Test may = runnable(now, stations, quiet);
     const JobQueue::Test in_budget = [&](const Job& job) {
         return may(job) && stations.may_spend(now, job.station);
@@ -156,8 +169,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     if (next == nullptr) next = backlog_.queue().peek(may);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
-    if (may_stall_ && !broadcast && stations.of(next->station).doubtful(proved))
-        return {std::nullopt, true};
+    if (auto proof = proof_before(*next, stations)) return std::move(*proof);
     others_.erase(next->station);
     if (turns_ > 0) --turns_;
     if (!broadcast && echo.must_be_learned_before(next->request, next->ticket == learned_for_)) {

@@ -26,51 +26,37 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 }
 
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
-    constexpr std::size_t kMost = 16;  // more attempts than that are not made for one request
-    owed_pdu_ = pdu;
     damaged_pdu_.clear();
     proved_ = false;
-    owed_.push_back(sent);
-    if (owed_.size() > kMost) owed_.pop_front();
+    debt_.add(sent, pdu);
     rest_for_owed(now);
-}
-
-/// When the request left that a frame of this kind answers: the oldest one whose reply could still
-/// come. An older one would make the reply look later than it is.
-TimePoint Station::answered_request(TimePoint now) const {
-    const auto open = [&](TimePoint sent) {
-        return now < sent + settings_.response_timeout + late_.value();
-    };
-    const auto found = std::ranges::find_if(owed_, open);
-    return found == owed_.end() ? owed_.back() : *found;
 }
 
 /// Until what left last can no longer be answered: within its timeout, and so much later as its
 /// replies may be late.
 void Station::rest_for_owed(TimePoint now) {
-    not_before_ = std::max(now, owed_.back() + settings_.response_timeout) + late_.value();
-}
-
-/// A reply came that each of the attempts may have been answered with, the one at `sent` too.
-void Station::take_one(TimePoint now, TimePoint sent) {
-    owed_.pop_front();
-    owed_.push_back(sent);
-    rest_for_owed(now);
+    not_before_ = std::max(now, debt_.last_sent() + settings_.response_timeout) + late_.value();
 }
 
 TimePoint Station::surely_answered(TimePoint started, ByteView reply) const {
-    const bool open = owes() && modbus::answers(owed_pdu_, reply);
-    return open ? std::min(owed_.front(), started) : started;
+    const Debt::Owed* const other = debt_.oldest(reply);
+    return other != nullptr ? std::min(other->sent, started) : started;
+}
+
+void Station::on_opened(TimePoint now) {
+    if (!owes()) return;
+    const auto replies = static_cast<int>(debt_.size()) + 1;
+    not_before_ = std::max(not_before_, now + std::min(latest_reply(), replies * usual()));
 }
 
 void Station::on_proved(TimePoint now, TimePoint sent) {
-    if (!owes() || proved_ || owed_.back() >= sent) return;
+    if (!owes() || proved_ || owes_since(sent)) return;
     proved_ = true;
     not_before_ = std::max(not_before_, now + settings_.response_timeout + late_.value());
 }
 
 void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
-    if (now >= not_before_ && !held_back) owed_.clear();
+    if (now >= not_before_ && !held_back) debt_.clear();
     asked_ = now;
     if (group.span) last_read_ = group.request;
 }
@@ -78,7 +64,7 @@ void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
 Stray Station::judge(TimePoint now, ByteView pdu) const {
     const bool copy = copies_.is_copy(now, pdu);
     if (copy && copies_.known()) return Stray::copy;  // what is owed comes all the same
-    if (owes() && modbus::answers(owed_pdu_, pdu)) return Stray::late;
+    if (debt_.fits(pdu)) return Stray::late;
     if (copy) return Stray::copy;
     return copies_.is_second(now, pdu) ? Stray::second : Stray::unasked;
 }
@@ -94,8 +80,10 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
         if (heard.stray == Stray::copy) trail_.on_stray(now);
         return heard;
     }
-    // Panels serve in turn: it is the oldest one that is owed.
-    const TimePoint asked = answered_request(now);
+    // The oldest one whose reply could still come: an older one would make it look later than it
+    // is.
+    const Debt::Owed answered = *debt_.oldest(pdu, now - latest_reply());
+    const TimePoint asked = answered.sent;
     const TimePoint due = asked + settings_.response_timeout;
     // Behind a wait that was cut short it tells how long the panel needs; what was held up for
     // longer than the whole timeout does not.
@@ -106,10 +94,10 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     if (may_be_copy) {
         copies_.on_either(now, pdu);
     } else {
-        owed_.pop_front();
+        debt_.take(pdu);
     }
-    heard.settled = owed_.empty();
-    copies_.on_reply(now, owed_pdu_, Bytes(pdu.begin(), pdu.end()));
+    heard.settled = !owes();
+    copies_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
     if (heard.settled) not_before_ = now + copies_.hold();
     heard.back = health_.on_reply(now);
     missed_ = false;
@@ -144,11 +132,14 @@ void Station::learn_of_copies(TimePoint now, const Attempt& attempt) {
 void Station::settle_debt(TimePoint now, const Attempt& attempt) {
     const Group& group = attempt.group();
     const TimePoint sent = attempt.timing().sent;
-    if (attempt.reply() == group.doubted && owed_.size() <= 1) {
-        owed_.clear();  // both have come
+    if (attempt.reply() == group.doubted && debt_.size() <= 1) {
+        debt_.clear();  // both have come
         not_before_ = now + copies_.take_doubt();
-    } else if (owes()) {
-        take_one(now, sent);
+    } else if (debt_.fits(attempt.reply())) {
+        // Each of the attempts may have been answered with it, this one too.
+        debt_.take(attempt.reply());
+        debt_.add(sent, group.request.pdu());
+        rest_for_owed(now);
     } else if (now < again_until_ && late_.worst() > Duration::zero()) {
         // It may be what came damaged, once more, and the reply to this attempt is late.
         owe(now, group.request.pdu(), sent);
@@ -193,7 +184,11 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
 
 void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) {
     damaged_pdu_ = pdu;
-    if (owes()) take_one(now, sent);
+    if (owes()) {  // it may have been the reply to any of them
+        debt_.pop();
+        debt_.add(sent, pdu);
+        rest_for_owed(now);
+    }
     copies_.on_doubt(CopyGuard::kSaidAgain);
     again_until_ = now + CopyGuard::kSaidAgain;
     not_before_ = std::max(not_before_, again_until_);
@@ -276,6 +271,27 @@ modbus::Request Station::probe() const {
     if (cheapest_read_) return *cheapest_read_;
     return last_read_ ? *last_read_
                       : modbus::Request::read({modbus::Table::holding_registers, 0, 1});
+}
+
+modbus::Request Station::proof() const {
+    modbus::Request read = probe();
+    if (!debt_.may_fit_reply_to(read.pdu())) return read;
+    const auto told_apart = [&](modbus::Span span, std::uint32_t count) {
+        span.count = count;
+        read = modbus::Request::read(span);
+        return !debt_.may_fit_reply_to(read.pdu());
+    };
+    const modbus::Span span = *read.span();
+    // A part of what it has answered before, if there is one of a length of its own.
+    for (std::uint32_t count = span.count - 1; count > 0; --count)
+        if (told_apart(span, count)) return read;
+    constexpr std::uint32_t kItems = 0x10000;  // of a table
+    constexpr std::uint32_t kBits = 8;         // whose replies have one length
+    const std::uint32_t most =
+        std::min<std::uint32_t>(span.count + kBits * (Debt::kMost + 1), kItems - span.first);
+    for (std::uint32_t count = span.count + 1; count <= most; ++count)
+        if (told_apart(span, count)) return read;
+    return read;
 }
 
 }  // namespace panelgate::arbiter

@@ -91,7 +91,7 @@ void Arbiter::settle(TimePoint now) {
     stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
     if (replied.back) stations_.on_back();
     if (settings_.may_stall) stations_.on_proved(now, proved);
-    proved_ = std::max(proved_, proved);
+    schedule_.on_way_proved(proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
     strays_.on_replied(group.station);

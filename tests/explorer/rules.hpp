@@ -62,6 +62,8 @@ struct Rules {
     /// The way to the wire may hold back what it was given, in order and however long, until it is
     /// closed (Settings::may_stall). What is behind it is as quick as ever.
     bool stalls = false;
+    /// ... and it does so over the next connection, too.
+    bool hangs = false;
     /// Bytes can come while a request is leaving: the line is no pair of wires.
     bool full_duplex = false;
 

@@ -269,7 +269,7 @@ void World::drain() {
     while (auto action = subject_.poll_action()) {
         std::visit([this](auto& a) { act(a); }, *action);
     }
-    if (std::exchange(reset_, false)) blink(false);
+    if (std::exchange(reset_, false)) blink(rules_->hangs);
 }
 
 void World::act(const arbiter::Transmit& transmit) {

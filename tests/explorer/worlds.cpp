@@ -64,6 +64,11 @@ std::vector<Rules> small_worlds() {
     tcp.stalls = true;
     tcp.full_duplex = true;
     worlds.push_back(tcp);
+    Rules hanging = tcp;
+    hanging.name = "Hangs";
+    hanging.hangs = true;
+    hanging.verbs = world("", bits({lost, line_blinks}), 0).verbs;
+    worlds.push_back(hanging);
     return worlds;
 }
 

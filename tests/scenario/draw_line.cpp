@@ -79,6 +79,7 @@ void draw_stalls(Random& random, Plan& plan) {
     plan.settings.paced = false;
     plan.settings.reply_hole = 400ms;
     plan.line.stalls = 0.05 + random.share() * 0.3;
+    plan.line.hangs = random.chance(0.5);
     for (PanelPlan& panel : plan.panels) {
         panel.late = 0;
         panel.nap = 0;

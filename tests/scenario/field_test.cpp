@@ -48,6 +48,17 @@ TEST(Field, P1ALineThatHoldsEverythingBackNeverGivesAnOldReply) {
     EXPECT_EQ(broken(plan), "");
 }
 
+TEST(Field, P1ADeviceServerThatHangsAndTakesConnectionsAllTheWhileNeverGivesAnOldReply) {
+    Plan plan = quiet_line(19200, 2);
+    plan.settings.may_stall = true;
+    plan.line.stalls = 0.5;
+    plan.line.hangs = true;
+    plan.settings.offline.after = 100;  // collisions behind a stall hide who has answered
+    add_client(plan, {1}, 0.1).in_flight = 4;
+    add_client(plan, {1, 2});
+    EXPECT_EQ(broken(plan), "");
+}
+
 TEST(Field, P1AQuickPanelBesideSlowOnesIsNotTooEarly) {
     Plan plan = quiet_line(115200, 3);
     plan.panels[1].think = 300us;

@@ -92,6 +92,8 @@ struct LinePlan {
     double losses = 0;        ///< the device goes away, by second
     double handover = 0;      ///< share of them: back at once, what is under way is heard
     double stalls = 0;        ///< by second: nothing gets through for 0.3 to 4 s, then all of it
+    bool hangs = false;       ///< a stall is a device server that hangs: it takes connections all
+                              ///< the while, and the newest is told what is said later
     double pauses = 0;        ///< by second: nobody calls the arbiter for 0.1 to 5 s
     Duration babble{};        ///< a good frame that nobody asked for, each such time
     bool other_master = false;  ///< a polite one, with a panel of its own

@@ -149,6 +149,7 @@ void Wire::garble(Frame& frame, std::size_t from, std::size_t to) {
 }
 
 void Wire::arrive(Held held) {
+    if (plan_.line.hangs) held.connection = connection_;
     if (!up_ || held.connection != connection_) return;
     if (agenda_.now() < stalled_until_) {
         held_in_.push_back(std::move(held));

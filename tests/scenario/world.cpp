@@ -189,8 +189,9 @@ void World::take_down(Duration pause) {
     checker_.on_line_down(now());
     subject_.on_line_down(now());
     drain();
-    // Where nothing gets through, no connection is made either.
-    const TimePoint back = std::max(now() + pause, wire_.stalled_until() + 1us);
+    // Where nothing gets through, no connection is made either, but to one that hangs.
+    const TimePoint open = plan_.line.hangs ? TimePoint{} : wire_.stalled_until() + 1us;
+    const TimePoint back = std::max(now() + pause, open);
     agenda_.at(back, [this] {
         reach([this] {
             agenda_.tell("the line is up");

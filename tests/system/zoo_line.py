@@ -107,12 +107,13 @@ class Reader:
         self.unit, self.count = unit, count
         self._dice = random.Random(1000 * seed + unit)
         self.asked = []
+        self.done = False
 
     def request(self):
         return read_registers(self._dice.randrange(2000), self.count)
 
     async def read_until(self, client, end, pause=0.0):
-        while time.monotonic() < end:
+        while time.monotonic() < end and not self.done:
             self.asked.append(await client.ask(self.unit, self.request()))
             if pause:
                 await asyncio.sleep(pause)

@@ -177,8 +177,7 @@ class Arbiter {
     Ledger ledger_;
     ClientNames names_;
     std::optional<Attempt> active_;
-    TimePoint rest_{};    ///< of the wire, also across a line that is opened anew
-    TimePoint proved_{};  ///< what was sent before has passed: a later one was answered
+    TimePoint rest_{};  ///< of the wire, also across a line that is opened anew
     bool up_ = false;
     bool held_ = false;       ///< between two lines, or about to be
     bool resetting_ = false;  ///< the line is to be opened anew: nothing is sent

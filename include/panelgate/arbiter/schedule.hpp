@@ -11,6 +11,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/sharing.hpp"
 #include "panelgate/arbiter/stations.hpp"
+#include "panelgate/arbiter/way.hpp"
 #include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
@@ -27,9 +28,7 @@ class Schedule {
         std::optional<Group> group;  ///< nothing: not now
         bool new_way = false;        ///< the line is to be opened anew first
     };
-    /// `proved`: what was sent before has passed the way to the wire.
-    Next next(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
-              TimePoint proved);
+    Next next(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
     /// When that may say something else; nothing: when something happens.
     std::optional<TimePoint> next_start(const Stations& stations, const Quiet& quiet) const;
 
@@ -38,6 +37,15 @@ class Schedule {
     /// others go on in any case; a timeout that was chosen short (adaptive) frees them early.
     std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
                                               const Station& station) const;
+
+    /// Where the way to the wire may stall (Settings::may_stall): a connection was made, a request
+    /// that was started then was answered.
+    void on_way_opened(TimePoint now) { way_.on_opened(now); }
+    void on_way_proved(TimePoint started) { way_.on_proved(started); }
+    /// What this station owes may still be on its way, whatever the time.
+    bool held_back(const Station& station) const {
+        return may_stall_ && station.owes_since(way_.proved());
+    }
 
     /// The last bit of a broadcast has left, or the line was lost under it.
     void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
@@ -56,8 +64,8 @@ class Schedule {
     bool others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const;
     void let_others_go_first();
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
-    Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo,
-                  TimePoint proved);
+    Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
+    std::optional<Next> proof_before(const Job& job, const Stations& stations) const;
     TimePoint rested(const Stations& stations, std::uint8_t station,
                      const modbus::Request& request) const;
     TimePoint repeat_from(const Group& group, const Stations& stations) const;
@@ -65,6 +73,7 @@ class Schedule {
 
     Quarantine quarantine_;
     bool may_stall_;
+    Way way_;
     Backlog backlog_;
     Sharing sharing_;
     BroadcastReplies broadcasts_;

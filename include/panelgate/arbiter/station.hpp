@@ -8,6 +8,7 @@
 
 #include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/copy_guard.hpp"
+#include "panelgate/arbiter/debt.hpp"
 #include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/late_window.hpp"
 #include "panelgate/arbiter/probe_budget.hpp"
@@ -17,7 +18,6 @@
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
-#include "panelgate/base/pool.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -51,7 +51,7 @@ class Station {
     /// ... but its reply has come, damaged. Some say such a one once more: until that would be over
     /// only the very same request may go there, and behind its answer the same holds.
     void on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent);
-    bool owes() const { return !owed_.empty(); }
+    bool owes() const { return !debt_.empty(); }
     /// From then on another request may go there; until then only the very same.
     TimePoint rested() const { return not_before_; }
     /// Of a request: how long after it has left a reply may still come.
@@ -59,21 +59,24 @@ class Station {
     /// When its next probe may go: as a rule it is the request that is owed.
     TimePoint probe_due() const {
         const TimePoint next = health_.next_probe();
-        return owes() && probe().pdu() == owed_pdu_ ? next : std::max(next, not_before_);
+        return debt_.is_only(probe().pdu()) ? next : std::max(next, not_before_);
     }
     bool may_ask(TimePoint now, const Bytes& pdu) const {
-        const bool again = (owes() && pdu == owed_pdu_) || pdu == damaged_pdu_;
+        const bool again = debt_.is_only(pdu) || pdu == damaged_pdu_;
         return again || now >= not_before_;
     }
     /// A request goes there, and what was owed before has lapsed if it could not come any more.
     /// `held_back`: it may still be on its way, whatever the time.
     void on_asked(TimePoint now, const Group& group, bool held_back = false);
-    /// It owes a reply to a request that nothing proves to have passed: none that was sent later
-    /// than `proved` has been answered since.
-    bool doubtful(TimePoint proved) const { return owes() && owed_.back() >= proved; }
+    /// It owes a reply to a request that left at `since` or later. Where that is when the way to
+    /// the wire was proved last, nothing proves the request to have passed.
+    bool owes_since(TimePoint since) const { return owes() && debt_.last_sent() >= since; }
     /// What this reply to an attempt that was started then proves: that a request of that moment
-    /// has reached the station. Where others are owed that it fits as well, the first of them.
+    /// has reached the station. Where another is owed that it fits as well, the first such one.
     TimePoint surely_answered(TimePoint started, ByteView reply) const;
+    /// The line is open again. What is owed may be sent, and answered, just now: whoever speaks
+    /// meanwhile is not understood.
+    void on_opened(TimePoint now);
     /// The way to the wire was proved free now, by a request that left at `sent`: what was owed
     /// from before may only now have reached the station.
     void on_proved(TimePoint now, TimePoint sent);
@@ -177,6 +180,9 @@ class Station {
     bool answers_as_asked() const { return odd_ == 0; }
     const Drift& clock_drift() const { return clock_drift_; }
     modbus::Request probe() const;
+    /// The same, or a read that differs from it in its length: no reply that is owed fits it, but
+    /// for an exception.
+    modbus::Request proof() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {
         return longest_read_[static_cast<std::size_t>(table)];
@@ -211,9 +217,7 @@ class Station {
         return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
     }
     void spend(TimePoint now, Duration cost) { budget_.spend(now, cost, kDebt * timeout_cost()); }
-    TimePoint answered_request(TimePoint now) const;
     void rest_for_owed(TimePoint now);
-    void take_one(TimePoint now, TimePoint sent);
     void learn_of_copies(TimePoint now, const Attempt& attempt);
     void settle_debt(TimePoint now, const Attempt& attempt);
     Duration short_wait(std::optional<Duration> line) const;
@@ -229,11 +233,10 @@ class Station {
     Trail trail_;
     ProbeBudget budget_{ProbeBudget::kFailing};   ///< of its failures; no reply pays for them
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of those while it is failing()
-    std::uint8_t lately_ = 0;    ///< the last 8 attempts, the latest lowest: 1 was silent
-    PoolDeque<TimePoint> owed_;  ///< when the requests left whose replies may still come
-    Bytes owed_pdu_;             ///< they are one and the same
-    TimePoint again_until_{};    ///< it may say the reply that came damaged once more
-    Bytes damaged_pdu_;          ///< the request whose reply has just come damaged
+    std::uint8_t lately_ = 0;  ///< the last 8 attempts, the latest lowest: 1 was silent
+    Debt debt_;                ///< requests whose replies may still come
+    TimePoint again_until_{};  ///< it may say the reply that came damaged once more
+    Bytes damaged_pdu_;        ///< the request whose reply has just come damaged
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     TimePoint asked_{};

@@ -42,6 +42,9 @@ class Stations {
         for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);
     }
     /// A request that left at `sent` was answered now, on a line that may hold things back.
+    void on_opened(TimePoint now) {
+        for (auto& [id, station] : stations_) station.on_opened(now);
+    }
     void on_proved(TimePoint now, TimePoint sent) {
         for (auto& [id, station] : stations_) station.on_proved(now, sent);
     }

@@ -1,6 +1,9 @@
 // What is owed (P1): no reply answers a request that it was not given for.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
 
@@ -220,6 +223,77 @@ TEST_F(ArbiterTest, P1WhereALineStallsAReplyThatMayBeAnOlderOnesProvesNoMoreThan
     script.run_for(900ms);
     EXPECT_EQ(script.sent.size(), sent);
     EXPECT_GT(script.resets, 0);
+}
+
+/// A device server that hangs takes connections all the same: its kernel does.
+class AfterAReset : public ArbiterTest {
+  protected:
+    /// A request was sent twice and not answered, then the line was opened anew.
+    AfterAReset() {
+        settings.may_stall = true;
+        script.emplace(settings);
+        const Ticket first = script->submit(17, read_at(1), 1);
+        while (!script->answered(first)) script->run_for(1ms);
+        script->line_down();
+        script->line_up();
+        script->run_for(2s);
+    }
+    void ask() {
+        second = script->submit(17, read_at(2), 1);
+        script->run_to_end_of_request();
+    }
+    bool read_at_2_was_sent() const {
+        const Bytes adu = modbus::encode_adu(17, read_at(2));
+        return std::ranges::any_of(script->sent, [&](const auto& one) { return one.adu == adu; });
+    }
+    std::optional<BusScript> script;
+    Ticket second = 0;
+};
+
+TEST_F(AfterAReset, P1WhatWasOwedBeforeAnswersNobody) {
+    ask();
+    ASSERT_FALSE(read_at_2_was_sent()) << "nothing tells yet that its reply would be its own";
+    script->hear_reply(17, kReply);  // the server goes on: the first attempt's
+    script->run_for(20ms);
+    script->hear_reply(17, "03 06 02 2B 00 00 00 65"_hex);  // the second's
+    script->run_for(20ms);
+    EXPECT_FALSE(script->answered(second));
+    script->hear_reply(17, "03 04 00 01 00 02"_hex);  // what was asked to prove the way
+    script->run_for(20ms);
+    ASSERT_TRUE(read_at_2_was_sent()) << "nothing is owed any more";
+    script->hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script->answer(second).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script->resets, 0);
+}
+
+TEST_F(AfterAReset, P1WhatIsProvedRestsUntilWhatIsOwedCouldHaveCome) {
+    ask();
+    script->hear_reply(17, "03 04 00 01 00 02"_hex);
+    const TimePoint proved = script->now();
+    script->run_for(600ms);
+    EXPECT_FALSE(read_at_2_was_sent());
+    ASSERT_TRUE(script->next_sent(500ms));
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_GE(script->now() - proved, 900ms) << "the timeout, and as much for being late";
+}
+
+TEST_F(AfterAReset, P1ARefusalMayBeOfWhatIsOwed) {
+    ask();
+    script->hear_reply(17, "83 02"_hex);
+    script->run_for(1s);
+    EXPECT_FALSE(read_at_2_was_sent()) << "two are owed yet, of three";
+}
+
+TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheWay) {
+    const Ticket other = script->submit(18, kRead, 2);
+    script->run_to_end_of_request();
+    script->hear_reply(18, kReply);
+    ASSERT_TRUE(script->answered(other));
+    const std::size_t sent = script->sent.size();
+    ask();
+    EXPECT_EQ(script->sent.size(), sent) << "what is owed may only now have reached its station";
+    ASSERT_TRUE(script->next_sent(1s));
+    EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(2))) << "no more is needed";
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ class ScheduleTest : public testing::Test {
         stations.of(station);
         return {.jobs = {one}, .station = station, .request = one.request, .attempts = 1};
     }
-    Schedule::Next next() { return schedule.next(now, stations, quiet, echo, {}); }
+    Schedule::Next next() { return schedule.next(now, stations, quiet, echo); }
     /// Which stations are asked, one after the other: "2 1 r3", r for what goes again.
     std::string order(std::size_t most = 99) {
         std::string text;
@@ -206,9 +206,17 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallWhatIsOwedWantsANewWay) {
     stations.of(1).owe(now, read_of(9999), now - 500ms);
     now = stations.of(1).rested();
     EXPECT_TRUE(next().new_way);
-    const auto proved = schedule.next(now, stations, quiet, echo, now);
+    schedule.on_way_opened(now);
+    const auto proof = next();
+    ASSERT_TRUE(proof.group) << "a connection proves nothing";
+    EXPECT_TRUE(proof.group->probe);
+    EXPECT_NE(proof.group->request.reply_length(), test::request_of(read_of(9999)).reply_length())
+        << "no reply to one is one to the other";
+    schedule.on_way_proved(now);
+    const auto proved = next();
     EXPECT_FALSE(proved.new_way) << "something that was sent later has been answered";
-    EXPECT_TRUE(proved.group);
+    ASSERT_TRUE(proved.group);
+    EXPECT_FALSE(proved.group->probe);
 }
 
 TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {

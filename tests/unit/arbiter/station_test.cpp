@@ -139,9 +139,9 @@ TEST_F(StationTest, P1ACopyThatIsKnownOnlyBehindTheReplyThatItPrecededHoldsTheSt
 TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
     const TimePoint sent = now_;
     miss(kRead);
-    EXPECT_TRUE(station_.doubtful(TimePoint{}));
-    EXPECT_TRUE(station_.doubtful(sent));
-    EXPECT_FALSE(station_.doubtful(sent + 1ns));
+    EXPECT_TRUE(station_.owes_since(TimePoint{}));
+    EXPECT_TRUE(station_.owes_since(sent));
+    EXPECT_FALSE(station_.owes_since(sent + 1ns));
     const TimePoint rested = station_.rested();
     now_ = rested + 1h;
     station_.on_proved(now_, sent - 1ns);

@@ -1,0 +1,58 @@
+#include "panelgate/arbiter/debt.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+
+auto may_be_answered_by(ByteView reply) {
+    return [reply](const Debt::Owed& one) { return modbus::answers(one.pdu, reply); };
+}
+
+}  // namespace
+
+void Debt::add(TimePoint sent, const Bytes& pdu) {
+    owed_.push_back({sent, pdu});
+    if (owed_.size() > kMost) owed_.pop_front();
+}
+
+bool Debt::is_only(const Bytes& pdu) const {
+    return !empty() && std::ranges::all_of(owed_, [&](const Owed& one) { return one.pdu == pdu; });
+}
+
+bool Debt::may_fit_reply_to(ByteView read) const {
+    const auto length = modbus::reply_length_from_request(read);
+    return std::ranges::any_of(owed_, [&](const Owed& one) {
+        return one.pdu[0] == read[0] && modbus::reply_length_from_request(one.pdu) == length;
+    });
+}
+
+const Debt::Owed* Debt::oldest(ByteView reply) const {
+    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
+    return found == owed_.end() ? nullptr : &*found;
+}
+
+const Debt::Owed* Debt::oldest(ByteView reply, TimePoint open) const {
+    const Owed* last = nullptr;
+    for (const Owed& one : owed_) {
+        if (!may_be_answered_by(reply)(one)) continue;
+        last = &one;
+        if (one.sent > open) break;
+    }
+    return last;
+}
+
+Bytes Debt::take(ByteView reply) {
+    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
+    if (found == owed_.end()) return {};
+    Bytes pdu = std::move(found->pdu);
+    owed_.erase(found);
+    return pdu;
+}
+
+}  // namespace panelgate::arbiter
