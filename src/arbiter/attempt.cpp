@@ -210,8 +210,9 @@ void Attempt::collect() {
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
         const bool in_front = i + behind < parts.size();
-        frames_in_front_ = frames_in_front_ || (in_front && parts[i].kind != Unused::Kind::damaged);
-        if (parts[i].kind == Unused::Kind::damaged && !foreign) {
+        const bool damaged = parts[i].kind == Unused::Kind::damaged;
+        frames_in_front_ = frames_in_front_ || (in_front && (!damaged || foreign));
+        if (damaged && !foreign) {
             if (in_front) noise_in_front_ += parts[i].bytes.size();
             fragment_ = fragment_ || (in_front && holds_fragment(parts[i].bytes, echo_.frame()));
             append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);

@@ -186,6 +186,19 @@ TEST_F(Echo, P8AReplyBehindAFrameOfSomebodyTellsNothingAboutAnEcho) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
 }
 
+TEST_F(Echo, P8AReplyBehindARequestOfAnotherMasterTellsNothingAboutAnEcho) {
+    BusScript bus(settings(EchoMode::automatic));
+    bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    Bytes heard = modbus::encode_adu(18, "04 00 01 00 02"_hex);
+    Bytes echo = bus.sent.back().adu;
+    echo[3] ^= 0x10;
+    heard.insert(heard.end(), echo.begin(), echo.end());
+    bus.hear_paced(heard);
+    bus.hear_paced(modbus::encode_adu(17, kReply));
+    EXPECT_NE(bus.arbiter().echo(), EchoState::absent) << "a damaged echo stood there as well";
+}
+
 TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     BusScript bus(settings(EchoMode::automatic));
     const Ticket ticket = bus.submit(17, kWriteCoil);
