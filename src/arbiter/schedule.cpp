@@ -154,6 +154,7 @@ std::optional<Schedule::Next> Schedule::proof_before(const Job& job,
     if (station->owes_since(way_.opened())) return Next{std::nullopt, true};
     Group proof = read_for_nobody(job.station, station->proof());
     proof.probe = true;
+    proof.told_apart = proof.request != station->probe();
     return Next{std::move(proof), false};
 }
 

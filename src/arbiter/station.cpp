@@ -28,6 +28,7 @@ void Station::apply(const StationSettings& settings, const OfflineSettings& offl
 void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
     damaged_pdu_.clear();
     proved_ = false;
+    return_.on_owed();
     debt_.add(sent, pdu);
     rest_for_owed(now);
 }
@@ -45,6 +46,7 @@ TimePoint Station::surely_answered(TimePoint started, ByteView reply) const {
 
 void Station::on_opened(TimePoint now) {
     if (!owes()) return;
+    return_.on_opened();
     const auto replies = static_cast<int>(debt_.size()) + 1;
     not_before_ = std::max(not_before_, now + std::min(latest_reply(), replies * usual()));
 }
@@ -58,7 +60,7 @@ void Station::on_proved(TimePoint now, TimePoint sent) {
 void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
     if (now >= not_before_ && !held_back) debt_.clear();
     asked_ = now;
-    if (group.span) last_read_ = group.request;
+    if (group.span && !group.told_apart) last_read_ = group.request;
 }
 
 Stray Station::judge(TimePoint now, ByteView pdu) const {
@@ -97,6 +99,8 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
         debt_.take(pdu);
     }
     heard.settled = !owes();
+    // Those behind it are still to come.
+    if (return_.answered()) not_before_ = std::max(not_before_, now + latest_reply());
     copies_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
     if (heard.settled) not_before_ = now + copies_.hold();
     heard.back = health_.on_reply(now);
@@ -166,6 +170,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
     trail_.on_reply(now);
+    return_.on_replied();
     learn_of_copies(now, attempt);
     if (trail_.hold() > Duration::zero() && !std::exchange(trail_told_, true))
         result.trail = trail_.hold();
@@ -275,7 +280,7 @@ modbus::Request Station::probe() const {
 
 modbus::Request Station::proof() const {
     modbus::Request read = probe();
-    if (!debt_.may_fit_reply_to(read.pdu())) return read;
+    if (return_.plainly() || !debt_.may_fit_reply_to(read.pdu())) return read;
     const auto told_apart = [&](modbus::Span span, std::uint32_t count) {
         span.count = count;
         read = modbus::Request::read(span);

@@ -5,6 +5,7 @@
 
 #include "field.hpp"
 #include "plan.hpp"
+#include "play.hpp"
 
 namespace panelgate::scenario {
 namespace {
@@ -57,6 +58,32 @@ TEST(Field, P1ADeviceServerThatHangsAndTakesConnectionsAllTheWhileNeverGivesAnOl
     add_client(plan, {1}, 0.1).in_flight = 4;
     add_client(plan, {1, 2});
     EXPECT_EQ(broken(plan), "");
+}
+
+TEST(Field, P1BehindAHangAPanelThatAnswersOneLengthAloneNeverGivesAnOldReply) {
+    Plan plan = quiet_line(19200, 1);
+    plan.settings.may_stall = true;
+    plan.line.stalls = 0.2;
+    plan.line.hangs = true;
+    plan.panels[0].only_registers = 4;
+    add_client(plan, {1}).in_flight = 4;
+    EXPECT_EQ(broken(plan), "");
+}
+
+TEST(Field, P4APanelThatIsSilentToWhatNobodyAskedComesBackWhenADeviceServerGoesOn) {
+    Plan plan = quiet_line(19200, 1);
+    plan.settings.may_stall = true;
+    plan.line.stalls = 0.05;
+    plan.line.hangs = true;
+    plan.seed = 1;
+    plan.transactions = 5000;
+    add_client(plan, {1}).same_read = true;
+    const Outcome plain = play(plan);
+    plan.panels[0].only_registers = 10;  // what the client asks for
+    const Outcome choosy = play(plan);
+    EXPECT_EQ(choosy.violation, "");
+    const auto rate = [](const Outcome& of) { return static_cast<double>(of.good) / of.seconds; };
+    EXPECT_GT(rate(choosy), 0.8 * rate(plain));
 }
 
 TEST(Field, P1AQuickPanelBesideSlowOnesIsNotTooEarly) {

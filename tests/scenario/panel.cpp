@@ -90,12 +90,17 @@ Duration Panel::horizon() const {
     return plan_.nap > 0 ? std::max<Duration>(most, 2100ms) : most;
 }
 
+/// Such a read.
+bool Panel::is_silent_to(unsigned registers) const {
+    if (plan_.only_registers > 0 && registers != plan_.only_registers) return true;
+    return plan_.refusal == 0 && registers > plan_.max_registers;
+}
+
 void Panel::begin(Request request) {
     const Duration thinking = think(request);
     const bool too_old = agenda_.now() + thinking > request.arrived + horizon();
     if (is_dead() || too_old) return serve_next();
-    const bool silent =
-        request.pdu[0] <= 4 && plan_.refusal == 0 && word(request.pdu, 3) > plan_.max_registers;
+    const bool silent = request.pdu[0] <= 4 && is_silent_to(word(request.pdu, 3));
     const Bytes reply = silent ? Bytes{} : serve(request.pdu);
     const bool mute = silent || random_.chance(plan_.mute);
     agenda_.at(agenda_.now() + thinking, [this, request = std::move(request), reply, mute] {

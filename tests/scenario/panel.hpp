@@ -38,6 +38,7 @@ class Panel {
     };
     void serve_next();
     void begin(Request request);
+    bool is_silent_to(unsigned registers) const;
     void answer(const Request& request, const Bytes& reply);
     void say_all(std::vector<Utterance> all, std::size_t next, std::uint64_t connection);
     void answer_broadcast(ByteView pdu, std::uint64_t connection);

@@ -12,7 +12,7 @@ bool PanelPlan::is_sound(Duration timeout, Duration reply_hole) const {
     constexpr unsigned kLongestRead = 20;  // that a client asks for
     const bool ever_silent = drop > 0 || mute > 0 || nap > 0 || late > 0 || dead ||
                              flapping > Duration::zero() || reboots > Duration::zero() ||
-                             (refusal == 0 && max_registers < kLongestRead);
+                             only_registers > 0 || (refusal == 0 && max_registers < kLongestRead);
     const bool ever_wrong = flip > 0 || truncate > 0 || noise > 0 || wrong_id > 0 || foreign > 0 ||
                             wrong_function > 0 || damaged_first > 0 || padded_inside > 0;
     const Duration slowest = std::max(think, slow_think) + (fragment > 0 ? 40ms : 10ms);

@@ -33,8 +33,9 @@ struct PanelPlan {
     double mute = 0;       ///< executed, not answered
     double exception = 0;  ///< refuses with 06
     unsigned max_registers = 125;
-    unsigned refusal = 3;       ///< the exception for more than those; 0 = silence
-    double wrong_function = 0;  ///< answers with an exception of another function
+    unsigned refusal = 3;         ///< the exception for more than those; 0 = silence
+    unsigned only_registers = 0;  ///< silent to reads of any other number; 0 = to none
+    double wrong_function = 0;    ///< answers with an exception of another function
     bool answers_broadcasts = false;
     Duration broadcast_think{};  ///< before it does; 0 = up to 8 ms
     bool dead = false;

@@ -118,6 +118,8 @@ TEST(Scenario, SeedsThatOnceBrokeAPromiseKeepThemAll) {
         {Kind::wild, 162},
         // An echo was lost in a stall, and frames of others were not.
         {Kind::wild, 148},
+        // It was damaged, and a request of another master stood in front of it.
+        {Kind::wild, 61},
         // A reply that came damaged was said again, and that to the repeated request was late.
         {Kind::wild, 29},
         {Kind::wild, 215},

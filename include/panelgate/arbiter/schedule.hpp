@@ -44,7 +44,7 @@ class Schedule {
     void on_way_proved(TimePoint started) { way_.on_proved(started); }
     /// What this station owes may still be on its way, whatever the time.
     bool held_back(const Station& station) const {
-        return may_stall_ && station.owes_since(way_.proved());
+        return may_stall_ && station.owes_since(way_.proved()) && !station.has_returned();
     }
 
     /// The last bit of a broadcast has left, or the line was lost under it.

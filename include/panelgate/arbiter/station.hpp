@@ -18,6 +18,7 @@
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/trail.hpp"
 #include "panelgate/arbiter/turnaround.hpp"
+#include "panelgate/arbiter/way.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
@@ -71,6 +72,9 @@ class Station {
     /// It owes a reply to a request that left at `since` or later. Where that is when the way to
     /// the wire was proved last, nothing proves the request to have passed.
     bool owes_since(TimePoint since) const { return owes() && debt_.last_sent() >= since; }
+    /// It has answered all that it was asked since the line was opened anew, the rest is over, and
+    /// nothing more has come: no reply is on its way, though none could be told from those owed.
+    bool has_returned() const { return return_.answered(); }
     /// What this reply to an attempt that was started then proves: that a request of that moment
     /// has reached the station. Where another is owed that it fits as well, the first such one.
     TimePoint surely_answered(TimePoint started, ByteView reply) const;
@@ -118,6 +122,8 @@ class Station {
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
+    /// It was silent; `told_apart`: to such a proof(), which tells nothing of its health.
+    void on_silent(bool told_apart) { return_.on_silent(told_apart); }
     /// The whole transaction failed. True when that took it offline.
     bool on_given_up(TimePoint now, Fault fault);
     /// This answer repeats an earlier reply, soon, and it came `too_early`: the request may never
@@ -181,7 +187,7 @@ class Station {
     const Drift& clock_drift() const { return clock_drift_; }
     modbus::Request probe() const;
     /// The same, or a read that differs from it in its length: no reply that is owed fits it, but
-    /// for an exception.
+    /// for an exception. In turns, as long as it is silent.
     modbus::Request proof() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {
@@ -239,6 +245,7 @@ class Station {
     Bytes damaged_pdu_;        ///< the request whose reply has just come damaged
     TimePoint not_before_{};
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
+    Return return_;
     TimePoint asked_{};
     std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
     std::optional<modbus::Request> last_read_;  ///< what to probe with before it has answered any

@@ -25,4 +25,30 @@ class Way {
     TimePoint proved_{};
 };
 
+/// What a station that owes replies has shown on the connection that was opened because of them.
+/// Pure.
+class Return {
+  public:
+    void on_opened() {
+        opened_ = true;
+        answered_ = false;
+    }
+    /// A request to it has ended without its own reply.
+    void on_owed() { opened_ = answered_ = false; }
+    void on_replied() { answered_ = opened_; }
+    /// `told_apart`: to a read that nobody would have asked for but to tell its reply apart.
+    void on_silent(bool told_apart) { plainly_ = told_apart; }
+
+    /// It has answered each request since then, and one at least. That may have been the replies
+    /// that it owes, one behind another: then as many are still to come, at once.
+    bool answered() const { return answered_; }
+    /// It may be silent to other reads than it is used to.
+    bool plainly() const { return plainly_; }
+
+  private:
+    bool opened_ = false;
+    bool answered_ = false;
+    bool plainly_ = false;
+};
+
 }  // namespace panelgate::arbiter

@@ -231,6 +231,7 @@ class AfterAReset : public ArbiterTest {
     /// A request was sent twice and not answered, then the line was opened anew.
     AfterAReset() {
         settings.may_stall = true;
+        settings.stations[0].late_window = 500ms;
         script.emplace(settings);
         const Ticket first = script->submit(17, read_at(1), 1);
         while (!script->answered(first)) script->run_for(1ms);
@@ -239,7 +240,9 @@ class AfterAReset : public ArbiterTest {
         script->run_for(2s);
     }
     void ask() {
+        const std::size_t before = script->sent.size();
         second = script->submit(17, read_at(2), 1);
+        if (script->sent.size() == before) script->next_sent();
         script->run_to_end_of_request();
     }
     bool read_at_2_was_sent() const {
@@ -280,8 +283,47 @@ TEST_F(AfterAReset, P1WhatIsProvedRestsUntilWhatIsOwedCouldHaveCome) {
 TEST_F(AfterAReset, P1ARefusalMayBeOfWhatIsOwed) {
     ask();
     script->hear_reply(17, "83 02"_hex);
-    script->run_for(1s);
+    script->run_for(900ms);
     EXPECT_FALSE(read_at_2_was_sent()) << "two are owed yet, of three";
+    script->hear_reply(17, "83 02"_hex);
+    script->run_for(900ms);
+    EXPECT_FALSE(read_at_2_was_sent()) << "one is, and it takes as long";
+    ASSERT_TRUE(script->next_sent(2s)) << "nothing more comes of it";
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_EQ(script->resets, 0);
+}
+
+TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked) {
+    settings.offline.after = 2;  // it has been silent once
+    script->apply(settings);
+    ask();
+    ASSERT_NE(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
+    script->run_for(1s);
+    ASSERT_EQ(script->resets, 1);
+    EXPECT_FALSE(script->arbiter().health(17).offline()) << "that tells nothing of the panel";
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
+}
+
+TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
+    ask();
+    script->run_for(1s);
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    script->hear_reply(17, kReply);
+    script->run_for(800ms);
+    ASSERT_FALSE(read_at_2_was_sent());
+    script->hear_reply(17, kReply);  // so it was the one before: as many as are owed may follow
+    script->run_for(900ms);
+    ASSERT_FALSE(read_at_2_was_sent());
+    ASSERT_TRUE(script->next_sent(2s));
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_EQ(script->resets, 1) << "none for that";
 }
 
 TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheWay) {
@@ -290,7 +332,7 @@ TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheWay) {
     script->hear_reply(18, kReply);
     ASSERT_TRUE(script->answered(other));
     const std::size_t sent = script->sent.size();
-    ask();
+    second = script->submit(17, read_at(2), 1);
     EXPECT_EQ(script->sent.size(), sent) << "what is owed may only now have reached its station";
     ASSERT_TRUE(script->next_sent(1s));
     EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(2))) << "no more is needed";
