@@ -179,7 +179,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
         for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    if (fault == Fault::timeout) station.on_silent(group.told_apart);
+    station.on_in_vain(group.told_apart);
     if (group.told_apart) return;
     if (!station.on_given_up(now, fault)) return;
     if (!station.stranger()) ledger_.event(Kind::offline, group.station);

@@ -233,14 +233,15 @@ class Reload(unittest.TestCase):
 
         def line(name, link):
             return config.gateway(
-                config.line(name, link, "{id: 1}", timing="{response_timeout: 200ms}", retries=0,
-                            echo="off"), http=config.OPERATOR)
+                config.line(name, link, "{id: 1}", retries=0, echo="off",
+                            timing="{response_timeout: 200ms, late_window: 5s}"),
+                http=config.OPERATOR)
         with tempfile.TemporaryDirectory() as folder:
             link = pathlib.Path(folder) / "tty"
             with RtuBus(link, {1: panel}), Running(line("one", link)) as running:
                 client = harness.Client(running.program.modbus_port())
                 running.program.log.wait_for("line up")
-                self.assertEqual(client.ask(1, read_registers(10)), b"\x83\x0b")
+                until(lambda: client.ask(1, read_registers(10)) == b"\x83\x0b")
                 self.assertEqual(running.reload(line("other", link))[1]["outcome"], "applied")
                 for address in range(50, 60):
                     reply = client.ask(1, read_registers(address))

@@ -122,8 +122,9 @@ class Station {
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
-    /// It was silent; `told_apart`: to such a proof(), which tells nothing of its health.
-    void on_silent(bool told_apart) { return_.on_silent(told_apart); }
+    /// A whole transaction was in vain; `told_apart`: such a proof(), which tells nothing of its
+    /// health.
+    void on_in_vain(bool told_apart) { return_.on_in_vain(told_apart); }
     /// The whole transaction failed. True when that took it offline.
     bool on_given_up(TimePoint now, Fault fault);
     /// This answer repeats an earlier reply, soon, and it came `too_early`: the request may never
@@ -187,7 +188,7 @@ class Station {
     const Drift& clock_drift() const { return clock_drift_; }
     modbus::Request probe() const;
     /// The same, or a read that differs from it in its length: no reply that is owed fits it, but
-    /// for an exception. In turns, as long as it is silent.
+    /// for an exception. In turns, as long as it is in vain.
     modbus::Request proof() const;
     /// The longest read of this table that it has answered; items.
     std::uint32_t longest_read(modbus::Table table) const {

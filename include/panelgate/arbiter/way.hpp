@@ -36,13 +36,13 @@ class Return {
     /// A request to it has ended without its own reply.
     void on_owed() { opened_ = answered_ = false; }
     void on_replied() { answered_ = opened_; }
-    /// `told_apart`: to a read that nobody would have asked for but to tell its reply apart.
-    void on_silent(bool told_apart) { plainly_ = told_apart; }
+    /// `told_apart`: a read that nobody would have asked for but to tell its reply apart.
+    void on_in_vain(bool told_apart) { plainly_ = told_apart; }
 
     /// It has answered each request since then, and one at least. That may have been the replies
     /// that it owes, one behind another: then as many are still to come, at once.
     bool answered() const { return answered_; }
-    /// It may be silent to other reads than it is used to.
+    /// It may not answer other reads than it is used to.
     bool plainly() const { return plainly_; }
 
   private:

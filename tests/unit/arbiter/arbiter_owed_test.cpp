@@ -308,6 +308,20 @@ TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked
     EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
 }
 
+TEST_F(AfterAReset, APanelThatAnswersWrongWhatNobodyAskedComesBackAsWell) {
+    ask();
+    const Bytes told_apart = script->sent.back().adu;
+    script->hear_reply(17, "03 02 00 01"_hex);
+    script->run_for(1s);
+    ASSERT_EQ(script->resets, 1);
+    EXPECT_FALSE(script->arbiter().health(17).offline());
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    EXPECT_NE(script->sent.back().adu, told_apart);
+}
+
 TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
     ask();
     script->run_for(1s);
