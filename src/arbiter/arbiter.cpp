@@ -314,6 +314,7 @@ void Arbiter::start(TimePoint now, Group group) {
         timing.usual = std::min(station.usual() + latency_, timing.patience);
         timing.notice = notice_.early();
         timing.drift = station.clock_drift();
+        timing.echoes = echo_memory_.expects_one();
         timing.as_asked = surprised_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
     if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 
@@ -23,6 +24,22 @@ void Debt::add(TimePoint sent, const Bytes& pdu) {
 
 bool Debt::is_only(const Bytes& pdu) const {
     return !empty() && std::ranges::all_of(owed_, [&](const Owed& one) { return one.pdu == pdu; });
+}
+
+bool Debt::may_be_refusal_of(const modbus::Request& request) const {
+    return std::ranges::any_of(owed_,
+                               [&](const Owed& one) { return one.pdu[0] == request.function(); });
+}
+
+bool Debt::may_fit_normal_reply_to(const modbus::Request& write) const {
+    const Bytes& pdu = write.pdu();
+    if (!modbus::is_broadcastable(pdu[0])) return may_fit_reply_to(pdu);
+    return fits(modbus::normal_write_reply(pdu));
+}
+
+bool Debt::fits_other(ByteView reply, const Bytes& pdu) const {
+    const auto fits = may_be_answered_by(reply);
+    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu != pdu && fits(one); });
 }
 
 bool Debt::may_fit_reply_to(ByteView read) const {

@@ -61,6 +61,12 @@ Bytes EchoFilter::release() {
 EchoMemory::EchoMemory(EchoMode mode) : mode_(mode), state_(EchoState::unknown) { forget(); }
 
 void EchoMemory::forget() {
+    heard_ = false;
+    missed_ = 0;
+    begin();
+}
+
+void EchoMemory::begin() {
     switch (mode_) {
         case EchoMode::automatic:
             state_ = EchoState::unknown;
@@ -88,15 +94,18 @@ bool EchoMemory::must_be_learned_before(const modbus::Request& request, bool tri
 }
 
 bool EchoMemory::on_echo(const modbus::Request& request) {
-    if (state_ == EchoState::present || !teaches_echo(request)) return false;
-    state_ = EchoState::present;
-    return true;
+    if (!teaches_echo(request)) return false;
+    heard_ = true;
+    missed_ = 0;
+    return std::exchange(state_, EchoState::present) != EchoState::present;
 }
 
 void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool fragment) {
     if (state_ == EchoState::present || state_ == EchoState::absent || !teaches_echo(request))
         return;
-    state_ = fragment ? EchoState::unclear : EchoState::absent;
+    if (!fragment) ++missed_;
+    if (fragment || heard_) state_ = EchoState::unclear;
+    if (!fragment && missed_ >= (heard_ ? kNoMore : kNever)) state_ = EchoState::absent;
 }
 
 void EchoMemory::on_unclear() {
@@ -108,7 +117,7 @@ void EchoMemory::on_unanswered(const modbus::Request& request) {
 }
 
 void EchoMemory::on_mismatch() {
-    if (mode_ != EchoMode::on) forget();
+    if (mode_ != EchoMode::on) begin();
 }
 
 }  // namespace panelgate::arbiter

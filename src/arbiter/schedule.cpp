@@ -151,6 +151,7 @@ std::optional<Schedule::Next> Schedule::proof_before(const Job& job,
     const Station* station = stations.find(job.station);
     if (job.station == kBroadcast || station == nullptr || !held_back(*station))
         return std::nullopt;
+    if (station->tells_apart(job.request)) return std::nullopt;
     if (station->owes_since(way_.opened())) return Next{std::nullopt, true};
     Group proof = read_for_nobody(job.station, station->proof());
     proof.probe = true;

@@ -86,7 +86,9 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     if (!station.health().offline()) return false;
     const bool may_wake = station.stranger() || !job.request.is_read();
     const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
-    return !may_wake || !budget.allows(now) || !station.take_half_open(now);
+    if (may_wake && budget.allows(now) && station.take_half_open(now)) return false;
+    station.on_refused(job.request);
+    return true;
 }
 
 TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {

@@ -68,14 +68,31 @@ void Arbiter::end_broadcast(TimePoint now) {
     }
 }
 
+/// What answers by its form may be somebody else's, or of another time: then it is put aside, or
+/// waits for what comes behind it.
+bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
+    Attempt& attempt = *active_;
+    const Group& group = attempt.group();
+    const bool refusal = modbus::exception_of(attempt.reply()).has_value();
+    const bool may_be_owed = refusal && !group.probe && schedule_.held_back(station) &&
+                             station.refuses_other(attempt.reply(), group.request.pdu());
+    const bool too_early = early && !settings_.paced && pace_.believed();
+    if (may_be_owed || attempt.is_contested() || station.is_copy(now, attempt, too_early)) {
+        attempt.reject_reply();
+        return false;
+    }
+    const bool waits = attempt.precedes_echo() && !attempt.was_held();
+    const bool may_be_copy = station.may_be_copy(now, attempt);
+    if (may_be_copy || waits)
+        attempt.hold_reply(station.needed(), may_be_copy && group.may_doubt(attempt.reply()));
+    return !may_be_copy && !waits;
+}
+
 /// The reply is there.
 void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
-    const bool too_early = early && !settings_.paced && pace_.believed();
-    if (station.is_copy(now, *active_, too_early)) return active_->reject_reply();
-    if (station.may_be_copy(now, *active_))
-        return active_->hold_reply(station.needed(), active_->group().may_doubt(active_->reply()));
+    if (!takes_reply(now, station, early)) return;
     pace_.on_reply(early);
     pace_.on_rate(active_->hasty());
     surprised_ = active_->overslept() ? Station::kOdd : std::max(surprised_ - 1, 0);
@@ -179,7 +196,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
         for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    station.on_in_vain(group.told_apart);
+    if (group.probe) station.on_in_vain(group.told_apart);
     if (group.told_apart) return;
     if (!station.on_given_up(now, fault)) return;
     if (!station.stranger()) ledger_.event(Kind::offline, group.station);

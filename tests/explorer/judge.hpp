@@ -44,6 +44,8 @@ class Judge {
     void on_gone(std::uint8_t client);
     void on_line(TimePoint now);
     void on_heard(TimePoint now) { heard_until_ = now; }
+    /// A device server keeps its line's silences itself: what it was given is in its hands.
+    void on_taken(TimePoint now) { sent_until_ = std::min(sent_until_, now); }
     /// `for_somebody`: not a probe, nor a read to learn the echo.
     void on_transmit(TimePoint now, ByteView adu, TimePoint end, bool for_somebody);
     /// A station has taken a request in.

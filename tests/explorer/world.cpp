@@ -229,6 +229,7 @@ void World::hear(ByteView bytes) {
     note({.verb = test::BusStep::Verb::hear, .bytes = Bytes(bytes.begin(), bytes.end())});
     clean_ = begun_ = false;
     judge_.on_heard(now_);
+    if (rules_->stalls) judge_.on_taken(now_);
     subject_.on_rx(now_, bytes);
     drain();
 }

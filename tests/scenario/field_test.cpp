@@ -44,6 +44,7 @@ TEST(Field, P1ALineThatHoldsEverythingBackNeverGivesAnOldReply) {
     Plan plan = quiet_line(19200, 2);
     plan.settings.may_stall = true;
     plan.line.stalls = 0.5;
+    plan.settings.offline.after = 100;  // collisions behind a stall hide who has answered
     add_client(plan, {1}, 0.1).in_flight = 4;
     add_client(plan, {1, 2});
     EXPECT_EQ(broken(plan), "");

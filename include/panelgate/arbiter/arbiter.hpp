@@ -147,6 +147,7 @@ class Arbiter {
     void check_active(TimePoint now);
     void conclude(TimePoint now, Verdict verdict);
     void end_broadcast(TimePoint now);
+    bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
     void fail(TimePoint now, Verdict verdict);

@@ -50,6 +50,7 @@ class Attempt {
         Duration notice{};         ///< the line's Notice
         Drift drift;               ///< what looks at the station's replies have told
         bool as_asked = false;     ///< what begins is the reply that was asked for, as a rule
+        bool echoes = false;       ///< what is sent on this line comes back, as a rule
         bool confirm_end = false;  ///< somebody will tell when the last bit has really left
     };
     /// Is this good frame of the station, which does not answer, what it said instead of the reply?
@@ -130,6 +131,14 @@ class Attempt {
     /// behind it the attempt is doubtful.
     void hold_reply(Duration needed, bool doubted);
     bool was_held() const { return held_back_; }
+    /// It came where the line's echo should have stood, and nothing of that before it: somebody
+    /// else's, if that follows.
+    bool precedes_echo() const {
+        return timing_.echoes && !echo_.complete() && !fragment_ && !echo_behind_ &&
+               noise_in_front_ == 0;
+    }
+    /// Another master has asked the same station for something that this answers as well.
+    bool is_contested() const;
     /// As much as the reply, and perhaps that very reply, came damaged in front of it.
     bool said_damaged_before() const;
     /// When what was held back came, if its reply is that once more.
@@ -196,6 +205,8 @@ class Attempt {
     }
     void judge_strays(std::size_t from, const Ends& ends);
     void collect();
+    void on_echo_behind();
+    void on_other_master(ByteView heard);
     bool is_stale(TimePoint now, std::size_t size) const;
     /// Bytes of somebody were heard: the reply may be lost, and the usual time tells.
     bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
@@ -233,6 +244,8 @@ class Attempt {
     bool heard_ = false;
     bool disturbed_ = false;
     bool fragment_ = false;
+    bool echo_behind_ = false;     ///< behind a frame of somebody
+    std::vector<Bytes> others_;    ///< requests of another master to the same station (bounded)
     bool own_frame_seen_ = false;  ///< behind something else, where only its echo was expected
     bool echo_possible_ = true;
     std::size_t noise_in_front_ = 0;  ///< bytes

@@ -5,6 +5,7 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
 
@@ -32,6 +33,12 @@ class Debt {
     bool is_only(const Bytes& pdu) const;
     /// This reply may be one of them.
     bool fits(ByteView reply) const { return oldest(reply) != nullptr; }
+    /// A reply to this request, be it a refusal, may be taken for one of them: the same function.
+    bool may_be_refusal_of(const modbus::Request& request) const;
+    /// The normal reply to this write may be.
+    bool may_fit_normal_reply_to(const modbus::Request& write) const;
+    /// This reply may be one of them, but not by being one to the very same request.
+    bool fits_other(ByteView reply, const Bytes& pdu) const;
     /// Any reply to this read may be taken for one of them: the same function and length.
     bool may_fit_reply_to(ByteView read) const;
     /// The oldest that this reply may answer, or nullptr.

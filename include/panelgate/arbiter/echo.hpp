@@ -64,6 +64,10 @@ class EchoMemory {
     explicit EchoMemory(EchoMode mode);
 
     EchoState state() const { return state_; }
+    /// What is sent comes back, as far as anybody knows: it has, and not just once has it not.
+    bool expects_one() const {
+        return state_ == EchoState::present || (heard_ && state_ != EchoState::absent);
+    }
     bool known() const { return state_ == EchoState::present || state_ == EchoState::absent; }
     /// The device was opened again: it may be another one.
     void forget();
@@ -86,8 +90,17 @@ class EchoMemory {
     void on_mismatch();
 
   private:
+    void begin();
+
+    /// Replies one after another without any echo, until there is none: bytes are lost now and
+    /// then, and a write would be confirmed by the next echo.
+    static constexpr int kNever = 2;    ///< where none was ever heard
+    static constexpr int kNoMore = 16;  ///< where one was
+
     EchoMode mode_;
     EchoState state_;
+    bool heard_ = false;  ///< an echo, since the device was opened
+    int missed_ = 0;      ///< in a row
 };
 
 }  // namespace panelgate::arbiter

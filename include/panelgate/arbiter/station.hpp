@@ -72,6 +72,18 @@ class Station {
     /// It owes a reply to a request that left at `since` or later. Where that is when the way to
     /// the wire was proved last, nothing proves the request to have passed.
     bool owes_since(TimePoint since) const { return owes() && debt_.last_sent() >= since; }
+    /// Whatever it owes may come now, and yet no reply to this request is mistaken: nothing of its
+    /// function is owed; or it is a write, reads are in vain, and nothing is owed that its normal
+    /// reply fits (a refusal may be: refuses_other()).
+    bool tells_apart(const modbus::Request& request) const {
+        if (!debt_.may_be_refusal_of(request)) return true;
+        return return_.reads_in_vain() && !request.is_read() &&
+               !debt_.may_fit_normal_reply_to(request);
+    }
+    /// This refusal of a request may be one of another that it owes.
+    bool refuses_other(ByteView reply, const Bytes& pdu) const {
+        return debt_.fits_other(reply, pdu);
+    }
     /// It has answered all that it was asked since the line was opened anew, the rest is over, and
     /// nothing more has come: no reply is on its way, though none could be told from those owed.
     bool has_returned() const { return return_.answered(); }
@@ -122,7 +134,7 @@ class Station {
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, Verdict verdict, Duration cost);
-    /// A whole transaction was in vain; `told_apart`: such a proof(), which tells nothing of its
+    /// A read for nobody was in vain; `told_apart`: such a proof(), which tells nothing of its
     /// health.
     void on_in_vain(bool told_apart) { return_.on_in_vain(told_apart); }
     /// The whole transaction failed. True when that took it offline.
@@ -206,6 +218,11 @@ class Station {
     TimePoint failed() const { return failed_; }
     /// Somebody wants a stranger that is not to be asked now.
     void on_wanted(TimePoint now) { asked_ = now; }
+    /// This request is not carried out because it is offline. Who has never answered is probed with
+    /// what is wanted: it may answer nothing else.
+    void on_refused(const modbus::Request& request) {
+        if (request.span()) last_read_ = request;
+    }
 
     static constexpr int kFailing = 2;  ///< transactions in a row
     static constexpr int kFlaky = 4;    ///< silent ones of the last 8 attempts

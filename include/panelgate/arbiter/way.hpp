@@ -35,17 +35,28 @@ class Return {
     }
     /// A request to it has ended without its own reply.
     void on_owed() { opened_ = answered_ = false; }
-    void on_replied() { answered_ = opened_; }
+    void on_replied() {
+        answered_ = opened_;
+        in_vain_ = 0;
+    }
     /// `told_apart`: a read that nobody would have asked for but to tell its reply apart.
-    void on_in_vain(bool told_apart) { plainly_ = told_apart; }
+    void on_in_vain(bool told_apart) {
+        plainly_ = told_apart;
+        in_vain_ = std::min(in_vain_ + 1, kMost);
+    }
 
     /// It has answered each request since then, and one at least. That may have been the replies
     /// that it owes, one behind another: then as many are still to come, at once.
     bool answered() const { return answered_; }
     /// It may not answer other reads than it is used to.
     bool plainly() const { return plainly_; }
+    /// Neither did it answer those that it is used to: perhaps it answers writes alone.
+    bool reads_in_vain() const { return in_vain_ >= kMost; }
 
   private:
+    static constexpr int kMost = 3;
+
+    int in_vain_ = 0;  ///< one after another
     bool opened_ = false;
     bool answered_ = false;
     bool plainly_ = false;

@@ -28,6 +28,17 @@ TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
     EXPECT_EQ(bus.sent.size(), frames);
 }
 
+TEST_F(ArbiterTest, P4WhoHasNeverAnsweredIsProbedWithWhatIsWanted) {
+    while (!bus.arbiter().health(17).offline()) {
+        if (bus.arbiter().idle()) bus.submit(17, kWrite, 7);
+        bus.run_for(100ms);
+    }
+    EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::offline);
+    ASSERT_TRUE(bus.next_sent());
+    EXPECT_EQ(bus.sent.back().kind, FrameKind::probe);
+    EXPECT_EQ(bus.sent.back().adu, modbus::encode_adu(17, kRead)) << "it may answer nothing else";
+}
+
 TEST_F(ArbiterTest, P4QueuedRequestsOfAStationThatGoesOfflineAreAnsweredAtOnce) {
     settings.queue.deadline = 60s;
     BusScript script{settings};

@@ -143,12 +143,15 @@ TEST_F(Echo, P8AFreshLineIsAskedByAReadBeforeItsFirstWrite) {
     EXPECT_EQ(bus.sent[0].adu[1], 3);
     bus.run_to_end_of_request();
     reply(bus, "03 02 00 07"_hex);
+    ASSERT_EQ(bus.next_sent()->adu, bus.sent[0].adu) << "the echo of one may have been lost";
+    bus.run_to_end_of_request();
+    reply(bus, "03 02 00 07"_hex);
     ASSERT_EQ(bus.next_sent()->adu, modbus::encode_adu(17, kWriteCoil));
     bus.run_to_end_of_request();
     reply(bus, kWriteCoil);
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kWriteCoil);
-    EXPECT_EQ(bus.sent.size(), 2u);
-    // Once is enough.
+    EXPECT_EQ(bus.sent.size(), 3u);
+    // Twice is enough.
     bus.run_for(10ms);
     bus.submit(17, kWriteRegister);
     EXPECT_EQ(bus.sent.back().adu[1], 6);
@@ -173,8 +176,27 @@ TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
     memory.on_unanswered(test::request_of(write));
     EXPECT_EQ(memory.state(), EchoState::unclear);
     EXPECT_TRUE(memory.must_be_learned_before(test::request_of(write), false));
+    constexpr int kReads = 16;
+    for (int i = 1; i < kReads; ++i) memory.on_reply_without_echo(test::request_of(read), false);
+    EXPECT_EQ(memory.state(), EchoState::unclear) << "bytes may be lost now and then";
     memory.on_reply_without_echo(test::request_of(read), false);
     EXPECT_EQ(memory.state(), EchoState::absent);
+}
+
+TEST(EchoMemory, P8OneReplyWithoutAnEchoTellsNotThatThereIsNone) {
+    EchoMemory memory(EchoMode::automatic);
+    memory.on_reply_without_echo(test::request_of(kRead), false);
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), true));
+    EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
+    memory.on_mismatch();
+    EXPECT_TRUE(memory.expects_one()) << "it has been heard";
+    for (int i = 0; i < 15; ++i) memory.on_reply_without_echo(test::request_of(kRead), false);
+    EXPECT_TRUE(memory.expects_one());
+    EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
+    memory.on_reply_without_echo(test::request_of(kRead), false);
+    EXPECT_FALSE(memory.expects_one());
+    memory.forget();
+    EXPECT_FALSE(memory.expects_one()) << "another device";
 }
 
 TEST_F(Echo, P8AReplyBehindAFrameOfSomebodyTellsNothingAboutAnEcho) {
@@ -250,8 +272,59 @@ TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
     reply(bus, kReply);
     bus.run_for(1s);
     EXPECT_EQ(bus.answer(lost).pdu.value(), kReply);
-    read_once(bus, false);
+    constexpr int kReads = 16;
+    for (int i = 0; i < kReads; ++i) {
+        bus.submit(17, kRead);
+        bus.run_to_end_of_request();
+        reply(bus, kReply);
+        bus.run_for(1s);
+    }
     EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
+}
+
+TEST_F(Echo, P1WhatComesBeforeTheEchoIsSomebodyElses) {
+    for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
+        BusScript bus(settings(mode));
+        read_once(bus, true);
+        for (const bool alive : {true, false, true}) {
+            const Ticket ticket = bus.submit(17, kRead);
+            bus.hear_reply(17, "03 06 00 09 00 09 00 09"_hex);
+            hear_echo(bus);
+            EXPECT_FALSE(bus.answered(ticket));
+            if (alive) reply(bus, kReply);
+            bus.run_for(2s);
+            ASSERT_TRUE(bus.answered(ticket));
+            if (alive) EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
+            if (!alive) EXPECT_FALSE(bus.answer(ticket).pdu);
+        }
+    }
+}
+
+TEST_F(Echo, P8AWriteIsNotConfirmedByWhatComesBeforeItsEcho) {
+    BusScript bus(settings(EchoMode::on));
+    const Ticket ticket = bus.submit(17, "0F 00 10 00 08 01 55"_hex);
+    bus.hear_reply(17, "0F 00 10 00 08"_hex);
+    hear_echo(bus);
+    bus.run_for(2s);
+    EXPECT_FALSE(bus.answer(ticket).pdu);
+}
+
+TEST_F(Echo, P1AReplyBehindAnotherMastersQuestionOfItsShapeIsNobodys) {
+    BusScript bus(settings(EchoMode::off));
+    const Ticket ticket = bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.hear(modbus::encode_adu(17, "03 00 00 00 03"_hex));
+    bus.hear_reply(17, kReply);
+    EXPECT_FALSE(bus.answered(ticket));
+    bus.run_for(2s);
+    EXPECT_FALSE(bus.answer(ticket).pdu);
+    // What it asks for besides is told apart.
+    const Ticket next = bus.submit(17, kRead);
+    bus.run_to_end_of_request();
+    bus.hear(modbus::encode_adu(17, "03 00 00 00 01"_hex));
+    bus.hear_reply(17, "03 02 00 07"_hex);
+    bus.hear_reply(17, kReply);
+    EXPECT_EQ(bus.answer(next).pdu.value(), kReply);
 }
 
 TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {

@@ -1,0 +1,194 @@
+// What is owed where the way to the wire may hold it back, across connections (P1, P4).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "arbiter_fixture.hpp"
+#include "support/hex.hpp"
+
+namespace panelgate::arbiter {
+namespace {
+
+/// A device server that hangs takes connections all the same: its kernel does.
+class AfterAReset : public ArbiterTest {
+  protected:
+    /// A request was sent twice and not answered, then the line was opened anew.
+    AfterAReset() {
+        settings.may_stall = true;
+        settings.stations[0].late_window = 500ms;
+        script.emplace(settings);
+        const Ticket first = script->submit(17, read_at(1), 1);
+        while (!script->answered(first)) script->run_for(1ms);
+        script->line_down();
+        script->line_up();
+        script->run_for(2s);
+    }
+    void ask() {
+        const std::size_t before = script->sent.size();
+        second = script->submit(17, read_at(2), 1);
+        if (script->sent.size() == before) script->next_sent();
+        script->run_to_end_of_request();
+    }
+    bool read_at_2_was_sent() const {
+        const Bytes adu = modbus::encode_adu(17, read_at(2));
+        return std::ranges::any_of(script->sent, [&](const auto& one) { return one.adu == adu; });
+    }
+    std::optional<BusScript> script;
+    Ticket second = 0;
+};
+
+TEST_F(AfterAReset, P1WhatWasOwedBeforeAnswersNobody) {
+    ask();
+    ASSERT_FALSE(read_at_2_was_sent()) << "nothing tells yet that its reply would be its own";
+    script->hear_reply(17, kReply);  // the server goes on: the first attempt's
+    script->run_for(20ms);
+    script->hear_reply(17, "03 06 02 2B 00 00 00 65"_hex);  // the second's
+    script->run_for(20ms);
+    EXPECT_FALSE(script->answered(second));
+    script->hear_reply(17, "03 04 00 01 00 02"_hex);  // what was asked to prove the way
+    script->run_for(20ms);
+    ASSERT_TRUE(read_at_2_was_sent()) << "nothing is owed any more";
+    script->hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script->answer(second).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
+    EXPECT_EQ(script->resets, 0);
+}
+
+TEST_F(AfterAReset, P1WhatIsProvedRestsUntilWhatIsOwedCouldHaveCome) {
+    ask();
+    script->hear_reply(17, "03 04 00 01 00 02"_hex);
+    const TimePoint proved = script->now();
+    script->run_for(600ms);
+    EXPECT_FALSE(read_at_2_was_sent());
+    ASSERT_TRUE(script->next_sent(500ms));
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_GE(script->now() - proved, 900ms) << "the timeout, and as much for being late";
+}
+
+TEST_F(AfterAReset, P1ARefusalMayBeOfWhatIsOwed) {
+    ask();
+    script->hear_reply(17, "83 02"_hex);
+    script->run_for(900ms);
+    EXPECT_FALSE(read_at_2_was_sent()) << "two are owed yet, of three";
+    script->hear_reply(17, "83 02"_hex);
+    script->run_for(900ms);
+    EXPECT_FALSE(read_at_2_was_sent()) << "one is, and it takes as long";
+    ASSERT_TRUE(script->next_sent(2s)) << "nothing more comes of it";
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_EQ(script->resets, 0);
+}
+
+TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked) {
+    settings.offline.after = 2;  // it has been silent once
+    script->apply(settings);
+    ask();
+    ASSERT_NE(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
+    script->run_for(1s);
+    ASSERT_EQ(script->resets, 1);
+    EXPECT_FALSE(script->arbiter().health(17).offline()) << "that tells nothing of the panel";
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
+}
+
+TEST_F(AfterAReset, APanelThatAnswersWrongWhatNobodyAskedComesBackAsWell) {
+    ask();
+    const Bytes told_apart = script->sent.back().adu;
+    script->hear_reply(17, "03 02 00 01"_hex);
+    script->run_for(1s);
+    ASSERT_EQ(script->resets, 1);
+    EXPECT_FALSE(script->arbiter().health(17).offline());
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    EXPECT_NE(script->sent.back().adu, told_apart);
+}
+
+TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
+    ask();
+    script->run_for(1s);
+    script->line_down();
+    script->line_up();
+    script->run_for(2s);
+    ask();
+    script->hear_reply(17, kReply);
+    script->run_for(800ms);
+    ASSERT_FALSE(read_at_2_was_sent());
+    script->hear_reply(17, kReply);  // so it was the one before: as many as are owed may follow
+    script->run_for(900ms);
+    ASSERT_FALSE(read_at_2_was_sent());
+    ASSERT_TRUE(script->next_sent(2s));
+    EXPECT_TRUE(read_at_2_was_sent());
+    EXPECT_EQ(script->resets, 1) << "none for that";
+}
+
+TEST_F(AfterAReset, WhatCannotBeMistakenGoesItselfAndProvesTheWay) {
+    const Ticket write = script->submit(17, kWrite, 1);
+    script->run_to_end_of_request();
+    ASSERT_EQ(script->sent.back().adu, modbus::encode_adu(17, kWrite)) << "reads alone are owed";
+    script->hear_reply(17, kReply);  // the server goes on
+    script->hear_reply(17, kWrite);
+    EXPECT_EQ(script->answer(write).pdu.value(), kWrite);
+    EXPECT_EQ(script->resets, 0);
+}
+
+/// Owes the replies to reads and to a write, on a connection before the one that is open.
+class AWriteIsOwed : public AfterAReset {
+  protected:
+    AWriteIsOwed() {
+        settings.offline.after = 100;
+        script->apply(settings);
+        const Ticket write = script->submit(17, "06 00 05 00 01"_hex, 1);
+        while (!script->answered(write)) script->run_for(10ms);
+        for (int i = 0; i < 3; ++i) anew();
+    }
+    /// A proof goes out, and nothing comes.
+    void anew() {
+        script->line_down();
+        script->line_up();
+        script->run_for(3s);
+        script->submit(17, kWrite, 1);
+        script->run_for(1s);
+        EXPECT_NE(script->sent.back().adu, modbus::encode_adu(17, kWrite));
+    }
+    void write() {
+        script->line_down();
+        script->line_up();
+        script->run_for(3s);
+        second = script->submit(17, kWrite, 1);
+        script->run_to_end_of_request();
+        ASSERT_EQ(script->sent.back().adu, modbus::encode_adu(17, kWrite));
+    }
+};
+
+TEST_F(AWriteIsOwed, P4APanelThatAnswersWritesAloneComesBack) {
+    write();
+    script->hear_reply(17, kWrite);
+    EXPECT_EQ(script->answer(second).pdu.value(), kWrite);
+}
+
+TEST_F(AWriteIsOwed, P1ARefusalOfItAnswersNoOther) {
+    write();
+    script->hear_reply(17, "86 02"_hex);
+    EXPECT_FALSE(script->answered(second));
+    script->hear_reply(17, kWrite);
+    EXPECT_EQ(script->answer(second).pdu.value(), kWrite);
+}
+
+TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheWay) {
+    const Ticket other = script->submit(18, kRead, 2);
+    script->run_to_end_of_request();
+    script->hear_reply(18, kReply);
+    ASSERT_TRUE(script->answered(other));
+    const std::size_t sent = script->sent.size();
+    second = script->submit(17, read_at(2), 1);
+    EXPECT_EQ(script->sent.size(), sent) << "what is owed may only now have reached its station";
+    ASSERT_TRUE(script->next_sent(1s));
+    EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(2))) << "no more is needed";
+}
+
+}  // namespace
+}  // namespace panelgate::arbiter
