@@ -105,7 +105,7 @@ void EchoMemory::on_reply_without_echo(const modbus::Request& request, bool frag
         return;
     if (!fragment) ++missed_;
     if (fragment || heard_) state_ = EchoState::unclear;
-    if (!fragment && missed_ >= (heard_ ? kNoMore : kNever)) state_ = EchoState::absent;
+    if (!fragment && (!heard_ || missed_ >= kNoMore)) state_ = EchoState::absent;
 }
 
 void EchoMemory::on_unclear() {

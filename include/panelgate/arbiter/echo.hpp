@@ -92,10 +92,9 @@ class EchoMemory {
   private:
     void begin();
 
-    /// Replies one after another without any echo, until there is none: bytes are lost now and
-    /// then, and a write would be confirmed by the next echo.
-    static constexpr int kNever = 2;    ///< where none was ever heard
-    static constexpr int kNoMore = 16;  ///< where one was
+    /// Replies one after another without any echo, until there is none, where one was heard: bytes
+    /// are lost now and then, and a write would be confirmed by the next echo.
+    static constexpr int kNoMore = 16;
 
     EchoMode mode_;
     EchoState state_;
