@@ -278,7 +278,7 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
         return Verdict::replied;
     }
     if (wrong_) return Verdict::wrong;
-    const bool damaged = framer_.was_damaged() || echo_.mismatch();
+    const bool damaged = framer_.was_damaged() || echo_.mismatch() || contested_;
     if (framer_.was_damaged_whole()) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;

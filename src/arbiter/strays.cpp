@@ -65,6 +65,8 @@ Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) 
         (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
         return Part::request;
     if (part.kind == Unused::Kind::damaged) return Part::damaged;
+    // Whatever else it might be, it is not to be believed to be that.
+    if (answers_other_master(now, part.bytes)) return Part::unknown;
     const Station* station = stations.find(part.station);
     const bool owed =
         station != nullptr && station->judge(now, modbus::pdu_of(part.bytes)) != Stray::unasked;
@@ -73,7 +75,7 @@ Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) 
 }
 
 void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, Stations& stations,
-                  Quiet& quiet, Ledger& ledger) const {
+                  Quiet& quiet, Ledger& ledger) {
     const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
         const Part what = judge(heard_at, part, stations);
@@ -82,6 +84,7 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
             if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
+            if (what == Part::request) on_other_master(heard_at, part.bytes);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
@@ -95,6 +98,22 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
         }
         if (heard.settled) quiet.lift(part.station);
     }
+}
+
+void Strays::on_other_master(TimePoint now, ByteView heard) {
+    constexpr std::size_t kMost = 4;
+    const ByteView adu = heard.first(modbus::request_adu_length(heard));
+    if (adu[0] == kBroadcast || adu.size() <= modbus::kAduOverhead) return;
+    if (others_.size() == kMost) others_.erase(others_.begin());
+    others_.push_back({now, Bytes(adu.begin(), adu.end())});
+}
+
+bool Strays::answers_other_master(TimePoint now, ByteView adu) const {
+    constexpr Duration kLongest = 500ms;  // for a reply; its master would have asked again
+    return std::ranges::any_of(others_, [&](const Question& other) {
+        return now <= other.at + kLongest && adu[0] == other.adu[0] &&
+               modbus::answers(modbus::pdu_of(other.adu), modbus::pdu_of(adu));
+    });
 }
 
 /// Another master asks: whoever speaks now damages the reply to it. Its panel has as long as ours
@@ -112,7 +131,8 @@ void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& sta
 }
 
 bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const {
-    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu))
+    if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu) ||
+        answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
     return station != nullptr && station->judge(now, modbus::pdu_of(adu)) == Stray::unasked;

@@ -77,7 +77,11 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const bool may_be_owed = refusal && !group.probe && schedule_.held_back(station) &&
                              station.refuses_other(attempt.reply(), group.request.pdu());
     const bool too_early = early && !settings_.paced && pace_.believed();
-    if (may_be_owed || attempt.is_contested() || station.is_copy(now, attempt, too_early)) {
+    if (attempt.is_contested()) {
+        attempt.reject_contested();
+        return false;
+    }
+    if (may_be_owed || station.is_copy(now, attempt, too_early)) {
         attempt.reject_reply();
         return false;
     }

@@ -139,6 +139,11 @@ class Attempt {
     }
     /// Another master has asked the same station for something that this answers as well.
     bool is_contested() const;
+    /// Then it is nobody's, and the station was not silent.
+    void reject_contested() {
+        contested_ = true;
+        reject_reply();
+    }
     /// As much as the reply, and perhaps that very reply, came damaged in front of it.
     bool said_damaged_before() const;
     /// When what was held back came, if its reply is that once more.
@@ -250,6 +255,7 @@ class Attempt {
     bool echo_possible_ = true;
     std::size_t noise_in_front_ = 0;  ///< bytes
     bool frames_in_front_ = false;    ///< good ones
+    bool contested_ = false;
     bool borrowed_ = false;
     bool wrong_ = false;
     bool refused_other_ = false;

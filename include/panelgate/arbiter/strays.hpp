@@ -34,7 +34,10 @@ class Strays {
     void on_replied(std::uint8_t station) { replied_ = station; }
     /// Who answered what was sent before the frame on the wire; 0: nobody.
     std::uint8_t replied_before() const { return replied_before_; }
-    void forget() { idle_.clear(); }
+    void forget() {
+        idle_.clear();
+        others_.clear();
+    }
 
     /// Bytes that nobody asked for (MST-04): counted, never matched with a later request.
     void hear(ByteView bytes);
@@ -49,14 +52,16 @@ class Strays {
     /// Counts, traces, and tells the stations. `idle`: no request has wholly left since the last
     /// reply, so that bytes may be its trail.
     void note(TimePoint now, const std::vector<modbus::Unused>& parts, bool idle,
-              Stations& stations, Quiet& quiet, Ledger& ledger) const;
+              Stations& stations, Quiet& quiet, Ledger& ledger);
     /// It is the reply that its station gives instead of the right one: not the echo, nor a copy,
-    /// nor what was owed, nor its answer to a broadcast.
+    /// nor what was owed, nor its answer to a broadcast or to another master.
     bool is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const;
 
   private:
     Ledger::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
     bool answers_broadcast(ByteView adu) const;
+    bool answers_other_master(TimePoint now, ByteView adu) const;
+    void on_other_master(TimePoint now, ByteView heard);
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 
@@ -64,9 +69,14 @@ class Strays {
     modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
-    Bytes broadcast_;           ///< the last one
-    unsigned sent_since_ = 0;   ///< frames behind it
-    std::uint8_t replied_ = 0;  ///< what was sent last; 0: nobody, or not yet
+    struct Question {
+        TimePoint at{};
+        Bytes adu;
+    };
+    std::vector<Question> others_;  ///< of other masters, the latest last (bounded)
+    Bytes broadcast_;               ///< the last one
+    unsigned sent_since_ = 0;       ///< frames behind it
+    std::uint8_t replied_ = 0;      ///< what was sent last; 0: nobody, or not yet
     std::uint8_t replied_before_ = 0;
 };
 
