@@ -6,8 +6,6 @@
 
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/request.hpp"
-#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "rules.hpp"
 
@@ -211,7 +209,7 @@ void Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
-        if (foreign) on_other_master(parts[i].bytes);
+        if (foreign && parts[i].bytes[0] == group_.station) others_.on_heard({}, parts[i].bytes);
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_echo_behind();
         const bool in_front = i + behind < parts.size();
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
@@ -231,20 +229,6 @@ void Attempt::on_echo_behind() {
     if (!timing_.echoes) return;
     echo_behind_ = true;
     if (held_) stray_frame(*std::exchange(held_, std::nullopt));
-}
-
-void Attempt::on_other_master(ByteView heard) {
-    constexpr std::size_t kMost = 4;
-    const std::size_t size = modbus::request_adu_length(heard);
-    if (heard[0] != group_.station || size <= modbus::kAduOverhead || others_.size() >= kMost)
-        return;
-    const ByteView pdu = modbus::pdu_of(heard.first(size));
-    others_.emplace_back(pdu.begin(), pdu.end());
-}
-
-bool Attempt::is_contested() const {
-    return std::ranges::any_of(others_,
-                               [&](const Bytes& other) { return modbus::answers(other, *reply_); });
 }
 
 std::vector<Unused> Attempt::take_strays() { return std::exchange(strays_, {}); }

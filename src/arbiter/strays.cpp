@@ -84,7 +84,7 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
             if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
-            if (what == Part::request) on_other_master(heard_at, part.bytes);
+            if (what == Part::request) others_.on_heard(heard_at, part.bytes);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
@@ -100,20 +100,9 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
     }
 }
 
-void Strays::on_other_master(TimePoint now, ByteView heard) {
-    constexpr std::size_t kMost = 4;
-    const ByteView adu = heard.first(modbus::request_adu_length(heard));
-    if (adu[0] == kBroadcast || adu.size() <= modbus::kAduOverhead) return;
-    if (others_.size() == kMost) others_.erase(others_.begin());
-    others_.push_back({now, Bytes(adu.begin(), adu.end())});
-}
-
 bool Strays::answers_other_master(TimePoint now, ByteView adu) const {
     constexpr Duration kLongest = 500ms;  // for a reply; its master would have asked again
-    return std::ranges::any_of(others_, [&](const Question& other) {
-        return now <= other.at + kLongest && adu[0] == other.adu[0] &&
-               modbus::answers(modbus::pdu_of(other.adu), modbus::pdu_of(adu));
-    });
+    return others_.fit(adu, now - kLongest);
 }
 
 /// Another master asks: whoever speaks now damages the reply to it. Its panel has as long as ours

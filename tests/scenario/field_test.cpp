@@ -10,6 +10,15 @@
 namespace panelgate::scenario {
 namespace {
 
+/// Behind a device server that hangs so often a second, and takes connections all the while.
+Plan hanging_line(unsigned panels, double stalls) {
+    Plan plan = quiet_line(19200, panels);
+    plan.settings.may_stall = true;
+    plan.line.stalls = stalls;
+    plan.line.hangs = true;
+    return plan;
+}
+
 TEST(Field, P1TheFirstBytesOfOurOwnRequestDoNotEndTheWaitForItsReply) {
     Plan plan = quiet_line(19200, 1, 30ms);
     plan.line.partial_echo = 1;
@@ -51,10 +60,7 @@ TEST(Field, P1ALineThatHoldsEverythingBackNeverGivesAnOldReply) {
 }
 
 TEST(Field, P1ADeviceServerThatHangsAndTakesConnectionsAllTheWhileNeverGivesAnOldReply) {
-    Plan plan = quiet_line(19200, 2);
-    plan.settings.may_stall = true;
-    plan.line.stalls = 0.5;
-    plan.line.hangs = true;
+    Plan plan = hanging_line(2, 0.5);
     plan.settings.offline.after = 100;  // collisions behind a stall hide who has answered
     add_client(plan, {1}, 0.1).in_flight = 4;
     add_client(plan, {1, 2});
@@ -62,20 +68,14 @@ TEST(Field, P1ADeviceServerThatHangsAndTakesConnectionsAllTheWhileNeverGivesAnOl
 }
 
 TEST(Field, P1BehindAHangAPanelThatAnswersOneLengthAloneNeverGivesAnOldReply) {
-    Plan plan = quiet_line(19200, 1);
-    plan.settings.may_stall = true;
-    plan.line.stalls = 0.2;
-    plan.line.hangs = true;
+    Plan plan = hanging_line(1, 0.2);
     plan.panels[0].only_registers = 4;
     add_client(plan, {1}).in_flight = 4;
     EXPECT_EQ(broken(plan), "");
 }
 
 TEST(Field, P4APanelThatIsSilentToWhatNobodyAskedComesBackWhenADeviceServerGoesOn) {
-    Plan plan = quiet_line(19200, 1);
-    plan.settings.may_stall = true;
-    plan.line.stalls = 0.05;
-    plan.line.hangs = true;
+    Plan plan = hanging_line(1, 0.05);
     plan.seed = 1;
     plan.transactions = 5000;
     add_client(plan, {1}).same_read = true;

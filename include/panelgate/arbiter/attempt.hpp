@@ -7,6 +7,7 @@
 
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/questions.hpp"
 #include "panelgate/arbiter/reply_end.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/bytes.hpp"
@@ -138,7 +139,7 @@ class Attempt {
                noise_in_front_ == 0;
     }
     /// Another master has asked the same station for something that this answers as well.
-    bool is_contested() const;
+    bool is_contested() const { return !others_.empty() && others_.fit(adu_of(*reply_)); }
     /// Then it is nobody's, and the station was not silent.
     void reject_contested() {
         contested_ = true;
@@ -211,7 +212,6 @@ class Attempt {
     void judge_strays(std::size_t from, const Ends& ends);
     void collect();
     void on_echo_behind();
-    void on_other_master(ByteView heard);
     bool is_stale(TimePoint now, std::size_t size) const;
     /// Bytes of somebody were heard: the reply may be lost, and the usual time tells.
     bool in_doubt() const { return framer_.was_damaged() || echo_.mismatch() || disturbed_; }
@@ -250,7 +250,7 @@ class Attempt {
     bool disturbed_ = false;
     bool fragment_ = false;
     bool echo_behind_ = false;     ///< behind a frame of somebody
-    std::vector<Bytes> others_;    ///< requests of another master to the same station (bounded)
+    Questions others_;             ///< of other masters
     bool own_frame_seen_ = false;  ///< behind something else, where only its echo was expected
     bool echo_possible_ = true;
     std::size_t noise_in_front_ = 0;  ///< bytes

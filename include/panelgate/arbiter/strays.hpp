@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/ledger.hpp"
+#include "panelgate/arbiter/questions.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/bytes.hpp"
@@ -61,7 +62,6 @@ class Strays {
     Ledger::Part judge(TimePoint now, const modbus::Unused& part, const Stations& stations) const;
     bool answers_broadcast(ByteView adu) const;
     bool answers_other_master(TimePoint now, ByteView adu) const;
-    void on_other_master(TimePoint now, ByteView heard);
     void let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
                         Quiet& quiet) const;
 
@@ -69,14 +69,10 @@ class Strays {
     modbus::CrcOrders orders_;
     Bytes idle_;
     Bytes last_frame_;
-    struct Question {
-        TimePoint at{};
-        Bytes adu;
-    };
-    std::vector<Question> others_;  ///< of other masters, the latest last (bounded)
-    Bytes broadcast_;               ///< the last one
-    unsigned sent_since_ = 0;       ///< frames behind it
-    std::uint8_t replied_ = 0;      ///< what was sent last; 0: nobody, or not yet
+    Questions others_;
+    Bytes broadcast_;           ///< the last one
+    unsigned sent_since_ = 0;   ///< frames behind it
+    std::uint8_t replied_ = 0;  ///< what was sent last; 0: nobody, or not yet
     std::uint8_t replied_before_ = 0;
 };
 

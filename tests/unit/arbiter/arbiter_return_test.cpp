@@ -20,9 +20,12 @@ class AfterAReset : public ArbiterTest {
         script.emplace(settings);
         const Ticket first = script->submit(17, read_at(1), 1);
         while (!script->answered(first)) script->run_for(1ms);
+        open_anew(2s);
+    }
+    void open_anew(Duration wait) {
         script->line_down();
         script->line_up();
-        script->run_for(2s);
+        script->run_for(wait);
     }
     void ask() {
         const std::size_t before = script->sent.size();
@@ -86,9 +89,7 @@ TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked
     script->run_for(1s);
     ASSERT_EQ(script->resets, 1);
     EXPECT_FALSE(script->arbiter().health(17).offline()) << "that tells nothing of the panel";
-    script->line_down();
-    script->line_up();
-    script->run_for(2s);
+    open_anew(2s);
     ask();
     EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
 }
@@ -100,9 +101,7 @@ TEST_F(AfterAReset, APanelThatAnswersWrongWhatNobodyAskedComesBackAsWell) {
     script->run_for(1s);
     ASSERT_EQ(script->resets, 1);
     EXPECT_FALSE(script->arbiter().health(17).offline());
-    script->line_down();
-    script->line_up();
-    script->run_for(2s);
+    open_anew(2s);
     ask();
     EXPECT_NE(script->sent.back().adu, told_apart);
 }
@@ -110,9 +109,7 @@ TEST_F(AfterAReset, APanelThatAnswersWrongWhatNobodyAskedComesBackAsWell) {
 TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
     ask();
     script->run_for(1s);
-    script->line_down();
-    script->line_up();
-    script->run_for(2s);
+    open_anew(2s);
     ask();
     script->hear_reply(17, kReply);
     script->run_for(800ms);
@@ -147,17 +144,13 @@ class AWriteIsOwed : public AfterAReset {
     }
     /// A proof goes out, and nothing comes.
     void anew() {
-        script->line_down();
-        script->line_up();
-        script->run_for(3s);
+        open_anew(3s);
         script->submit(17, kWrite, 1);
         script->run_for(1s);
         EXPECT_NE(script->sent.back().adu, modbus::encode_adu(17, kWrite));
     }
     void write() {
-        script->line_down();
-        script->line_up();
-        script->run_for(3s);
+        open_anew(3s);
         second = script->submit(17, kWrite, 1);
         script->run_to_end_of_request();
         ASSERT_EQ(script->sent.back().adu, modbus::encode_adu(17, kWrite));
