@@ -74,7 +74,7 @@ def read_table(root):
 
 def read_depends(root):
     text = (root / "src/CMakeLists.txt").read_text()
-    found = re.findall(r"^panelgate_module\(([\w/]+)(?: DEPENDS ([\w/\s]*?))?(?: LIBRARIES [^)]*)?\)", text, re.M)
+    found = re.findall(r"^panelgate_module\(([\w/]+)(?: ASIO)?(?: DEPENDS ([\w/\s]*?))?(?: LIBRARIES [^)]*)?\)", text, re.M)
     return {module: set(depends.split()) for module, depends in found}
 
 

@@ -44,7 +44,7 @@ must() {
     failed=$before
 }
 
-build() { cmake --preset "$1" -DPANELGATE_TEST_PCH=ON && cmake --build --preset "$1"; }
+build() { cmake --preset "$1" -DPANELGATE_TEST_PCH=ON -DPANELGATE_WERROR=ON && cmake --build --preset "$1"; }
 run_tests() { env "${@:2}" ctest --preset "$1" -j "$jobs"; }
 check_format() {
     find src include tests -name '*.[ch]pp' -print0 | xargs -0 clang-format-19 --dry-run -Werror
