@@ -50,7 +50,7 @@ bool Attempt::takes_along(TimePoint now, const Job& job) const {
     // Rates may differ by 2 %: its last bit may have left that much sooner.
     const Duration spare = (timing_.sent - timing_.started) * 2 / 100;
     const bool leaving = timing_.tolerance && now < timing_.sent - spare;
-    return leaving && group_.attempts == 1 && job.station == group_.station &&
+    return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
            contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
 }
 
@@ -193,10 +193,11 @@ Verdict Attempt::judge_pending(const Ends& ends) {
 void Attempt::judge_strays(std::size_t from, const Ends& ends) {
     for (; from < strays_.size(); ++from) {
         const Unused& part = strays_[from];
-        if (part.kind != Unused::Kind::own || !ends(part.bytes)) continue;
-        // What has nothing to do with the request may be babble: the reply has its usual time.
+        if (part.kind != Unused::Kind::own) continue;
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
         const std::uint8_t function = modbus::plain_function(part.bytes[1]);
+        if (!ends(part.bytes)) continue;
+        // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool other = !exception && function != group_.request.function();
         refused_other_ = refused_other_ || (exception && function != group_.request.function());
         (other ? disturbed_ : wrong_) = true;
@@ -333,6 +334,7 @@ void Attempt::stray_frame(const Bytes& pdu) {
 }
 
 void Attempt::reject_reply() {
+    refusal_rejected_ = refusal_rejected_ || (reply_->front() & modbus::kExceptionBit) != 0;
     stray_frame(*std::exchange(reply_, std::nullopt));
     heard_ = false;
     disturbed_ = true;

@@ -26,27 +26,25 @@ bool Debt::is_only(const Bytes& pdu) const {
     return !empty() && std::ranges::all_of(owed_, [&](const Owed& one) { return one.pdu == pdu; });
 }
 
-bool Debt::may_be_refusal_of(const modbus::Request& request) const {
-    return std::ranges::any_of(owed_,
-                               [&](const Owed& one) { return one.pdu[0] == request.function(); });
+bool Debt::is_ambiguous(const modbus::Request& request, bool again) const {
+    const Bytes& pdu = request.pdu();
+    const bool is_echoed = modbus::is_broadcastable(pdu[0]);
+    const Bytes reply = is_echoed ? modbus::normal_write_reply(pdu) : Bytes{};
+    const auto length = modbus::reply_length_from_request(pdu);
+    return std::ranges::any_of(owed_, [&](const Owed& one) {
+        if (one.pdu[0] != pdu[0] || (again && one.pdu == pdu)) return false;
+        return is_echoed ? modbus::answers(one.pdu, reply)
+                         : modbus::reply_length_from_request(one.pdu) == length;
+    });
 }
 
-bool Debt::may_fit_normal_reply_to(const modbus::Request& write) const {
-    const Bytes& pdu = write.pdu();
-    if (!modbus::is_broadcastable(pdu[0])) return may_fit_reply_to(pdu);
-    return fits(modbus::normal_write_reply(pdu));
+void Debt::close_before(TimePoint sent, TimePoint connected) {
+    std::erase_if(owed_, [&](const Owed& one) { return one.sent < sent && one.sent >= connected; });
 }
 
 bool Debt::fits_other(ByteView reply, const Bytes& pdu) const {
     const auto fits = may_be_answered_by(reply);
     return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu != pdu && fits(one); });
-}
-
-bool Debt::may_fit_reply_to(ByteView read) const {
-    const auto length = modbus::reply_length_from_request(read);
-    return std::ranges::any_of(owed_, [&](const Owed& one) {
-        return one.pdu[0] == read[0] && modbus::reply_length_from_request(one.pdu) == length;
-    });
 }
 
 const Debt::Owed* Debt::oldest(ByteView reply) const {

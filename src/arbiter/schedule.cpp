@@ -51,28 +51,37 @@ void Schedule::apply(const Settings& settings) {
     sharing_.apply(settings.share_reads);
 }
 
-/// Nothing else can come then that would be taken for the reply to this request: to what it was
-/// asked before (P1), or to a broadcast (P8). No reply is that to a broadcast.
-TimePoint Schedule::rested(const Stations& stations, std::uint8_t id,
-                           const modbus::Request& request) const {
-    if (id == kBroadcast) return {};
-    const Station* station = stations.find(id);
-    const Duration window =
-        station != nullptr ? station->broadcast_window() : stations.settings(id).response_timeout;
-    const TimePoint broadcasts = broadcasts_.over(request, window);
-    return station != nullptr ? std::max(station->rested(), broadcasts) : broadcasts;
+/// From then on a job may have its turn: it is sent, or, where that is sooner, a read whose answer
+/// shows that nothing else is outstanding (P1). Nothing that answers a broadcast can be taken for
+/// its reply either (P8). No reply is that to a broadcast.
+TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
+    if (job.station == kBroadcast) return {};
+    const Station* station = stations.find(job.station);
+    if (station == nullptr)
+        return broadcasts_.over(job.request, stations.settings(job.station).response_timeout);
+    // Before a write that its echo could confirm a read goes that may be any one.
+    const bool is_learned = echo_known_ || job.request.is_read();
+    TimePoint clear = is_learned ? station->clear_at(job.request) : station->rested();
+    if (can_prove(*station)) clear = std::min(clear, station->clear_at(station->proof()));
+    return std::max(clear, broadcasts_.over(job.request, station->broadcast_window()));
 }
 
 /// At once when the reply that its station owes is to this very request, else behind that (P1).
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
-    if (!station.may_ask(TimePoint{}, group.request.pdu()))
-        return rested(stations, group.station, group.request);
-    return broadcasts_.over(group.request, station.broadcast_window());
+    return std::max(station.clear_at(group.request, true),
+                    broadcasts_.over(group.request, station.broadcast_window()));
+}
+
+/// On the connection where the way may hold back what is outstanding, more is sent only while the
+/// station is seen to answer.
+bool Schedule::can_prove(const Station& station) const {
+    return station.may_prove() && (!may_stall_ || station.is_answering());
 }
 
 Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
                               const EchoMemory& echo) {
+    echo_known_ = echo.known();
     if (now < quiet.free_at(stations.gap(quiet.station()))) return {};
     const bool alone = backlog_.has_retries() &&
                        (quarantine_ == Quarantine::line || now < quiet.quarantined_until());
@@ -112,15 +121,14 @@ void Schedule::let_others_go_first() {
         others_.insert(job.station);
         return false;
     });
-    // Who has many clients does not have all of these turns.
-    turns_ = dear_ ? 2 * others_.size() : 1;
+    turns_ = dear_ ? others_.size() : 1;
 }
 
 bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
     if (turns_ == 0) return false;
     const JobQueue::Test may = runnable(now, stations, quiet);
     return backlog_.queue().peek([&](const Job& job) {
-        return others_.contains(job.station) && may(job) && stations.may_spend(now, job.station);
+        return others_.contains(job.station) && may(job) && stations.may_spend(now, job);
     }) != nullptr;
 }
 
@@ -138,21 +146,23 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
                                   const Quiet& quiet) const {
     return [&, this, now](const Job& job) {
         if (now < quiet.quarantined_until()) return false;
-        return now >= rested(stations, job.station, job.request) &&
-               !backlog_.has_retry(job.station);
+        return now >= ready_at(stations, job) && !backlog_.has_retry(job.station);
     };
 }
 
-/// P1: what its station owes may still be on its way. On the connection that it was sent on there
-/// is no telling: a new one is needed. Behind that an answer of its own tells, of any station; here
-/// a read for nobody is to have one.
-std::optional<Schedule::Next> Schedule::proof_before(const Job& job,
+/// P1: what is outstanding at its station could be taken for the answer to this job. Stations serve
+/// in turn: the answer to a read of another length shows that nothing is. Where the way may hold
+/// things back and the station does not answer, nothing shows that on the connection which the
+/// request was sent on: a new one is needed.
+std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
-    if (job.station == kBroadcast || station == nullptr || !held_back(*station))
+    if (job.station == kBroadcast || station == nullptr || !station->is_ambiguous(job.request))
         return std::nullopt;
-    if (station->tells_apart(job.request)) return std::nullopt;
-    if (station->owes_since(way_.opened())) return Next{std::nullopt, true};
+    const bool held = held_back(*station);
+    if (!held && now >= station->clear_at(job.request)) return std::nullopt;
+    if (held && !can_prove(*station) && station->owes_since(way_.opened()))
+        return Next{std::nullopt, true};
     Group proof = read_for_nobody(job.station, station->proof());
     proof.probe = true;
     proof.told_apart = proof.request != station->probe();
@@ -161,9 +171,21 @@ std::optional<Schedule::Next> Schedule::proof_before(const Job& job,
 
 Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quiet,
                                   const EchoMemory& echo) {
-    const JobQueue::Test may = runnable(now, stations, quiet);
+    // While a retry lets others go first, each of them has one turn.
+    const bool others = others_go_first(now, stations, quiet);
+    const JobQueue::Test may_run = runnable(now, stations, quiet);
+    PoolSet<std::uint8_t> reads;  // that go before their station's writes
+    backlog_.queue().any_first([&](const Job& job) {
+        if (job.request.is_read() && stations.has_read_turn(job.station) && may_run(job))
+            reads.insert(job.station);
+        return false;
+    });
+    const JobQueue::Test may = [&](const Job& job) {
+        return (!others || others_.contains(job.station)) && may_run(job) &&
+               (job.request.is_read() || !reads.contains(job.station));
+    };
     const JobQueue::Test in_budget = [&](const Job& job) {
-        return may(job) && stations.may_spend(now, job.station);
+        return may(job) && stations.may_spend(now, job);
     };
     // Who fails again and again waits for its share only while others want the line.
     const Job* next = backlog_.queue().peek(in_budget);
@@ -171,14 +193,14 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     if (next == nullptr) next = backlog_.queue().peek(may);
     if (next == nullptr || !gap_is_over(now, next->station, stations, quiet)) return {};
     const bool broadcast = next->station == kBroadcast;
-    if (auto proof = proof_before(*next, stations)) return std::move(*proof);
-    others_.erase(next->station);
-    if (turns_ > 0) --turns_;
+    if (auto proof = proof_before(now, *next, stations)) return std::move(*proof);
     if (!broadcast && echo.must_be_learned_before(next->request, next->ticket == learned_for_)) {
         learned_for_ = next->ticket;
         return {learning_for(*next, stations.of(next->station)), false};
     }
     Job job = *backlog_.queue().pop(test);
+    others_.erase(job.station);
+    if (turns_ > 0) --turns_;
     if (broadcast) {
         Group group{.request = job.request};
         group.jobs.push_back(std::move(job));
@@ -198,7 +220,7 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
     // As a rule the first of them may start at once: however many wait, nothing starts sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
-        earlier(std::max(quiet.quarantined_until(), rested(stations, job.station, job.request)));
+        earlier(std::max(quiet.quarantined_until(), ready_at(stations, job)));
         return *next <= free;
     });
     if (at_once) return next;

@@ -45,6 +45,7 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
+    if (station.owes() && station.is_ambiguous(modbus::Request::read(both))) return false;
     // The whole of one that contains all the others has been asked for by a client.
     if (both != *span && both.count > known_length(station, both)) return false;
     return std::none_of(refused_.begin(), refused_.end(), [&](const ReadSpan& refused) {

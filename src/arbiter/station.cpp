@@ -36,7 +36,8 @@ void Station::owe(TimePoint now, const Bytes& pdu, TimePoint sent) {
 /// Until what left last can no longer be answered: within its timeout, and so much later as its
 /// replies may be late.
 void Station::rest_for_owed(TimePoint now) {
-    not_before_ = std::max(now, debt_.last_sent() + settings_.response_timeout) + late_.value();
+    outstanding_until_ =
+        std::max(now, debt_.last_sent() + settings_.response_timeout) + late_.value();
 }
 
 TimePoint Station::surely_answered(TimePoint started, ByteView reply) const {
@@ -45,6 +46,7 @@ TimePoint Station::surely_answered(TimePoint started, ByteView reply) const {
 }
 
 void Station::on_opened(TimePoint now) {
+    connected_ = now;
     if (!owes()) return;
     return_.on_opened();
     const auto replies = static_cast<int>(debt_.size()) + 1;
@@ -54,12 +56,14 @@ void Station::on_opened(TimePoint now) {
 void Station::on_proved(TimePoint now, TimePoint sent) {
     if (!owes() || proved_ || owes_since(sent)) return;
     proved_ = true;
-    not_before_ = std::max(not_before_, now + settings_.response_timeout + late_.value());
+    outstanding_until_ =
+        std::max(outstanding_until_, now + settings_.response_timeout + late_.value());
 }
 
 void Station::on_asked(TimePoint now, const Group& group, bool held_back) {
-    if (now >= not_before_ && !held_back) debt_.clear();
+    if (now >= rested() && !held_back) debt_.clear();
     asked_ = now;
+    if (group.request.is_read()) read_turn_ = wants_check_ = woken_by_write_ = false;
     if (group.span && !group.told_apart) last_read_ = group.request;
 }
 
@@ -96,13 +100,14 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     if (may_be_copy) {
         copies_.on_either(now, pdu);
     } else {
+        debt_.close_before(debt_.oldest(pdu)->sent, connected_);
         debt_.take(pdu);
     }
     heard.settled = !owes();
     // Those behind it are still to come.
-    if (return_.answered()) not_before_ = std::max(not_before_, now + latest_reply());
+    if (return_.answered()) outstanding_until_ = std::max(outstanding_until_, now + latest_reply());
     copies_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
-    if (heard.settled) not_before_ = now + copies_.hold();
+    if (heard.settled) rest_is_over(now + copies_.hold());
     heard.back = health_.on_reply(now);
     missed_ = false;
     probes_ = 0;
@@ -138,9 +143,10 @@ void Station::settle_debt(TimePoint now, const Attempt& attempt) {
     const TimePoint sent = attempt.timing().sent;
     if (attempt.reply() == group.doubted && debt_.size() <= 1) {
         debt_.clear();  // both have come
-        not_before_ = now + copies_.take_doubt();
-    } else if (debt_.fits(attempt.reply())) {
+        rest_is_over(now + copies_.take_doubt());
+    } else if (const Debt::Owed* const oldest = debt_.oldest(attempt.reply())) {
         // Each of the attempts may have been answered with it, this one too.
+        debt_.close_before(oldest->sent, connected_);
         debt_.take(attempt.reply());
         debt_.add(sent, group.request.pdu());
         rest_for_owed(now);
@@ -148,8 +154,16 @@ void Station::settle_debt(TimePoint now, const Attempt& attempt) {
         // It may be what came damaged, once more, and the reply to this attempt is late.
         owe(now, group.request.pdu(), sent);
     } else {
+        debt_.close_before(sent, connected_);
         not_before_ = std::max(not_before_, now + copies_.take_doubt());
+        if (!owes()) outstanding_until_ = {};
     }
+}
+
+/// Nothing is outstanding any more.
+void Station::rest_is_over(TimePoint not_before) {
+    not_before_ = not_before;
+    outstanding_until_ = {};
 }
 
 Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Duration waited,
@@ -158,11 +172,16 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     Replied result;
     result.back = health_.on_reply(now);
     probes_ = 0;
+    proof_in_vain_ = wants_check_ = read_turn_ = false;
+    if (group.request.is_read()) read_missed_ = false;
     failed_in_a_row_ = 0;
     failing_.clear();
     missed_ = false;
     lately_ = result.back ? 0 : static_cast<std::uint8_t>(lately_ << 1);
-    if (group.tells_pace()) slowest_.add(waited);
+    if (group.tells_pace()) {
+        slowest_.add(waited);
+        quickest_.add(waited);
+    }
     turnaround_.add(think);
     adaptive_.on_reply();
     late_.on_timely();
@@ -184,14 +203,16 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     longest = std::max(longest, group.span->count);
     if (!cheapest_read_ || group.span->count < cheapest_read_->span()->count)
         cheapest_read_ = group.request;
+    if (!largest_read_ || group.span->count > largest_read_->span()->count)
+        largest_read_ = group.request;
     return result;
 }
 
-void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) {
-    damaged_pdu_ = pdu;
-    if (owes()) {  // it may have been the reply to any of them
+void Station::on_damaged_reply(TimePoint now, const modbus::Request& request, TimePoint sent) {
+    damaged_pdu_ = request.pdu();
+    if (is_ambiguous(request)) {  // it may have been the reply to any of them
         debt_.pop();
-        debt_.add(sent, pdu);
+        debt_.add(sent, request.pdu());
         rest_for_owed(now);
     }
     copies_.on_doubt(CopyGuard::kSaidAgain);
@@ -199,7 +220,9 @@ void Station::on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent) 
     not_before_ = std::max(not_before_, again_until_);
 }
 
-void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
+void Station::on_failed(TimePoint now, Verdict verdict, Duration cost, bool is_read) {
+    read_missed_ = read_missed_ || is_read;
+    read_turn_ = !is_read;
     if (verdict == Verdict::silent) adaptive_.on_timeout();
     failed_ = now;
     if (verdict != Verdict::silent) odd_ = kOdd;
@@ -207,17 +230,26 @@ void Station::on_failed(TimePoint now, Verdict verdict, Duration cost) {
     const int silent = verdict == Verdict::silent ? 1 : 0;
     lately_ = static_cast<std::uint8_t>(lately_ << 1 | silent);
     if (failing()) failing_.spend(now, cost);
-    if (!health_.offline()) spend(now, cost);
+    if (!health_.offline()) spend(now, cost, is_read);
 }
 
-bool Station::on_given_up(TimePoint now, Fault fault) {
+bool Station::take_half_open(TimePoint now, bool is_read) {
+    if (!is_read && woken_by_write_) return false;
+    if (!health_.take_half_open(now)) return false;
+    woken_by_write_ = !is_read && cheapest_read_;
+    return true;
+}
+
+bool Station::on_given_up(TimePoint now, Fault fault, bool is_read) {
     ++failed_in_a_row_;
     missed_ = false;
     if (fault == Fault::damaged && !health_.offline()) {
         health_.on_damaged();
         return false;
     }
-    return health_.on_silence(now, stranger());
+    if (is_read || !answers_reads()) return health_.on_silence(now, stranger());
+    wants_check_ = health_.on_silent_write();
+    return false;
 }
 
 bool Station::may_retry(const Group& group) const {
@@ -244,6 +276,7 @@ Duration Station::patience(const Group& group, std::optional<Duration> line, boo
         if (group.silent_after >= whole) return short_wait(line);
         return settings_.adaptive_timeout ? whole : std::min(whole, 2 * group.silent_after);
     }
+    if (group.told_apart) return short_wait(line);
     // Who stopped inside a reply is alive, and may still be held up: the two attempts together wait
     // as long as one.
     if (group.cut_after > Duration::zero() && !health_.offline())
@@ -280,22 +313,22 @@ modbus::Request Station::probe() const {
 
 modbus::Request Station::proof() const {
     modbus::Request read = probe();
-    if (return_.plainly() || !debt_.may_fit_reply_to(read.pdu())) return read;
+    if (return_.plainly() || !is_ambiguous(read)) return read;
     const auto told_apart = [&](modbus::Span span, std::uint32_t count) {
         span.count = count;
         read = modbus::Request::read(span);
-        return !debt_.may_fit_reply_to(read.pdu());
+        return !is_ambiguous(read);
     };
-    const modbus::Span span = *read.span();
     // A part of what it has answered before, if there is one of a length of its own.
-    for (std::uint32_t count = span.count - 1; count > 0; --count)
-        if (told_apart(span, count)) return read;
+    const modbus::Span known = largest_read_ ? *largest_read_->span() : *read.span();
+    for (std::uint32_t count = 1; count <= known.count; ++count)
+        if (told_apart(known, count)) return read;
     constexpr std::uint32_t kItems = 0x10000;  // of a table
     constexpr std::uint32_t kBits = 8;         // whose replies have one length
     const std::uint32_t most =
-        std::min<std::uint32_t>(span.count + kBits * (Debt::kMost + 1), kItems - span.first);
-    for (std::uint32_t count = span.count + 1; count <= most; ++count)
-        if (told_apart(span, count)) return read;
+        std::min<std::uint32_t>(known.count + kBits * (Debt::kMost + 1), kItems - known.first);
+    for (std::uint32_t count = known.count + 1; count <= most; ++count)
+        if (told_apart(known, count)) return read;
     return read;
 }
 

@@ -37,6 +37,14 @@ bool StationHealth::on_silence(TimePoint now, bool at_once) {
     return true;
 }
 
+bool StationHealth::on_silent_write() {
+    if (offline()) return false;
+    state_ = Health::suspect;
+    const bool is_last = silent_ + 1 >= settings_.after;
+    if (!is_last) ++silent_;
+    return is_last;
+}
+
 bool StationHealth::take_half_open(TimePoint now) {
     if (now < next_half_open_) return false;
     next_half_open_ = now + pause_;

@@ -69,12 +69,14 @@ bool Stations::is_stranger(std::uint8_t id) const {
            (station == nullptr ? !configured_.contains(id) : station->stranger());
 }
 
-bool Stations::may_spend(TimePoint now, std::uint8_t id) const {
-    if (is_stranger(id)) return strangers_.allows(now, surprise());
-    const Station* station = find(id);
+bool Stations::may_spend(TimePoint now, const Job& job) const {
+    if (is_stranger(job.station)) return strangers_.allows(now, surprise());
+    const Station* station = find(job.station);
     if (station == nullptr) return true;
-    if (station->suspect() && !suspects_.allows(now)) return false;
-    return station->may_spend(now);
+    // A write that is ignored says nothing of reads while these are answered.
+    const bool is_read = job.request.is_read();
+    const bool is_suspect = station->suspect() && !(is_read && station->answers_reads());
+    return (!is_suspect || suspects_.allows(now)) && station->may_spend(now, is_read);
 }
 
 /// A client's request may be the probe once an interval, as far as the budget goes.
@@ -86,7 +88,8 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     if (!station.health().offline()) return false;
     const bool may_wake = station.stranger() || !job.request.is_read();
     const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
-    if (may_wake && budget.allows(now) && station.take_half_open(now)) return false;
+    if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
+        return false;
     station.on_refused(job.request);
     return true;
 }
@@ -116,9 +119,9 @@ Duration Stations::response_timeout(std::uint8_t id) const {
     return found == nullptr ? settings(id).response_timeout : found->response_timeout();
 }
 
-void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost) {
-    Station& station = of(id);
-    station.on_failed(now, verdict, cost);
+void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost) {
+    Station& station = of(group.station);
+    station.on_failed(now, verdict, cost, group.request.is_read());
     if (station.stranger()) {
         strangers_.spend(now, cost, 2 * surprise());
         if (station.health().offline()) known_strangers_.spend(now, cost, kCompany);
@@ -135,14 +138,20 @@ void Stations::on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Durati
     }
 }
 
+/// What is offline has to pay for it.
+std::optional<TimePoint> Stations::probe_at(const Station& station) const {
+    if (station.wants_check()) return station.probe_due();
+    if (!station.health().offline() || station.stranger()) return std::nullopt;
+    return std::max(station.probe_due(), probes().next());
+}
+
 std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
     std::optional<std::uint8_t> best;
     TimePoint earliest = TimePoint::max();
     for (const auto& [id, station] : stations_) {
-        if (!station.health().offline() || station.stranger()) continue;
-        const TimePoint due = station.probe_due();
-        if (due > now || due >= earliest) continue;
-        earliest = due;
+        const auto at = probe_at(station);
+        if (!at || *at > now || station.probe_due() >= earliest) continue;
+        earliest = station.probe_due();
         best = id;
     }
     return best;
@@ -150,11 +159,9 @@ std::optional<std::uint8_t> Stations::next_to_probe(TimePoint now) const {
 
 std::optional<TimePoint> Stations::next_probe() const {
     std::optional<TimePoint> next;
-    const TimePoint allowed = probes().next();
     for (const auto& [id, station] : stations_) {
-        if (!station.health().offline() || station.stranger()) continue;
-        const TimePoint due = std::max(station.probe_due(), allowed);
-        if (!next || due < *next) next = due;
+        const auto at = probe_at(station);
+        if (at && (!next || *at < *next)) next = at;
     }
     return next;
 }

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "rules.hpp"
@@ -124,7 +125,12 @@ bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& station
         answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
-    return station != nullptr && station->judge(now, modbus::pdu_of(adu)) == Stray::unasked;
+    if (station == nullptr) return false;
+    // A refusal with the number of another function that is outstanding may be that of this
+    // request: asking once more tells sooner than waiting.
+    const Stray stray = station->judge(now, modbus::pdu_of(adu));
+    return stray == Stray::unasked ||
+           (stray == Stray::late && modbus::exception_of(modbus::pdu_of(adu)));
 }
 
 }  // namespace panelgate::arbiter

@@ -74,8 +74,9 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
     const Group& group = attempt.group();
     const bool refusal = modbus::exception_of(attempt.reply()).has_value();
-    const bool may_be_owed = refusal && !group.probe && schedule_.held_back(station) &&
-                             station.refuses_other(attempt.reply(), group.request.pdu());
+    const bool may_be_owed = refusal && !group.probe &&
+                             (attempt.refusal_was_rejected() ||
+                              station.refuses_other(attempt.reply(), group.request.pdu()));
     const bool too_early = early && !settings_.paced && pace_.believed();
     if (attempt.is_contested()) {
         attempt.reject_contested();
@@ -156,13 +157,13 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const TimePoint sent = attempt.timing().sent;
     const Duration cost = now - attempt.timing().started + stations_.gap(group.station);
     if (attempt.came_damaged()) {
-        station.on_damaged_reply(now, group.request.pdu(), sent);
+        station.on_damaged_reply(now, group.request, sent);
     } else {
         station.owe(now, group.request.pdu(), sent);
     }
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
-    stations_.on_failed(now, group.station, verdict, cost);
+    stations_.on_failed(now, group, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(group.station, *until);
         station.on_line_rests(now, *until - now);
@@ -202,7 +203,7 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
     Station& station = stations_.of(group.station);
     if (group.probe) station.on_in_vain(group.told_apart);
     if (group.told_apart) return;
-    if (!station.on_given_up(now, fault)) return;
+    if (!station.on_given_up(now, fault, group.request.is_read())) return;
     if (!station.stranger()) ledger_.event(Kind::offline, group.station);
     const auto theirs = [&](const Job& job) { return job.station == group.station; };
     for (const Job& job : backlog.remove_if(theirs)) ledger_.finish(job, Fault::offline);

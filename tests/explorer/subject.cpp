@@ -14,7 +14,7 @@ void Subject::on_rx(TimePoint now, ByteView bytes) {
     arbiter_.on_rx(now, bytes);
     arbiter_.check_invariants();
     constexpr Duration kSilence = 10ms;  // a reply that begins before it is heard
-    const bool read = last_sent_.size() > 1 && last_sent_[1] == 3;
+    const bool read = last_sent_.size() > 1 && last_sent_[1] == 3 && was_asked_for_;
     const bool echo =
         read && bytes.size() == 3 && std::equal(bytes.begin(), bytes.end(), last_sent_.begin());
     repeat_at_.reset();
@@ -55,6 +55,9 @@ std::optional<Action> Subject::poll_arbiter() {
     } else if (const auto* transmit = std::get_if<Transmit>(&*action)) {
         last_sent_ = transmit->adu;
         if (flaw_ == Flaw::sends_twice) waiting_.emplace_back(*transmit);
+    } else if (const auto* note = std::get_if<arbiter::Note>(&*action)) {
+        if (direction_of(note->kind) == FrameDirection::sent)
+            was_asked_for_ = note->kind != FrameKind::probe;
     }
     return action;
 }

@@ -79,6 +79,7 @@ class Subject {
     std::uint64_t last_ticket_ = 0;
     std::uint64_t renamed_ = 0;  ///< tickets of arbiters before this one
     Bytes last_sent_;
+    bool was_asked_for_ = true;  ///< by a client
     std::optional<TimePoint> repeat_at_;
     int finished_ = 0;
 };

@@ -127,6 +127,8 @@ class Attempt {
     }
     /// The reply is a copy of an earlier one: it counts as heard, and the attempt goes on.
     void reject_reply();
+    /// It was a refusal: another one that follows may be the same once more.
+    bool refusal_was_rejected() const { return refusal_rejected_; }
     /// It may be one: when nothing else comes until `needed` after the request, as long as the
     /// station has ever needed, it is the answer all the same; or, when it is `doubted`, as long
     /// behind it the attempt is doubtful.
@@ -256,6 +258,7 @@ class Attempt {
     std::size_t noise_in_front_ = 0;  ///< bytes
     bool frames_in_front_ = false;    ///< good ones
     bool contested_ = false;
+    bool refusal_rejected_ = false;
     bool borrowed_ = false;
     bool wrong_ = false;
     bool refused_other_ = false;

@@ -84,6 +84,13 @@ class CopyGuard {
                    (any || !std::ranges::equal(request, slot.request));
         });
     }
+    /// This answer repeats that to another request of the last moments.
+    bool repeats_other(TimePoint now, ByteView request, ByteView reply) const {
+        return std::ranges::any_of(slots_, [&](const Slot& slot) {
+            return slot.is_recent(now) && std::ranges::equal(reply, slot.reply) &&
+                   !std::ranges::equal(request, slot.request);
+        });
+    }
     /// It was no copy: a read had the same values when it was asked once more; behind anything
     /// else, which is not asked twice, no other answer came.
     void on_confirmed(ByteView request, ByteView reply) {

@@ -27,20 +27,22 @@ class Debt {
     void add(TimePoint sent, const Bytes& pdu);
     /// The oldest one is owed no more. Not of an empty one.
     void pop() { owed_.pop_front(); }
-    /// The one that left last. Not of an empty one.
+    /// The one that left first, and last. Not of an empty one.
+    TimePoint first_sent() const { return owed_.front().sent; }
     TimePoint last_sent() const { return owed_.back().sent; }
     /// It owes something, and nothing but replies to this very request.
     bool is_only(const Bytes& pdu) const;
     /// This reply may be one of them.
     bool fits(ByteView reply) const { return oldest(reply) != nullptr; }
-    /// A reply to this request, be it a refusal, may be taken for one of them: the same function.
-    bool may_be_refusal_of(const modbus::Request& request) const;
-    /// The normal reply to this write may be.
-    bool may_fit_normal_reply_to(const modbus::Request& write) const;
+    /// A normal reply to one of them could be taken for that to this request: the same function,
+    /// and the same length or echoed fields. `again`: this request is repeated, so that a reply to
+    /// its own earlier attempts is an answer to it.
+    bool is_ambiguous(const modbus::Request& request, bool again) const;
+    /// The request of what this reply answers was served, and a station serves in turn: those of
+    /// the same connection (that left at `connected` or later) and before `sent` were served, too.
+    void close_before(TimePoint sent, TimePoint connected);
     /// This reply may be one of them, but not by being one to the very same request.
     bool fits_other(ByteView reply, const Bytes& pdu) const;
-    /// Any reply to this read may be taken for one of them: the same function and length.
-    bool may_fit_reply_to(ByteView read) const;
     /// The oldest that this reply may answer, or nullptr.
     const Owed* oldest(ByteView reply) const;
     /// ... that left later than `open`: the last one where none did; nullptr where none fits.

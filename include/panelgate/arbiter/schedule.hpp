@@ -65,14 +65,15 @@ class Schedule {
     void let_others_go_first();
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
-    std::optional<Next> proof_before(const Job& job, const Stations& stations) const;
-    TimePoint rested(const Stations& stations, std::uint8_t station,
-                     const modbus::Request& request) const;
+    std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
+    TimePoint ready_at(const Stations& stations, const Job& job) const;
+    bool can_prove(const Station& station) const;
     TimePoint repeat_from(const Group& group, const Stations& stations) const;
     JobQueue::Test runnable(TimePoint now, const Stations& stations, const Quiet& quiet) const;
 
     Quarantine quarantine_;
     bool may_stall_;
+    bool echo_known_ = false;
     Way way_;
     Backlog backlog_;
     Sharing sharing_;

@@ -32,4 +32,18 @@ class Slowest {
     int count_ = 0;
 };
 
+/// The shortest, likewise. Pure.
+class Quickest {
+  public:
+    void add(Duration seen) { slowest_.add(-seen); }
+    /// Nothing: none was seen.
+    std::optional<Duration> value() const {
+        const auto longest = slowest_.value();
+        return longest ? std::optional(-*longest) : std::nullopt;
+    }
+
+  private:
+    Slowest slowest_;
+};
+
 }  // namespace panelgate::arbiter

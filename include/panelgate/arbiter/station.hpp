@@ -51,20 +51,43 @@ class Station {
     void owe(TimePoint now, const Bytes& pdu, TimePoint sent);
     /// ... but its reply has come, damaged. Some say such a one once more: until that would be over
     /// only the very same request may go there, and behind its answer the same holds.
-    void on_damaged_reply(TimePoint now, const Bytes& pdu, TimePoint sent);
+    void on_damaged_reply(TimePoint now, const modbus::Request& request, TimePoint sent);
     bool owes() const { return !debt_.empty(); }
-    /// From then on another request may go there; until then only the very same.
-    TimePoint rested() const { return not_before_; }
+    /// From then on any request may go there.
+    TimePoint rested() const { return std::max(not_before_, outstanding_until_); }
+    /// From then on this request may: nothing that is outstanding could be taken for its answer.
+    /// Another function, length or place is unambiguous and need not wait. `again`: it is repeated.
+    TimePoint clear_at(const modbus::Request& request, bool again = false) const {
+        if (again && (request.pdu() == damaged_pdu_ || debt_.is_only(request.pdu()))) return {};
+        return is_ambiguous(request, again) ? rested() : not_before_;
+    }
+    /// A normal reply that is outstanding could be taken for that to this request. A refusal may be
+    /// of any request of the same function (refuses_other()).
+    bool is_ambiguous(const modbus::Request& request, bool again = false) const {
+        return debt_.is_ambiguous(request, again);
+    }
+    /// What it was asked last was a write that it did not answer: a read that waits goes next.
+    bool has_read_turn() const { return read_turn_; }
+    /// It answers reads, as far as anybody has seen: what writes cost is no reason to put them off.
+    bool answers_reads() const { return cheapest_read_ && !read_missed_; }
+    /// So many writes in a row were in vain that a read is to tell whether it is there.
+    bool wants_check() const { return wants_check_; }
+    /// It is there and serves in turn, so that the answer to proof() shows that nothing which was
+    /// asked before can still come: asking for that is quicker than to wait. Not again after one
+    /// was in vain, until it has answered something.
+    bool may_prove() const {
+        return owes() && debt_.first_sent() >= connected_ && cheapest_read_ && !proof_in_vain_ &&
+               !health_.offline() && !is_ambiguous(proof());
+    }
+    /// It has answered what it was asked last.
+    bool is_answering() const { return !missed_ && health_.silent_in_a_row() == 0; }
     /// Of a request: how long after it has left a reply may still come.
     Duration latest_reply() const { return settings_.response_timeout + late_.value(); }
     /// When its next probe may go: as a rule it is the request that is owed.
     TimePoint probe_due() const {
-        const TimePoint next = health_.next_probe();
-        return debt_.is_only(probe().pdu()) ? next : std::max(next, not_before_);
-    }
-    bool may_ask(TimePoint now, const Bytes& pdu) const {
-        const bool again = debt_.is_only(pdu) || pdu == damaged_pdu_;
-        return again || now >= not_before_;
+        if (wants_check_) return clear_at(probe());
+        return std::max(health_.next_probe(),
+                        debt_.is_only(probe().pdu()) ? TimePoint{} : rested());
     }
     /// A request goes there, and what was owed before has lapsed if it could not come any more.
     /// `held_back`: it may still be on its way, whatever the time.
@@ -72,14 +95,6 @@ class Station {
     /// It owes a reply to a request that left at `since` or later. Where that is when the way to
     /// the wire was proved last, nothing proves the request to have passed.
     bool owes_since(TimePoint since) const { return owes() && debt_.last_sent() >= since; }
-    /// Whatever it owes may come now, and yet no reply to this request is mistaken: nothing of its
-    /// function is owed; or it is a write, reads are in vain, and nothing is owed that its normal
-    /// reply fits (a refusal may be: refuses_other()).
-    bool tells_apart(const modbus::Request& request) const {
-        if (!debt_.may_be_refusal_of(request)) return true;
-        return return_.reads_in_vain() && !request.is_read() &&
-               !debt_.may_fit_normal_reply_to(request);
-    }
     /// This refusal of a request may be one of another that it owes.
     bool refuses_other(ByteView reply, const Bytes& pdu) const {
         return debt_.fits_other(reply, pdu);
@@ -133,12 +148,15 @@ class Station {
     /// `think`: without the silence that tells the panel that the request is over.
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
-    void on_failed(TimePoint now, Verdict verdict, Duration cost);
+    void on_failed(TimePoint now, Verdict verdict, Duration cost, bool is_read = true);
     /// A read for nobody was in vain; `told_apart`: such a proof(), which tells nothing of its
     /// health.
-    void on_in_vain(bool told_apart) { return_.on_in_vain(told_apart); }
+    void on_in_vain(bool told_apart) {
+        return_.on_in_vain(told_apart);
+        proof_in_vain_ = proof_in_vain_ || told_apart;
+    }
     /// The whole transaction failed. True when that took it offline.
-    bool on_given_up(TimePoint now, Fault fault);
+    bool on_given_up(TimePoint now, Fault fault, bool is_read = true);
     /// This answer repeats an earlier reply, soon, and it came `too_early`: the request may never
     /// have got through.
     bool is_copy(TimePoint now, const Attempt& attempt, bool too_early) const {
@@ -150,15 +168,25 @@ class Station {
     bool may_be_copy(TimePoint now, const Attempt& attempt) const {
         const Group& group = attempt.group();
         if (attempt.was_held() || attempt.reply() == group.doubted) return false;
+        const Bytes& pdu = group.request.pdu();
         return copies_.repeats_itself(now, attempt.reply()) ||
-               copies_.suspicious(now, group.request.pdu(), attempt.reply());
+               copies_.suspicious(now, pdu, attempt.reply()) ||
+               (is_quicker_than_ever(attempt.first_sign(now)) &&
+                copies_.repeats_other(now, pdu, attempt.reply()));
+    }
+    /// No reply of its has begun so soon after the request, by far.
+    bool is_quicker_than_ever(Duration first_sign) const {
+        const auto quickest = quickest_.value();
+        return quickest && first_sign < *quickest * 3 / 4;
     }
 
     // How it is to be asked
 
     const StationSettings& settings() const { return settings_; }
     const StationHealth& health() const { return health_; }
-    bool take_half_open(TimePoint now) { return health_.take_half_open(now); }
+    /// A client's request may be the probe, once an interval. A write that was ignored does not
+    /// keep reads from being the next one.
+    bool take_half_open(TimePoint now, bool is_read);
     /// Nobody listed it, and nobody has ever heard it.
     bool stranger() const { return !listed_ && !health_.last_success(); }
     bool forgettable(TimePoint now) const {
@@ -174,8 +202,9 @@ class Station {
     bool flaky() const { return std::popcount(lately_) >= kFlaky; }
     /// What its failures took of the bus lately is within its share, but for the odd one that
     /// nobody could foresee.
-    bool may_spend(TimePoint now) const {
-        return budget_.allows(now, kCredit * timeout_cost()) &&
+    bool may_spend(TimePoint now, bool is_read = true) const {
+        const Duration credit = kCredit * timeout_cost();
+        return budget_.allows(now, credit) && (is_read || writes_.allows(now, credit)) &&
                (!failing() || failing_.allows(now));
     }
     /// ... and all of it is paid.
@@ -240,8 +269,11 @@ class Station {
     Duration timeout_cost() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * settings_.response_timeout;
     }
-    void spend(TimePoint now, Duration cost) { budget_.spend(now, cost, kDebt * timeout_cost()); }
+    void spend(TimePoint now, Duration cost, bool is_read = true) {
+        (is_read ? budget_ : writes_).spend(now, cost, kDebt * timeout_cost());
+    }
     void rest_for_owed(TimePoint now);
+    void rest_is_over(TimePoint not_before);
     void learn_of_copies(TimePoint now, const Attempt& attempt);
     void settle_debt(TimePoint now, const Attempt& attempt);
     Duration short_wait(std::optional<Duration> line) const;
@@ -255,25 +287,35 @@ class Station {
     DriftAlarm drift_;
     CopyGuard copies_;
     Trail trail_;
-    ProbeBudget budget_{ProbeBudget::kFailing};   ///< of its failures; no reply pays for them
+    ProbeBudget budget_{ProbeBudget::kFailing};   ///< of reads that fail; no reply pays for them
+    ProbeBudget writes_{ProbeBudget::kFailing};   ///< ... of writes: reads do not pay for those
     ProbeBudget failing_{ProbeBudget::kFailing};  ///< of those while it is failing()
-    std::uint8_t lately_ = 0;  ///< the last 8 attempts, the latest lowest: 1 was silent
-    Debt debt_;                ///< requests whose replies may still come
-    TimePoint again_until_{};  ///< it may say the reply that came damaged once more
-    Bytes damaged_pdu_;        ///< the request whose reply has just come damaged
-    TimePoint not_before_{};
+    std::uint8_t lately_ = 0;        ///< the last 8 attempts, the latest lowest: 1 was silent
+    Debt debt_;                      ///< requests whose replies may still come
+    TimePoint again_until_{};        ///< it may say the reply that came damaged once more
+    Bytes damaged_pdu_;              ///< the request whose reply has just come damaged
+    TimePoint not_before_{};         ///< its replies may come twice, or the line is just open
+    TimePoint outstanding_until_{};  ///< what is outstanding may come; {}: nothing is
+    TimePoint connected_{};          ///< the line was opened, on a way that holds things back
+    bool proof_in_vain_ = false;     ///< since it was heard last
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     Return return_;
     TimePoint asked_{};
     std::optional<modbus::Request> cheapest_read_;  ///< that it has answered
+    std::optional<modbus::Request> largest_read_;   ///< the same; parts of it are answered as well
     std::optional<modbus::Request> last_read_;  ///< what to probe with before it has answered any
     std::array<std::uint32_t, modbus::kTables.size()> longest_read_{};  ///< by table
-    Slowest slowest_;  ///< from request to first sign of the reply
+    Slowest slowest_;    ///< from request to first sign of the reply
+    Quickest quickest_;  ///< the same
     TimePoint failed_{};
     Drift clock_drift_;
     int failed_in_a_row_ = 0;
     int odd_ = 0;          ///< so many more replies until answers_as_asked()
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
+    bool read_turn_ = false;
+    bool read_missed_ = false;  ///< the last read was in vain
+    bool wants_check_ = false;
+    bool woken_by_write_ = false;  ///< its last probe
     bool trail_told_ = false;
     bool answers_broadcasts_ = false;  ///< it has, once
     int probes_ = 0;                   ///< in vain, since it was heard last

@@ -38,6 +38,10 @@ class StationHealth {
     /// A whole transaction (all its attempts) passed in silence. True when that took it offline:
     /// `at_once`, or after as many in a row as the settings say.
     bool on_silence(TimePoint now, bool at_once = false);
+    /// The same of a write, at a station that answers reads: it may ignore this write alone. One
+    /// silence short of offline at most; what is offline stays as it is. True when a read is to
+    /// tell, because any other transaction would have taken it offline.
+    bool on_silent_write();
 
     /// When an offline station may be asked again; the budget of the line may postpone it.
     TimePoint next_probe() const { return next_probe_; }

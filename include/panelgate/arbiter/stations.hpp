@@ -81,11 +81,17 @@ class Stations {
     /// The budgets for stations that do not answer allow asking this one. One that has just fallen
     /// silent, that keeps failing, or that nobody knows waits for them only while others want the
     /// line.
-    bool may_spend(TimePoint now, std::uint8_t id) const;
+    bool may_spend(TimePoint now, const Job& job) const;
     /// An attempt failed that kept the line for `cost`.
-    void on_failed(TimePoint now, std::uint8_t id, Verdict verdict, Duration cost);
+    void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
+    /// A read of this station that waits goes before its writes.
+    bool has_read_turn(std::uint8_t id) const {
+        const Station* station = find(id);
+        return station != nullptr && station->has_read_turn();
+    }
 
-    /// The listed offline station whose probe is due longest, nothing when none is.
+    /// The listed station, offline or unanswering to writes, whose probe is due longest; nothing
+    /// when none is.
     std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
     /// When the next probe is due.
     std::optional<TimePoint> next_probe() const;
@@ -94,6 +100,8 @@ class Stations {
 
   private:
     bool anyone_online() const;
+    /// When it is asked though nobody wants anything of it; nothing: never.
+    std::optional<TimePoint> probe_at(const Station& station) const;
     bool is_stranger(std::uint8_t id) const;
     /// Another station has answered lately, and after this one failed: the line is well.
     bool has_company(TimePoint now, const Station& station) const;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "support/hex.hpp"
+#include "support/request.hpp"
 
 namespace panelgate::arbiter {
 namespace {
@@ -48,12 +49,35 @@ TEST(Debt, PassesOverWhatCouldNotComeAnyMore) {
 TEST(Debt, TellsWhetherAReadsReplyWouldBeItsOwn) {
     Debt debt;
     debt.add(at(1s), kThree);
-    EXPECT_TRUE(debt.may_fit_reply_to("03 00 00 00 03"_hex)) << "of another place, but as long";
-    EXPECT_FALSE(debt.may_fit_reply_to(kTwo));
-    EXPECT_FALSE(debt.may_fit_reply_to("04 00 64 00 03"_hex));
+    const auto ambiguous = [&](const Bytes& pdu, bool again = false) {
+        return debt.is_ambiguous(test::request_of(pdu), again);
+    };
+    EXPECT_TRUE(ambiguous("03 00 00 00 03"_hex)) << "of another place, but as long";
+    EXPECT_FALSE(ambiguous(kTwo));
+    EXPECT_FALSE(ambiguous("04 00 64 00 03"_hex));
     debt.add(at(2s), "01 00 00 00 08"_hex);
-    EXPECT_TRUE(debt.may_fit_reply_to("01 00 00 00 01"_hex)) << "a byte each";
-    EXPECT_FALSE(debt.may_fit_reply_to("01 00 00 00 09"_hex));
+    EXPECT_TRUE(ambiguous("01 00 00 00 01"_hex)) << "a byte each";
+    EXPECT_FALSE(ambiguous("01 00 00 00 09"_hex));
+    EXPECT_TRUE(ambiguous(kThree)) << "asked anew, its value would be too old";
+    EXPECT_FALSE(ambiguous(kThree, true)) << "repeated, it is an answer";
+    debt.add(at(3s), "06 00 01 00 07"_hex);
+    EXPECT_FALSE(ambiguous("06 00 01 00 08"_hex)) << "the reply names the value";
+    EXPECT_TRUE(ambiguous("06 00 01 00 07"_hex));
+    debt.add(at(4s), "10 00 01 00 01 02 00 07"_hex);
+    EXPECT_TRUE(ambiguous("10 00 01 00 01 02 00 08"_hex)) << "and that of 10 only the count";
+}
+
+TEST(Debt, StationsServeInTurn) {
+    Debt debt;
+    debt.add(at(1s), kThree);
+    debt.add(at(3s), kTwo);
+    debt.add(at(5s), kThree);
+    debt.close_before(at(5s), at(2s));
+    EXPECT_EQ(debt.size(), 2U);
+    EXPECT_EQ(debt.oldest(kReplyOfThree)->sent, at(1s)) << "of another connection";
+    EXPECT_FALSE(debt.fits(kReplyOfTwo));
+    debt.close_before(at(9s), {});
+    EXPECT_TRUE(debt.empty());
 }
 
 TEST(Debt, IsOnlyOfOneRequest) {

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "panelgate/base/bytes.hpp"
+#include "support/attempts.hpp"
+#include "support/hex.hpp"
 #include "support/request.hpp"
 
 namespace panelgate::arbiter {
@@ -72,7 +74,8 @@ class ScheduleTest : public testing::Test {
     }
     void kill(std::uint8_t id) {
         while (!stations.health(id).offline()) {
-            stations.on_failed(now, id, Verdict::silent, 100ms);
+            stations.on_failed(now, test::group_of(id, "03 00 6B 00 01"_hex), Verdict::silent,
+                               100ms);
             stations.of(id).on_given_up(now, Fault::timeout);
         }
     }
@@ -120,7 +123,7 @@ TEST_F(ScheduleTest, P4WhoHasManyClientsDoesNotHaveAllTurnsBeforeADearRetry) {
     for (int i = 0; i < 6; ++i) wait(2);
     wait(3);
     schedule.retry(failed(1), kDear);
-    EXPECT_EQ(order(5), "2 2 2 2 r1") << "two for each of the stations that waited";
+    EXPECT_EQ(order(5), "2 3 r1 2 2") << "one for each of the stations that waited";
 }
 
 TEST_F(ScheduleTest, WhereTheWholeLineRestsARetryGoesFirst) {

@@ -25,6 +25,10 @@ Settings three_stations() {
     return settings;
 }
 
+Job job_for(unsigned id) {
+    return test::group_of(static_cast<std::uint8_t>(id), kRead).jobs.front();
+}
+
 class StationsTest : public testing::Test {
   protected:
     void answer(std::uint8_t id) {
@@ -37,7 +41,7 @@ class StationsTest : public testing::Test {
     void kill(std::uint8_t id, Duration cost) {
         for (int i = 0; i < 10; ++i) {
             now_ += cost;
-            stations_.on_failed(now_, id, Verdict::silent, cost);
+            stations_.on_failed(now_, test::group_of(id, kRead), Verdict::silent, cost);
             stations_.of(id).on_given_up(now_, Fault::timeout);
         }
         ASSERT_TRUE(stations_.health(id).offline());
@@ -80,7 +84,7 @@ TEST_F(StationsTest, P4OnlyWhereAnotherHasAnsweredSinceIsAFlakyStationHeldShort)
     answer(2);
     for (int i = 0; i < Station::kFlaky; ++i) {
         now_ += 500ms;
-        stations_.on_failed(now_, 1, Verdict::silent, 500ms);
+        stations_.on_failed(now_, test::group_of(1, kRead), Verdict::silent, 500ms);
     }
     const Station& flaky = stations_.of(1);
     ASSERT_TRUE(flaky.flaky());
@@ -98,12 +102,15 @@ TEST_F(StationsTest, P4StrangersDoNotUseUpWhatTheProbesOfOthersMayCost) {
     kill(2, 20ms);
     now_ += 1min;
     ASSERT_LE(wait_for_probe(), 0s);
-    for (int i = 0; i < 10; ++i) stations_.on_failed(now_, kStranger, Verdict::silent, 100ms);
+    for (int i = 0; i < 10; ++i)
+        stations_.on_failed(now_, test::group_of(kStranger, kRead), Verdict::silent, 100ms);
     stations_.of(kStranger).on_given_up(now_, Fault::timeout);
-    for (int i = 0; i < 10; ++i) stations_.on_failed(now_, kStranger, Verdict::silent, 100ms);
+    for (int i = 0; i < 10; ++i)
+        stations_.on_failed(now_, test::group_of(kStranger, kRead), Verdict::silent, 100ms);
     EXPECT_LE(wait_for_probe(), 0s);
-    EXPECT_FALSE(stations_.may_spend(now_, kStranger + 1)) << "all strangers have one budget";
-    EXPECT_TRUE(stations_.may_spend(now_, 3)) << "which is not that of who is listed";
+    EXPECT_FALSE(stations_.may_spend(now_, job_for(kStranger + 1)))
+        << "all strangers have one budget";
+    EXPECT_TRUE(stations_.may_spend(now_, job_for(3))) << "which is not that of who is listed";
 }
 
 TEST_F(StationsTest, AStrangerIsWaitedForAsLongAsTheKnownNeedUnlessItsClientIsPatient) {
