@@ -311,7 +311,7 @@ void Arbiter::start(TimePoint now, Group group) {
             group.first_silence =
                 !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
-        timing.usual = std::min(station.usual() + latency_, timing.patience);
+        timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
         timing.notice = notice_.early();
         timing.drift = station.clock_drift();
         timing.echoes = echo_memory_.expects_one();

@@ -196,10 +196,15 @@ void Attempt::judge_strays(std::size_t from, const Ends& ends) {
         if (part.kind != Unused::Kind::own) continue;
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
         const std::uint8_t function = modbus::plain_function(part.bytes[1]);
-        if (!ends(part.bytes)) continue;
+        const bool refuses_other = exception && function != group_.request.function();
+        if (!ends(part.bytes)) {
+            // It may be the refusal of this request, with another function's number.
+            disturbed_ = disturbed_ || refuses_other;
+            continue;
+        }
         // What has nothing to do with the request may be babble: the reply has its usual time.
         const bool other = !exception && function != group_.request.function();
-        refused_other_ = refused_other_ || (exception && function != group_.request.function());
+        refused_other_ = refused_other_ || refuses_other;
         (other ? disturbed_ : wrong_) = true;
         strange_ = strange_ || other;
     }

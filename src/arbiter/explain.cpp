@@ -43,8 +43,8 @@ std::string turn(const Reason& reason) {
 
 Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names) {
     Reason reason;
-    if (group.learns_for != 0 || group.probe) {
-        const bool learns = group.learns_for != 0;
+    if (group.learns_for != 0 || !group.confirms.empty() || group.probe) {
+        const bool learns = !group.probe;
         reason.kind = learns ? Reason::Kind::learns_echo : Reason::Kind::probe;
         return reason;
     }

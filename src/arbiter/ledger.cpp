@@ -33,7 +33,7 @@ FrameKind kind_of(Ledger::Part what) {
 }
 
 FrameKind kind_of(const Group& group) {
-    if (group.learns_for != 0) return FrameKind::learn_echo;
+    if (group.learns_for != 0 || !group.confirms.empty()) return FrameKind::learn_echo;
     if (group.station == kBroadcast) return FrameKind::broadcast;
     if (group.probe) return FrameKind::probe;
     return group.attempts > 1 ? FrameKind::retry : FrameKind::request;

@@ -88,9 +88,14 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     }
     const bool waits = attempt.precedes_echo() && !attempt.was_held();
     const bool may_be_copy = station.may_be_copy(now, attempt);
-    if (may_be_copy || waits)
-        attempt.hold_reply(station.needed(), may_be_copy && group.may_doubt(attempt.reply()));
-    return !may_be_copy && !waits;
+    const bool may_be_echo = attempt.may_be_its_echo() && !attempt.was_held() &&
+                             (too_early || station.is_quicker_than_ever(attempt.first_sign(now)));
+    if (may_be_copy || may_be_echo || waits) {
+        const bool doubted = may_be_echo || (may_be_copy && group.may_doubt(attempt.reply()));
+        attempt.hold_reply(station.needed(), doubted);
+        if (may_be_echo) attempt.suspect_echo();
+    }
+    return !may_be_copy && !may_be_echo && !waits;
 }
 
 /// The reply is there.
@@ -120,8 +125,10 @@ void Arbiter::settle(TimePoint now) {
     quiet_.rest_until(station.trail_until());
     ledger_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
+    if (attempt.echo_is_suspected()) echo_memory_.on_suspected();
     const bool refused = modbus::exception_of(reply).has_value();
     ledger_.tell(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
+    if (!group.confirms.empty()) return confirm(group, !attempt.echoed());
     if (refused) {
         give_back(group);
     } else {
@@ -129,6 +136,18 @@ void Arbiter::settle(TimePoint now) {
     }
     for (const Job& job : group.jobs)
         ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
+}
+
+/// P8: what equals a write came back sooner than the station has ever answered, and a read has told
+/// whether the line hears itself.
+void Arbiter::confirm(const Group& group, bool is_answer) {
+    for (const Job& job : group.jobs) {
+        if (is_answer) {
+            ledger_.finish(job, group.confirms);
+        } else {
+            ledger_.finish(job, Fault::timeout);
+        }
+    }
 }
 
 /// What came may be a copy of an earlier reply, and its own may still come. Nobody is to blame.
@@ -141,11 +160,23 @@ void Arbiter::ask_again(TimePoint now) {
     station.owe(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     if (in_time(now, group) && !group.abandoned()) {
+        if (!group.request.is_read()) return schedule_.retry(confirming(group, station), {});
         ledger_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
         return schedule_.retry(std::move(group), station.usual());
     }
     for (const Job& job : group.jobs)
         ledger_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
+}
+
+/// A read for the jobs of this write, whose confirmation may be its echo.
+Group Arbiter::confirming(Group& write, const Station& station) {
+    Group read{.jobs = std::move(write.jobs), .station = write.station, .request = station.probe()};
+    if (!teaches_echo(read.request))
+        read.request = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
+    read.attempts = write.attempts;
+    read.started = write.started;
+    read.confirms = std::move(write.doubted);
+    return read;
 }
 
 void Arbiter::fail(TimePoint now, Verdict verdict) {
@@ -174,7 +205,9 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
                              : Duration::zero();
     const bool cut_off = verdict == Verdict::damaged && attempt.was_cut_off();
     group.cut_after = cut_off ? now - sent : Duration::zero();
-    if (in_time(now, group) && affordable && station.may_retry(group)) {
+    if (!group.confirms.empty()) {
+        give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
+    } else if (in_time(now, group) && affordable && station.may_retry(group)) {
         station.on_retry(verdict == Verdict::silent);
         schedule_.retry(std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {

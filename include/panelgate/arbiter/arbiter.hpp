@@ -150,6 +150,8 @@ class Arbiter {
     bool takes_reply(TimePoint now, const Station& station, bool early);
     void settle(TimePoint now);
     void ask_again(TimePoint now);
+    void confirm(const Group& group, bool is_answer);
+    static Group confirming(Group& write, const Station& station);
     void fail(TimePoint now, Verdict verdict);
     void give_back(Group& group);
     void give_up(TimePoint now, const Group& group, Fault fault);

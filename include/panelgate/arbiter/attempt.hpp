@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -140,6 +141,11 @@ class Attempt {
         return timing_.echoes && !echo_.complete() && !fragment_ && !echo_behind_ &&
                noise_in_front_ == 0;
     }
+    /// Nothing but its time tells its reply, that to a write, from the echo of its request.
+    bool may_be_its_echo() const {
+        return !group_.request.is_read() && !echo_.complete() && !own_frame_seen_ &&
+               std::ranges::equal(adu_of(*reply_), echo_.frame());
+    }
     /// Another master has asked the same station for something that this answers as well.
     bool is_contested() const { return !others_.empty() && others_.fit(adu_of(*reply_)); }
     /// Then it is nobody's, and the station was not silent.
@@ -150,7 +156,12 @@ class Attempt {
     /// As much as the reply, and perhaps that very reply, came damaged in front of it.
     bool said_damaged_before() const;
     /// When what was held back came, if its reply is that once more.
-    std::optional<TimePoint> said_twice() const { return said_twice_; }
+    std::optional<TimePoint> said_twice() const {
+        return echo_suspected_ ? std::nullopt : said_twice_;
+    }
+    /// What is held back may be the echo of the request, on a line that had none so far.
+    void suspect_echo() { echo_suspected_ = true; }
+    bool echo_is_suspected() const { return echo_suspected_; }
     /// Notes in its group what made it doubtful.
     void remember_doubt() {
         group_.doubted = std::exchange(held_, std::nullopt).value_or(Bytes{});
@@ -259,6 +270,7 @@ class Attempt {
     bool frames_in_front_ = false;    ///< good ones
     bool contested_ = false;
     bool refusal_rejected_ = false;
+    bool echo_suspected_ = false;
     bool borrowed_ = false;
     bool wrong_ = false;
     bool refused_other_ = false;

@@ -86,6 +86,11 @@ class EchoMemory {
     /// Its own echo was heard and no answer: where it could be its own answer, that may be what it
     /// was, because the line has no echo any more.
     void on_unanswered(const modbus::Request& request);
+    /// What came back may have been an echo, where none was known: learn again, unless the
+    /// configuration knows.
+    void on_suspected() {
+        if (mode_ == EchoMode::automatic && state_ == EchoState::absent) begin();
+    }
     /// The echo differed: learn again, unless the configuration knows.
     void on_mismatch();
 

@@ -29,7 +29,10 @@ struct Group {
     Bytes doubted{};  ///< the attempt before was answered so, and it may be a copy; or nothing
     TimePoint doubted_at{};  ///< when that came
     bool probe = false;
-    bool told_apart = false;     ///< ... of a length that nothing outstanding has (Station::proof)
+    bool told_apart = false;  ///< ... of a length that nothing outstanding has (Station::proof)
+    /// It is a read that tells whether the reply to the write of its jobs was that write's echo;
+    /// their answer, where it was not.
+    Bytes confirms{};
     bool repeatable = true;      ///< its station's `retry_writes` when it began, of a write
     bool first_silence = false;  ///< its station was well when it was first sent
     /// It only finds out about the echo, for this job, which waits in the queue.

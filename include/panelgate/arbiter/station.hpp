@@ -174,10 +174,10 @@ class Station {
                (is_quicker_than_ever(attempt.first_sign(now)) &&
                 copies_.repeats_other(now, pdu, attempt.reply()));
     }
-    /// No reply of its has begun so soon after the request, by far.
+    /// None of its latest replies has begun so soon after the request.
     bool is_quicker_than_ever(Duration first_sign) const {
         const auto quickest = quickest_.value();
-        return quickest && first_sign < *quickest * 3 / 4;
+        return quickest && first_sign < *quickest;
     }
 
     // How it is to be asked
@@ -219,8 +219,9 @@ class Station {
     /// `spent`: it has failed so often that others are not to pay for more than it has needed.
     Duration patience(const Group& group, std::optional<Duration> line, bool hurry,
                       bool spent = false) const;
-    /// What it has needed, and some more; at most its response timeout.
-    Duration usual() const { return slowest() ? short_wait({}) : settings_.response_timeout; }
+    /// What it has needed, and some more; at most its response timeout. Of one that was never heard
+    /// the same of the others of the `line`, if they were.
+    Duration usual(std::optional<Duration> line = {}) const { return short_wait(line); }
     /// ... and not more than that, but for what a receiver holds back.
     Duration needed() const { return slowest().value_or(settings_.response_timeout) + 10ms; }
     Duration response_timeout() const { return timeout(); }

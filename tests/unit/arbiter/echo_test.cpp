@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
@@ -360,6 +363,68 @@ TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurn
     ASSERT_TRUE(next);
     EXPECT_EQ(next->at - start, wire_time({38400, 8, Parity::none, 1}, 8) + 100ms);
     EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
+}
+
+/// A line without an echo, whose station has answered; then a write, and its very frame comes back
+/// as it leaves.
+class EchoInMidLife : public Echo {
+  protected:
+    EchoInMidLife() {
+        for (int i = 0; i < 3; ++i) read_once(bus, false);
+        write = bus.submit(17, kWriteRegister);
+        hear_echo(bus);
+        EXPECT_FALSE(bus.answered(write));
+    }
+    /// A read goes out that tells.
+    void ask() {
+        ASSERT_TRUE(bus.next_sent(600ms));
+        ASSERT_EQ(bus.sent.back().kind, FrameKind::learn_echo);
+    }
+    BusScript bus{settings(EchoMode::automatic)};
+    Ticket write = 0;
+};
+
+TEST_F(EchoInMidLife, P8ConfirmsNoWriteOfAPanelThatIsOff) {
+    ask();
+    hear_echo(bus);
+    bus.run_for(2s);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+    EXPECT_TRUE(bus.answer(write).transmitted);
+    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
+}
+
+TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
+    ask();
+    hear_echo(bus);
+    reply(bus, kReply);
+    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
+}
+
+TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
+    reply(bus, kWriteRegister);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
+    const Ticket next = bus.submit(17, kWriteRegister);
+    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "nothing is known of the echo";
+    EXPECT_FALSE(bus.answered(next));
+}
+
+TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
+    ask();
+    bus.run_to_end_of_request();
+    reply(bus, kReply);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
+    const auto writes = std::ranges::count_if(bus.sent, [](const auto& one) {
+        return one.adu == modbus::encode_adu(17, kWriteRegister);
+    });
+    EXPECT_EQ(writes, 1);
+}
+
+TEST_F(EchoInMidLife, P2ARefusedReadTellsAsWellAndTheWriteIsNotRepeated) {
+    ask();
+    bus.run_to_end_of_request();
+    reply(bus, "83 02"_hex);
+    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
+    EXPECT_FALSE(bus.next_sent(1s));
 }
 
 TEST_F(Echo, P8TheEchoOfARequestNobodyAnswersIsNoSignOfLife) {
