@@ -38,6 +38,10 @@ bool Debt::is_ambiguous(const modbus::Request& request, bool again) const {
     });
 }
 
+bool Debt::has_other_function(std::uint8_t function) const {
+    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu[0] != function; });
+}
+
 void Debt::close_before(TimePoint sent, TimePoint connected) {
     std::erase_if(owed_, [&](const Owed& one) { return one.sent < sent && one.sent >= connected; });
 }

@@ -247,10 +247,12 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
 void Schedule::retry(Group group, Duration patience) {
     constexpr Duration kDear = 100ms;
     const bool first = !backlog_.has_retries();
+    const bool at_once = !group.confirms.empty();
     // A write that goes again has had its turn among the writes.
     dear_ = dear_ || (patience > kDear && group.request.is_read());
     backlog_.retry(std::move(group));
     if (first) let_others_go_first();
+    if (at_once) turns_ = 0;
 }
 
 Jobs Schedule::give_back(Group& group) {

@@ -81,6 +81,12 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     const bool said_again = now < std::exchange(again_until_, TimePoint{});
     const bool may_be_copy = said_again || copies_.is_copy(now, pdu);
     if (heard.stray != Stray::late) {
+        const bool known = std::ranges::equal(pdu, stray_refusal_) &&
+                           now < stray_refusal_at_ + CopyGuard::kLongest;
+        if (modbus::exception_of(pdu) && !known) {
+            stray_refusal_.assign(pdu.begin(), pdu.end());
+            stray_refusal_at_ = now;
+        }
         copies_.on_unasked(now, pdu);
         not_before_ = std::max(not_before_, copies_.rest_until());
         if (heard.stray == Stray::copy) trail_.on_stray(now);
@@ -220,7 +226,10 @@ void Station::on_damaged_reply(TimePoint now, const modbus::Request& request, Ti
     not_before_ = std::max(not_before_, again_until_);
 }
 
-void Station::on_failed(TimePoint now, Verdict verdict, Duration cost, bool is_read) {
+void Station::on_failed(TimePoint now, Verdict verdict, Duration cost,
+                        const modbus::Request* write) {
+    const bool is_read = write == nullptr;
+    if (!is_read) ignored_ = write->pdu();
     read_missed_ = read_missed_ || is_read;
     read_turn_ = !is_read;
     if (verdict == Verdict::silent) adaptive_.on_timeout();

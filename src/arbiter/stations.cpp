@@ -76,7 +76,8 @@ bool Stations::may_spend(TimePoint now, const Job& job) const {
     // A write that is ignored says nothing of reads while these are answered.
     const bool is_read = job.request.is_read();
     const bool is_suspect = station->suspect() && !(is_read && station->answers_reads());
-    return (!is_suspect || suspects_.allows(now)) && station->may_spend(now, is_read);
+    return (!is_suspect || suspects_.allows(now)) &&
+           station->may_spend(now, is_read ? nullptr : &job.request);
 }
 
 /// A client's request may be the probe once an interval, as far as the budget goes.
@@ -121,7 +122,7 @@ Duration Stations::response_timeout(std::uint8_t id) const {
 
 void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost) {
     Station& station = of(group.station);
-    station.on_failed(now, verdict, cost, group.request.is_read());
+    station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
     if (station.stranger()) {
         strangers_.spend(now, cost, 2 * surprise());
         if (station.health().offline()) known_strangers_.spend(now, cost, kCompany);

@@ -87,15 +87,19 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
         return false;
     }
     const bool waits = attempt.precedes_echo() && !attempt.was_held();
+    const bool may_be_others =
+        refusal && group.may_doubt_refusal() && !attempt.was_held() &&
+        station.may_refuse_other(now, attempt.reply(), group.request.function());
     const bool may_be_copy = station.may_be_copy(now, attempt);
     const bool may_be_echo = attempt.may_be_its_echo() && !attempt.was_held() &&
-                             (too_early || station.is_quicker_than_ever(attempt.first_sign(now)));
-    if (may_be_copy || may_be_echo || waits) {
-        const bool doubted = may_be_echo || (may_be_copy && group.may_doubt(attempt.reply()));
+                             (too_early || station.is_far_too_quick(attempt.first_sign(now)));
+    if (may_be_copy || may_be_echo || may_be_others || waits) {
+        const bool doubted =
+            may_be_echo || may_be_others || (may_be_copy && group.may_doubt(attempt.reply()));
         attempt.hold_reply(station.needed(), doubted);
         if (may_be_echo) attempt.suspect_echo();
     }
-    return !may_be_copy && !may_be_echo && !waits;
+    return !may_be_copy && !may_be_echo && !may_be_others && !waits;
 }
 
 /// The reply is there.

@@ -43,6 +43,8 @@ class Debt {
     void close_before(TimePoint sent, TimePoint connected);
     /// This reply may be one of them, but not by being one to the very same request.
     bool fits_other(ByteView reply, const Bytes& pdu) const;
+    /// A request of another function is among them.
+    bool has_other_function(std::uint8_t function) const;
     /// The oldest that this reply may answer, or nullptr.
     const Owed* oldest(ByteView reply) const;
     /// ... that left later than `open`: the last one where none did; nullptr where none fits.

@@ -63,6 +63,10 @@ struct Group {
     bool may_doubt(ByteView reply) const {
         return is_values(reply) && doubted.empty() && !jobs.empty();
     }
+    /// A refusal of it may be asked for once more.
+    bool may_doubt_refusal() const {
+        return request.is_read() && doubted.empty() && !jobs.empty() && confirms.empty();
+    }
     /// This reply to it holds values: it is a read, and not refused.
     bool is_values(ByteView reply) const {
         return request.is_read() && reply[0] == request.function();

@@ -35,15 +35,20 @@ class Slowest {
 /// The shortest, likewise. Pure.
 class Quickest {
   public:
-    void add(Duration seen) { slowest_.add(-seen); }
-    /// Nothing: none was seen.
+    static constexpr int kEnough = 32;  ///< fewer tell nothing of what is too quick
+
+    void add(Duration seen) {
+        slowest_.add(-seen);
+        count_ = std::min(count_ + 1, kEnough);
+    }
+    /// Nothing: not enough were seen.
     std::optional<Duration> value() const {
-        const auto longest = slowest_.value();
-        return longest ? std::optional(-*longest) : std::nullopt;
+        return count_ < kEnough ? std::nullopt : std::optional(-*slowest_.value());
     }
 
   private:
     Slowest slowest_;
+    int count_ = 0;
 };
 
 }  // namespace panelgate::arbiter

@@ -95,9 +95,16 @@ class Station {
     /// It owes a reply to a request that left at `since` or later. Where that is when the way to
     /// the wire was proved last, nothing proves the request to have passed.
     bool owes_since(TimePoint since) const { return owes() && debt_.last_sent() >= since; }
-    /// This refusal of a request may be one of another that it owes.
+    /// This refusal of a request may be one of another that is outstanding.
     bool refuses_other(ByteView reply, const Bytes& pdu) const {
         return debt_.fits_other(reply, pdu);
+    }
+    /// ... as some panels refuse with another function's number, or once more what it said unasked
+    /// a moment ago: asking again tells.
+    bool may_refuse_other(TimePoint now, ByteView reply, std::uint8_t function) const {
+        const bool again = std::ranges::equal(reply, stray_refusal_) &&
+                           now < stray_refusal_at_ + CopyGuard::kLongest;
+        return again || (now < outstanding_until_ && debt_.has_other_function(function));
     }
     /// It has answered all that it was asked since the line was opened anew, the rest is over, and
     /// nothing more has come: no reply is on its way, though none could be told from those owed.
@@ -148,7 +155,8 @@ class Station {
     /// `think`: without the silence that tells the panel that the request is over.
     Replied on_reply(TimePoint now, const Attempt& attempt, Duration waited, Duration think);
     /// An attempt failed that kept the line for `cost`.
-    void on_failed(TimePoint now, Verdict verdict, Duration cost, bool is_read = true);
+    void on_failed(TimePoint now, Verdict verdict, Duration cost,
+                   const modbus::Request* write = nullptr);
     /// A read for nobody was in vain; `told_apart`: such a proof(), which tells nothing of its
     /// health.
     void on_in_vain(bool told_apart) {
@@ -179,6 +187,11 @@ class Station {
         const auto quickest = quickest_.value();
         return quickest && first_sign < *quickest;
     }
+    /// ... and by far.
+    bool is_far_too_quick(Duration first_sign) const {
+        const auto quickest = quickest_.value();
+        return quickest && first_sign < *quickest * 3 / 4;
+    }
 
     // How it is to be asked
 
@@ -202,9 +215,10 @@ class Station {
     bool flaky() const { return std::popcount(lately_) >= kFlaky; }
     /// What its failures took of the bus lately is within its share, but for the odd one that
     /// nobody could foresee.
-    bool may_spend(TimePoint now, bool is_read = true) const {
+    bool may_spend(TimePoint now, const modbus::Request* write = nullptr) const {
         const Duration credit = kCredit * timeout_cost();
-        return budget_.allows(now, credit) && (is_read || writes_.allows(now, credit)) &&
+        const bool was_ignored = write != nullptr && is_ignored(*write);
+        return budget_.allows(now, credit) && (!was_ignored || writes_.allows(now, credit)) &&
                (!failing() || failing_.allows(now));
     }
     /// ... and all of it is paid.
@@ -273,6 +287,13 @@ class Station {
     void spend(TimePoint now, Duration cost, bool is_read = true) {
         (is_read ? budget_ : writes_).spend(now, cost, kDebt * timeout_cost());
     }
+    /// A write to the same place was the last one that it did not answer.
+    bool is_ignored(const modbus::Request& write) const {
+        const auto place = [](const Bytes& pdu) {
+            return ByteView(pdu).first(std::min<std::size_t>(pdu.size(), 3));
+        };
+        return std::ranges::equal(place(write.pdu()), place(ignored_));
+    }
     void rest_for_owed(TimePoint now);
     void rest_is_over(TimePoint not_before);
     void learn_of_copies(TimePoint now, const Attempt& attempt);
@@ -298,7 +319,9 @@ class Station {
     TimePoint not_before_{};         ///< its replies may come twice, or the line is just open
     TimePoint outstanding_until_{};  ///< what is outstanding may come; {}: nothing is
     TimePoint connected_{};          ///< the line was opened, on a way that holds things back
-    bool proof_in_vain_ = false;     ///< since it was heard last
+    Bytes stray_refusal_;            ///< that nothing asked for, and when it came first
+    TimePoint stray_refusal_at_{};
+    bool proof_in_vain_ = false;  ///< since it was heard last
     bool proved_ = false;  ///< nothing of what is owed can be on its way to the station any more
     Return return_;
     TimePoint asked_{};
@@ -313,6 +336,7 @@ class Station {
     int failed_in_a_row_ = 0;
     int odd_ = 0;          ///< so many more replies until answers_as_asked()
     bool missed_ = false;  ///< the attempt before was silent, and its retry has not ended
+    Bytes ignored_;        ///< the write that it answered last with silence
     bool read_turn_ = false;
     bool read_missed_ = false;  ///< the last read was in vain
     bool wants_check_ = false;

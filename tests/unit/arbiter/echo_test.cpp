@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_script.hpp"
@@ -370,7 +371,7 @@ TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurn
 class EchoInMidLife : public Echo {
   protected:
     EchoInMidLife() {
-        for (int i = 0; i < 3; ++i) read_once(bus, false);
+        for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
         write = bus.submit(17, kWriteRegister);
         hear_echo(bus);
         EXPECT_FALSE(bus.answered(write));
@@ -403,9 +404,9 @@ TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
 TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
     reply(bus, kWriteRegister);
     EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
-    const Ticket next = bus.submit(17, kWriteRegister);
+    bus.run_for(200ms);
+    bus.submit(17, kWriteRegister);
     EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "nothing is known of the echo";
-    EXPECT_FALSE(bus.answered(next));
 }
 
 TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
