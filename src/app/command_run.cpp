@@ -43,7 +43,7 @@ struct Service {
 void reload(Reloader& reloader, const std::string& cause) {
     const std::string why = reloader.barred(false);
     if (!why.empty()) return rt::log(rt::LogLevel::warn, "no reload", {{"why", why}});
-    reloader.reload(false, cause, [](const auto&) {});  // the log says what came of it
+    reloader.reload({}, cause, [](const auto&) {});  // the log says what came of it
 }
 
 /// The process to the configuration, and the other way round.
@@ -53,6 +53,16 @@ void fit(config::Config& config) {
         rt::log(rt::LogLevel::warn, notice.event, {{"warning", notice.text}});
     for (const std::string& refused : rt::be_punctual(config.realtime))
         rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
+}
+
+std::string url_of(const config::Config& config, const Gateway& gateway) {
+    return "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+}
+
+/// Where a person looks first.
+void log_dashboard(const config::Config& config, const Gateway& gateway) {
+    if (!config.http) return;
+    rt::log(rt::LogLevel::info, "dashboard", {{"url", url_of(config, gateway) + '/'}});
 }
 
 /// `started` is told the gateway once it serves.
@@ -73,6 +83,7 @@ ExitCode serve(config::Config config, const Service& service,
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
+    log_dashboard(*gateway.config(), gateway);
     reloader.serve(gateway);
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
@@ -98,12 +109,12 @@ ExitCode serve(config::Config config, const Service& service,
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
-    const std::string url =
-        "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+    const std::string url = url_of(config, gateway);
     const std::string host = config::reachable(config.modbus_tcp[0].address);
     const std::string port = std::to_string(gateway.modbus_port());
     std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "
-              << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n"
+              << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n\n"
+              << "  Dashboard: " << url << "/\n\n"
               << "  press 31 autonics-gplp-s   mixer 5 autonics-gp-2005   io 17 autonics-arm\n"
               << "  oven 20 panasonic-gt       filler 1 omron-cp2e\n\n"
               << "Try, in another terminal:\n"

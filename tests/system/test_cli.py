@@ -26,7 +26,8 @@ class CommandLine(unittest.TestCase):
         return ended
 
     def test_version_and_help_end_with_0(self):
-        self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n$")
+        self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n"
+                         r"commit \w+, \w+ \d.*\nboost 1\.\d+\.\d+, .*yaml-cpp \d.*\n$")
         text = self.expect(0, "--help").stdout
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
                         "health", "schema", "import", "init", "scan"):

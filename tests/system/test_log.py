@@ -1,5 +1,6 @@
 """What the program writes to stderr: that nobody waits for its reader, and what stands in it."""
 import contextlib
+import http.client
 import itertools
 import json
 import os
@@ -151,6 +152,34 @@ class Log(unittest.TestCase):
                         for count in re.findall(r" repeated=(\d+) first=\S+Z last=\S+Z", line)]
             self.assertEqual(len(lines) - len(gathered) + sum(gathered), 101)
             self.assertLess(len(lines), 20)
+
+    def test_what_is_refused_before_it_is_a_write_and_who_plays_with_the_plant_is_there(self):
+        point = ("{id: 31, name: press, points: [{name: setpoint, at: '400001', type: u16, "
+                 "writable: true, max: 10}]}")
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "eye")
+            with open(path, "w") as file:
+                file.write("0123456789abcdef")
+            text = config.gateway(
+                config.line(stations=point),
+                http=f"{config.OPERATOR}, tokens: [{{name: eye, role: viewer, file: {path}}}]")
+            with harness.configured(text) as program:
+                place = "/api/v1/stations/press/points/setpoint"
+                self.assertEqual(program.rest("PUT", place, {"value": 11})[0], 422)
+                program.log.wait_for(r"info write refused client=\S*http 127.0.0.1\S* "
+                                     r"at=press/points/setpoint status=422 why=")
+                with contextlib.closing(http.client.HTTPConnection(
+                        "127.0.0.1", program.http_port(), timeout=harness.PATIENCE)) as connection:
+                    connection.request("PUT", place, '{"value": 1}',
+                                       {"Authorization": "Bearer 0123456789abcdef"})
+                    self.assertEqual(connection.getresponse().status, 403)
+                program.log.wait_for(r'info http request refused client="http 127.0.0.1 token eye" '
+                                     rf"path={place} method=PUT")
+                self.assertEqual(program.rest("PUT", "/api/v1/simulator/press", {"drop": 1})[0],
+                                 200)
+                program.log.wait_for(r'simulator faults set client="http 127.0.0.1" station=press')
+                program.rest("POST", "/api/v1/lines/floor1/discover", {"stations": "1-2"})
+                program.log.wait_for(r'discovery started client="http 127.0.0.1" line=floor1')
 
     def test_refused_writes_to_changing_addresses_do_not_fill_the_disk(self):
         read_only = config.line(stations="{id: 31, name: press, access: read_only}")
