@@ -60,7 +60,8 @@ std::string url_of(const config::Config& config, const Gateway& gateway) {
 }
 
 /// Where a person looks first.
-void log_dashboard(const config::Config& config, const Gateway& gateway) {
+void log_dashboard(const Gateway& gateway) {
+    const config::Config& config = *gateway.config();
     if (!config.http) return;
     rt::log(rt::LogLevel::info, "dashboard", {{"url", url_of(config, gateway) + '/'}});
 }
@@ -83,7 +84,6 @@ ExitCode serve(config::Config config, const Service& service,
         rt::log(rt::LogLevel::error, "cannot start", {{"reason", error.what()}});
         return kUnavailable;
     }
-    log_dashboard(*gateway.config(), gateway);
     reloader.serve(gateway);
     reloader.on_step([&](bool begins) { begins ? manager.reloading() : manager.ready(); });
     started(gateway);
@@ -155,7 +155,7 @@ ExitCode run(const std::string& file, bool simulate, bool watch) {
     }
     Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
-    return serve(std::move(*loaded.config), {simulate, file, watch}, [](const Gateway&) {});
+    return serve(std::move(*loaded.config), {simulate, file, watch}, log_dashboard);
 }
 
 ExitCode demo(const std::string& http, const std::string& modbus) {
@@ -164,8 +164,10 @@ ExitCode demo(const std::string& http, const std::string& modbus) {
     config::Config& config = *loaded.config;
     if (!listen_on(http, *config.http) || !listen_on(modbus, config.modbus_tcp[0])) return kUsage;
     const config::Config shown = config;
-    return serve(std::move(config), {},
-                 [&](const Gateway& gateway) { print_demo_help(shown, gateway); });
+    return serve(std::move(config), {}, [&](const Gateway& gateway) {
+        log_dashboard(gateway);
+        print_demo_help(shown, gateway);
+    });
 }
 
 }  // namespace panelgate::app
