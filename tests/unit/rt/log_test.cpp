@@ -42,6 +42,13 @@ TEST_F(LogTest, LeavesOutWhoRepeatsHimselfWhateverHisPort) {
     EXPECT_EQ(tap.count("client=10.0.0.8"), 1u);
 }
 
+TEST_F(LogTest, TopicsThatChangeDoNotFillTheLog) {
+    for (int i = 0; i < 1000; ++i)
+        log(LogLevel::warn, "mqtt write refused",
+            {{"client", "mqtt"}, {"topic", "plant/" + std::to_string(i) + "/set"}, {"why", "odd"}});
+    EXPECT_LE(tap.count("mqtt write refused client"), 70u);
+}
+
 TEST_F(LogTest, AClientWithAnIpv6AddressIsWhoItIs) {
     for (int port = 50000; port < 50100; ++port)
         log(LogLevel::info, "connection closed",
