@@ -19,8 +19,8 @@ inline constexpr std::array kReloadOutcomes{ReloadOutcome::applied, ReloadOutcom
                                             ReloadOutcome::invalid, ReloadOutcome::failed,
                                             ReloadOutcome::refused};
 inline std::string_view label(ReloadOutcome outcome) {
-    constexpr std::array<std::string_view, kReloadOutcomes.size()> kWords{"applied", "unchanged",
-                                                                          "invalid", "failed", "refused"};
+    constexpr std::array<std::string_view, kReloadOutcomes.size()> kWords{
+        "applied", "unchanged", "invalid", "failed", "refused"};
     return kWords[static_cast<std::size_t>(outcome)];
 }
 
