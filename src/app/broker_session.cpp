@@ -206,7 +206,7 @@ void BrokerSession::refuse(const std::string& topic, const std::string& id,
                            const web::Problem& why) {
     ++counters_.writes_refused;
     rt::log(rt::LogLevel::warn, "mqtt write refused",
-            {{"topic", web::excerpt(topic)}, {"why", why.detail}});
+            {{"client", kName}, {"topic", web::excerpt(topic)}, {"why", why.detail}});
     json::object body{{"ok", false}};
     for (const auto& [name, value] : web::json_of(why)) body[name] = value;
     publisher_.answer({topic, id, web::json_text(body)}, true);

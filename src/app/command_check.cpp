@@ -123,6 +123,9 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
     Judged judged;
     if (loaded.config) {
         judged = judge(*loaded.config, options.allow_overload);
+        if (compared.loaded.config)
+            std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
+                              std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);
         for (const std::string& told : judged.warnings)
             std::cerr << path_of(file) << ": warning: " << told << '\n';

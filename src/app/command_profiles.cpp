@@ -1,6 +1,9 @@
+#include <algorithm>
+#include <cstddef>
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "catalogue.hpp"
@@ -15,9 +18,14 @@ namespace {
 
 constexpr std::string_view kGateway = "gateway";  // no panel, and yet it is asked like one
 
-void list(std::string_view name, std::string_view description) {
-    std::cout << name << std::string(name.size() < 20 ? 20 - name.size() : 1, ' ') << description
-              << '\n';
+using Listed = std::vector<std::pair<std::string_view, std::string_view>>;
+
+/// Names and what they are, in two columns.
+void print(const Listed& all) {
+    std::size_t width = 0;
+    for (const auto& [name, description] : all) width = std::max(width, name.size() + 2);
+    for (const auto& [name, description] : all)
+        std::cout << name << std::string(width - name.size(), ' ') << description << '\n';
 }
 
 /// nullptr, and told, when there is none of this name.
@@ -65,9 +73,12 @@ ExitCode profiles(const std::string& name, const std::string& dir) {
         std::cout << profile::describe(*profile);
         return kFine;
     }
-    for (const auto& [known, profile] : catalogue->all()) list(known, profile.description);
+    Listed all;
+    for (const auto& [known, profile] : catalogue->all())
+        all.emplace_back(known, profile.description);
     if (catalogue->find(kGateway) == nullptr)
-        list(kGateway, "the gateway's own unit: registers, counters, identification");
+        all.emplace_back(kGateway, "the gateway's own unit: registers, counters, identification");
+    print(all);
     return kFine;
 }
 

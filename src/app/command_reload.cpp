@@ -52,12 +52,18 @@ ExitCode tell(const json::object& verdict) {
     if (outcome == "applied" || outcome == "unchanged") {
         std::cout << outcome << '\n';
         print_list(std::cout, verdict, "changes", "  ");
+        print_list(std::cerr, verdict, "weaker", "protects less: ");
         print_list(std::cerr, verdict, "warnings", "");
         print_list(std::cerr, verdict, "restart_needed", "only a restart changes: ");
         return kFine;
     }
     print_faults(verdict);
     std::cerr << "panelgate: not reloaded: " << text_in(verdict, "detail") << '\n';
+    if (outcome == "refused") {
+        print_list(std::cerr, verdict, "weaker", "  ");
+        std::cerr << "  (where that is meant: panelgate reload --rollback --weaker)\n";
+        return kNotReady;
+    }
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
@@ -85,8 +91,9 @@ ExitCode reload(const ReloadOptions& options) {
     const std::string place = endpoint_text(address, port);
     const std::string request =
         "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
-        " HTTP/1.1\r\nHost: " + place + (secret->empty() ? "" : "\r\nAuthorization: Bearer ") +
-        *secret + "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
+        (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
+        (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
+        "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
     const Said said =
         ask(address, port, request, kPatience, kMost, [](const Said&) { return false; });
     boost::system::error_code wrong;

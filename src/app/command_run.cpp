@@ -43,7 +43,7 @@ struct Service {
 void reload(Reloader& reloader, const std::string& cause) {
     const std::string why = reloader.barred(false);
     if (!why.empty()) return rt::log(rt::LogLevel::warn, "no reload", {{"why", why}});
-    reloader.reload(false, cause, [](const auto&) {});  // the log says what came of it
+    reloader.reload({}, cause, [](const auto&) {});  // the log says what came of it
 }
 
 /// The process to the configuration, and the other way round.
@@ -53,6 +53,17 @@ void fit(config::Config& config) {
         rt::log(rt::LogLevel::warn, notice.event, {{"warning", notice.text}});
     for (const std::string& refused : rt::be_punctual(config.realtime))
         rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
+}
+
+std::string url_of(const config::Config& config, const Gateway& gateway) {
+    return "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+}
+
+/// Where a person looks first.
+void log_dashboard(const Gateway& gateway) {
+    const config::Config& config = *gateway.config();
+    if (!config.http) return;
+    rt::log(rt::LogLevel::info, "dashboard", {{"url", url_of(config, gateway) + '/'}});
 }
 
 /// `started` is told the gateway once it serves.
@@ -98,12 +109,12 @@ ExitCode serve(config::Config config, const Service& service,
 }
 
 void print_demo_help(const config::Config& config, const Gateway& gateway) {
-    const std::string url =
-        "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
+    const std::string url = url_of(config, gateway);
     const std::string host = config::reachable(config.modbus_tcp[0].address);
     const std::string port = std::to_string(gateway.modbus_port());
     std::cout << "\npanelgate demo: five simulated panels on one RS-485 line (floor1, "
-              << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n"
+              << to_string(config.lines[0].device.serial) << "), asked for real over a pty.\n\n"
+              << "  Dashboard: " << url << "/\n\n"
               << "  press 31 autonics-gplp-s   mixer 5 autonics-gp-2005   io 17 autonics-arm\n"
               << "  oven 20 panasonic-gt       filler 1 omron-cp2e\n\n"
               << "Try, in another terminal:\n"
@@ -144,7 +155,7 @@ ExitCode run(const std::string& file, bool simulate, bool watch) {
     }
     Loaded loaded = load_file(file);
     if (!loaded.config) return loaded.code;
-    return serve(std::move(*loaded.config), {simulate, file, watch}, [](const Gateway&) {});
+    return serve(std::move(*loaded.config), {simulate, file, watch}, log_dashboard);
 }
 
 ExitCode demo(const std::string& http, const std::string& modbus) {
@@ -153,8 +164,10 @@ ExitCode demo(const std::string& http, const std::string& modbus) {
     config::Config& config = *loaded.config;
     if (!listen_on(http, *config.http) || !listen_on(modbus, config.modbus_tcp[0])) return kUsage;
     const config::Config shown = config;
-    return serve(std::move(config), {},
-                 [&](const Gateway& gateway) { print_demo_help(shown, gateway); });
+    return serve(std::move(config), {}, [&](const Gateway& gateway) {
+        log_dashboard(gateway);
+        print_demo_help(shown, gateway);
+    });
 }
 
 }  // namespace panelgate::app

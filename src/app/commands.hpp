@@ -33,6 +33,7 @@ struct ReloadOptions {
     std::string http;        ///< or this does: "ADDR:PORT"
     std::string token_file;  ///< its first line is a token of the role operator
     bool rollback = false;   ///< to what ran before
+    bool weaker = false;     ///< ... also where that protects less
 };
 /// Has a running gateway read its file again, and prints its verdict.
 ExitCode reload(const ReloadOptions& options);

@@ -28,6 +28,10 @@ std::string_view label(Change::Kind kind);
 /// a second or so.
 std::vector<Change> differences(const config::Config& before, const config::Config& after);
 
+/// Units of a listener that reach another line, because the one they went to is not the listener's
+/// any more: a write to them would reach somebody else's panel. A sentence each. Pure.
+std::vector<std::string> moved_units(const config::Config& before, const config::Config& after);
+
 /// "lines/floor1/stations/press/poll/UW0: every 1s -> 2s", "lines/floor2: added"
 std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after"} each; the last two where they are told.

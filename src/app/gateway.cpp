@@ -206,6 +206,9 @@ web::Providers Gateway::providers() {
     providers.ready = [this] { return ready_ && servers_.missing().empty(); };
     providers.missing = [this] { return servers_.missing(); };
     providers.version = PANELGATE_VERSION;
+    providers.commit = build_commit();
+    providers.compiler = build_compiler();
+    providers.libraries = build_libraries();
     providers.now = [this] { return clock_.now(); };
     providers.events = &events_;
     providers.relays = [this] { return relays_->status(); };

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "build_info.hpp"
 #include "commands.hpp"
 #include "panelgate/base/suggest.hpp"
 #include "usage.hpp"
@@ -22,13 +23,12 @@ using namespace panelgate::app;
 
 constexpr const char* kAbout =
     "panelgate: a Modbus RTU-to-TCP gateway for operator panels on RS-485 lines";
-constexpr const char* kVersion = "panelgate " PANELGATE_VERSION;
 
 /// The command line; the command that is asked for runs while it is parsed.
 class CommandLine {
   public:
     CommandLine() {
-        cli_.set_version_flag("-V,--version", kVersion);
+        cli_.set_version_flag("-V,--version", build_text());
         cli_.require_subcommand(1);
         add_run();
         add_demo();
@@ -129,8 +129,9 @@ class CommandLine {
     }
 
     void add_help() {
-        CLI::App* version = cli_.add_subcommand("version", "print the version");
-        version->callback([] { std::cout << kVersion << '\n'; });
+        CLI::App* version =
+            cli_.add_subcommand("version", "print the version, the commit and the libraries");
+        version->callback([] { std::cout << build_text() << '\n'; });
         cli_.add_subcommand("help", "say what all commands do, or what COMMAND does");
     }
 
@@ -289,10 +290,15 @@ class CommandLine {
                             "a file whose first line is a token of the role operator");
         command->add_flag("--rollback", reload_.rollback,
                           "serve what ran before the last reload, whatever the file says");
+        command
+            ->add_flag("--weaker", reload_.weaker,
+                       "with --rollback: also where that protects less (access, allow, hosts, "
+                       "guard, roles)")
+            ->needs("--rollback");
         command->footer(
-            "Exit codes: 0 it serves the file, or did already; 1 nobody could be asked; 69 valid, "
-            "but\nsomething could not be opened; 78 the file has faults. After 69 and 78 nothing "
-            "has changed.");
+            "Exit codes: 0 it serves the file, or did already; 1 nobody could be asked, or a "
+            "rollback\nwould protect less; 69 valid, but something could not be opened; 78 the "
+            "file has faults.\nAfter 1, 69 and 78 nothing has changed.");
         command->callback([this] { code_ = reload(reload_); });
     }
 

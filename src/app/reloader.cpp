@@ -11,6 +11,7 @@
 #include "gateway.hpp"
 #include "load.hpp"
 #include "openings.hpp"
+#include "panelgate/config/weaker.hpp"
 #include "panelgate/rt/log.hpp"
 #include "prepare.hpp"
 
@@ -41,6 +42,8 @@ void tell(const web::ReloadVerdict& verdict) {
         rt::log(LogLevel::info, "configuration changed", {{"change", change}});
     for (const std::string& warning : verdict.warnings)
         rt::log(LogLevel::warn, "configuration", {{"warning", warning}});
+    for (const std::string& weaker : verdict.weaker | std::views::take(kLogged))
+        rt::log(LogLevel::warn, "configuration weaker", {{"what", weaker}});
     for (const std::string& later : verdict.later)
         rt::log(LogLevel::warn, "restart needed", {{"for", later}});
     const bool good =
@@ -78,6 +81,7 @@ struct Reloader::Job {
     std::string file;
     std::shared_ptr<const config::Config> running;
     std::shared_ptr<const config::Config> rollback;  ///< null: the file is read
+    bool may_be_weaker = false;                      ///< of a rollback
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
     web::ReloadVerdict verdict;
@@ -101,6 +105,15 @@ std::shared_ptr<const config::Config> with_tokens_of(const config::Config& confi
 void Reloader::Job::read() try {
     if (rollback) {
         next = with_tokens_of(*rollback, *running);
+        verdict.weaker = config::weaker(*running, *next);
+        if (!verdict.weaker.empty() && !may_be_weaker) {
+            next = nullptr;
+            verdict.outcome = ReloadOutcome::refused;
+            verdict.why =
+                "what ran before protects less than what runs now; ask with weaker where "
+                "that is meant";
+            return;
+        }
     } else {
         Loaded loaded = read_file(file);
         for (const yaml::Problem& problem : loaded.problems)
@@ -149,24 +162,25 @@ std::string Reloader::barred(bool rollback) const {
     return {};
 }
 
-void Reloader::reload(bool rollback, std::string cause, Handler handler) {
-    waiting_.push_back({rollback, std::move(cause), std::move(handler)});
+void Reloader::reload(web::ReloadWish wish, std::string cause, Handler handler) {
+    waiting_.push_back({wish, std::move(cause), std::move(handler)});
     if (served_.empty()) begin();
 }
 
 /// The wishes that have come together are one, as far as they are the same.
 void Reloader::begin() {
-    const bool rollback = waiting_.front().rollback;
+    const web::ReloadWish wish = waiting_.front().wish;
     std::vector<Waiting> others;
     for (Waiting& one : std::exchange(waiting_, {}))
-        (one.rollback == rollback ? served_ : others).push_back(std::move(one));
+        (one.wish == wish ? served_ : others).push_back(std::move(one));
     waiting_ = std::move(others);
     if (step_) step_(true);
     auto job = std::make_shared<Job>();
     job->file = file_;
     job->running = gateway_->config();
-    if (rollback) job->rollback = before_;
-    job->verdict.rollback = rollback;
+    if (wish.rollback) job->rollback = before_;
+    job->may_be_weaker = wish.weaker;
+    job->verdict.rollback = wish.rollback;
     job->verdict.cause = served_.front().cause;
     worker_.run([job] { job->read(); }, [this, job] { apply(job); });
 }
@@ -194,8 +208,8 @@ void Reloader::end(const std::shared_ptr<Job>& job) {
     verdict.at = rt::wall_now();
     const bool good =
         verdict.outcome == ReloadOutcome::applied || verdict.outcome == ReloadOutcome::unchanged;
+    if (verdict.outcome != ReloadOutcome::refused) counters_.last_succeeded = good;
     ++counters_.reloads[static_cast<std::size_t>(verdict.outcome)];
-    counters_.last_succeeded = good;
     if (good) counters_.last_success_unix = unix_now();
     tell(verdict);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));

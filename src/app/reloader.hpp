@@ -32,7 +32,7 @@ class Reloader final : public web::ReloadSource {
     void stop() { stopping_ = true; }
 
     std::string barred(bool rollback) const override;
-    void reload(bool rollback, std::string cause, Handler handler) override;
+    void reload(web::ReloadWish wish, std::string cause, Handler handler) override;
     std::shared_ptr<const web::ReloadVerdict> last() const override { return last_; }
     const config::ReloadCounters& counters() const { return counters_; }
     const std::string& file() const { return file_; }
@@ -40,7 +40,7 @@ class Reloader final : public web::ReloadSource {
   private:
     struct Job;
     struct Waiting {
-        bool rollback = false;
+        web::ReloadWish wish;
         std::string cause;
         Handler handler;
     };

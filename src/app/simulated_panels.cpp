@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "build_info.hpp"
 #include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/rt/log.hpp"
 #include "simulated_line.hpp"
@@ -53,6 +54,9 @@ void SimulatedPanels::serve_faults(const config::Endpoint& endpoint) {
     providers.ready = [] { return true; };
     providers.missing = [] { return std::string(); };
     providers.version = PANELGATE_VERSION;
+    providers.commit = build_commit();
+    providers.compiler = build_compiler();
+    providers.libraries = build_libraries();
     providers.now = [this] { return clock_.now(); };
     providers.events = &nothing_happens_;
     http_ = std::make_unique<web::Server>(executor_, settings,

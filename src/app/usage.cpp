@@ -42,6 +42,7 @@ std::string usage_fault(const CLI::ParseError& error) {
         return option + (told.find("At Most") != told.npos ? " may be given once"
                                                            : " needs a value behind it");
     if (kind == "ConversionError") return "an option that takes no value was given one";
+    if (kind == "RequiresError") return told;  // "--weaker requires --rollback"
     if (kind == "ValidationError") return wrong_choice(told, option);
     const int extras =
         static_cast<int>(CLI::ExitCodes::ExtrasError);  // its kind is the command's name

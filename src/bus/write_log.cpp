@@ -1,11 +1,11 @@
 #include "write_log.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/rt/log.hpp"
@@ -14,12 +14,25 @@ namespace panelgate::bus {
 
 namespace {
 
-/// As `raw` takes it; the first bytes of a long one.
+/// As `raw` takes it.
 std::string hex_of(ByteView pdu) {
-    constexpr std::size_t kShown = 32;  // bytes
-    std::string hex = to_hex(pdu.first(std::min(kShown, pdu.size())));
+    std::string hex = to_hex(pdu);
     std::erase(hex, ' ');
-    return pdu.size() > kShown ? hex + "..." : hex;
+    return hex;
+}
+
+/// The first bytes of a long one: of a request that had no effect, and of which there may be many.
+std::string shortened(const std::string& hex) {
+    constexpr std::size_t kShown = 64;
+    return hex.size() > kShown ? hex.substr(0, kShown) + "..." : hex;
+}
+
+/// No reads, and none of the numbers that are no functions (0, and exceptions from 128 on).
+bool may_write(ByteView pdu) { return !modbus::is_pure_read(pdu) && pdu[0] != 0 && pdu[0] < 0x80; }
+
+/// It was on the wire, or has been carried out: whatever came of it, a panel may have changed.
+bool is_accepted(const Deed& deed, Outcome outcome) {
+    return deed.transaction != 0 || outcome == Outcome::ok;
 }
 
 std::string place_of(const modbus::Request& request) {
@@ -31,13 +44,13 @@ std::string place_of(const modbus::Request& request) {
 }  // namespace
 
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
-    if (request.poll || request.request.is_read()) return std::nullopt;
+    if (request.poll || !may_write(request.request.pdu())) return std::nullopt;
     return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu()),
                 0};
 }
 
 std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
-    if (modbus::is_pure_read(pdu)) return std::nullopt;
+    if (!may_write(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
     return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu), 0};
@@ -46,18 +59,19 @@ std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::Client
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {
     const std::string name =
         station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
-    // A client's next connection has another port.
-    const std::string who = deed.client.substr(0, deed.client.rfind(':'));
-    const std::string subject = settings.name + '/' + name + ' ' + deed.place + ' ' + who;
+    const std::string client = without_port(deed.client);
+    const std::string place = settings.name + '/' + name + ' ' + deed.place;
     const std::string ended(label(outcome));
+    const bool accepted = is_accepted(deed, outcome);
     std::vector<rt::LogField> fields{
         {"line", settings.name}, {"station", name}, {"client", deed.client}};
     if (!deed.place.empty()) fields.push_back({"at", deed.place});
-    fields.push_back({"pdu", deed.pdu});
+    fields.push_back({"pdu", accepted ? deed.pdu : shortened(deed.pdu)});
     fields.push_back({"outcome", ended});
     const std::string transaction = std::to_string(deed.transaction);
     if (deed.transaction != 0) fields.push_back({"transaction", transaction});
-    rt::log_deed("write", subject, fields);
+    if (!accepted) return rt::log_deed("write", place + ' ' + client, fields);
+    rt::log_each("write", place, client + ' ' + deed.pdu + ' ' + ended, fields);
 }
 
 }  // namespace panelgate::bus

@@ -15,7 +15,7 @@ namespace panelgate::bus {
 struct Deed {
     std::string client;
     std::string place;  ///< "holding-registers/100", or empty
-    std::string pdu;    ///< hex; the first bytes of a long one
+    std::string pdu;    ///< hex
     /// The line's last one that was made for it, as in the trace; 0: none was.
     arbiter::Transaction transaction = 0;
 };
@@ -24,7 +24,8 @@ struct Deed {
 std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names);
 /// The same of a PDU that nobody was asked; its place is not told when it is no request.
 std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names);
-/// One line at info.
+/// At info. What was transmitted is in the log each time, with its whole PDU (rt::log_each); what
+/// was refused or given up before is told at a pace.
 void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);
 
 }  // namespace panelgate::bus

@@ -101,6 +101,16 @@ void warn_of_open_listener(Loading& loading, const Node& node,
                      std::to_string(listener.port));
 }
 
+/// A datagram's sender is not proven: whoever asks in another's name has the answers sent there.
+void warn_of_open_udp(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
+    if (!listener.udp || !is_any_address(listener.address) || !lets_all_in(listener.allow)) return;
+    loading.warn(mark_of(node, "udp"),
+                 "udp: true on all addresses answers datagrams whose sender may be forged, with "
+                 "up to twenty times what was sent; name who may ask, such as allow: "
+                 "[192.168.10.0/24], or listen on 127.0.0.1:" +
+                     std::to_string(listener.port));
+}
+
 /// One station forbids them for all; where nothing can be written anyway, nobody wonders.
 void warn_of_broadcasts(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
     const bool sends = listener.broadcast != tcp_server::BroadcastMode::deny;
@@ -176,9 +186,29 @@ void warn_of_health(Loading& loading, const Node& node, const web::Settings& htt
             (is_ipv6(own) ? "/128" : "/32"));
 }
 
+void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Settings& http) {
+    if (http.tokens.empty() || is_in(http.address, "127.0.0.0", 8) ||
+        is_in(http.address, "::1", 128))
+        return;
+    loading.warn(mark_of(node, "tokens"),
+                 "tokens are sent in plain text to " + http.name() +
+                     ": whoever is on the way can read and use them; listen on 127.0.0.1:" +
+                     std::to_string(http.port) + " behind a proxy with TLS, or a VPN");
+}
+
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
     warn_of_health(loading, node, http);
     const bool open = is_any_address(http.address) && lets_all_in(http.allow);
+    warn_of_plain_tokens(loading, node, http);
+    if (open && http.anonymous == web::Role::viewer) {
+        loading.warn(mark_of(node, "anonymous"),
+                     "whoever reaches port " + std::to_string(http.port) +
+                         " of any address may see the configuration, all values and every frame, "
+                         "and read on the bus, without a token; say anonymous: none and give "
+                         "readers a token, or name who may, such as allow: [192.168.10.0/24], or "
+                         "listen on 127.0.0.1:" +
+                         std::to_string(http.port));
+    }
     if (open && http.anonymous == web::Role::operator_) {
         loading.warn(mark_of(node, "anonymous"),
                      "whoever reaches port " + std::to_string(http.port) +
@@ -206,6 +236,7 @@ void warn_of_doors(Loading& loading, const Node& tree) {
         doors.push_back(
             {mark_of(node, "listen"), listener.address, listener.port, listener.name()});
         warn_of_open_listener(loading, node, listener);
+        warn_of_open_udp(loading, node, listener);
         warn_of_broadcasts(loading, node, listener);
         for (const auto& [unit, target] : listener.units)
             warn_of_unit(loading, node, listener, unit, target);

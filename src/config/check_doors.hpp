@@ -8,7 +8,7 @@ namespace panelgate::config {
 /// Warns of doors that stand open, or that somebody else stands behind, in what was loaded from
 /// `tree` without a problem: listeners on all addresses through which anybody may write, listeners
 /// that take each other's port, units that are not the stations that have these ids, and tokens
-/// that others can read or guess.
+/// that others can read or guess, datagrams for all, what all may see.
 void warn_of_doors(Loading& loading, const yaml::Node& tree);
 
 }  // namespace panelgate::config

@@ -8,10 +8,13 @@
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <utility>
 
+#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/journal.hpp"
 #include "panelgate/rt/log_output.hpp"
+#include "panelgate/rt/log_repeats.hpp"
 #include "panelgate/rt/log_throttle.hpp"
 
 namespace panelgate::rt {
@@ -84,6 +87,7 @@ std::shared_ptr<std::vector<std::string>> g_tapped;
 
 /// Who has said what lately.
 LogThrottle g_throttle;
+LogRepeats g_repeats;
 
 /// JSON string escapes; good for text too.
 std::string escaped(std::string_view text) {
@@ -126,19 +130,24 @@ std::string subject_of(std::span<const LogField> fields) {
     std::size_t taken = 0;
     for (const auto& [key, value] : fields) {
         if (++taken > 2) break;
-        // A client's next connection has another port.
-        subject += key == "client" ? value.substr(0, value.rfind(':')) : value;
+        subject += key == "client" ? without_port(value) : value;
         subject += '\0';
     }
     return subject;
 }
 
+std::string client_of(std::span<const LogField> fields) {
+    const auto client = std::ranges::find(fields, "client", &LogField::first);
+    return client == fields.end() ? "" : without_port(client->second);
+}
+
+void append(LogLine& line, std::string_view key, const std::string& value) {
+    line.text += field_of(key, value);
+    if (destination().native) append_journal_field(line.fields, key, value);
+}
+
 void put(LogLevel level, LogLine line, std::uint64_t left_out) {
-    if (left_out > 0) {
-        const std::string count = std::to_string(left_out);
-        line.text += field_of("left_out", count);
-        if (destination().native) append_journal_field(line.fields, "left_out", count);
-    }
+    if (left_out > 0) append(line, "left_out", std::to_string(left_out));
     if (g_tapped) return g_tapped->push_back(std::move(line.text));
     output().write(whole(level, line));
 }
@@ -146,7 +155,8 @@ void put(LogLevel level, LogLine line, std::uint64_t left_out) {
 /// From error to info: unless its subject has said the same too often.
 void put_at_pace(LogLevel level, std::string_view event, std::string_view subject,
                  std::span<const LogField> fields, const LogThrottle::Pace& pace) {
-    const auto passed = g_throttle.pass(std::chrono::steady_clock::now(), event, subject, pace);
+    const auto passed =
+        g_throttle.pass(std::chrono::steady_clock::now(), event, subject, pace, client_of(fields));
     LogLine line = line_of(level, event, fields);
     if (passed) return put(level, std::move(line), *passed);
     g_throttle.hold(event, subject, level, std::move(line));
@@ -155,6 +165,21 @@ void put_at_pace(LogLevel level, std::string_view event, std::string_view subjec
 void put_held(TimePoint now) {
     for (LogThrottle::Held& held : g_throttle.take_held(now))
         put(held.level, std::move(held.line), held.left_out);
+    for (const LogThrottle::LeftOut& one : g_throttle.take_left_out(now)) {
+        std::vector<LogField> fields{{"of", one.event}};
+        if (!one.client.empty()) fields.emplace_back("client", one.client);
+        fields.emplace_back("count", std::to_string(one.count));
+        put(LogLevel::warn, line_of(LogLevel::warn, "log lines left out", fields), 0);
+    }
+}
+
+void put_gathered(std::vector<LogRepeats::Gathered> gathered) {
+    for (LogRepeats::Gathered& one : gathered) {
+        append(one.line, "repeated", std::to_string(one.repeated));
+        append(one.line, "first", rfc3339(one.first));
+        append(one.line, "last", rfc3339(one.last));
+        put(LogLevel::info, std::move(one.line), 0);
+    }
 }
 
 }  // namespace
@@ -193,6 +218,16 @@ void log_deed(std::string_view event, std::string_view subject, std::span<const 
     put_at_pace(LogLevel::info, event, subject, fields, LogThrottle::kDeeds);
 }
 
+void log_each(std::string_view event, std::string_view place, std::string_view what,
+              std::span<const LogField> fields) {
+    if (!log_enabled(LogLevel::info)) return;
+    const bool again = g_repeats.is_repeat(std::chrono::steady_clock::now(), place, what);
+    put_gathered(g_repeats.take_ended());
+    LogLine line = line_of(LogLevel::info, event, fields);
+    if (!again) return put(LogLevel::info, std::move(line), 0);
+    g_repeats.gather(place, std::move(line), wall_now());
+}
+
 struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
     explicit State(Clock& its_clock)
         : clock(its_clock), alarm(clock.make_alarm()), held(clock.make_alarm()) {}
@@ -201,6 +236,7 @@ struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
         constexpr Duration kPause = 10s;
         held->arm(clock.now() + kPause, [self = shared_from_this()] {
             put_held(self->clock.now());
+            put_gathered(g_repeats.take_due(self->clock.now()));
             self->tell_held();
         });
     }
@@ -230,12 +266,14 @@ LogDrain::~LogDrain() {
     state_->alarm->cancel();
     state_->held->cancel();
     put_held(TimePoint::max());
+    put_gathered(g_repeats.take_due(TimePoint::max()));
     output().flush();
 }
 
 LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) {
     g_tapped = lines_;
     g_throttle = {};
+    g_repeats = {};
 }
 
 LogTap::~LogTap() { g_tapped.reset(); }

@@ -14,29 +14,100 @@ std::string key_of(std::string_view event, std::string_view subject) {
     return key;
 }
 
+void count(std::uint64_t& left_out, TimePoint& since, TimePoint now, std::uint64_t more) {
+    if (left_out == 0) since = now;
+    left_out += more;
+}
+
 }  // namespace
 
 std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view event,
-                                               std::string_view subject, const Pace& pace) {
+                                               std::string_view subject, const Pace& pace,
+                                               std::string_view client) {
     std::string key = key_of(event, subject);
-    auto found = seen_.find(key);
-    if (found == seen_.end()) {
-        make_room(now);
-        found = seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst}).first;
+    const auto found = seen_.find(key);
+    if (found != seen_.end()) {
+        Seen& seen = found->second;
+        // Credit comes back one at a time: what was quiet for long may speak freely again.
+        const auto earned = (now - seen.last) / pace.interval;
+        if (earned > 0)
+            seen.credit =
+                static_cast<int>(std::min<std::int64_t>(pace.burst, seen.credit + earned));
+        if (seen.credit == 0) {
+            ++seen.left_out;
+            return std::nullopt;
+        }
     }
-    Seen& seen = found->second;
-    // Credit comes back one at a time: what was quiet for long may speak freely again.
-    const auto earned = (now - seen.last) / pace.interval;
-    if (earned > 0)
-        seen.credit = static_cast<int>(std::min<std::int64_t>(pace.burst, seen.credit + earned));
-    if (seen.credit == 0) {
-        ++seen.left_out;
-        return std::nullopt;
-    }
+    // A subject beyond the budget is not even remembered: there may be any number of them.
+    if (!is_within_budget(now, event, client)) return std::nullopt;
+    Seen& seen = found != seen_.end() ? found->second : new_subject(now, std::move(key), pace);
     --seen.credit;
     seen.last = now;
     seen.held.reset();
     return std::exchange(seen.left_out, 0);
+}
+
+LogThrottle::Seen& LogThrottle::new_subject(TimePoint now, std::string key, const Pace& pace) {
+    make_room(now);
+    return seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst}).first->second;
+}
+
+bool LogThrottle::is_within_budget(TimePoint now, std::string_view event, std::string_view client) {
+    if (!client.empty()) {
+        Budget& own = budget(of_clients_, now, event, client, kByClient);
+        if (own.credit == 0) {
+            count(own.left_out, own.since, now, 1);
+            return false;
+        }
+        --own.credit;
+        make_room_for_client(now);
+    }
+    Budget& all = budget(of_events_, now, event, {}, kByEvent);
+    if (all.credit == 0) {
+        count(all.left_out, all.since, now, 1);
+        return false;
+    }
+    --all.credit;
+    return true;
+}
+
+LogThrottle::Budget& LogThrottle::budget(Budgets& budgets, TimePoint now, std::string_view event,
+                                         std::string_view client, const Pace& pace) {
+    std::string key = key_of(event, client);
+    auto found = budgets.find(key);
+    if (found == budgets.end()) {
+        Budget fresh{std::string(event), std::string(client), now, pace.burst, 0, now};
+        found = budgets.emplace(std::move(key), std::move(fresh)).first;
+    }
+    Budget& one = found->second;
+    const auto earned = (now - one.filled) / pace.interval;
+    one.credit = static_cast<int>(std::min<std::int64_t>(pace.burst, one.credit + earned));
+    one.filled += earned * pace.interval;
+    return one;
+}
+
+/// The client that has been quiet longest gives way; what it was left out counts for the event.
+void LogThrottle::make_room_for_client(TimePoint now) {
+    if (of_clients_.size() <= kMostClients) return;
+    const auto oldest = std::ranges::min_element(
+        of_clients_, {}, [](const auto& entry) { return entry.second.filled; });
+    const Budget& gone = oldest->second;
+    if (gone.left_out > 0) {
+        Budget& all = budget(of_events_, now, gone.event, {}, kByEvent);
+        count(all.left_out, all.since, now, gone.left_out);
+    }
+    of_clients_.erase(oldest);
+}
+
+std::vector<LogThrottle::LeftOut> LogThrottle::take_left_out(TimePoint now) {
+    std::vector<LeftOut> all;
+    for (Budgets* budgets : {&of_clients_, &of_events_}) {
+        for (auto& [key, one] : *budgets) {
+            if (one.left_out == 0 || now - one.since < kLeftOutPause) continue;
+            all.push_back({one.event, one.client, std::exchange(one.left_out, 0)});
+        }
+    }
+    return all;
 }
 
 void LogThrottle::hold(std::string_view event, std::string_view subject, LogLevel level,

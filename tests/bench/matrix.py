@@ -237,7 +237,7 @@ def try_client(client, seed):
 def head():
     text = re.search(r'PRETTY_NAME="(.*)"', pathlib.Path("/etc/os-release").read_text()).group(1)
     return (f"{platform.machine()}, {os.cpu_count()} cores, {text}, Linux {platform.release()}, "
-            f"{datetime.date.today()}; {harness.run('--version').stdout.strip()}\n"
+            f"{datetime.date.today()}; {harness.run('--version').stdout.splitlines()[0]}\n"
             "calls that went right / calls (of these: what the panel has no function for, and says so), frames of "
             "requests on the bus + those asked again; reading back is among them\n"
             f"{'client':<30}" + "".join(f"{panel.name:<26}" for panel in PANELS))

@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import re
 import socket
 import subprocess
 import tempfile
@@ -26,7 +27,8 @@ class CommandLine(unittest.TestCase):
         return ended
 
     def test_version_and_help_end_with_0(self):
-        self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n$")
+        self.assertRegex(self.expect(0, "--version").stdout, r"^panelgate \d+\.\d+\.\d+\n"
+                         r"commit \w+, \w+ \d.*\nboost 1\.\d+\.\d+, .*yaml-cpp \d.*\n$")
         text = self.expect(0, "--help").stdout
         for command in ("run", "demo", "check", "simulate", "address", "profiles",
                         "health", "schema", "import", "init", "scan"):
@@ -65,6 +67,7 @@ class CommandLine(unittest.TestCase):
                             ("check --format", "--format needs a value behind it"),
                             ("check -c a -c b", "--config may be given once"),
                             ("scan", "DEVICE is missing"),
+                            ("reload --weaker", "--weaker requires --rollback"),
                             ("address autonics-gplp-s", "NOTATION is missing"),
                             ("run --simulate=x", "an option that takes no value was given one"),
                             ("run -- x", "nothing is to stand behind '--'")):
@@ -72,6 +75,19 @@ class CommandLine(unittest.TestCase):
             self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
                              f"panelgate: {command}: {told}; `panelgate help {command}` says what "
                              "it takes\n")
+
+    def test_the_demo_and_the_log_name_the_dashboard_first(self):
+        with subprocess.Popen([harness.PANELGATE, "demo", "--http", "127.0.0.1:0", "--modbus",
+                               "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                              text=True) as program:
+            try:
+                urls = (re.search(r"http://\S+", line) for line in program.stdout)
+                self.assertRegex(next(url[0] for url in urls if url),
+                                 r"^http://127\.0\.0\.1:\d+/$")
+                self.assertTrue(any(re.search(r" info dashboard url=http://127\.0\.0\.1:\d+/$",
+                                              line) for line in program.stderr))
+            finally:
+                program.terminate()
 
     def test_a_service_whose_stdout_is_closed_runs_and_ends_like_any_other(self):
         start = 'exec "$0" demo --http 127.0.0.1:0 --modbus 127.0.0.1:0 >&-'
@@ -127,6 +143,11 @@ class CommandLine(unittest.TestCase):
                      "panasonic-gt", "omron-cp2e", "generic"):
             self.assertRegex(listed, rf"(?m)^{name} ")
             self.assertIn(name, self.expect(0, "profiles", name).stdout)
+
+    def test_profiles_stand_in_two_columns(self):
+        lines = self.expect(0, "profiles").stdout.splitlines()
+        columns = {re.match(r"\S+ {2,}", line).end() for line in lines}
+        self.assertEqual(len(columns), 1, lines)
 
 
 class Files(unittest.TestCase):

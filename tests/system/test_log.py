@@ -1,8 +1,10 @@
 """What the program writes to stderr: that nobody waits for its reader, and what stands in it."""
 import contextlib
+import http.client
 import itertools
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -126,15 +128,72 @@ class Log(unittest.TestCase):
             program.stop()
             self.assertRegex(program.log.finished_text(), r" relay relay=.* left_out=\d+")
 
-    def test_a_program_that_writes_without_end_does_not_fill_the_disk(self):
+    def test_each_accepted_write_of_another_value_is_there(self):
         with harness.configured(config.gateway(FAST)) as program:
             with program.client() as client:
                 for n in range(100):
                     client.ask(31, write_register(1000, n))
-            self.assertIn(program.log.text().count(" info write "), range(20, 40))
             program.stop()
-            last = program.log.finished_text().split(" info write ")[-1]
-            self.assertRegex(last, r"pdu=0603e80063 outcome=ok transaction=\d+ left_out=\d+")  # 99
+            written = re.findall(r" info write .*pdu=0603e8(\w{4}) outcome=ok",
+                                 program.log.finished_text())
+            self.assertEqual(written, [f"{n:04x}" for n in range(100)])
+
+    def test_a_heartbeat_is_gathered_and_does_not_hide_who_else_writes(self):
+        with harness.configured(config.gateway(FAST)) as program:
+            with program.client() as client:
+                for _ in range(100):
+                    client.ask(31, write_register(1000, 1))
+                client.ask(31, write_register(1000, 2))
+            program.stop()
+            lines = [line for line in program.log.finished_text().splitlines()
+                     if " info write " in line]
+            self.assertIn("pdu=0603e80002 outcome=ok", lines[-1])
+            gathered = [int(count) for line in lines
+                        for count in re.findall(r" repeated=(\d+) first=\S+Z last=\S+Z", line)]
+            self.assertEqual(len(lines) - len(gathered) + sum(gathered), 101)
+            self.assertLess(len(lines), 20)
+
+    def test_what_is_refused_before_it_is_a_write_and_who_plays_with_the_plant_is_there(self):
+        point = ("{id: 31, name: press, points: [{name: setpoint, at: '400001', type: u16, "
+                 "writable: true, max: 10}]}")
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "eye")
+            with open(path, "w") as file:
+                file.write("0123456789abcdef")
+            text = config.gateway(
+                config.line(stations=point),
+                http=f"{config.OPERATOR}, tokens: [{{name: eye, role: viewer, file: {path}}}]")
+            with harness.configured(text) as program:
+                place = "/api/v1/stations/press/points/setpoint"
+                self.assertEqual(program.rest("PUT", place, {"value": 11})[0], 422)
+                program.log.wait_for(r"info write refused client=\S*http 127.0.0.1\S* "
+                                     r"at=press/points/setpoint status=422 why=")
+                with contextlib.closing(http.client.HTTPConnection(
+                        "127.0.0.1", program.http_port(), timeout=harness.PATIENCE)) as connection:
+                    connection.request("PUT", place, '{"value": 1}',
+                                       {"Authorization": "Bearer 0123456789abcdef"})
+                    self.assertEqual(connection.getresponse().status, 403)
+                program.log.wait_for(r'info http request refused client="http 127.0.0.1 token eye" '
+                                     rf"path={place} method=PUT")
+                self.assertEqual(program.rest("PUT", "/api/v1/simulator/press", {"drop": 1})[0],
+                                 200)
+                program.log.wait_for(r'simulator faults set client="http 127.0.0.1" station=press')
+                program.rest("POST", "/api/v1/lines/floor1/discover", {"stations": "1-2"})
+                program.log.wait_for(r'discovery started client="http 127.0.0.1" line=floor1')
+
+    def test_refused_writes_to_changing_addresses_do_not_fill_the_disk(self):
+        read_only = config.line(stations="{id: 31, name: press, access: read_only}")
+        with harness.configured(config.gateway(read_only)) as program:
+            with program.client() as client:
+                for n in range(1000):
+                    client.ask(31, write_register(n, 1))
+            program.stop()
+            text = program.log.finished_text()
+            lines = text.count(" info write ")
+            self.assertLess(lines, 300)
+            left_out = re.findall(r'log lines left out of=write client="modbus_tcp 127\S+" '
+                                  r"count=(\d+)", text)
+            self.assertEqual(lines + sum(map(int, left_out)), 1000)
 
     def test_a_json_log_has_nothing_but_json_also_when_the_program_cannot_start(self):
         with contextlib.closing(socket.create_server(("127.0.0.1", 0))) as taken:

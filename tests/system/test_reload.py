@@ -141,6 +141,29 @@ class Reload(unittest.TestCase):
             self.assertEqual(running.program.get("/api/v1/stations/mixer")[0], 200)
             self.assertEqual(running.program.get("/api/v1/stations/io")[0], 404)
 
+    def test_the_way_back_weakens_nothing_that_nobody_has_named(self):
+        hard = "{id: 5, name: mixer, profile: autonics-gp-2005, access: read_only}"
+        with Running(plant(other())) as running:
+            self.assertEqual(running.reload(plant(other(hard)))[1]["outcome"], "applied")
+            client = harness.Client(running.program.modbus_port())
+            status, problem = running.reload(path="/api/v1/reload?rollback=true")
+            self.assertEqual((status, problem["outcome"], problem["weaker"]),
+                             (409, "refused", ["station mixer: access read_only -> read_write"]))
+            self.assertEqual(client.ask(5, bytes.fromhex("0600000001")), b"\x86\x01")
+            self.assertEqual(running.metric("panelgate_config_last_reload_successful"), ["1"])
+            self.assertEqual(running.reload(path="/api/v1/reload?weaker=true")[0], 400)
+            place = f"127.0.0.1:{running.program.http_port()}"
+            done = subprocess.run(
+                [harness.PANELGATE, "reload", "--rollback", "--http", place],
+                capture_output=True, text=True, timeout=harness.PATIENCE)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("  station mixer: access read_only -> read_write", done.stderr)
+            done = subprocess.run(
+                [harness.PANELGATE, "reload", "--rollback", "--weaker", "--http", place],
+                capture_output=True, text=True, timeout=harness.PATIENCE)
+            self.assertEqual((done.returncode, done.stdout.split()[0]), (0, "applied"))
+            running.program.log.wait_for("warn configuration weaker what=.station mixer: access")
+
     def test_by_signal_and_by_a_file_that_is_replaced(self):
         with Running(plant(other()), "--watch") as running:
             running.file.write_text(plant(other(f"{MIXER}, {IO}")))

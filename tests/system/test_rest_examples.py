@@ -30,6 +30,7 @@ OF_A_TRANSACTION = {"id", "sequence", "ended", "time", "client", "arrived", "gra
                     "first_byte_in", "last_byte_in", "answered", "request", "reply"}
 OF_AN_INCIDENT = {"time", "errors", "complete", "frames", "decisions", "transactions"}
 OF_A_RELOAD = {"at", "warnings"}
+OF_A_BUILD = {"commit", "compiler", "libraries"}
 OF_A_RELAY = {"state", "reads", "writes"}
 # Of panels that confirm and do not keep (verify_test.cpp), and of a line whose master speaks.
 UNSEEN = {("Written", "read_back"), ("Written", "verify_detail"), ("Problem", "read_back"),
@@ -85,7 +86,7 @@ def settled(value):
     passing = set(PASSING)
     for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY),
                         ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT),
-                        ("rollback", OF_A_RELOAD)):
+                        ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD)):
         passing |= names if mark in value else set()
     return {key: "~" if key in passing and one is not None else settled(one)
             for key, one in value.items()}

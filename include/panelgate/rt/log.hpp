@@ -38,8 +38,8 @@ class LogDrain {
 /// One line an event: `2026-11-21T10:00:00.123Z info line up line=floor1 device=/dev/x`. Values
 /// with blanks or quotes are quoted; control characters are escaped. The first two fields say whom
 /// it is about: from error to info, the same event of the same subject is soon left out
-/// (LogThrottle), and what follows tells how often in the field `left_out`. Of a field `client` the
-/// port does not count.
+/// (LogThrottle), and what follows tells how often in the field `left_out`. A field `client` has a
+/// budget besides, whatever the subjects; its port does not count.
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
 /// The same of a subject by name: however its fields differ, its lines are of one kind.
@@ -48,6 +48,10 @@ void log_about(std::string_view subject, LogLevel level, std::string_view event,
 /// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
 /// times at once, then once a minute; the last one always.
 void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields);
+/// The same for what must be in the log every time (LogRepeats): a line each, but where the last
+/// one at this place was `what` too, one line tells how often, with its first and its last time.
+void log_each(std::string_view event, std::string_view place, std::string_view what,
+              std::span<const LogField> fields);
 
 /// For tests: while it lives, lines go to it, without their time, instead of to stderr, and nothing
 /// that was said before makes it leave one out. One at a time.

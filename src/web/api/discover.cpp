@@ -12,6 +12,7 @@
 #include "panelgate/base/fault.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/web/api/discovery_source.hpp"
+#include "panelgate/web/http/client_log.hpp"
 #include "refusal.hpp"
 #include "station_path.hpp"
 
@@ -117,6 +118,8 @@ Handling post_discover(HttpRequest request, const Api* api) {
     const std::string& name = (*line)->name;
     if (const auto wrong = source.start(name, wanted->stations, wanted->share))
         co_return to_response(problem(400, "stations " + *wrong));
+    log_client(*request.caller, "discovery started",
+               {{"line", name}, {"stations", wanted->stations}});
     request.caller->take_effect();
     co_return json_response(202, describe(name, source.report(name)));
 }
@@ -125,6 +128,8 @@ Handling delete_discovery(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const std::string& name = (*line)->name;
+    if (api->providers.discovery->report(name).state == DiscoveryReport::State::running)
+        log_client(*request.caller, "discovery stopped", {{"line", name}});
     api->providers.discovery->stop(name);
     co_return json_response(200, describe(name, api->providers.discovery->report(name)));
 }

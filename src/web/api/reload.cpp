@@ -24,9 +24,10 @@ using Verdict = std::shared_ptr<const ReloadVerdict>;
 /// Resumes the coroutine by post, never from inside the source.
 struct StartReload {
     template <class Handler>
-    void operator()(Handler handler, ReloadSource* source, bool rollback, std::string cause) const {
+    void operator()(Handler handler, ReloadSource* source, ReloadWish wish,
+                    std::string cause) const {
         auto shared = std::make_shared<Handler>(std::move(handler));
-        source->reload(rollback, std::move(cause), [shared](Verdict verdict) {
+        source->reload(wish, std::move(cause), [shared](Verdict verdict) {
             const auto executor = asio::get_associated_executor(*shared);
             asio::post(executor, [shared, verdict = std::move(verdict)]() mutable {
                 (std::move(*shared))(std::move(verdict));
@@ -35,9 +36,9 @@ struct StartReload {
     }
 };
 
-asio::awaitable<Verdict> reloaded(ReloadSource* source, bool rollback, std::string cause) {
+asio::awaitable<Verdict> reloaded(ReloadSource* source, ReloadWish wish, std::string cause) {
     return asio::async_initiate<const asio::use_awaitable_t<>, void(Verdict)>(
-        StartReload{}, asio::use_awaitable, source, rollback, std::move(cause));
+        StartReload{}, asio::use_awaitable, source, wish, std::move(cause));
 }
 
 json::array texts(const std::vector<std::string>& list) {
@@ -61,6 +62,7 @@ json::object describe(const ReloadVerdict& verdict) {
     json::object object{{"outcome", label(verdict.outcome)}, {"at", rfc3339(verdict.at)},
                         {"rollback", verdict.rollback},      {"cause", verdict.cause},
                         {"changes", texts(verdict.changes)}, {"warnings", texts(verdict.warnings)}};
+    if (!verdict.weaker.empty()) object["weaker"] = texts(verdict.weaker);
     if (!verdict.later.empty()) object["restart_needed"] = texts(verdict.later);
     if (!verdict.faults.empty()) object["errors"] = faults_of(verdict);
     if (!verdict.why.empty()) object["why"] = verdict.why;
@@ -68,15 +70,29 @@ json::object describe(const ReloadVerdict& verdict) {
 }
 
 /// By the query, or by a body.
-Parsed<bool> is_rollback(const HttpRequest& request) {
-    const auto query = query_flag(request, "rollback");
-    if (!query || request.body.empty()) return query;
-    const auto body = parse_object(request.body, {"rollback"});
-    if (!body) return body.error();
-    const json::value* flag = body->if_contains("rollback");
+Parsed<bool> flag_of(const HttpRequest& request, const json::object& body, const char* name) {
+    const auto query = query_flag(request, name);
+    if (!query) return query;
+    const json::value* flag = body.if_contains(name);
     if (flag == nullptr) return query;
-    if (!flag->is_bool()) return problem(400, "rollback must be true or false");
+    if (!flag->is_bool()) return problem(400, std::string(name) + " must be true or false");
     return *query || flag->as_bool();
+}
+
+Parsed<ReloadWish> wish_of(const HttpRequest& request) {
+    json::object body;
+    if (!request.body.empty()) {
+        auto given = parse_object(request.body, {"rollback", "weaker"});
+        if (!given) return given.error();
+        body = std::move(*given);
+    }
+    const auto rollback = flag_of(request, body, "rollback");
+    if (!rollback) return rollback.error();
+    const auto weaker = flag_of(request, body, "weaker");
+    if (!weaker) return weaker.error();
+    if (*weaker && !*rollback)
+        return problem(400, "weaker goes with rollback: a file is served as it is");
+    return ReloadWish{*rollback, *weaker};
 }
 
 HttpResponse answer_of(const ReloadVerdict& verdict) {
@@ -90,9 +106,11 @@ HttpResponse answer_of(const ReloadVerdict& verdict) {
             made.extensions = describe(verdict);
             return to_response(made);
         }
-        case ReloadOutcome::failed: {
+        case ReloadOutcome::failed:
+        case ReloadOutcome::refused: {
+            const bool refused = verdict.outcome == ReloadOutcome::refused;
             Problem made = problem(409, verdict.why + "; nothing has changed");
-            made.kind = "reload-failed";
+            made.kind = refused ? "reload-weaker" : "reload-failed";
             made.extensions = describe(verdict);
             return to_response(made);
         }
@@ -108,14 +126,14 @@ Handling get_reload(HttpRequest, const Api* api) {
 }
 
 Handling post_reload(HttpRequest request, const Api* api) {
-    const auto rollback = is_rollback(request);
-    if (!rollback) co_return to_response(rollback.error());
+    const auto wish = wish_of(request);
+    if (!wish) co_return to_response(wish.error());
     ReloadSource* source = api->providers.reload;
     const std::string why =
-        source ? source->barred(*rollback) : "this program serves a built-in configuration";
+        source ? source->barred(wish->rollback) : "this program serves a built-in configuration";
     if (!why.empty()) co_return to_response(problem(409, why));
     request.caller->take_effect();
-    asio::awaitable<Verdict> reloading = reloaded(source, *rollback, request.caller->name());
+    asio::awaitable<Verdict> reloading = reloaded(source, *wish, request.caller->name());
     const Verdict verdict = co_await std::move(reloading);
     co_return answer_of(*verdict);
 }

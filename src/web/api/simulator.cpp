@@ -4,6 +4,8 @@
 #include "answer.hpp"
 #include "body.hpp"
 #include "handlers.hpp"
+#include "panelgate/web/http/client_log.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
@@ -54,6 +56,8 @@ Handling put_simulated(HttpRequest request, const Api* api) {
     if (!numbers) co_return to_response(numbers.error());
     if (const auto wrong = station->simulated->set_faults(*numbers))
         co_return to_response(problem(400, *wrong));
+    log_client(*request.caller, "simulator faults set",
+               {{"station", station->name}, {"faults", json_text(*body)}});
     co_return faults_of(*station);
 }
 

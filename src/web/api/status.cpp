@@ -1,8 +1,10 @@
+#include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "answer.hpp"
 #include "docs_page.hpp"
 #include "handlers.hpp"
 #include "panelgate/web/http/gzip.hpp"
@@ -32,6 +34,18 @@ Handling get_docs(HttpRequest, const Api*) {
     HttpResponse response = text_response(200, page, "text/html; charset=utf-8");
     response.headers.emplace_back("Content-Security-Policy", std::string(kDocsPolicy));
     co_return response;
+}
+
+Handling get_version(HttpRequest, const Api* api) {
+    const Providers& providers = api->providers;
+    boost::json::object libraries;
+    for (const auto& [name, version] : providers.libraries) libraries[name] = version;
+    boost::json::object body;
+    body["version"] = providers.version;
+    body["commit"] = providers.commit;
+    body["compiler"] = providers.compiler;
+    body["libraries"] = std::move(libraries);
+    co_return json_response(200, body);
 }
 
 Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok\n"); }

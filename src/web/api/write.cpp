@@ -1,3 +1,5 @@
+#include <cstddef>
+#include <string>
 #include <utility>
 
 #include "answer.hpp"
@@ -19,8 +21,17 @@ Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
     return *round ? points::Rounding::nearest : points::Rounding::exact;
 }
 
+/// As the path names it: "press/points/setpoint".
+HttpResponse refused(const HttpRequest& request, const Problem& why) {
+    std::string at;
+    for (std::size_t i = 3; i < request.path.size(); ++i)  // behind /api/v1/stations
+        at += (at.empty() ? "" : "/") + request.path[i];
+    log_refused(*request.caller, at, why);
+    return to_response(why);
+}
+
 Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api) {
-    if (!writing) co_return to_response(writing.error());
+    if (!writing) co_return refused(request, writing.error());
     const Duration deadline = api->directory->line_of(writing->station).deadline;
     const Patience patience(request, deadline, api->providers.now);
     boost::asio::awaitable<Parsed<json::object>> writes =
@@ -31,7 +42,7 @@ Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api)
 }
 
 Handling put_items(HttpRequest request, Parsed<Items> items, const Api* api) {
-    if (!items) co_return to_response(items.error());
+    if (!items) co_return refused(request, items.error());
     auto writing = write_of(*items, parse_object(request.body, {"values", "verify"}));
     boost::asio::awaitable<HttpResponse> done =
         carry_out(std::move(request), std::move(writing), api);

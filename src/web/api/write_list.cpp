@@ -8,6 +8,7 @@
 #include "entries.hpp"
 #include "gather.hpp"
 #include "handlers.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "writing.hpp"
 
 namespace panelgate::web {
@@ -46,10 +47,22 @@ Parsed<Writing> write_of(const json::object& entry, const Directory& directory) 
     return write_of(*to, entry, *round ? points::Rounding::nearest : points::Rounding::exact);
 }
 
+/// As the entry names it: "press/setpoint", "press/GDT108".
+std::string place_of(const json::object& entry) {
+    std::string place;
+    for (const char* name : {"point", "station", "device", "table", "address"}) {
+        const json::value* part = entry.if_contains(name);
+        if (part == nullptr) continue;
+        if (!place.empty()) place += '/';
+        place += part->is_string() ? std::string(part->as_string()) : json_text(*part);
+    }
+    return place;
+}
+
 /// What is malformed fails all of them, before anything goes out; what cannot be written is told in
 /// its place.
-Parsed<std::vector<BatchWrite>> writes_of(std::string_view body, const Api& api) {
-    const auto entries = entries_of(body, api.providers.settings.max_items);
+Parsed<std::vector<BatchWrite>> writes_of(const HttpRequest& request, const Api& api) {
+    const auto entries = entries_of(request.body, api.providers.settings.max_items);
     if (!entries) return entries.error();
     std::vector<BatchWrite> writes;
     for (const json::object& entry : *entries) {
@@ -60,6 +73,7 @@ Parsed<std::vector<BatchWrite>> writes_of(std::string_view body, const Api& api)
         if (writing) {
             write.writing = std::move(*writing);
         } else {
+            log_refused(*request.caller, place_of(entry), writing.error());
             write.result = json_of(writing.error());
         }
     }
@@ -84,7 +98,7 @@ const std::string* line_of(const BatchWrite& write) {
 }  // namespace
 
 Handling post_write(HttpRequest request, const Api* api) {
-    auto writes = writes_of(request.body, *api);
+    auto writes = writes_of(request, *api);
     if (!writes) co_return to_response(writes.error());
     std::vector<boost::asio::awaitable<void>> lines;
     for (auto& [name, entries] : by_line(*writes, line_of)) {

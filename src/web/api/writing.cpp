@@ -1,7 +1,9 @@
 #include "writing.hpp"
 
 #include <algorithm>
+#include <array>
 #include <boost/json/array.hpp>
+#include <string>
 #include <utility>
 
 #include "answer.hpp"
@@ -9,6 +11,7 @@
 #include "body.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/http/client_log.hpp"
 #include "reading.hpp"
 #include "refusal.hpp"
 #include "write_plan.hpp"
@@ -71,6 +74,13 @@ json::object confirmed(const Writing& writing) {
 }
 
 }  // namespace
+
+void log_refused(const Caller& caller, const std::string& at, const Problem& why) {
+    constexpr std::array<unsigned, 4> kRefusals{403, 405, 409, 422};
+    if (std::ranges::find(kRefusals, why.status) == kRefusals.end()) return;
+    log_client(caller, "write refused",
+               {{"at", at}, {"status", std::to_string(why.status)}, {"why", why.detail}});
+}
 
 void tell(json::object& told, const ReadBack& back) {
     told["verified"] = nullptr;

@@ -39,6 +39,10 @@ struct Writing {
     std::optional<Verification> verification{};  ///< its client wants it read back
 };
 
+/// Says in the log that a client's write was refused before any line was asked: by rights, by what
+/// its panel is, by a point's limits (403, 405, 409, 422). `at`: what it was to write.
+void log_refused(const Caller& caller, const std::string& at, const Problem& why);
+
 /// The table that writes the memory of a notation; 422 where the panel lets nobody write it.
 Parsed<Items> made_writable(Parsed<Items> items);
 /// "values" of the body from the first of these items on; "verify". Where nobody may write, that is

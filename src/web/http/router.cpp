@@ -13,6 +13,7 @@
 
 #include "access.hpp"
 #include "panelgate/rt/log.hpp"
+#include "panelgate/web/http/client_log.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "panelgate/web/http/query.hpp"
 
@@ -105,6 +106,15 @@ void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
             {{"listener", shared.site->settings.name()}, {"client", address}});
 }
 
+/// Whoever has a token, but none for this; other refusals of tokens are failed logins.
+void tell_refused(const HttpRequest& request, const Problem& why) {
+    if (why.status != 403) return;
+    std::string path;
+    for (const std::string& segment : request.path) path += '/' + segment;
+    log_client(*request.caller, "http request refused",
+               {{"path", path}, {"method", request.method}, {"why", why.detail}});
+}
+
 /// check_access(), and what comes of a token.
 asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
                                               Shared* shared) {
@@ -151,12 +161,15 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     if (found.route == nullptr) co_return to_response(not_found(found));
     const auto refused = co_await admit(&request, found.route->needed, shared);
     if (request.caller->has_left()) co_return HttpResponse();
-    if (refused) co_return to_response(*refused);
+    if (request.caller) request.caller->uses_token(token_name(request, site->settings));
+    if (refused) {
+        tell_refused(request, *refused);
+        co_return to_response(*refused);
+    }
     // Probes are answered whatever their makers add.
     auto mistaken = free ? std::nullopt : check_queries(request, found.route->queries);
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
-    if (request.caller) request.caller->uses_token(token_name(request, site->settings));
     request.role = role_of(request, site->settings);
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));

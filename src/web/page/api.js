@@ -66,6 +66,7 @@ export async function introduce() {
     const {configuration, rest, role, version} = await get(path('configuration'));
     gateway.configuration = {...configuration, rest, version};
     gateway.role = role;
+    gateway.build = offers('GET /api/v1/version') ? await get(path('version')) : null;
 }
 
 /** Takes another token, or none for ''; throws when the gateway does not know it. */

@@ -56,9 +56,17 @@ function interface_(routes) {
     return h('details', {class: 'card'}, h('summary', null, t('rest')), docs, shown.node);
 }
 
+/** What support asks for: the commit, the compiler and the libraries. */
+function build() {
+    if (!gateway.build) return null;
+    const {commit, compiler, libraries} = gateway.build;
+    const versions = Object.entries(libraries).map(([name, version]) => `${name} ${version}`);
+    return h('p', {class: 'muted'}, [`commit ${commit}`, compiler, ...versions].join(' · '));
+}
+
 export function settingsView() {
     const now = gateway.configuration;
-    return {node: h('div', null, h('h1', null, t('nav.settings')), h('p', {class: 'muted'}, `panelgate ${now.version} · ${t('role', {role: word('role', gateway.role)})}`),
+    return {node: h('div', null, h('h1', null, t('nav.settings')), h('p', {class: 'muted'}, `panelgate ${now.version} · ${t('role', {role: word('role', gateway.role)})}`), build(),
         h('h2', null, t('open.to.whom')), h('div', {class: 'columns'}, http(now), now.modbus_tcp.map(listener), (now.serial_masters ?? []).map(master)), interface_(now.rest),
         h('h2', null, t('lines')), now.lines.map(line), relays(now.relays))};
 }

@@ -138,5 +138,33 @@ TEST(Difference, AsJsonHasPathKindAndBothValues) {
               R"([{"path":"lines/floor1/retries","kind":"changed","before":"1","after":"2"}])");
 }
 
+std::string two_lines(const std::string& of_a, const std::string& listener) {
+    return "lines:\n  - {name: a, device: sim, " + of_a +
+           "stations: [{id: 1, name: one}]}\n"
+           "  - {name: b, device: sim, stations: [{id: 2, name: two}]}\n"
+           "modbus_tcp: [{listen: '127.0.0.1:1502', " +
+           listener + "}]\n";
+}
+
+TEST(MovedUnits, TellsThatUnitsOfARemovedLineNowReachTheOneThatIsLeft) {
+    const config::Config both = load(two_lines("", "lines: [a, b]"));
+    EXPECT_THAT(moved_units(both, load(two_lines("", "lines: [a]"))),
+                ElementsAre("unit 2 of 127.0.0.1:1502 was 'two' of line b and now goes to line a: "
+                            "a write to it may reach another panel; say unlisted_stations: refuse "
+                            "there, or tell its clients first"));
+    const std::string one =
+        "lines: [{name: a, device: sim, stations: [{id: 1, name: one}]}]\n"
+        "modbus_tcp: [{listen: '127.0.0.1:1502'}]\n";
+    EXPECT_EQ(moved_units(both, load(one)).size(), 1u) << "the line is gone altogether";
+}
+
+TEST(MovedUnits, IsSilentWhereTheyReachNobodyOrAreNamed) {
+    const config::Config both = load(two_lines("", "lines: [a, b]"));
+    EXPECT_THAT(moved_units(both, both), IsEmpty());
+    EXPECT_THAT(moved_units(both, load(two_lines("unlisted_stations: refuse, ", "lines: [a]"))),
+                IsEmpty());
+    EXPECT_THAT(moved_units(both, load(two_lines("", "lines: [a], units: {2: b/2}"))), IsEmpty());
+}
+
 }  // namespace
 }  // namespace panelgate::app

@@ -97,6 +97,34 @@ TEST_F(BusTellsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     EXPECT_EQ(report.stations.front().requests.at(5)[Outcome::refused], 1u);
 }
 
+TEST_F(BusTellsTest, EveryAcceptedWriteIsInTheLogWhoeverElseHasWritten) {
+    make_bus();
+    bus->start();
+    line->reply = kWrite;
+    const rt::LogTap log;
+    bus->name_client(1, "http ::1 token alice");
+    for (int i = 0; i < 100; ++i) ask(17, kWrite);
+    EXPECT_EQ(log.count("token alice"), 1u) << "the same again is gathered";
+    bus->name_client(1, "http ::1 token bob");
+    ask(17, kWrite);
+    EXPECT_EQ(log.count("token bob"), 1u);
+    EXPECT_EQ(log.count("repeated=99 first="), 1u) << "in one line, before what follows it";
+    line->reply.clear();
+    ask(17, kWrite);
+    EXPECT_EQ(log.count("token bob"), 2u) << "it was sent, and nobody knows what came of it";
+    EXPECT_EQ(log.count("outcome=timeout"), 1u);
+}
+
+TEST_F(BusTellsTest, WhatIsNoFunctionIsNoWrite) {
+    make_bus();
+    const rt::LogTap log;
+    bus->tell_refused(17, "00"_hex, 1);
+    bus->tell_refused(17, "83 02"_hex, 1);
+    EXPECT_EQ(log.count("write"), 0u);
+    bus->tell_refused(17, "41 02"_hex, 1);
+    EXPECT_EQ(log.count("write"), 1u) << "nobody knows what it does";
+}
+
 TEST_F(BusTellsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
     bus->start();
     for (int i = 0; i < 20; ++i) {

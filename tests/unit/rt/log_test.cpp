@@ -42,6 +42,24 @@ TEST_F(LogTest, LeavesOutWhoRepeatsHimselfWhateverHisPort) {
     EXPECT_EQ(tap.count("client=10.0.0.8"), 1u);
 }
 
+TEST_F(LogTest, TopicsThatChangeDoNotFillTheLog) {
+    for (int i = 0; i < 1000; ++i)
+        log(LogLevel::warn, "mqtt write refused",
+            {{"client", "mqtt"}, {"topic", "plant/" + std::to_string(i) + "/set"}, {"why", "odd"}});
+    EXPECT_LE(tap.count("mqtt write refused client"), 70u);
+}
+
+TEST_F(LogTest, AClientWithAnIpv6AddressIsWhoItIs) {
+    for (int port = 50000; port < 50100; ++port)
+        log(LogLevel::info, "connection closed",
+            {{"listener", "a:502"}, {"client", "[::1]:" + std::to_string(port)}});
+    for (int host = 1; host <= 9; ++host)
+        log(LogLevel::warn, "login failed",
+            {{"listener", "a:80"}, {"client", "2001:db8::" + std::to_string(host)}});
+    EXPECT_EQ(tap.count("client=[::1]"), 3u);
+    EXPECT_EQ(tap.count("login failed"), 9u) << "none of them is another's port";
+}
+
 TEST_F(LogTest, QuotesASubjectThatChangesItsMindLikeOneThatRepeatsItself) {
     for (int i = 0; i < 30; ++i) {
         for (const char* state : {"ok", "timeout", "damaged"})

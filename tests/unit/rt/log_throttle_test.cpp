@@ -57,9 +57,60 @@ TEST(LogThrottle, TheNextOneThatPassesTellsHowManyWereLeftOut) {
 TEST(LogThrottle, MoreSubjectsThanItRemembersCostNoMemoryAndLoseNoFirstLine) {
     LogThrottle throttle;
     for (std::size_t i = 0; i < 3 * LogThrottle::kMostSubjects; ++i) {
-        const TimePoint now = kStart + 1ms * static_cast<int>(i);
+        const TimePoint now = kStart + LogThrottle::kByEvent.interval * static_cast<int>(i);
         EXPECT_TRUE(throttle.pass(now, "closed", std::to_string(i)));
     }
+}
+
+TEST(LogThrottle, AClientThatChangesTheSubjectHasABudgetOfLinesASecond) {
+    LogThrottle throttle;
+    int lines = 0;
+    for (int i = 0; i < 100000; ++i) {
+        const TimePoint now = kStart + 100us * i;
+        lines += throttle.pass(now, "write", std::to_string(i), LogThrottle::kDeeds, "10.0.0.7")
+                         .has_value()
+                     ? 1
+                     : 0;
+    }
+    EXPECT_LE(lines, LogThrottle::kByClient.burst + 10);
+    EXPECT_TRUE(throttle.pass(kStart + 10s, "write", "1", LogThrottle::kDeeds, "10.0.0.8"))
+        << "another client has its own";
+    EXPECT_TRUE(throttle.pass(kStart + 10s, "closed", "1", LogThrottle::kDeeds, "10.0.0.7"))
+        << "another event, too";
+    const auto left_out = throttle.take_left_out(kStart + 2min);
+    ASSERT_EQ(left_out.size(), 1u);
+    EXPECT_EQ(left_out[0].event, "write");
+    EXPECT_EQ(left_out[0].client, "10.0.0.7");
+    EXPECT_EQ(left_out[0].count, 100000u - static_cast<unsigned>(lines));
+    EXPECT_TRUE(throttle.take_left_out(kStart + 4min).empty()) << "once";
+}
+
+TEST(LogThrottle, AnyNumberOfClientsHasABudgetAndNoLineIsLostWithoutACount) {
+    LogThrottle throttle;
+    constexpr int kLines = 50000;
+    std::uint64_t passed = 0;
+    for (int i = 0; i < kLines; ++i) {
+        const std::string client = "2001:db8::" + std::to_string(i / 100);
+        if (throttle.pass(kStart + 100us * i, "write", std::to_string(i), LogThrottle::kDeeds,
+                          client))
+            ++passed;
+    }
+    EXPECT_LE(passed, LogThrottle::kByEvent.burst + 50u);
+    std::uint64_t told = 0;
+    for (const auto& one : throttle.take_left_out(TimePoint::max())) told += one.count;
+    EXPECT_EQ(passed + told, static_cast<std::uint64_t>(kLines));
+}
+
+TEST(LogThrottle, ABudgetComesBackWithTime) {
+    LogThrottle throttle;
+    for (int i = 0; i < 1000; ++i)
+        throttle.pass(kStart, "write", std::to_string(i), LogThrottle::kDeeds, "10.0.0.7");
+    const auto passes = [&](TimePoint now) {
+        return throttle.pass(now, "write", "new", LogThrottle::kDeeds, "10.0.0.7").has_value();
+    };
+    EXPECT_FALSE(passes(kStart));
+    EXPECT_TRUE(passes(kStart + LogThrottle::kByClient.interval));
+    EXPECT_FALSE(passes(kStart + LogThrottle::kByClient.interval));
 }
 
 }  // namespace

@@ -27,7 +27,15 @@ struct ReloadVerdict {
     std::vector<std::string> later;    ///< what only a restart changes
     std::vector<std::string> warnings;
     std::vector<Fault> faults;  ///< of outcome invalid
-    std::string why;            ///< of outcome failed
+    std::string why;            ///< of outcomes failed and refused
+    /// What protects less after a way back: "station press: access read_only -> read_write".
+    std::vector<std::string> weaker;
+};
+
+struct ReloadWish {
+    bool rollback = false;  ///< what ran before, in place of the file
+    bool weaker = false;    ///< ... also where that protects less than what runs
+    friend bool operator==(const ReloadWish&, const ReloadWish&) = default;
 };
 
 /// Reads the configuration again and serves it. One thread.
@@ -39,8 +47,8 @@ class ReloadSource {
     /// Why there is nothing to be read, or to go back to; empty: there is.
     virtual std::string barred(bool rollback) const = 0;
     /// Not while barred(). The handler is called once, from the loop; who comes while one is under
-    /// way gets the next. `rollback`: what ran before, in place of the file.
-    virtual void reload(bool rollback, std::string cause, Handler handler) = 0;
+    /// way gets the next.
+    virtual void reload(ReloadWish wish, std::string cause, Handler handler) = 0;
     /// Of the last one; null: there was none.
     virtual std::shared_ptr<const ReloadVerdict> last() const = 0;
 };

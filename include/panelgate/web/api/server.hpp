@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -35,8 +36,11 @@ struct Providers {
     std::function<bool()> ready;           ///< do configuration and listeners stand?
     std::function<std::string()> missing;  ///< what does not stand yet, in words
     std::string version;
-    std::function<TimePoint()> now;  ///< the machine's monotonic clock
-    std::function<WallTime()> wall;  ///< what the clock on the wall shows
+    std::string commit;                            ///< it was built from
+    std::string compiler;                          ///< "clang 19.1.7"
+    std::map<std::string, std::string> libraries;  ///< by name, their versions
+    std::function<TimePoint()> now;                ///< the machine's monotonic clock
+    std::function<WallTime()> wall;                ///< what the clock on the wall shows
     std::function<std::vector<points::RelayStatus>()> relays;
     EventHub* events = nullptr;            ///< never null; outlives the server
     DiscoverySource* discovery = nullptr;  ///< null only where there are no lines; outlives it

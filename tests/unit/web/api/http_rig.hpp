@@ -129,6 +129,9 @@ class HttpRig : public ::testing::Test {
         providers.ready = [this] { return ready; };
         providers.missing = [this] { return missing; };
         providers.version = "1.2.3";
+        providers.commit = "3b4b6e8f0a1c";
+        providers.compiler = "clang 19.1.7";
+        providers.libraries = {{"boost", "1.81.0"}};
         providers.now = [this] { return now; };
         providers.wall = [this] { return wall; };
         providers.relays = [this] { return relays; };

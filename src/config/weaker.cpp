@@ -1,0 +1,189 @@
+#include "panelgate/config/weaker.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "panelgate/config/endpoint.hpp"
+
+namespace panelgate::config {
+namespace {
+
+using Lines = std::vector<std::string>;
+
+unsigned bits_of(const Network& network) {
+    return is_ipv6(network.address) ? network.prefix : 96 + network.prefix;
+}
+
+std::string text_of(const Network& network) {
+    return network.address + '/' + std::to_string(network.prefix);
+}
+
+bool covers(const Network& wide, const Network& narrow) {
+    return bits_of(wide) <= bits_of(narrow) && is_in(narrow.address, wide.address, wide.prefix);
+}
+
+/// What a door lets in now and did not before. An empty list lets all in.
+void compare_allow(Lines& all, const std::string& door, const std::vector<Network>& running,
+                   const std::vector<Network>& next) {
+    if (running.empty()) return;
+    if (next.empty()) all.push_back(door + ": allow lets all addresses in");
+    for (const Network& network : next) {
+        const auto had = [&](const Network& one) { return covers(one, network); };
+        if (std::ranges::none_of(running, had))
+            all.push_back(door + ": allow lets " + text_of(network) + " in");
+    }
+}
+
+void compare_access(Lines& all, const std::string& what, bool was_read_only, bool is_read_only) {
+    if (was_read_only && !is_read_only) all.push_back(what + ": access read_only -> read_write");
+}
+
+/// Whether who reaches `door` could reach `before`.
+template <class Door>
+bool was_open(const Door& before, const Door& door) {
+    if (before.port != door.port) return false;
+    if (before.address == door.address) return before.ipv6_only || !door.ipv6_only;
+    const bool took_both = is_ipv6(before.address) && !before.ipv6_only;
+    return is_any_address(before.address) &&
+           (took_both || is_ipv6(before.address) == is_ipv6(door.address));
+}
+
+/// What a client of Modbus may do through these.
+void compare_rights(Lines& all, const std::string& door, const tcp_server::Settings& running,
+                    const tcp_server::Settings& next) {
+    using tcp_server::BroadcastMode;
+    compare_access(all, door, running.read_only, next.read_only);
+    if (running.broadcast == BroadcastMode::deny && next.broadcast != BroadcastMode::deny)
+        all.push_back(door + ": broadcast deny -> " +
+                      (next.broadcast == BroadcastMode::reply ? "reply" : "silent"));
+    for (const std::string& line : next.lines) {
+        if (std::ranges::find(running.lines, line) == running.lines.end())
+            all.push_back(door + ": reaches line " + line);
+    }
+    for (const auto& [unit, target] : next.units) {
+        const auto was = running.units.find(unit);
+        if (was == running.units.end() || was->second != target)
+            all.push_back(door + ": unit " + std::to_string(unit) + " is station " +
+                          std::to_string(target.station) + " of " + target.line);
+    }
+}
+
+void compare_listeners(Lines& all, const Config& running, const Config& next) {
+    for (const tcp_server::Settings& listener : next.modbus_tcp) {
+        const std::string door = "modbus_tcp " + listener.name();
+        const auto was = std::ranges::find_if(
+            running.modbus_tcp, [&](const auto& before) { return was_open(before, listener); });
+        if (was == running.modbus_tcp.end()) {
+            all.push_back(door + ": is opened");
+            continue;
+        }
+        if (!was->udp && listener.udp) all.push_back(door + ": udp false -> true");
+        compare_allow(all, door, was->allow, listener.allow);
+        compare_rights(all, door, *was, listener);
+    }
+}
+
+void compare_serial_masters(Lines& all, const Config& running, const Config& next) {
+    for (const serial_server::Settings& master : next.serial_masters) {
+        const std::string door = "serial master " + master.name;
+        const auto was =
+            std::ranges::find(running.serial_masters, master.name, &serial_server::Settings::name);
+        if (was == running.serial_masters.end()) {
+            all.push_back(door + ": is opened");
+        } else {
+            compare_rights(all, door, was->access, master.access);
+        }
+    }
+}
+
+const Line* find_line(const Config& config, const Line& like) {
+    auto found = std::ranges::find(config.lines, like.name, &Line::name);
+    if (found == config.lines.end() && like.kind != Line::Kind::simulated)
+        found = std::ranges::find(config.lines, like.device.device,
+                                  [](const Line& line) { return line.device.device; });
+    return found == config.lines.end() ? nullptr : &*found;
+}
+
+void compare_stations(Lines& all, const Line& running, const Line& next) {
+    for (const Station& was : running.stations) {
+        const std::string what = "station " + was.name;
+        const auto is = std::ranges::find(next.stations, was.id, &Station::id);
+        if (is == next.stations.end()) {
+            const bool passes = !next.refuse_unlisted && !next.listens;
+            if (passes && (was.read_only || was.guard))
+                all.push_back(what + ": is not listed, so nothing is refused for it");
+            continue;
+        }
+        compare_access(all, what, was.read_only, is->read_only);
+        if (was.guard && !is->guard) all.push_back(what + ": guard true -> false");
+    }
+}
+
+void compare_lines(Lines& all, const Config& running, const Config& next) {
+    for (const Line& line : next.lines) {
+        const Line* was = find_line(running, line);
+        if (was == nullptr) continue;
+        if (was->listens && !line.listens)
+            all.push_back("line " + line.name + ": mode listen -> ask");
+        if (was->refuse_unlisted && !line.refuse_unlisted)
+            all.push_back("line " + line.name + ": unlisted_stations refuse -> pass");
+        compare_stations(all, *was, line);
+    }
+}
+
+void compare_tokens(Lines& all, const web::Settings& running, const web::Settings& next) {
+    for (const web::Token& token : next.tokens) {
+        const auto was = std::ranges::find(running.tokens, token.secret, &web::Token::secret);
+        if (was == running.tokens.end()) {
+            all.push_back("http: token " + token.name + " is valid");
+        } else if (token.role > was->role) {
+            all.push_back("http: token " + token.name + ": role " + std::string(label(was->role)) +
+                          " -> " + std::string(label(token.role)));
+        }
+    }
+}
+
+void compare_hosts(Lines& all, const web::Settings& running, const web::Settings& next) {
+    if (running.hosts.empty() && next.hosts.empty()) return;
+    if (next.hosts.empty()) all.push_back("http: hosts are all names of this machine");
+    for (const std::string& host : next.hosts) {
+        if (std::ranges::find(running.hosts, host) == running.hosts.end())
+            all.push_back("http: hosts has " + host);
+    }
+}
+
+void compare_http(Lines& all, const Config& running, const Config& next) {
+    if (!next.http) return;
+    const std::string door = "http " + next.http->name();
+    if (!running.http) {
+        all.push_back(door + ": is opened");
+        return;
+    }
+    if (!was_open(*running.http, *next.http)) all.push_back(door + ": is opened");
+    compare_allow(all, door, running.http->allow, next.http->allow);
+    compare_hosts(all, *running.http, *next.http);
+    if (next.http->anonymous > running.http->anonymous)
+        all.push_back("http: anonymous " + std::string(label(running.http->anonymous)) + " -> " +
+                      std::string(label(next.http->anonymous)));
+    compare_tokens(all, *running.http, *next.http);
+}
+
+void compare_mqtt(Lines& all, const Config& running, const Config& next) {
+    if (!next.mqtt || !next.mqtt->write) return;
+    if (!running.mqtt || !running.mqtt->write) all.emplace_back("mqtt: write false -> true");
+}
+
+}  // namespace
+
+std::vector<std::string> weaker(const Config& running, const Config& next) {
+    Lines all;
+    compare_lines(all, running, next);
+    compare_listeners(all, running, next);
+    compare_serial_masters(all, running, next);
+    compare_http(all, running, next);
+    compare_mqtt(all, running, next);
+    return all;
+}
+
+}  // namespace panelgate::config
