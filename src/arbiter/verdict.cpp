@@ -91,8 +91,9 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
         refusal && group.may_doubt_refusal() && !attempt.was_held() &&
         station.may_refuse_other(now, attempt.reply(), group.request.function());
     const bool may_be_copy = station.may_be_copy(now, attempt);
-    const bool may_be_echo = attempt.may_be_its_echo() && !attempt.was_held() &&
-                             (too_early || station.is_far_too_quick(attempt.first_sign(now)));
+    const bool may_be_echo =
+        attempt.may_be_its_echo() && !attempt.was_held() &&
+        (too_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest()));
     if (may_be_copy || may_be_echo || may_be_others || waits) {
         const bool doubted =
             may_be_echo || may_be_others || (may_be_copy && group.may_doubt(attempt.reply()));

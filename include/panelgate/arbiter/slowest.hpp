@@ -35,16 +35,18 @@ class Slowest {
 /// The shortest, likewise. Pure.
 class Quickest {
   public:
-    static constexpr int kEnough = 32;  ///< fewer tell nothing of what is too quick
+    static constexpr int kEnough = 16;  ///< fewer tell nothing of what is too quick
 
     void add(Duration seen) {
         slowest_.add(-seen);
         count_ = std::min(count_ + 1, kEnough);
     }
-    /// Nothing: not enough were seen.
+    /// Nothing: none was seen.
     std::optional<Duration> value() const {
-        return count_ < kEnough ? std::nullopt : std::optional(-*slowest_.value());
+        const auto longest = slowest_.value();
+        return longest ? std::optional(-*longest) : std::nullopt;
     }
+    bool known() const { return count_ >= kEnough; }
 
   private:
     Slowest slowest_;

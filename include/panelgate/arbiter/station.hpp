@@ -187,10 +187,10 @@ class Station {
         const auto quickest = quickest_.value();
         return quickest && first_sign < *quickest;
     }
-    /// ... and by far.
-    bool is_far_too_quick(Duration first_sign) const {
-        const auto quickest = quickest_.value();
-        return quickest && first_sign < *quickest * 3 / 4;
+    /// ... and by far; of one that was not heard often the same of the others of the `line`.
+    bool is_far_too_quick(Duration first_sign, const Quickest& line) const {
+        const Quickest& seen = quickest_.known() ? quickest_ : line;
+        return seen.known() && first_sign < *seen.value() * 3 / 4;
     }
 
     // How it is to be asked

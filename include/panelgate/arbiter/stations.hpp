@@ -54,8 +54,12 @@ class Stations {
     /// `waited` from request to first sign; nothing: that cannot be told.
     void on_reply(TimePoint now, std::optional<Duration> waited) {
         heard_ = now;
-        if (waited) slowest_.add(*waited);
+        if (!waited) return;
+        slowest_.add(*waited);
+        quickest_.add(*waited);
     }
+    /// The shortest that any station of the line has needed lately.
+    const Quickest& quickest() const { return quickest_; }
 
     /// From when on nothing is owed that could still come; `may_stall`: on a way that holds things
     /// back, as from now on.
@@ -131,6 +135,7 @@ class Stations {
     ProbeBudget strangers_{ProbeBudget::kFailing};          ///< all attempts at strangers
     ProbeBudget known_strangers_{ProbeBudget::kStrangers};  ///< ... but the first at each
     Slowest slowest_;
+    Quickest quickest_;
     TimePoint heard_{};        ///< any of them
     TimePoint hurry_until_{};  ///< one has just been waited for in vain: the next ones are not
 };
