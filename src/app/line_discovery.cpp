@@ -19,14 +19,15 @@ constexpr Duration kPatience = 100ms;
 
 using Reply = scan::Discovery::Reply;
 
-/// An address that the bus knows as silent was asked a moment ago, and was silent.
+/// Only what was asked can be silent: a refusal tells nothing about the address.
 Reply reply_of(const bus::Answer& answer) {
     if (answer.pdu) return Reply::answered;
     switch (answer.pdu.error()) {
         case Fault::timeout:
-        case Fault::offline:
         case Fault::line_lost:
-            return Reply::silent;
+            return answer.transmitted ? Reply::silent : Reply::unsent;
+        case Fault::offline:
+            return answer.transmitted ? Reply::silent : Reply::refused;
         case Fault::damaged:
             return Reply::damaged;
         case Fault::denied:
@@ -79,7 +80,8 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
         .request = *modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide),
         .client = client_,
         .poll = true,
-        .patience = kPatience};
+        .patience = kPatience,
+        .search = true};
     asked_ = clock_.now();
     paid_ = used();
     bus_.transact(std::move(wanted), [self = weak_from_this()](const bus::Answer& answer) {
@@ -133,7 +135,9 @@ web::DiscoveryReport LineDiscovery::report() const {
     report.state = state_;
     report.share_percent = share_percent_;
     report.asked = discovery_.asked();
+    report.refused = discovery_.refused();
     report.of = discovery_.of();
+    if (state_ == State::running) report.remaining = discovery_.remaining(clock_.now());
     for (const scan::StationFinding& finding : discovery_.findings()) {
         web::DiscoveredStation& station = report.stations.emplace_back();
         station.id = finding.station;

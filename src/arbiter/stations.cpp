@@ -87,6 +87,7 @@ bool Stations::refuses(TimePoint now, const Job& job) {
     Station& station = of(job.station);
     if (station.stranger()) station.on_wanted(now);
     if (!station.health().offline()) return false;
+    if (station.stranger() && job.search) return false;
     const bool may_wake = station.stranger() || !job.request.is_read();
     const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
     if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))

@@ -23,6 +23,11 @@ std::size_t pause_class(Duration pause) {
     return i;
 }
 
+/// Of addresses that a search asks nobody knows whether anybody is there.
+bool is_search(const Group& group) {
+    return !group.jobs.empty() && std::ranges::all_of(group.jobs, &Job::search);
+}
+
 }  // namespace
 
 void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
@@ -44,6 +49,7 @@ void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     if (attempt.echoed()) ++symptoms.echoes;
     if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (replied.trailed) ++symptoms.trailed;
+    credit_unheard(attempt.group());
     if (replied.back) event(StationEvent::Kind::online, station);
     if (replied.drift) event(StationEvent::Kind::drift, station, *replied.drift);
     if (replied.trail) event(StationEvent::Kind::trail, station, *replied.trail);
@@ -67,9 +73,34 @@ void Ledger::on_failed(const Attempt& attempt, Verdict verdict) {
     } else {
         const bool silent = !attempt.heard() && !attempt.disturbed();
         ++(silent ? symptoms.silent : symptoms.disturbed);
-        if (silent) ++symptoms.silent_after[pause_class(attempt.timing().pause)];
-        ++symptoms.mute_in_a_row;
+        if (silent) remember_unheard(attempt, symptoms.mute_in_a_row);
+        if (!is_search(attempt.group())) ++symptoms.mute_in_a_row;
     }
+}
+
+/// A read that stays without reply now, and is answered when it is asked again, tells about the
+/// pause before it. A station that is off tells nothing, nor does a register that it ignores.
+void Ledger::remember_unheard(const Attempt& attempt, std::uint64_t mute_before) {
+    const Group& group = attempt.group();
+    constexpr std::uint64_t kMost = 2;  // in a row: a retry may follow another frame closely, too
+    if (!group.request.is_read()) return;
+    if (mute_before >= kMost) {
+        unheard_.erase(group.station);
+        return;
+    }
+    Unheard& unheard = unheard_[group.station];
+    if (unheard.pdu != group.request.pdu()) unheard = {group.request.pdu(), {}, 0};
+    if (unheard.count < unheard.pauses.size())
+        unheard.pauses[unheard.count++] = pause_class(attempt.timing().pause);
+}
+
+void Ledger::credit_unheard(const Group& group) {
+    const auto found = unheard_.find(group.station);
+    if (found == unheard_.end() || found->second.pdu != group.request.pdu()) return;
+    const Unheard& unheard = found->second;
+    for (std::size_t i = 0; i < unheard.count; ++i)
+        ++symptoms_of(group.station).silent_after[unheard.pauses[i]];
+    unheard_.erase(found);
 }
 
 /// Its own line in the account of an attempt: what came instead of the reply.

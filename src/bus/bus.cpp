@@ -78,7 +78,8 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
                      .priority = priority,
                      .asked_function = entry.sent_as == 0 ? std::uint8_t{0} : entry.function,
                      .within = request.within,
-                     .patience = request.patience};
+                     .patience = request.patience,
+                     .search = request.search};
     drive.tell([&](TimePoint now) {
         const Result<arbiter::Ticket> ticket = arbiter.submit(now, std::move(job));
         if (!ticket) return refuse(std::move(entry), ticket.error());

@@ -7,7 +7,8 @@
 namespace panelgate::bus {
 namespace {
 
-doctor::LineFacts facts_of(const arbiter::Settings& settings) {
+doctor::LineFacts facts_of(const Settings& all) {
+    const arbiter::Settings& settings = all.arbiter;
     doctor::LineFacts facts;
     facts.serial = settings.serial;
     facts.echo = settings.echo;
@@ -15,6 +16,7 @@ doctor::LineFacts facts_of(const arbiter::Settings& settings) {
     facts.deadline = settings.queue.deadline;
     facts.response_timeout = settings.unlisted.response_timeout;
     for (const arbiter::StationSettings& station : settings.stations) {
+        facts.names[station.id] = name_of(all.stations, station.id);
         facts.response_timeouts[station.id] = station.response_timeout;
         if (station.crc_order == modbus::CrcOrder::high_first)
             facts.crc_high_first.insert(station.id);
@@ -35,9 +37,9 @@ doctor::Sample sample_of(const LineCounts& counts) {
 }  // namespace
 
 LineDoctor::LineDoctor(const Settings& settings)
-    : settings_(settings), doctor_(settings.doctor, facts_of(settings.arbiter)) {}
+    : settings_(settings), doctor_(settings.doctor, facts_of(settings)) {}
 
-void LineDoctor::apply() { doctor_.apply(facts_of(settings_.arbiter)); }
+void LineDoctor::apply() { doctor_.apply(facts_of(settings_)); }
 
 void LineDoctor::begin(TimePoint now, const LineCounts& counts) {
     doctor_.begin(now, sample_of(counts));
@@ -88,7 +90,8 @@ std::vector<FindingReport> LineDoctor::report() const {
 std::vector<LineFinding> LineDoctor::findings() const {
     std::vector<LineFinding> list;
     for (const doctor::Finding& f : doctor_.findings()) {
-        list.push_back({std::string(code(f.cause)), f.station, f.text, f.advice, f.evidence});
+        list.push_back({std::string(code(f.cause)), f.station, f.text, f.advice, f.evidence, {}});
+        if (f.station) list.back().name = name_of(settings_.stations, *f.station);
     }
     return list;
 }

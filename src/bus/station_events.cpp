@@ -9,7 +9,7 @@ namespace panelgate::bus {
 
 void log_event(const Settings& settings, const arbiter::StationEvent& event) {
     const std::string station = name_of(settings.stations, event.station);
-    const std::string ms = std::to_string(std::lround(to_milliseconds(event.by)));
+    const std::string ms = std::to_string(std::lround(std::ceil(to_milliseconds(event.by))));
     const auto say = [&](rt::LogLevel level, const char* what, const std::string& hint) {
         if (hint.empty()) {
             rt::log(level, what, {{"line", settings.name}, {"station", station}});
@@ -23,6 +23,8 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
         case arbiter::StationEvent::Kind::online:
             return say(rt::LogLevel::info, "station online", "");
         case arbiter::StationEvent::Kind::late:
+            // Behind a wait that was cut short no setting is wrong.
+            if (event.by <= Duration::zero()) return say(rt::LogLevel::info, "late reply", "");
             return say(rt::LogLevel::warn, "late reply",
                        "raise its response_timeout by at least " + ms + "ms");
         case arbiter::StationEvent::Kind::drift:

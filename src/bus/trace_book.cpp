@@ -39,6 +39,7 @@ void TraceBook::note(arbiter::Note note) {
     incidents_.add(frame, note.bytes);
     store_.add(std::move(frame), note.bytes);
     if (note.kind != FrameKind::late || note.bytes.empty()) return;
+    if (is_stranger(note.bytes.front())) return;
     incidents_.on_trouble({note.at, time, note.bytes.front(), "late"}, store_);
 }
 
@@ -80,9 +81,15 @@ void TraceBook::end(const arbiter::Exchange& exchange) {
 void TraceBook::judge(const RecordedTransaction& transaction, TimePoint at) {
     const TransactionEnd before = std::exchange(ends_[transaction.station], transaction.end);
     if (!is_error(transaction.end) || transaction.end == TransactionEnd::line_down) return;
+    if (transaction.end == TransactionEnd::timeout && is_stranger(transaction.station)) return;
     incidents_.on_trouble({at, transaction.time, transaction.station, label(transaction.end),
                            before != transaction.end},
                           store_);
+}
+
+/// Nobody has listed it: its silence, and a reply behind the short wait for it, are expected.
+bool TraceBook::is_stranger(std::uint8_t station) const {
+    return station != 0 && !settings_.stations.contains(station);
 }
 
 void TraceBook::answered(arbiter::Transaction transaction, TimePoint at) {

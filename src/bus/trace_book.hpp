@@ -35,6 +35,7 @@ class TraceBook {
   private:
     void begin(const arbiter::Note& note, const RecordedFrame& request);
     void judge(const RecordedTransaction& transaction, TimePoint at);
+    bool is_stranger(std::uint8_t station) const;
 
     const Settings& settings_;
     Wall& wall_;

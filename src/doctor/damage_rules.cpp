@@ -22,8 +22,10 @@ double share(std::uint64_t part, std::uint64_t whole) {
 Symptoms unexplained(const Case& c) {
     Sample rest;
     for (const auto& [id, symptoms] : c.window.stations) {
-        const bool explained = c.has(Cause::duplicate_address, id) ||
-                               c.has(Cause::wrong_parity, id) || is_told_by_its_frames(c, id);
+        const bool explained =
+            c.has(Cause::duplicate_address, id) || c.has(Cause::damaged_replies, id) ||
+            (id != 0 && c.has(Cause::wrong_baud, id)) ||
+            (id != 0 && c.has(Cause::wrong_parity, id)) || is_told_by_its_frames(c, id);
         if (explained) continue;
         Symptoms& own = rest.stations[id] = symptoms;
         if (c.has_of_line(Cause::trailing_bytes) || c.has(Cause::trailing_bytes, id))
@@ -61,7 +63,7 @@ bool hits_long_replies(const Symptoms& s) {
 }
 
 bool has_better_than_noise(const Case& c) {
-    return c.has(Cause::echo) || c.has(Cause::wrong_baud) || c.has(Cause::other_master) ||
+    return c.has(Cause::echo) || c.has_of_line(Cause::wrong_baud) || c.has(Cause::other_master) ||
            c.has(Cause::collision) || c.has_of_line(Cause::wrong_parity);
 }
 
@@ -97,8 +99,8 @@ void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
                   " its `crc_order: high_first`; Autonics GP panels with firmware of before June "
                   "2005 have the profile autonics-gp-2005-old, which sets it.";
     c.add(Cause::wrong_crc_order, named(station),
-          "The replies of " + station_text(station) + " carry the CRC's " + (set ? "low" : "high") +
-              " byte first.",
+          "The replies of " + station_text(c, station) + " carry the CRC's " +
+              (set ? "low" : "high") + " byte first.",
           advice,
           share_text(s.crc_swapped, s.damaged(), "damaged replies") +
               " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
@@ -110,7 +112,7 @@ void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
     if (c.facts.serial.mode != SerialMode::ascii) return;
     if (s.lower_case < bar.enough(3) || s.lower_case * 2 <= s.damaged()) return;
     c.add(Cause::ascii_lower_case, named(station),
-          "The replies of " + station_text(station) + " have lower-case hex digits.",
+          "The replies of " + station_text(c, station) + " have lower-case hex digits.",
           "Set `serial: {ascii_lower_case: take}` of the line; the standard has upper case only.",
           share_text(s.lower_case, s.damaged(), "damaged replies") +
               " are written in lower case; " + std::to_string(s.answered) +
@@ -119,11 +121,18 @@ void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
 
 void find_all_damaged(Case& c) {
     const Symptoms s = unexplained(c);
-    if (c.facts.over_tcp || !is_all_damaged(c, s) || c.has(Cause::echo)) return;
+    if (!is_all_damaged(c, s) || c.has(Cause::echo)) return;
     const Cause cause = cause_of_damage(c, s);
     const std::string evidence = damage_text(c, s);
     const std::string now = to_string(c.facts.serial);
-    if (cause == Cause::wrong_parity) {
+    if (c.facts.over_tcp) {
+        // Another length may as well be what lies between.
+        if (cause != Cause::wrong_parity || s.damaged_exact != s.damaged()) return;
+        c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
+              "Set the parity, data and stop bits of the server's serial port as in the panels' "
+              "communication settings.",
+              evidence);
+    } else if (cause == Cause::wrong_parity) {
         c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
               "Set `serial.parity`, data and stop bits as in the panels' communication settings "
               "(now " +
@@ -144,17 +153,21 @@ void find_all_damaged(Case& c) {
 }
 
 void find_noise(Case& c) {
-    if (has_better_than_noise(c)) return;
+    if (has_better_than_noise(c) || c.has(Cause::tcp_framing)) return;
     const Bar bar{c, Cause::noise};
     const Symptoms s = unexplained(c);
     const bool overrun =
         c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
-    const bool damage = is_too_often(c, bar, s, s.damaged());
-    const bool strays = s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
+    // Over TCP replies are cut short where the connection stalls, and their rests come alone.
+    const std::uint64_t damaged = c.facts.over_tcp ? s.damaged_exact : s.damaged();
+    const bool damage = is_too_often(c, bar, s, damaged);
+    const bool strays =
+        !c.facts.over_tcp && s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
     if (overrun || (!damage && !strays)) return;
     std::string advice =
         "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
         "what runs beside the cable.";
+    if (c.facts.over_tcp) advice = "On the line behind the server: " + advice;
     std::string evidence = damage_text(c, s);
     if (hits_long_replies(s)) {
         advice = "Long replies suffer most: look at the termination first. " + advice;
@@ -169,15 +182,16 @@ void find_noise(Case& c) {
           std::move(evidence));
 }
 
-/// A connection that stalls or breaks leaves the beginning of a reply now and its rest later:
-/// nothing has been changed, so only what has the right length or more counts, unless nothing else
-/// ever comes.
+/// What lies between changes lengths: telnet doubles bytes or takes them out. A wrong byte in a
+/// reply of the right length comes from the wire behind the server, and one that is cut short from
+/// a connection that stalls, unless nothing else ever comes.
 void find_tcp_framing(Case& c) {
     if (has_better_than_noise(c)) return;
     const Bar bar{c, Cause::tcp_framing};
     const Symptoms s = unexplained(c);
-    const bool never_right = is_all_damaged(c, s) && s.silent + s.disturbed <= s.damaged();
-    const std::uint64_t changed = never_right ? s.damaged() : s.damaged_exact + s.damaged_long;
+    const bool never_right = is_all_damaged(c, s) && s.damaged_exact * 2 < s.damaged() &&
+                             s.silent + s.disturbed <= s.damaged();
+    const std::uint64_t changed = never_right ? s.damaged() : s.damaged_long;
     if (!is_too_often(c, bar, s, changed)) return;
     c.add(Cause::tcp_framing, {}, "Bytes are changed on the way from the server.",
           "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "

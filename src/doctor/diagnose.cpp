@@ -29,11 +29,8 @@ std::vector<Finding> diagnose(const LineFacts& facts, const Sample& window,
         find_unasked_frames(c, id, symptoms);
         find_silent_station(c, id, symptoms);
     }
-    if (facts.over_tcp) {
-        find_tcp_framing(c);
-    } else {
-        find_noise(c);
-    }
+    if (facts.over_tcp) find_tcp_framing(c);
+    find_noise(c);
     std::ranges::sort(c.findings, {},
                       [](const Finding& f) { return std::tuple(f.cause, f.station); });
     return std::move(c.findings);

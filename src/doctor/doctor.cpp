@@ -28,6 +28,12 @@ Doctor::Doctor(Settings settings, LineFacts facts)
     : settings_(settings), facts_(std::move(facts)) {}
 
 void Doctor::begin(TimePoint now, Sample counted) {
+    if (!marks_.empty()) {
+        const Sample window = difference(counted, marks_.front().counted);
+        const arbiter::Symptoms all = window.total();
+        // Damage that goes on across openings, one after another, is one trouble.
+        if (all.damaged() > 0 && all.answered == 0) return;
+    }
     marks_.clear();
     marks_.push_back({now, std::move(counted)});
     looked_ = now;

@@ -7,7 +7,7 @@ namespace panelgate::doctor {
 namespace {
 
 /// In the order of Cause.
-constexpr std::array<std::string_view, 20> kCodes{
+constexpr std::array<std::string_view, 21> kCodes{
     "echo",
     "no-answer-at-all",
     "wrong-baud",
@@ -23,6 +23,7 @@ constexpr std::array<std::string_view, 20> kCodes{
     "wrong-exception",
     "wrong-reply",
     "answers-broadcasts",
+    "damaged-replies",
     "duplicate-address",
     "timeout-too-short",
     "gap-too-short",

@@ -59,10 +59,10 @@ void find_no_answer(Case& c) {
     int stations = 0;
     for (const auto& [id, symptoms] : c.window.stations) {
         if (symptoms.attempts() == 0) continue;
+        // A scan of unlisted addresses finds nobody: that says nothing about the line.
+        if (id == 0 && symptoms.answered == 0 && c.window.stations.size() > 1) continue;
         if (symptoms.mute_in_a_row < bar.enough(3)) return;
         if (symptoms.wrong * 2 >= symptoms.attempts()) return;  // not what was asked, yet a voice
-        // A scan of unlisted addresses finds nobody: that says nothing about the line.
-        if (id == 0 && c.window.stations.size() > 1) continue;
         mute += symptoms.mute_in_a_row;
         ++stations;
     }
@@ -145,7 +145,7 @@ void find_trailing_bytes(Case& c) {
     if (found.size() >= 2 && found.size() == answering)
         return add_trailing(c, {}, "all stations", c.all);
     for (const std::uint8_t id : found)
-        add_trailing(c, named(id), station_text(id), c.window.stations.at(id));
+        add_trailing(c, named(id), station_text(c, id), c.window.stations.at(id));
 }
 
 }  // namespace panelgate::doctor

@@ -93,7 +93,7 @@ std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what
 std::string duration_text(Duration duration);
 /// How the damage looked: "10 of right length, 2 shorter, …"; with the driver's error counts.
 std::string damage_text(const Case& c, const arbiter::Symptoms& symptoms);
-/// "station 7", or the ones without an entry.
-std::string station_text(std::uint8_t station);
+/// Its name ("press"), "station 7" without one, or the ones without an entry; first in a sentence.
+std::string station_text(const Case& c, std::uint8_t station, bool first = false);
 
 }  // namespace panelgate::doctor

@@ -18,7 +18,7 @@ bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
     const std::uint64_t own = s.answered + s.damaged();
     const std::uint64_t expected = others_answered * s.damaged();  // in parts of `own`
-    const bool hit = s.damaged() >= bar.enough(3) && s.damaged() * 20 >= s.answered;
+    const bool hit = s.damaged() >= bar.enough(3) && s.damaged() * 100 >= s.answered;
     const bool others_fine =
         expected >= bar.enough(5) * own && others_damaged * 5 * own <= expected;
     const bool unfair = s.long_damaged == s.damaged() && c.all.long_answered < s.long_answered + 5;
@@ -37,10 +37,7 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool twice = s.doubled * 2 >= s.answered && s.doubled > 0;
     const bool others_are_fine =
         c.all.answered > s.answered && c.all.damaged() == s.damaged() && c.all.doubled == s.doubled;
-    c.add(Cause::duplicate_address, station,
-          s.doubled > 0 ? "Two panels seem to have the address " + address + "."
-                        : "Only the replies of station " + address +
-                              " are damaged: two panels may have its address.",
+    c.add(Cause::duplicate_address, station, "Two panels seem to have the address " + address + ".",
           std::string("Take the panel off the line: when the address still answers, find the other "
                       "one and change it. If nobody answers, ") +
               (twice ? "this panel or a repeater sends everything twice: set its "
@@ -50,10 +47,38 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
               (others_are_fine ? "; the other stations are fine" : ""));
 }
 
+/// Replies longer than they can be, that begin rightly: a second voice, which no cable adds.
+bool has_second_voice(const Bar& bar, const Symptoms& s) {
+    return s.damaged_long >= bar.enough(3) && s.damaged_long * 4 >= s.damaged() &&
+           s.damaged_heads * 4 >= s.damaged();
+}
+
+/// Its cable, its transceiver or its settings: what one panel alone suffers from.
+void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
+    const std::string who = station_text(c, station);
+    const std::string evidence = damage_text(c, s) + "; the other stations are fine";
+    const bool always = s.damaged() >= 5 && s.answered * 10 <= s.damaged();
+    const Cause cause = always ? cause_of_damage(c, s) : Cause::noise;
+    const std::string line = " to those of the line (" + to_string(c.facts.serial) + ").";
+    if (!c.facts.over_tcp && cause == Cause::wrong_parity)
+        return c.add(cause, station, "All replies of " + who + " have wrong bytes.",
+                     "Set this panel's parity and data bits" + line, evidence);
+    if (!c.facts.over_tcp && cause == Cause::wrong_baud)
+        return c.add(cause, station, "All that " + who + " sends is no Modbus at this speed.",
+                     "Set this panel's baud" + line, evidence);
+    c.add(
+        Cause::damaged_replies, station, "Only the replies of " + who + " are damaged.",
+        "Look at this panel's terminals, its branch of the cable and its shield; if the damage "
+        "goes with the panel to another place, its transceiver is faulty" +
+            std::string(always ? ", or its communication settings differ from the others'." : "."),
+        evidence);
+}
+
 }  // namespace
 
 void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
-    const bool line = c.has(Cause::wrong_baud) || c.has(Cause::wrong_parity) || c.has(Cause::echo);
+    const bool line = c.has_of_line(Cause::wrong_baud) || c.has_of_line(Cause::wrong_parity) ||
+                      c.has(Cause::echo);
     // Another master that reads what we read makes replies come twice.
     const bool masters =
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
@@ -62,16 +87,9 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_hit_more(c, s);
     if (s.doubled >= bar.enough(3) || mixed) return add_duplicate(c, station, s);
     // A connection that stalls cuts replies short; that takes no second panel.
-    if (c.facts.over_tcp && s.damaged_short * 2 >= s.damaged()) return;
-    if (!only_this_is_damaged(c, bar, s)) return;
-    const bool always = s.damaged() >= 5 && s.answered * 10 <= s.damaged();
-    if (!always || c.facts.over_tcp || cause_of_damage(c, s) != Cause::wrong_parity)
-        return add_duplicate(c, station, s);
-    c.add(Cause::wrong_parity, station,
-          "All replies of station " + std::to_string(station) + " have wrong bytes.",
-          "Set this panel's parity and data bits to those of the line (" +
-              to_string(c.facts.serial) + ").",
-          damage_text(c, s));
+    if (c.facts.over_tcp && s.damaged_short * 2 > s.damaged()) return;
+    if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s)) return;
+    has_second_voice(bar, s) ? add_duplicate(c, station, s) : add_damage(c, station, s);
 }
 
 namespace {
@@ -107,7 +125,7 @@ void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const Duration timeout =
         found == c.facts.response_timeouts.end() ? c.facts.response_timeout : found->second;
     c.add(Cause::timeout_too_short, named(station),
-          "The replies of " + station_text(station) + " come after the response timeout.",
+          "The replies of " + station_text(c, station) + " come after the response timeout.",
           timeout_advice(c.facts, timeout, s.worst_lateness),
           std::to_string(s.late) + " replies came up to " + duration_text(s.worst_lateness) +
               " after the timeout of " + duration_text(timeout) + "; " +
@@ -148,6 +166,11 @@ std::optional<GapSplit> split_by_pause(const Bar& bar, const Symptoms& s) {
 }  // namespace
 
 void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
+    // Silences count that the same read, asked again, was answered behind. A station that is
+    // silent otherwise, too, has another reason.
+    std::uint64_t heard_again = 0;
+    for (const std::uint64_t count : s.silent_after) heard_again += count;
+    if (heard_again * 2 < s.silent) return;
     // A late reply to the first attempt answers the second one, too.
     if (c.has(Cause::timeout_too_short, station) ||
         s.late * 2 >= std::max<std::uint64_t>(1, s.silent))
@@ -157,7 +180,7 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
     // Users of slow panels report 10 to 40 ms; from there on it is doubled until it suffices.
     const Duration advised = std::max<Duration>(10ms, 2 * split->below);
     c.add(Cause::gap_too_short, named(station),
-          "Requests right behind another frame are lost on " + station_text(station) + ".",
+          "Requests right behind another frame are lost on " + station_text(c, station) + ".",
           "Set its `timing.frame_gap` to " + duration_text(advised) + ".",
           share_text(
               split->silent_below, split->silent_below + split->answered_below,
@@ -172,7 +195,7 @@ void find_wrong_exception(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_exception, named(station)};
     if (s.wrong_exceptions < bar.enough(3) || s.wrong_exceptions * 2 < s.wrong) return;
     c.add(Cause::wrong_exception, named(station),
-          "What " + station_text(station) +
+          "What " + station_text(c, station) +
               " refuses, it refuses with the number of another function.",
           "No such exception can be told from a stray frame, so clients are answered 0B. Ask it "
           "only for what it has; with its profile, `guard: true` refuses the rest here, with the "
@@ -186,8 +209,7 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::answers_broadcasts, named(station)};
     if (s.broadcast_replies < bar.enough(3) || s.broadcast_replies * 4 < c.window.broadcasts)
         return;
-    const std::string who = station == 0 ? "A station that the configuration does not list"
-                                         : "Station " + std::to_string(station);
+    const std::string who = station_text(c, station, true);
     c.add(Cause::answers_broadcasts, named(station),
           who + " answers broadcasts, which nobody may (serial line V1.02, 2.1).",
           "Its replies run into those of other panels that do the same, and into the next request "
@@ -203,8 +225,7 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool masters = c.has(Cause::other_master) && s.wrong <= c.all.requests;
     if (s.wrong < bar.enough(3) || s.wrong * 20 < s.answered || masters) return;
     if (c.has(Cause::wrong_exception, station)) return;
-    const std::string who = station == 0 ? "A station that the configuration does not list"
-                                         : "Station " + std::to_string(station);
+    const std::string who = station_text(c, station, true);
     c.add(Cause::wrong_reply, named(station),
           who + " answers with frames that do not fit the request.",
           "Compare the line's trace with the panel's manual: another function, length or address "
@@ -221,7 +242,7 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
     const std::uint64_t frames = s.unasked - std::min(s.unasked, s.wrong);
     if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
     c.add(Cause::unasked_frames, station,
-          "Station " + std::to_string(station) + " sends frames that nobody asked for.",
+          station_text(c, station, true) + " sends frames that nobody asked for.",
           c.window.broadcasts > 0
               ? "It may answer broadcasts, which no panel should (serial line V1.02, 2.1), or send "
                 "by itself: look for that in its settings."
@@ -245,7 +266,7 @@ void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool by_crc = s.answered == 0 && !c.facts.crc_high_first.contains(station) &&
                         c.facts.serial.mode == SerialMode::rtu;
     c.add(Cause::station_silent, station,
-          "Station " + std::to_string(station) + " does not answer; others do.",
+          station_text(c, station, true) + " does not answer; others do.",
           std::string("The line is fine: check this panel's power, its address and its plug.") +
               (by_crc ? " An Autonics GP with firmware of before June 2005 is silent until its "
                         "`crc_order: high_first` is set."

@@ -33,9 +33,13 @@ std::string damage_text(const Case& c, const arbiter::Symptoms& s) {
     return text;
 }
 
-std::string station_text(std::uint8_t station) {
-    return station == 0 ? "a station that the configuration does not list"
-                        : "station " + std::to_string(station);
+std::string station_text(const Case& c, std::uint8_t station, bool first) {
+    const auto found = c.facts.names.find(station);
+    if (found != c.facts.names.end()) return found->second;
+    std::string text = station == 0 ? "a station that the configuration does not list"
+                                    : "station " + std::to_string(station);
+    if (first) text.front() = text.front() == 'a' ? 'A' : 'S';
+    return text;
 }
 
 }  // namespace panelgate::doctor

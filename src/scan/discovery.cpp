@@ -1,6 +1,7 @@
 #include "panelgate/scan/discovery.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 #include "examination.hpp"
@@ -12,7 +13,8 @@ Discovery::Discovery(const profile::Catalogue& profiles, DiscoverySettings setti
     : profiles_(profiles),
       settings_(std::move(settings)),
       waiting_(settings_.stations.begin(), settings_.stations.end()),
-      due_(now) {}
+      due_(now),
+      began_(now) {}
 
 Discovery::~Discovery() = default;
 
@@ -27,12 +29,14 @@ std::optional<ReadRequest> Discovery::question(TimePoint now) {
 void Discovery::on_answer(TimePoint now, const Answer& answer) {
     if (done()) return;
     pay(now, answer.cost);
-    if (answer.reply == Reply::unsent) {
+    const bool known = recogniser_ != nullptr;  // it has answered, and waits for its turn
+    if (answer.reply == Reply::unsent || (answer.reply == Reply::refused && known)) {
         ++unsent_;
         due_ = std::max(due_, now + kUnsentPause);
         return;
     }
     unsent_ = 0;
+    if (answer.reply == Reply::refused) return on_refused(now);
     if (recogniser_ == nullptr) {
         on_first(answer);
     } else {
@@ -50,7 +54,7 @@ void Discovery::on_first(const Answer& answer) {
     const std::uint8_t station = waiting_.front();
     if (answer.reply == Reply::damaged && ++damaged_ < kDamagedTries) return;
     waiting_.pop_front();
-    const bool again = asked_ == of();  // who was late
+    const bool again = asked_ + refused_ == of();  // who was late
     if (!again) ++asked_;
     if (answer.reply == Reply::silent) {
         damaged_ = 0;  // that was noise
@@ -70,6 +74,22 @@ void Discovery::on_first(const Answer& answer) {
     recogniser_ = std::make_unique<Recogniser>(profiles_, station, settings_.format);
     silent_probes_ = 0;
     take_probe();
+}
+
+/// It has to wait for its turn; the others need not.
+void Discovery::on_refused(TimePoint now) {
+    due_ = std::max(due_, now + kUnsentPause);
+    const std::uint8_t station = waiting_.front();
+    waiting_.pop_front();
+    if (++refusals_[station] < kMostRefused) return waiting_.push_back(station);
+    if (asked_ + refused_ < of()) ++refused_;
+}
+
+std::optional<Duration> Discovery::remaining(TimePoint now) const {
+    if (done()) return Duration::zero();
+    if (asked_ == 0) return std::nullopt;
+    return (now - began_) / static_cast<std::int64_t>(asked_) *
+           static_cast<std::int64_t>(waiting_.size());
 }
 
 void Discovery::take_probe() {

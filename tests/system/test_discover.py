@@ -11,6 +11,7 @@ from pymodbus.transaction import ModbusRtuFramer
 import config
 import harness
 from harness import read_registers
+from rtu_bus import RtuBus, echo_address
 from test_ascii import BUILT, UNIT, ForeignSlave
 from test_events import Events
 from test_points import until
@@ -97,6 +98,39 @@ class Foreign(unittest.TestCase):
             checked = subprocess.run([harness.PANELGATE, "check", "-c", str(file)], text=True,
                                      capture_output=True, timeout=harness.PATIENCE, check=False)
             self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr + file.read_text())
+
+
+class Again(unittest.TestCase):
+    """Panels that were off in the first search, and are on in the second."""
+
+    def test_a_second_search_asks_everybody_again_and_leaves_no_incident(self):
+        asked, on = [], set()
+
+        def panel(frame):
+            asked.append(frame[0])
+            return echo_address(frame) if frame[0] in on else None
+        addresses = set(range(3, 13))
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            listed = config.line(device=link, stations="{id: 1, name: press}", baud=115200,
+                                 timing="{response_timeout: 60ms}")
+            with RtuBus(link, {1: echo_address} | dict.fromkeys(addresses, panel)), \
+                    harness.configured(config.gateway(listed, http=config.OPERATOR)) as program:
+                program.log.wait_for("line up")
+                with program.client() as client:
+                    client.ask(1, read_registers(7))
+                first = discover(program, stations="3-12", share_percent=50)
+                self.assertEqual((first["asked"], first["refused"], first["found"]), (10, 0, 0))
+                self.assertEqual(set(asked), addresses)
+                asked.clear()
+                on.update((5, 9))
+                second = discover(program, stations="3-12", share_percent=50)
+                self.assertEqual((second["asked"], second["refused"]), (10, 0))
+                self.assertEqual(set(asked), addresses)
+                self.assertEqual([one["id"] for one in second["stations"]], [5, 9])
+                incidents = program.get("/api/v1/lines/floor1/incidents")[1]["incidents"]
+                self.assertEqual(incidents, [])
+                self.assertEqual(program.get("/api/v1/lines/floor1")[1]["findings"], [])
 
 
 class Beside(unittest.TestCase):

@@ -167,6 +167,27 @@ class Doctor(unittest.TestCase):
             found = self.expect(running, "gap-too-short", 2, "oven")
             self.assertRegex(found["advice"], r"`timing.frame_gap` to \d+ms")
 
+    def test_a_panel_that_was_off_is_silent_and_needs_no_longer_gap(self):
+        off = [False]
+        with line({1: echo_address, 2: lambda f: None if off[0] else echo_address(f)}) as running:
+            running.ask_both(20)
+            for _ in range(2):
+                off[0] = True
+                running.until(lambda found: [one["cause"] for one in found] == ["station-silent"])
+                off[0] = False
+                running.until(lambda found: not found)
+                running.ask_both(20)
+            self.assertEqual(running.findings(), [])
+            self.assertEqual(set(self.said(running.program)), {("station-silent", "oven")})
+
+    def test_one_panel_with_a_loose_plug_is_no_second_panel(self):
+        seen = itertools.count(1)
+
+        def loose(frame):
+            return Raw(flipped(reply_of(frame)) if next(seen) % 12 == 0 else reply_of(frame))
+        with line({1: echo_address, 2: loose}) as running:
+            self.expect(running, "damaged-replies", 2, "oven", drive=lambda: running.ask_both(20))
+
     def test_a_panel_that_needs_a_longer_timeout(self):
         with line({1: echo_address}) as running:
             def ask():

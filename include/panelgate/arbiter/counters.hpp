@@ -41,7 +41,8 @@ struct Symptoms {
     std::uint64_t lower_case = 0;         ///< damaged frames of ASCII in lower-case digits
     std::uint64_t trailed = 0;            ///< replies with something behind them: bytes, or a copy
 
-    /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above.
+    /// Attempts by the silence before them: below 2 ms, 4 ms, 8 ms … 256 ms, and above. Silent are
+    /// reads that were answered when they were asked again soon: no station that is off, no write.
     static constexpr std::size_t kPauses = 9;
     std::array<std::uint64_t, kPauses> answered_after{};
     std::array<std::uint64_t, kPauses> silent_after{};

@@ -31,6 +31,9 @@ struct Job {
     /// Its reply is waited for at least so long (within the response timeout), also of a station
     /// that nobody knows.
     Duration patience{};
+    /// A search that keeps to a share of its own: silent strangers are asked without their budget,
+    /// and their silence tells nothing about the line.
+    bool search = false;
     TimePoint arrived{};
     TimePoint deadline{};
     TimePoint start_by{};  ///< the last moment at which starting it makes sense

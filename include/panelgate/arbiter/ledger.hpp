@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -77,6 +80,8 @@ class Ledger {
     StationCounters& of(std::uint8_t station);
     Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
     void count_damaged(const Attempt& attempt);
+    void remember_unheard(const Attempt& attempt, std::uint64_t mute_before);
+    void credit_unheard(const Group& group);
     void count_stray(const modbus::Unused& part, Part what, std::uint8_t asked, Duration lateness);
 
     bool explain_ = false;
@@ -86,6 +91,13 @@ class Ledger {
     PoolDeque<Action> actions_;
     LineCounters line_;
     BusShares shares_;
+    /// The last read of a station that stayed without reply, and the pauses before its attempts.
+    struct Unheard {
+        Bytes pdu;
+        std::array<std::size_t, 2> pauses{};
+        std::size_t count = 0;
+    };
+    std::map<std::uint8_t, Unheard> unheard_;  ///< at most one a station
     std::map<std::uint8_t, StationCounters> stations_;
 };
 

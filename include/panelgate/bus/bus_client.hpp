@@ -42,6 +42,8 @@ struct Request {
     /// The reply is waited for at least so long (within the response timeout): a station that
     /// nobody knows is otherwise not waited for longer than the line's others need.
     Duration patience{};
+    /// A search for stations that keeps to a share of its own: it may ask silent strangers anew.
+    bool search = false;
 };
 
 enum class Source : std::uint8_t { bus, cache };
@@ -81,6 +83,7 @@ struct LineFinding {
     std::string text;
     std::string advice;
     std::string evidence;  ///< the numbers behind it
+    std::string name{};    ///< of the station, as the configuration has it; empty: the whole line
 };
 
 struct LineStatus {

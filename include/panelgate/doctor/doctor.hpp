@@ -23,8 +23,8 @@ class Doctor {
 
     /// They are others now; what was found stands until the next look.
     void apply(LineFacts facts) { facts_ = std::move(facts); }
-    /// The line was opened: what was counted before tells nothing about it. Findings stay until
-    /// there is something to judge by.
+    /// The line was opened: what was counted before tells nothing about it, unless nothing but
+    /// damage has come since the window began. Findings stay until there is something to judge by.
     void begin(TimePoint now, Sample counted);
     /// A step has passed since the window moved last.
     bool due(TimePoint now) const { return !marks_.empty() && now >= marks_.back().at + step(); }

@@ -24,6 +24,7 @@ enum class Cause : std::uint8_t {
     wrong_exception,     ///< a panel refuses with the number of a function that was not asked
     wrong_reply,         ///< a panel's good frames do not answer what was asked
     answers_broadcasts,  ///< a panel answers what nobody may answer
+    damaged_replies,     ///< only one panel's replies are damaged: its cable or transceiver
     duplicate_address,   ///< two panels answer to one address
     timeout_too_short,   ///< a panel answers after its response timeout
     gap_too_short,       ///< a panel does not hear what follows another frame closely

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string>
 
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/base/echo_state.hpp"
@@ -22,7 +23,8 @@ struct LineFacts {
     Duration deadline = 2s;  ///< of a request: no reply later than this is ever waited for
     Duration response_timeout = 500ms;  ///< of stations without an entry below
     std::map<std::uint8_t, Duration> response_timeouts;
-    std::set<std::uint8_t> crc_high_first;  ///< stations that are set so
+    std::map<std::uint8_t, std::string> names;  ///< of the stations that are listed
+    std::set<std::uint8_t> crc_high_first;      ///< stations that are set so
 };
 
 /// The counts of one line: at an instant, or (as a difference of two) of a window.

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -37,7 +38,8 @@ class Discovery {
         answered,  ///< the panel's exceptions, too
         silent,
         damaged,
-        unsent,  ///< the line could not take it: it is asked again
+        unsent,   ///< the line could not take it: it is asked again
+        refused,  ///< the line does not ask this address now: it is asked again behind the others
     };
     struct Answer {
         Reply reply = Reply::silent;
@@ -64,19 +66,26 @@ class Discovery {
     const std::set<std::uint8_t>& silent() const { return silent_; }
     void ask_late(std::uint8_t station);
 
+    /// Addresses that were really asked.
     std::size_t asked() const { return asked_; }
+    /// Addresses that the line has refused to ask each time, and that were given up.
+    std::size_t refused() const { return refused_; }
+    /// What is left of the first questions at the pace so far; nothing before any was asked.
+    std::optional<Duration> remaining(TimePoint now) const;
     std::size_t of() const { return settings_.stations.size(); }
     /// Who has answered, by address; the one that is looked at, too.
     std::vector<StationFinding> findings() const;
 
   private:
     static constexpr unsigned kMostUnsent = 60;
+    static constexpr unsigned kMostRefused = 5;  ///< of one address
     static constexpr Duration kUnsentPause = 1s;
     static constexpr unsigned kDamagedTries = 3;
     static constexpr unsigned kSilentProbes = 3;  ///< in a row: it has gone again
 
     void on_first(const Answer& answer);
     void on_probe(const Answer& answer);
+    void on_refused(TimePoint now);
     void take_probe();
     void end_examination();
     void pay(TimePoint now, Duration cost);
@@ -90,9 +99,12 @@ class Discovery {
     StationFinding looked_at_;
     std::optional<Bytes> probe_;
     TimePoint due_;
+    TimePoint began_;
     std::size_t asked_ = 0;
-    unsigned unsent_ = 0;   ///< in a row
-    unsigned damaged_ = 0;  ///< of the question that is asked, in a row
+    std::size_t refused_ = 0;
+    std::map<std::uint8_t, unsigned> refusals_;  ///< of those that still wait
+    unsigned unsent_ = 0;                        ///< in a row
+    unsigned damaged_ = 0;                       ///< of the question that is asked, in a row
     unsigned silent_probes_ = 0;
 };
 

@@ -45,10 +45,12 @@ json::object describe(const std::string& line, const DiscoveryReport& report) {
     object["state"] = label(report.state);
     object["share_percent"] = report.share_percent;
     object["asked"] = report.asked;
+    object["refused"] = report.refused;
     object["of"] = report.of;
     object["found"] = report.stations.size();
     object["bus_ms"] = whole_ms(report.bus);
     object["took_ms"] = whole_ms(report.took);
+    if (report.remaining) object["remaining_ms"] = whole_ms(*report.remaining);
     if (!report.why.empty()) object["why"] = report.why;
     json::array stations;
     for (const DiscoveredStation& station : report.stations) {

@@ -35,6 +35,8 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
         object["cause"] = finding.cause;
         object["station"] = nullptr;
         if (finding.station) object["station"] = *finding.station;
+        object["name"] = nullptr;
+        if (!finding.name.empty()) object["name"] = finding.name;
         object["text"] = finding.text;
         object["advice"] = finding.advice;
         object["evidence"] = finding.evidence;

@@ -47,6 +47,7 @@ export const costOf = (answer) => costs.get(answer) ?? [];
 
 export const get = (path) => ask('GET', path);
 export const put = (path, body) => ask('PUT', path, body);
+export const remove = (path) => ask('DELETE', path);
 export const post = (path, body) => ask('POST', path, body);
 
 /** /api/v1/... with each part encoded. */

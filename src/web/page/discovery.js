@@ -1,10 +1,12 @@
 // Looks for stations that nobody has listed, on a line that runs.
-import {get, mayWrite, path, post} from './api.js';
+import {get, mayWrite, path, post, remove} from './api.js';
 import {refusal} from './confirm.js';
 import {choice, h, replace, table, text} from './dom.js';
-import {t} from './language.js';
+import {duration, t} from './language.js';
 import {live} from './live.js';
 import {askToken} from './token.js';
+
+const FRESH = 2000;  // ms: how long the time left is shown before it is asked anew
 
 class Discovery {
     constructor(line) {
@@ -12,6 +14,7 @@ class Discovery {
         this.stations = h('input', {id: 'stations', value: '1-247', autocomplete: 'off'});
         this.share = h('input', {id: 'share', type: 'number', min: 1, max: 50, value: 10});
         this.start = h('button', {class: 'primary'}, t('discovery.start'));
+        this.end = h('button', {type: 'button', hidden: true, onclick: () => this.#stop()}, t('discovery.stop'));
         this.progress = h('progress', {hidden: true, 'aria-label': t('nav.discovery')});
         this.said = h('p', {class: 'muted', role: 'status'});
         this.result = h('div');
@@ -19,7 +22,7 @@ class Discovery {
         this.told = ({detail}) => {
             if (detail.line !== line) return;
             this.#goes(detail);
-            if (detail.state !== 'running') this.#ask();
+            if (detail.state !== 'running' || performance.now() - this.looked > FRESH) this.#ask();
         };
         live.addEventListener('discovery', this.told);
         this.#ask();
@@ -28,7 +31,10 @@ class Discovery {
     stop() { live.removeEventListener('discovery', this.told); }
 
     /** How far it is, and what was found, also where others have begun it. */
-    #ask() { get(path('lines', this.line, 'discover')).then((report) => this.#show(report), () => {}); }
+    #ask() {
+        this.looked = performance.now();
+        get(path('lines', this.line, 'discover')).then((report) => this.#show(report), () => {});
+    }
 
     #form() {
         if (!mayWrite()) {
@@ -36,16 +42,24 @@ class Discovery {
         }
         return h('form', {class: 'request three', onsubmit: (event) => { event.preventDefault(); this.#look(); }},
             h('label', null, h('span', null, t('discovery.stations')), this.stations),
-            h('label', null, h('span', null, t('discovery.share')), this.share), this.start);
+            h('label', null, h('span', null, t('discovery.share')), this.share), this.start, this.end);
     }
 
-    #goes({asked, of, found}) {
+    #goes({state, asked, of, found, refused = this.refused ?? 0, remaining_ms = this.left}) {
+        Object.assign(this, {refused, left: remaining_ms});
         Object.assign(this.progress, {hidden: false, max: of, value: asked});
-        text(this.said, t('discovery.progress', {asked, of, found}));
+        const parts = [t('discovery.progress', {asked, of, found})];
+        if (refused > 0) parts.push(t('discovery.refused', {refused}));
+        this.end.hidden = state !== 'running';
+        if (state === 'running' && remaining_ms !== undefined) parts.push(t('discovery.left', {time: duration(remaining_ms)}));
+        text(this.said, parts.join(', '));
     }
+
+    #stop() { remove(path('lines', this.line, 'discover')).then((report) => this.#show(report), (error) => replace(this.result, refusal(error))); }
 
     async #look() {
         this.start.disabled = true;
+        Object.assign(this, {refused: 0, left: undefined});
         replace(this.result);
         try {
             this.#show(await post(path('lines', this.line, 'discover'), {stations: this.stations.value, share_percent: Number(this.share.value)}));
@@ -57,7 +71,7 @@ class Discovery {
 
     #show(report) {
         if (report.state === 'never') return text(this.said, t('discovery.never'));
-        this.#goes({asked: report.asked, of: report.of, found: report.stations.length});
+        this.#goes(report);
         if (report.state === 'running') return null;
         this.progress.hidden = true;
         if (report.stations.length === 0) return replace(this.result, h('p', {class: 'empty'}, t('discovery.none')));

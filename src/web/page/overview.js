@@ -1,7 +1,7 @@
 // Lines with their load, and their stations as tiles.
 import {get, offers, path} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
-import {duration, number, t, word} from './language.js';
+import {duration, language, number, t, word} from './language.js';
 import {live} from './live.js';
 import {sparkline} from './plot.js';
 import {latency} from './timeline.js';
@@ -23,8 +23,17 @@ export function badge(kind, state) {
     return h('span', {class: `badge ${tone(state)}`}, word(kind, state));
 }
 
+/** What is wrong, in the reader's language; figures and advice are the gateway's own. */
+function findingText(finding) {
+    const key = `finding.${finding.cause}`;
+    const said = word('finding', finding.cause);
+    if (language === 'en' || said === finding.cause) return {lang: 'en', said: finding.text};
+    return {lang: language, said: t(key, {who: finding.name ?? t('finding.line')})};
+}
+
 export function findingNote(finding) {
-    return h('li', {class: 'finding'}, h('strong', {lang: 'en'}, finding.text), ' ',
+    const {lang, said} = findingText(finding);
+    return h('li', {class: 'finding'}, h('strong', {lang}, said), ' ',
         h('span', {lang: 'en'}, finding.advice), finding.evidence ? h('small', {lang: 'en'}, finding.evidence) : null);
 }
 
@@ -35,7 +44,7 @@ function tile(first) {
     const spark = sparkline();
     const figure = h('span', {class: 'figure'});
     const facts = h('span', {class: 'muted'});
-    const finding = h('span', {class: 'tile-finding', lang: 'en'});
+    const finding = h('span', {class: 'tile-finding'});
     const node = h('a', {class: 'tile', href: `#/station/${encodeURIComponent(first.name)}`, 'data-station': first.name},
         h('span', {class: 'head'}, name, state), h('span', {class: 'muted'}, `${first.line}:${first.id} · ${first.profile ?? t('no.profile')}`),
         h('span', {class: 'head'}, spark.node, figure), facts, finding);
@@ -50,7 +59,7 @@ function tile(first) {
         text(figure, duration(latency(traced).total.mean));
         text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
         const told = line?.told?.find((one) => one.station === station.id);
-        text(finding, told ? told.text : '');
+        text(finding, told ? findingText(told).said : '');
     }};
 }
 

@@ -17,15 +17,15 @@ class Mix {
         s_.long_answered += n;
         return answered(n);
     }
-    Mix& silent(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
+    Mix& silent(std::uint64_t n) {
         s_.silent += n;
-        s_.silent_after[pause] += n;
         s_.mute_in_a_row += n;
         return *this;
     }
-    /// n silent attempts that were not the last.
+    /// n silent attempts whose requests were answered when they were asked again.
     Mix& lost(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
-        silent(n, pause);
+        silent(n);
+        s_.silent_after[pause] += n;
         s_.mute_in_a_row = 0;
         return *this;
     }

@@ -71,7 +71,7 @@ TEST_F(Diagnose, OnlyDamageOfEverybodyIsBaudOrParity) {
     EXPECT_THAT(causes({{1, Mix().damaged(9)}, {2, Mix().damaged(9)}}), ElementsAre("noise"))
         << "right beginnings: neither";
     EXPECT_THAT(causes({{1, Mix().garbage(9)}, {2, Mix().answered(9)}}),
-                ElementsAre("duplicate-address 1"));
+                ElementsAre("wrong-baud 1"));
 }
 
 TEST_F(Diagnose, WhereAllOfAsciiIsDamagedTheFormatDiffersAndPerhapsTheMode) {
@@ -124,7 +124,7 @@ TEST_F(Diagnose, AFewDamagedRepliesOfOneOfTwoStationsDoNotTellYet) {
     EXPECT_THAT(causes({{1, Mix().answered(20).damaged(1)}, {2, Mix().answered(20).damaged(3)}}),
                 ElementsAre("noise"));
     EXPECT_THAT(causes({{1, Mix().answered(60)}, {2, Mix().answered(20).damaged(3)}}),
-                ElementsAre("duplicate-address 2"));
+                ElementsAre("damaged-replies 2"));
     EXPECT_THAT(causes({{1, Mix().answered(2)}, {2, Mix().answered(20).damaged(9)}}),
                 ElementsAre("noise"))
         << "the other one was hardly asked";
@@ -151,9 +151,13 @@ TEST_F(Diagnose, BytesThatNobodySaidPointToTheBias) {
 TEST_F(Diagnose, DamageOrDoubledRepliesOfOneAddressOnly) {
     const Symptoms fine = Mix().answered(50);
     EXPECT_THAT(causes({{1, fine}, {2, Mix().answered(30).damaged(6)}}),
-                ElementsAre("duplicate-address 2"));
-    EXPECT_THAT(causes({{1, fine}, {2, Mix().damaged(6)}}), ElementsAre("duplicate-address 2"));
-    EXPECT_THAT(causes({{1, fine}, {2, Mix().garbage(6)}}), ElementsAre("duplicate-address 2"));
+                ElementsAre("damaged-replies 2"));
+    EXPECT_THAT(causes({{1, fine}, {2, Mix().damaged(6)}}), ElementsAre("damaged-replies 2"));
+    EXPECT_THAT(causes({{1, fine}, {2, Mix().garbage(6)}}), ElementsAre("wrong-baud 2"));
+    EXPECT_THAT(
+        causes({{1, fine}, {2, Mix().answered(30).damaged(6).with(&Symptoms::damaged_long, 3)}}),
+        ElementsAre("duplicate-address 2"))
+        << "replies of a second length, which no cable makes";
     EXPECT_THAT(causes({{1, fine}, {2, Mix().zeroed(6)}}), ElementsAre("wrong-parity 2"));
     EXPECT_THAT(causes({{1, fine}, {2, Mix().answered(30).with(&Symptoms::doubled, 3)}}),
                 ElementsAre("duplicate-address 2"));

@@ -95,6 +95,16 @@ TEST_F(DoctorTest, ANewLineForgetsTheCountsAndKeepsTheFindingUntilItIsUsed) {
     EXPECT_EQ(causes(pass(0).gone), std::vector{Cause::noise});
 }
 
+TEST_F(DoctorTest, DamageAlonePersistsAcrossOpeningsAndIsNamed) {
+    for (int i = 0; i < 6; ++i) {  // one damaged reply, then the line is opened anew
+        now += 2s;
+        counted.stations[1] = one.with(&Symptoms::damaged_long, 1);
+        doctor.begin(now, counted);
+    }
+    now += 5s;
+    EXPECT_FALSE(doctor.look(now, counted).appeared.empty());
+}
+
 TEST_F(DoctorTest, LooksOnceAStepAndNotBeforeItHasRested) {
     EXPECT_FALSE(doctor.due(now));
     EXPECT_FALSE(doctor.due(now + 5s - 1ns));

@@ -72,7 +72,7 @@ TEST_F(Diagnose, ACrcWithItsHighByteFirstIsNeitherNoiseNorASecondPanel) {
     EXPECT_THAT(causes({{1, swapped(9)}, {2, swapped(9)}}),
                 ElementsAre("wrong-crc-order 1", "wrong-crc-order 2"));
     EXPECT_THAT(causes({{1, fine}, {2, swapped(2)}}), IsEmpty());
-    EXPECT_THAT(causes({{1, fine}, {2, swapped(3).damaged(6)}}), ElementsAre("duplicate-address 2"))
+    EXPECT_THAT(causes({{1, fine}, {2, swapped(3).damaged(6)}}), ElementsAre("damaged-replies 2"))
         << "most of it is other damage";
     EXPECT_THAT(causes({{1, Mix().answered(50).damaged(6)}, {2, swapped(9)}}),
                 ElementsAre("noise", "wrong-crc-order 2"));
@@ -220,9 +220,9 @@ TEST_F(DiagnoseOverTcp, AHealthyLineHasNoFinding) {
 
 TEST_F(DiagnoseOverTcp, DamageIsAMatterOfTheServer) {
     for (const Stations& stations :
-         {Stations{{1, Mix().answered(80).damaged(5)}, {2, Mix().answered(80).damaged(5)}},
-          Stations{{1, Mix().zeroed(9)}}, Stations{{1, Mix().garbage(9)}},
-          Stations{{1, Mix().strange(9)}},
+         {Stations{{1, Mix().garbage(9)}},
+          Stations{{1, Mix().answered(80).with(&Symptoms::damaged_long, 5)},
+                   {2, Mix().answered(80).with(&Symptoms::damaged_long, 5)}},
           Stations{{1, Mix().with(&Symptoms::damaged_short, 9)}}}) {
         const auto found = findings(stations);
         ASSERT_EQ(found.size(), 1u);
@@ -230,6 +230,19 @@ TEST_F(DiagnoseOverTcp, DamageIsAMatterOfTheServer) {
         EXPECT_THAT(found[0].advice, HasSubstr("telnet"));
         EXPECT_THAT(found[0].advice, Not(AnyOf(HasSubstr("termination"), HasSubstr("parity"))));
     }
+}
+
+TEST_F(DiagnoseOverTcp, RightLengthsAreNotWhatFramingChanges) {
+    const Symptoms hit = Mix().answered(297).damaged(3);
+    const auto found = findings({{1, hit}, {2, hit}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].cause, Cause::noise);
+    EXPECT_THAT(found[0].advice, HasSubstr("behind the server"));
+    EXPECT_THAT(causes({{1, hit}}), ElementsAre("noise"));
+    const auto never = findings({{1, Mix().zeroed(9)}});
+    ASSERT_EQ(never.size(), 1u);
+    EXPECT_EQ(never[0].cause, Cause::wrong_parity);
+    EXPECT_THAT(never[0].advice, HasSubstr("the server's serial port"));
 }
 
 TEST_F(DiagnoseOverTcp, AConnectionThatStallsIsNoNoise) {
@@ -248,7 +261,7 @@ TEST_F(DiagnoseOverTcp, AdviceIsAboutTheServerAndNotAboutWires) {
     EXPECT_THAT(found[0].advice, HasSubstr("server"));
     EXPECT_THAT(found[0].advice, Not(AnyOf(HasSubstr("wires"), HasSubstr("bias"))));
     EXPECT_THAT(causes({{1, Mix().answered(50)}, {2, Mix().zeroed(9)}}),
-                ElementsAre("duplicate-address 2"))
+                ElementsAre("damaged-replies 2"))
         << "the line's parity is the server's";
 }
 

@@ -37,8 +37,8 @@ TEST(Sample, ADifferenceCountsWhatCameBetweenAndKeepsWhatIsNow) {
 TEST(Sample, ATotalAddsWhatIsCountedAndTakesTheWorstOfTheRest) {
     Sample sample;
     sample.stations[1] = Mix().answered(10, 0).late(2, 50ms);
-    sample.stations[2] = Mix().silent(3, 1).late(1, 80ms);
-    sample.stations[0] = Mix().silent(9, 1);
+    sample.stations[2] = Mix().lost(3, 1).late(1, 80ms);
+    sample.stations[0] = Mix().lost(9, 1).with(&Symptoms::mute_in_a_row, 9);
     const Symptoms total = sample.total();
     EXPECT_EQ(total.answered, 10u);
     EXPECT_EQ(total.silent, 12u);

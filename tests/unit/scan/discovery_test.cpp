@@ -71,6 +71,36 @@ class DiscoveryTest : public testing::Test {
     TimePoint now = kStart;
 };
 
+TEST_F(DiscoveryTest, WhomTheLineRefusesToAskWaitsForItsTurnAndIsNotSilent) {
+    add("panasonic-gt", 5);
+    int refusals = 0;
+    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+        if (request.station() != 5 || refusals == 2) return std::nullopt;
+        ++refusals;
+        return Answer{Reply::refused, {}, {}};
+    };
+    Discovery discovery(shipped(), all(), now);
+    run(discovery);
+    EXPECT_EQ(discovery.asked(), 247u);
+    EXPECT_EQ(discovery.refused(), 0u);
+    ASSERT_EQ(discovery.findings().size(), 1u);
+    EXPECT_EQ(discovery.findings()[0].station, 5);
+    EXPECT_EQ(discovery.remaining(now), Duration::zero());
+}
+
+TEST_F(DiscoveryTest, WhoIsRefusedEachTimeIsCountedAsNotAsked) {
+    odd = [](const ReadRequest& request) -> std::optional<Answer> {
+        if (request.station() % 2 == 0) return std::nullopt;
+        return Answer{Reply::refused, {}, {}};
+    };
+    Discovery discovery(shipped(), all(), now);
+    EXPECT_FALSE(discovery.remaining(now)) << "nothing was asked yet";
+    run(discovery);
+    EXPECT_EQ(discovery.asked(), 123u);
+    EXPECT_EQ(discovery.refused(), 124u);
+    EXPECT_THAT(discovery.silent(), testing::Not(testing::Contains(1)));
+}
+
 TEST_F(DiscoveryTest, FindsWhoAnswersAndWhatPanelItIs) {
     add("autonics-gplp-s", 31);
     add("panasonic-gt", 20);

@@ -24,7 +24,9 @@ struct DiscoveryReport {
     State state = State::never;
     unsigned share_percent = 0;  ///< of the line's time, at most
     std::size_t asked = 0;       ///< addresses
+    std::size_t refused = 0;     ///< addresses that the line would not ask
     std::size_t of = 0;
+    std::optional<Duration> remaining;        ///< at the pace so far; nothing: not known
     std::vector<DiscoveredStation> stations;  ///< so far
     std::string yaml;                         ///< to paste below `stations:`; "" without any
     Duration bus{};                           ///< what it has cost of the line's time

@@ -28,13 +28,13 @@ TEST_F(ApiLines, ListsTheLines) {
 TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of("[]"));
     bus.line.findings = {{"wrong-baud", {}, "What is wrong.", "What to do.", "9 of 9"},
-                         {"gap-too-short", 31, "Why.", "How.", "5 of 6"}};
+                         {"gap-too-short", 31, "Why.", "How.", "5 of 6", "press"}};
     EXPECT_EQ(get("/api/v1/lines").at("lines").as_array()[0].at("findings"),
               json_of(R"(["wrong-baud","gap-too-short"])"));
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of(R"([
-        {"cause":"wrong-baud","station":null,"text":"What is wrong.","advice":"What to do.",
+        {"cause":"wrong-baud","station":null,"name":null,"text":"What is wrong.","advice":"What to do.",
          "evidence":"9 of 9"},
-        {"cause":"gap-too-short","station":31,"text":"Why.","advice":"How.",
+        {"cause":"gap-too-short","station":31,"name":"press","text":"Why.","advice":"How.",
          "evidence":"5 of 6"}])"));
 }
 
