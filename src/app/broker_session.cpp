@@ -136,7 +136,7 @@ std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
     if (place.point != nullptr) return state_of(*place.station, *place.point);
     const Health health = place.station->bus->station_status(place.station->id).state;
     mqtt::State state;
-    state.value = health != Health::offline;
+    state.value = health != Health::offline && health != Health::unknown;
     state.text = label(health);
     state.time = rt::wall_now();
     return state;
@@ -174,6 +174,11 @@ void BrokerSession::on_bus_event(const std::string& line, const bus::BusEvent& e
     state.text = of_line->up ? "up" : "down: " + of_line->why;
     state.time = rt::wall_now();
     offer(*subject, std::move(state));
+    for (std::size_t i = 0; i < places_.size(); ++i) {  // its stations are unknown now
+        const Place& place = places_[i];
+        if (place.station != nullptr && place.point == nullptr && place.station->line == line)
+            look(i);
+    }
 }
 
 void BrokerSession::on_points(const Station& station, const std::vector<std::size_t>& wants) {

@@ -108,7 +108,7 @@ void LineDiscovery::on_answer(const bus::Answer& answer) {
 void LineDiscovery::ask_the_late() {
     const auto silent = discovery_.silent();
     for (const std::uint8_t station : silent) {
-        const auto heard = bus_.station_status(station).last_success;
+        const auto heard = bus_.station_status(station).last_reply;
         if (heard && clock_.now() - *heard >= began_) discovery_.ask_late(station);
     }
 }

@@ -155,6 +155,7 @@ void Arbiter::on_line_down(TimePoint now) {
     up_ = false;
     held_ = false;
     resetting_ = false;
+    stations_.on_line_down();
     strays_.forget();
     reception_.memory().clear();
     if (active_) {

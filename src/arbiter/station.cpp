@@ -114,7 +114,7 @@ Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     if (return_.answered()) outstanding_until_ = std::max(outstanding_until_, now + latest_reply());
     copies_.on_reply(now, answered.pdu, Bytes(pdu.begin(), pdu.end()));
     if (heard.settled) rest_is_over(now + copies_.hold());
-    heard.back = health_.on_reply(now);
+    heard.back = health_.on_late_reply(now);
     missed_ = false;
     probes_ = 0;
     return heard;

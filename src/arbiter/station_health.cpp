@@ -5,11 +5,19 @@
 namespace panelgate::arbiter {
 
 bool StationHealth::on_reply(TimePoint now) {
+    const bool back = on_late_reply(now);
+    state_ = Health::online;
+    last_success_ = now;
+    return back;
+}
+
+bool StationHealth::on_late_reply(TimePoint now) {
     const bool back = offline();
     returns_ += silent_ > 0 ? 1u : 0u;
-    state_ = Health::online;
+    state_ = Health::suspect;
+    known_ = true;
     silent_ = 0;
-    last_success_ = now;
+    last_heard_ = now;
     return back;
 }
 
@@ -17,10 +25,12 @@ void StationHealth::on_damaged() {
     returns_ += silent_ > 0 ? 1u : 0u;
     silent_ = 0;
     state_ = Health::suspect;
+    known_ = true;
 }
 
 bool StationHealth::on_silence(TimePoint now, bool at_once) {
     ++silent_;
+    known_ = true;
     if (offline()) {
         pause_ = std::min(pause_ * 2, settings_.probe_max);
         next_probe_ = now + pause_;
@@ -38,6 +48,7 @@ bool StationHealth::on_silence(TimePoint now, bool at_once) {
 }
 
 bool StationHealth::on_silent_write() {
+    known_ = true;
     if (offline()) return false;
     state_ = Health::suspect;
     const bool is_last = silent_ + 1 >= settings_.after;

@@ -58,7 +58,7 @@ Duration Stations::patience(TimePoint now, const Group& group) {
 bool Stations::has_company(TimePoint now, const Station& station) const {
     const TimePoint since = std::max(station.failed(), now - kCompany);
     return std::ranges::any_of(stations_, [&](const auto& entry) {
-        const auto answered = entry.second.health().last_success();
+        const auto answered = entry.second.health().last_heard();
         return &entry.second != &station && answered && *answered > since;
     });
 }
@@ -171,7 +171,7 @@ std::optional<TimePoint> Stations::next_probe() const {
 bool Stations::anyone_online() const {
     return std::ranges::any_of(stations_, [](const auto& entry) {
         const StationHealth& health = entry.second.health();
-        return !health.offline() && health.last_success();
+        return !health.offline() && health.last_heard();
     });
 }
 

@@ -238,7 +238,9 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     StationStatus status;
     status.state = health.state();
     status.returns = health.returns() + state_->ups;
-    if (const auto last = health.last_success()) status.last_success = state_->clock.now() - *last;
+    const TimePoint now = state_->clock.now();
+    if (const auto last = health.last_success()) status.last_success = now - *last;
+    if (const auto last = health.last_heard()) status.last_reply = now - *last;
     return status;
 }
 

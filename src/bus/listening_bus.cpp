@@ -237,7 +237,9 @@ LineStatus ListeningBus::status() const {
 }
 
 StationStatus ListeningBus::station_status(std::uint8_t station) const {
-    return state_->heard.status(station, state_->clock.now());
+    StationStatus status = state_->heard.status(station, state_->clock.now());
+    if (!state_->up) status.state = Health::unknown;
+    return status;
 }
 
 std::optional<Refusal> ListeningBus::refusal_of_write(std::uint8_t station) const {
@@ -267,7 +269,7 @@ LineReport ListeningBus::report() const {
     report.device = state_->line->counters();
     report.stations = state_->account.counters().report(
         state_->heard.wire(),
-        [this](std::uint8_t station) { return state_->heard.health(station); });
+        [this](std::uint8_t station) { return station_status(station).state; });
     return report;
 }
 

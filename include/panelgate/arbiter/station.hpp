@@ -112,6 +112,7 @@ class Station {
     /// What this reply to an attempt that was started then proves: that a request of that moment
     /// has reached the station. Where another is owed that it fits as well, the first such one.
     TimePoint surely_answered(TimePoint started, ByteView reply) const;
+    void on_line_down() { health_.on_line_down(); }
     /// The line is open again. What is owed may be sent, and answered, just now: whoever speaks
     /// meanwhile is not understood.
     void on_opened(TimePoint now);
@@ -201,7 +202,7 @@ class Station {
     /// keep reads from being the next one.
     bool take_half_open(TimePoint now, bool is_read);
     /// Nobody listed it, and nobody has ever heard it.
-    bool stranger() const { return !listed_ && !health_.last_success(); }
+    bool stranger() const { return !listed_ && !health_.last_heard(); }
     bool forgettable(TimePoint now) const {
         return stranger() && !owes() && now >= asked_ + kForgetStranger;
     }

@@ -24,15 +24,25 @@ class StationHealth {
     /// From now on; pauses that have begun stay.
     void apply(const OfflineSettings& settings) { settings_ = settings; }
 
-    Health state() const { return state_; }
+    /// What every face shows. Unknown until the station was asked, and from the loss of its line
+    /// until it has answered, or not, behind that.
+    Health state() const { return known_ ? state_ : Health::unknown; }
     bool offline() const { return state_ == Health::offline; }
+    /// Its last answer in time. A late reply is a sign of life and no success.
     std::optional<TimePoint> last_success() const { return last_success_; }
+    /// Its last good frame, in time or late.
+    std::optional<TimePoint> last_heard() const { return last_heard_; }
     int silent_in_a_row() const { return silent_; }
     /// How often it was heard again after a silence: each may have been a restart.
     std::uint64_t returns() const { return returns_; }
 
-    /// A good frame of the station came, in time or late. True when that brought it back.
+    /// Its answer came in time. True when that brought it back.
     bool on_reply(TimePoint now);
+    /// A good frame of the station came that answers nobody any more: alive, though not well. True
+    /// when that brought it back.
+    bool on_late_reply(TimePoint now);
+    /// Its line is down: nothing is known of it any more.
+    void on_line_down() { known_ = false; }
     /// Only damaged bytes came: alive, though not well.
     void on_damaged();
     /// A whole transaction (all its attempts) passed in silence. True when that took it offline:
@@ -51,12 +61,14 @@ class StationHealth {
   private:
     OfflineSettings settings_;
     Health state_ = Health::unknown;
+    bool known_ = false;  ///< since the line was opened
     int silent_ = 0;
     std::uint64_t returns_ = 0;
     Duration pause_{};
     TimePoint next_probe_{};
     TimePoint next_half_open_{};
     std::optional<TimePoint> last_success_;
+    std::optional<TimePoint> last_heard_;
 };
 
 }  // namespace panelgate::arbiter

@@ -41,6 +41,9 @@ class Stations {
     void on_damaged(TimePoint now, ByteView bytes) {
         for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);
     }
+    void on_line_down() {
+        for (auto& [id, station] : stations_) station.on_line_down();
+    }
     /// A request that left at `sent` was answered now, on a line that may hold things back.
     void on_opened(TimePoint now) {
         for (auto& [id, station] : stations_) station.on_opened(now);

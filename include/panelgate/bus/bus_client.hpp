@@ -111,11 +111,13 @@ struct HeardCounts {
 };
 
 struct StationStatus {
+    /// `unknown` while its line is down: what it does cannot be seen.
     Health state = Health::unknown;
-    std::optional<Duration> last_success;  ///< how long ago
+    std::optional<Duration> last_success;  ///< how long ago; late replies are none
     /// How often it, or its line, was gone and came back: each may have been a restart.
     std::uint64_t returns = 0;
-    std::optional<HeardCounts> heard{};  ///< on a line that is only listened to
+    std::optional<Duration> last_reply{};  ///< how long ago, late ones too
+    std::optional<HeardCounts> heard{};    ///< on a line that is only listened to
 };
 
 /// What servers, REST and the poller see of a line: the bus seam. One thread. A bus lives as long

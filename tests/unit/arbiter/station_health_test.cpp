@@ -100,5 +100,50 @@ TEST_F(StationHealthTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     EXPECT_TRUE(health.take_half_open(now + 1s));
 }
 
+TEST(StationHealth, P10ALateReplyIsASignOfLifeAndNoSuccess) {
+    StationHealth health(OfflineSettings{.after = 2});
+    const TimePoint now{1h};
+    health.on_silence(now);
+    health.on_silence(now);
+    ASSERT_EQ(health.state(), Health::offline);
+    EXPECT_TRUE(health.on_late_reply(now + 1s)) << "it is back";
+    EXPECT_EQ(health.state(), Health::suspect);
+    EXPECT_FALSE(health.last_success());
+    EXPECT_EQ(health.last_heard(), now + 1s);
+    health.on_reply(now + 2s);
+    EXPECT_EQ(health.state(), Health::online);
+    EXPECT_EQ(health.last_success(), now + 2s);
+}
+
+TEST(StationHealth, P10OnALineThatIsDownNothingIsKnownUntilItIsAskedAgain) {
+    StationHealth health(OfflineSettings{.after = 2});
+    const TimePoint now{1h};
+    health.on_reply(now);
+    health.on_line_down();
+    EXPECT_EQ(health.state(), Health::unknown);
+    EXPECT_EQ(health.last_success(), now);
+    health.on_reply(now + 1s);
+    EXPECT_EQ(health.state(), Health::online);
+    health.on_silence(now);
+    health.on_silence(now);
+    health.on_line_down();
+    EXPECT_EQ(health.state(), Health::unknown);
+    EXPECT_TRUE(health.offline()) << "it is asked by probes all the same";
+    health.on_silence(now + 2s);
+    EXPECT_EQ(health.state(), Health::offline);
+}
+
+TEST(StationHealth, P4SilentWritesAloneTakeNoStationOfflineThatAnswersReads) {
+    StationHealth health(OfflineSettings{.after = 3});
+    const TimePoint now{1h};
+    health.on_reply(now);
+    EXPECT_FALSE(health.on_silent_write());
+    EXPECT_FALSE(health.on_silent_write());
+    for (int i = 0; i < 9; ++i) EXPECT_TRUE(health.on_silent_write()) << "a read is to tell";
+    EXPECT_EQ(health.state(), Health::suspect);
+    EXPECT_TRUE(health.on_silence(now)) << "the read was silent, too";
+    EXPECT_EQ(health.state(), Health::offline);
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter
