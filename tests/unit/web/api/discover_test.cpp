@@ -58,12 +58,13 @@ TEST_F(ApiDiscover, TellsWhatWasFound) {
     source.told.yaml = "      - {id: 9}\n";
     source.told.bus = 9800ms;
     source.told.took = 98s;
-    EXPECT_EQ(get(kPath).body(),
-              R"({"line":"floor1","state":"done","share_percent":10,"asked":245,"refused":0,"of":245,)"
-              R"("found":1,"bus_ms":9800,"took_ms":98000,"stations":[{"id":9,)"
-              R"("profiles":["panasonic-gt","omron-cp2e"],"evidence":"9 of 9 reads"}],)"
-              R"("yaml":"      - {id: 9}\n"})"
-              "\n");
+    EXPECT_EQ(
+        get(kPath).body(),
+        R"({"line":"floor1","state":"done","share_percent":10,"asked":245,"refused":0,"of":245,)"
+        R"("found":1,"bus_ms":9800,"took_ms":98000,"stations":[{"id":9,)"
+        R"("profiles":["panasonic-gt","omron-cp2e"],"evidence":"9 of 9 reads"}],)"
+        R"("yaml":"      - {id: 9}\n"})"
+        "\n");
     source.told = {};
     EXPECT_EQ(get(kPath).at("state"), "never");
 }
