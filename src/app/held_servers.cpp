@@ -49,6 +49,7 @@ void hold_listener(const Holder& top, const std::string& name,
     held.tell("diagnostics_unit", unit ? std::to_string(*unit) : "null");
     held.tell("allow", networks(settings.allow));
     held.tell("max_connections", settings.max_connections);
+    held.tell("max_connections_per_address", settings.max_connections_per_address);
 }
 
 void hold_master(const Holder& top, const serial_server::Settings& settings) {

@@ -75,18 +75,20 @@ Stray Station::judge(TimePoint now, ByteView pdu) const {
     return copies_.is_second(now, pdu) ? Stray::second : Stray::unasked;
 }
 
+/// What nothing asked for, with the time at which it came first.
+void Station::remember_refusal(TimePoint now, ByteView pdu) {
+    if (!modbus::exception_of(pdu) || is_stray_refusal(now, pdu)) return;
+    stray_refusal_.assign(pdu.begin(), pdu.end());
+    stray_refusal_at_ = now;
+}
+
 Station::Heard Station::on_stray_frame(TimePoint now, ByteView pdu) {
     Heard heard;
     heard.stray = judge(now, pdu);
     const bool said_again = now < std::exchange(again_until_, TimePoint{});
     const bool may_be_copy = said_again || copies_.is_copy(now, pdu);
     if (heard.stray != Stray::late) {
-        const bool known = std::ranges::equal(pdu, stray_refusal_) &&
-                           now < stray_refusal_at_ + CopyGuard::kLongest;
-        if (modbus::exception_of(pdu) && !known) {
-            stray_refusal_.assign(pdu.begin(), pdu.end());
-            stray_refusal_at_ = now;
-        }
+        remember_refusal(now, pdu);
         copies_.on_unasked(now, pdu);
         not_before_ = std::max(not_before_, copies_.rest_until());
         if (heard.stray == Stray::copy) trail_.on_stray(now);
@@ -204,14 +206,16 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
     odd_ = exception ? kOdd : std::max(odd_ - 1, 0);
     damaged_pdu_.clear();
     settle_debt(now, attempt);
-    if (!group.span || exception) return result;
-    std::uint32_t& longest = longest_read_[static_cast<std::size_t>(group.span->table)];
-    longest = std::max(longest, group.span->count);
-    if (!cheapest_read_ || group.span->count < cheapest_read_->span()->count)
-        cheapest_read_ = group.request;
-    if (!largest_read_ || group.span->count > largest_read_->span()->count)
-        largest_read_ = group.request;
+    if (group.span && !exception) learn_of_read(group.request, *group.span);
     return result;
+}
+
+/// It answers this.
+void Station::learn_of_read(const modbus::Request& read, const modbus::Span& span) {
+    std::uint32_t& longest = longest_read_[static_cast<std::size_t>(span.table)];
+    longest = std::max(longest, span.count);
+    if (!cheapest_read_ || span.count < cheapest_read_->span()->count) cheapest_read_ = read;
+    if (!largest_read_ || span.count > largest_read_->span()->count) largest_read_ = read;
 }
 
 void Station::on_damaged_reply(TimePoint now, const modbus::Request& request, TimePoint sent) {

@@ -132,6 +132,7 @@ constexpr auto kTexts = std::to_array<KeyText>({
     {"modbus_tcp/diagnostics_unit", "255", "The gateway's own registers; null: none."},
     {"modbus_tcp/allow", "", "Networks such as 192.168.1.0/24; everybody without."},
     {"modbus_tcp/max_connections", "1024", ""},
+    {"modbus_tcp/max_connections_per_address", "64", "Then its longest idle one gives way."},
 
     {"serial_masters", "", "Masters on serial ports of their own, as clients."},
     {"serial_masters/name", "", "Unique: a-z, 0-9 and '-'."},

@@ -290,6 +290,8 @@ tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     load_allow(loading, in, settings.allow);
     settings.max_connections =
         static_cast<std::size_t>(in.integer("max_connections", 1, 65535).value_or(1024));
+    settings.max_connections_per_address =
+        static_cast<std::size_t>(in.integer("max_connections_per_address", 1, 65535).value_or(64));
     refuse_tls(in);
     refuse_empty_access(in);
     refuse_empty(in, "allow", kNoNetwork);

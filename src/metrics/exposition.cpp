@@ -264,6 +264,10 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
     Family open = make_gauge("panelgate_tcp_connections", "Modbus/TCP connections open now.");
     Family total =
         make_counter("panelgate_tcp_connections_total", "Modbus/TCP connections accepted.");
+    Family refused = make_counter("panelgate_tcp_connections_refused_total",
+                                  "Connections refused: no place, and no idle one to give way.");
+    Family evicted = make_counter("panelgate_tcp_connections_evicted_total",
+                                  "Idle connections that gave way to newer ones.");
     Family errors = make_counter("panelgate_tcp_protocol_errors_total",
                                  "Modbus/TCP frames that broke the protocol.");
     Family joined = make_counter("panelgate_tcp_retransmissions_joined_total",
@@ -272,11 +276,15 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
         const Labels labels{{"listener", listener.listener}};
         open.gauge(labels, static_cast<double>(listener.connections));
         total.counter(labels, listener.connections_total);
+        refused.counter(labels, listener.refused);
+        evicted.counter(labels, listener.evicted);
         errors.counter(labels, listener.protocol_errors);
         joined.counter(labels, listener.joined);
     }
     out.push_back(open.take());
     out.push_back(total.take());
+    out.push_back(refused.take());
+    out.push_back(evicted.take());
     out.push_back(errors.take());
     out.push_back(joined.take());
 }

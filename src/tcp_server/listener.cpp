@@ -4,10 +4,13 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
+#include <map>
 #include <set>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -91,7 +94,9 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
   private:
     void on_accepted(tcp::socket socket);
     void admit(tcp::socket socket, const tcp::endpoint& peer);
-    bool has_room();
+    bool make_room(const tcp::endpoint& peer);
+    std::shared_ptr<Session> longest_idle(bus::Host host) const;
+    void tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own);
     void on_closed(const std::shared_ptr<Session>& session);
     void tell_when_empty();
 
@@ -141,19 +146,57 @@ void Listener::Core::on_accepted(tcp::socket socket) {
     if (!allowed_.allows(peer.address())) {
         shared_->log(rt::LogLevel::info, "connection refused",
                      {{"client", text(peer)}, {"reason", "not in the allow list"}});
-    } else if (has_room()) {
+    } else if (make_room(peer)) {
         admit(std::move(socket), peer);
     }
 }
 
-bool Listener::Core::has_room() {
+/// P9: who has no place left of its share, or the most of a full house, loses its longest idle one.
+/// An address that leaks connections locks out nobody but itself.
+bool Listener::Core::make_room(const tcp::endpoint& peer) {
+    const bus::Host host = bus::host_of(peer.address().to_string());
+    std::map<bus::Host, std::size_t> counts;
+    for (const auto& session : sessions_) ++counts[session->host()];
+    const std::size_t own = counts[host];
+    const bool share_used = own >= shared_->settings.max_connections_per_address;
     const bool full = sessions_.size() >= shared_->settings.max_connections;
-    if (full && !std::exchange(full_, true)) {
-        shared_->log(
-            rt::LogLevel::warn, "connections refused",
-            {{"reason", "max_connections reached"}, {"open", std::to_string(sessions_.size())}});
+    if (!share_used && !full) return true;
+    const auto greediest =
+        std::ranges::max_element(counts, {}, [](auto& one) { return one.second; });
+    const bool other = !share_used && greediest->second > own;
+    const auto victim = longest_idle(other ? greediest->first : host);
+    if (!victim) {
+        ++shared_->counters.refused;
+        const char* key = share_used ? "max_connections_per_address" : "max_connections";
+        tell_refused(peer, key, own);
+        return false;
     }
-    return !full;
+    ++shared_->counters.evicted;
+    shared_->log(
+        rt::LogLevel::info, "connection gives way",
+        {{"client", victim->client()}, {"reason", "the longest idle one"}, {"to", text(peer)}});
+    victim->close();
+    return true;
+}
+
+std::shared_ptr<Session> Listener::Core::longest_idle(bus::Host host) const {
+    std::shared_ptr<Session> longest;
+    for (const auto& session : sessions_) {
+        const auto since = session->idle_since();
+        if (session->host() != host || !since) continue;
+        if (!longest || *since < *longest->idle_since()) longest = session;
+    }
+    return longest;
+}
+
+/// Once until one closes.
+void Listener::Core::tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own) {
+    if (std::exchange(full_, true)) return;
+    shared_->log(rt::LogLevel::warn, "connections refused",
+                 {{"client", text(peer)},
+                  {"reason", std::string(key) + " reached"},
+                  {"open", std::to_string(sessions_.size())},
+                  {"of_its_address", std::to_string(own)}});
 }
 
 void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {

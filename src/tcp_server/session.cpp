@@ -27,17 +27,24 @@ Session::Session(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
     : socket_(std::move(socket)),
       shared_(std::move(shared)),
       on_closed_(std::move(on_closed)),
+      active_(shared_->clock.now()),
       reader_(make_request_reader(shared_->settings)),
       due_alarm_(shared_->clock.make_alarm()),
       output_alarm_(shared_->clock.make_alarm()) {}
 
 void Session::start(Caller caller) {
+    host_ = caller.host();
     pipeline_ = std::make_shared<Pipeline>(shared_, std::move(caller), [weak = weak_from_this()] {
         if (const auto self = weak.lock()) self->go_on();
     });
     error_code ignored;
     socket_.non_blocking(true, ignored);
     read();
+}
+
+std::optional<TimePoint> Session::idle_since() const {
+    if (!pipeline_->empty() || writing_ || due_) return std::nullopt;
+    return active_;
 }
 
 asio::ip::address Session::peer() const {
@@ -98,6 +105,7 @@ void Session::on_read(const error_code& error, std::size_t size) {
     if (closed_) return;
     if (error == asio::error::eof) return on_end_of_input();
     if (error) return close();
+    active_ = shared_->clock.now();
     if (input_state_ == Input::served)
         reader_->feed(shared_->clock.now(), ByteView(input_.data(), size));
     go_on();

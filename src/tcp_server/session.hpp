@@ -34,6 +34,12 @@ class Session : public std::enable_shared_from_this<Session> {
     /// The address of the other end; of a connection that is cut already, none that is allowed
     /// anything.
     boost::asio::ip::address peer() const;
+    /// Its name in logs.
+    const std::string& client() const { return pipeline_->client(); }
+    /// Who shares places with it: bus::host_of() its address.
+    bus::Host host() const { return host_; }
+    /// Since then it has neither asked nor been answered; nothing: it has something open.
+    std::optional<TimePoint> idle_since() const;
     /// Takes no more requests, answers what is in flight, turns away what waits, then closes.
     void finish();
     /// Closes at once and takes its waiting requests back from the buses. May be called twice.
@@ -67,6 +73,8 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
     std::shared_ptr<Pipeline> pipeline_;
+    bus::Host host_{};
+    TimePoint active_;
 
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};

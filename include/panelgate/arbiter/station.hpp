@@ -102,9 +102,8 @@ class Station {
     /// ... as some panels refuse with another function's number, or once more what it said unasked
     /// a moment ago: asking again tells.
     bool may_refuse_other(TimePoint now, ByteView reply, std::uint8_t function) const {
-        const bool again = std::ranges::equal(reply, stray_refusal_) &&
-                           now < stray_refusal_at_ + CopyGuard::kLongest;
-        return again || (now < outstanding_until_ && debt_.has_other_function(function));
+        return is_stray_refusal(now, reply) ||
+               (now < outstanding_until_ && debt_.has_other_function(function));
     }
     /// It has answered all that it was asked since the line was opened anew, the rest is over, and
     /// nothing more has come: no reply is on its way, though none could be told from those owed.
@@ -298,6 +297,13 @@ class Station {
     void rest_for_owed(TimePoint now);
     void rest_is_over(TimePoint not_before);
     void learn_of_copies(TimePoint now, const Attempt& attempt);
+    void learn_of_read(const modbus::Request& read, const modbus::Span& span);
+    void remember_refusal(TimePoint now, ByteView pdu);
+    /// It has said this unasked a moment ago.
+    bool is_stray_refusal(TimePoint now, ByteView pdu) const {
+        return std::ranges::equal(pdu, stray_refusal_) &&
+               now < stray_refusal_at_ + CopyGuard::kLongest;
+    }
     void settle_debt(TimePoint now, const Attempt& attempt);
     Duration short_wait(std::optional<Duration> line) const;
 

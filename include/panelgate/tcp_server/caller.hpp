@@ -18,6 +18,7 @@ class Caller {
     Caller(std::string name, bus::Host host, std::string protocol = "modbus_tcp");
 
     const std::string& name() const { return name_; }
+    bus::Host host() const { return host_; }
     /// Hands the request to a bus, for one of its stations; 0: all of them.
     void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);

@@ -15,6 +15,8 @@ struct Counters {
     std::uint64_t exceptions = 0;  ///< answered, the panels' own included
     std::uint64_t busy = 0;        ///< exceptions 06
     std::uint64_t unanswered = 0;  ///< requests that get no answer: unit 0 where nobody is answered
+    std::uint64_t refused = 0;     ///< connections: no place, and no idle one to give way
+    std::uint64_t evicted = 0;     ///< idle connections that gave way to newer ones
 };
 
 }  // namespace panelgate::tcp_server

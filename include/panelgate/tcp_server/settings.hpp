@@ -50,6 +50,8 @@ struct Settings {
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
+    /// Of one address (IPv6: one network of 64 bits): then its longest idle one gives way.
+    std::size_t max_connections_per_address = 64;
     /// Requests of one connection on the buses, or answered and not yet taken by the client.
     std::size_t in_flight = 16;
     std::size_t waiting = 64;  ///< requests that wait behind them; then nobody reads

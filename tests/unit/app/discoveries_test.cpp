@@ -137,7 +137,7 @@ TEST_F(DiscoveriesTest, CanBeDoneAgain) {
 TEST_F(DiscoveriesTest, WhoAnsweredLateIsAskedOnceMore) {
     bus.script = [this](const bus::Request& request) -> std::optional<bus::Answer> {
         if (request.station == 20 && bus.requests.size() == 1) {
-            bus.stations[20].last_success = Duration::zero();  // a moment behind its timeout
+            bus.stations[20].last_reply = Duration::zero();  // a moment behind its timeout
             return test::FakeBus::fault(Fault::timeout, true);
         }
         return answer(request);
@@ -148,13 +148,14 @@ TEST_F(DiscoveriesTest, WhoAnsweredLateIsAskedOnceMore) {
     EXPECT_THAT(report().stations[0].evidence, HasSubstr("answers late"));
 }
 
-TEST_F(DiscoveriesTest, WhoWasSilentAMomentAgoIsNotAskedTwice) {
+TEST_F(DiscoveriesTest, WhomTheLineRefusesToAskIsTriedAgainAFewTimes) {
     bus.script = [](const bus::Request&) { return test::FakeBus::fault(Fault::offline, false); };
     discoveries.start("floor1", "1-30", 10);
     run();
     EXPECT_EQ(report().state, State::done);
-    EXPECT_EQ(bus.requests.size(), 30u);
-    EXPECT_EQ(report().took, Duration::zero()) << "and it costs nothing";
+    EXPECT_EQ(bus.requests.size(), 5u * 30u);
+    EXPECT_EQ(report().asked, 0u);
+    EXPECT_EQ(report().refused, 30u);
 }
 
 TEST_F(DiscoveriesTest, GivesUpOnALineThatTakesNothing) {

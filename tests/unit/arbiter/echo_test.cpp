@@ -4,24 +4,18 @@
 
 #include <algorithm>
 
-#include "panelgate/arbiter/slowest.hpp"
+#include "echo_fixture.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "support/bus_script.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::echo {
 namespace {
 
-using test::BusScript;
 using Expect = EchoFilter::Expect;
 
 const Bytes kFrame = "11 06 00 01 00 03 9A 9B"_hex;
-const Bytes kRead = "03 00 6B 00 03"_hex;
-const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
-const Bytes kWriteCoil = "05 00 01 FF 00"_hex;
-const Bytes kWriteRegister = "06 00 01 00 03"_hex;
 
 Bytes copy(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
 
@@ -77,38 +71,6 @@ TEST(EchoMemory, LearnsOnlyFromRequestsWhoseAnswerCannotBeTheirEcho) {
     memory.forget();
     EXPECT_TRUE(memory.must_be_learned_before(test::request_of(kWriteRegister), false));
 }
-
-class Echo : public testing::Test {
-  protected:
-    static Settings settings(EchoMode mode) {
-        Settings s;
-        s.serial = {38400, 8, Parity::none, 1};
-        s.unlisted.retries = 0;
-        s.stations = {s.unlisted};
-        s.stations[0].id = 17;
-        s.echo = mode;
-        return s;
-    }
-    /// The adapter hears what was sent last; then the station answers, or not.
-    static void hear_echo(BusScript& bus) {
-        const Bytes adu = bus.sent.back().adu;
-        bus.hear_paced(adu);
-    }
-    static void reply(BusScript& bus, ByteView pdu) {
-        bus.run_for(3ms);
-        bus.hear_reply(17, pdu);
-    }
-    /// A line that has carried a read and is known to have an echo, or not to have one.
-    static void read_once(BusScript& bus, bool echo) {
-        const Ticket ticket = bus.submit(17, kRead);
-        if (echo) hear_echo(bus);
-        bus.run_to_end_of_request();
-        reply(bus, kReply);
-        ASSERT_TRUE(bus.answered(ticket));
-        EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
-        bus.run_for(10ms);
-    }
-};
 
 TEST_F(Echo, P8AWriteIsNeverConfirmedByItsOwnEcho) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
@@ -366,68 +328,6 @@ TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurn
     EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
 }
 
-/// A line without an echo, whose station has answered; then a write, and its very frame comes back
-/// as it leaves.
-class EchoInMidLife : public Echo {
-  protected:
-    EchoInMidLife() {
-        for (int i = 0; i < Quickest::kEnough; ++i) read_once(bus, false);
-        write = bus.submit(17, kWriteRegister);
-        hear_echo(bus);
-        EXPECT_FALSE(bus.answered(write));
-    }
-    /// A read goes out that tells.
-    void ask() {
-        ASSERT_TRUE(bus.next_sent(600ms));
-        ASSERT_EQ(bus.sent.back().kind, FrameKind::learn_echo);
-    }
-    BusScript bus{settings(EchoMode::automatic)};
-    Ticket write = 0;
-};
-
-TEST_F(EchoInMidLife, P8ConfirmsNoWriteOfAPanelThatIsOff) {
-    ask();
-    hear_echo(bus);
-    bus.run_for(2s);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-    EXPECT_TRUE(bus.answer(write).transmitted);
-    EXPECT_EQ(bus.arbiter().echo(), EchoState::present);
-}
-
-TEST_F(EchoInMidLife, P8ConfirmsNoWriteWhereTheReadIsAnsweredBehindAnEcho) {
-    ask();
-    hear_echo(bus);
-    reply(bus, kReply);
-    EXPECT_EQ(bus.answer(write).pdu.error(), Fault::timeout);
-}
-
-TEST_F(EchoInMidLife, P8TheReplyBehindItConfirmsTheWrite) {
-    reply(bus, kWriteRegister);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
-    bus.run_for(200ms);
-    bus.submit(17, kWriteRegister);
-    EXPECT_EQ(bus.sent.back().kind, FrameKind::learn_echo) << "nothing is known of the echo";
-}
-
-TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
-    ask();
-    bus.run_to_end_of_request();
-    reply(bus, kReply);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
-    const auto writes = std::ranges::count_if(bus.sent, [](const auto& one) {
-        return one.adu == modbus::encode_adu(17, kWriteRegister);
-    });
-    EXPECT_EQ(writes, 1);
-}
-
-TEST_F(EchoInMidLife, P2ARefusedReadTellsAsWellAndTheWriteIsNotRepeated) {
-    ask();
-    bus.run_to_end_of_request();
-    reply(bus, "83 02"_hex);
-    EXPECT_EQ(bus.answer(write).pdu.value(), kWriteRegister);
-    EXPECT_FALSE(bus.next_sent(1s));
-}
-
 TEST_F(Echo, P8TheEchoOfARequestNobodyAnswersIsNoSignOfLife) {
     BusScript bus(settings(EchoMode::on));
     for (int i = 0; i < 3; ++i) {
@@ -440,4 +340,4 @@ TEST_F(Echo, P8TheEchoOfARequestNobodyAnswersIsNoSignOfLife) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::echo

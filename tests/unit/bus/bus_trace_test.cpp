@@ -52,10 +52,11 @@ class BusTrace : public testing::Test {
     void ask_often(int times) {
         for (int i = 0; i < times; ++i) ask();
     }
-    /// Asks once and hears nothing.
+    /// Asks once and hears nothing; by another function, so that nothing has to show afterwards
+    /// that no reply is outstanding.
     void fail() {
         line->reply.clear();
-        ask();
+        ask("04 00 64 00 01"_hex);
         line->reply = kReply;
     }
     /// "1:timeout 2:late": ids and causes.
@@ -152,8 +153,9 @@ TEST_F(BusTrace, KeepsWhatHappenedAroundAnError) {
     EXPECT_EQ(incident->part.transactions[16].end, TransactionEnd::timeout);
     EXPECT_EQ(incident->part.transactions[15].id, 40u);
     EXPECT_EQ(incident->part.transactions[32].end, TransactionEnd::ok);
-    for (const TraceTransaction& one : incident->part.transactions)
-        EXPECT_EQ(one.request, line->written[0]) << one.id;
+    for (const TraceTransaction& one : incident->part.transactions) {
+        if (one.end == TransactionEnd::ok) EXPECT_EQ(one.request, line->written[0]) << one.id;
+    }
     EXPECT_FALSE(bus->incident(2));
 }
 

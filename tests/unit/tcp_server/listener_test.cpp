@@ -99,27 +99,72 @@ TEST_F(ListenerTest, P9TakesIpv4ForTheSameAddressOnAnIpv6Listener) {
     EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
 }
 
-TEST_F(ListenerTest, RefusesTheNewestWhenItIsFull) {
+TEST_F(ListenerTest, RefusesTheNewestWhenItIsFullAndNobodyIsIdle) {
     settings.max_connections = 2;
-    bus1.instant = reply_to_read(1);
     start();
     Client first = connect();
-    std::optional<Client> second(connect());
-    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 2; }));
+    Client second = connect();
+    first.request(1, 1, read_pdu(1));
+    second.request(1, 1, read_pdu(1));
+    ASSERT_TRUE(run_until([&] { return bus1.seen.size() == 2; }));
     Client third = connect();
     Client fourth = connect();
     EXPECT_TRUE(third.sees_close());
     EXPECT_TRUE(fourth.sees_close());
-    EXPECT_EQ(log.count("max_connections"), 1U) << "told once";
+    EXPECT_EQ(log.count("max_connections reached"), 1U) << "told once";
+    EXPECT_EQ(listener->counters().refused, 2U);
+}
+
+TEST_F(ListenerTest, TakesNewOnesWhenOneHasLeftAFullHouse) {
+    settings.max_connections = 1;
+    bus1.instant = reply_to_read(1);
+    start();
+    std::optional<Client> first(connect());
+    EXPECT_EQ(first->ask(1, read_pdu(1)), reply_to_read(1));
+    first.reset();
+    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
+    Client second = connect();
+    EXPECT_EQ(second.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_EQ(listener->counters().evicted, 0U);
+}
+
+TEST_F(ListenerTest, P9AnAddressThatLeaksConnectionsLosesItsLongestIdleOneAndLocksOutNobody) {
+    settings.max_connections = 6;
+    settings.max_connections_per_address = 3;
+    bus1.instant = reply_to_read(1);
+    start();
+    Client first = connect();
     EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
-    EXPECT_EQ(second->ask(1, read_pdu(1)), reply_to_read(1));
-    second.reset();
-    ASSERT_TRUE(run_until([&] { return listener->counters().connections == 1; }));
-    Client fifth = connect();
-    EXPECT_EQ(fifth.ask(1, read_pdu(1)), reply_to_read(1));
+    Client second = connect();
+    EXPECT_EQ(second.ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
+    Client third = connect();
+    EXPECT_EQ(third.ask(1, read_pdu(1)), reply_to_read(1));
+    Client fourth = connect();
+    EXPECT_TRUE(second.sees_close()) << "it has asked nothing for longest";
+    for (Client* one : {&first, &third, &fourth})
+        EXPECT_EQ(one->ask(1, read_pdu(1)), reply_to_read(1));
+    EXPECT_EQ(listener->counters().evicted, 1U);
+    EXPECT_EQ(listener->counters().refused, 0U);
+    EXPECT_EQ(listener->counters().connections, 3U) << "others have their places";
+}
+
+TEST_F(ListenerTest, P9AConnectionWithSomethingOpenNeverGivesWay) {
+    settings.max_connections_per_address = 2;
+    start();
+    Client first = connect();
+    Client second = connect();
+    first.request(1, 1, read_pdu(1));
+    second.request(2, 1, read_pdu(1));
+    ASSERT_TRUE(run_until([&] { return bus1.seen.size() == 2; }));
+    Client third = connect();
+    EXPECT_TRUE(third.sees_close());
+    EXPECT_EQ(listener->counters().refused, 1U);
+    EXPECT_EQ(log.count("max_connections_per_address reached"), 1U);
 }
 
 TEST_F(ListenerTest, TakesThreeHundredClientsAtOnce) {
+    settings.max_connections_per_address = 300;
     bus1.instant = reply_to_read(1);
     start();
     std::list<Client> clients;
