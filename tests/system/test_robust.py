@@ -11,7 +11,7 @@ import config
 import harness
 from harness import adu, read_registers
 
-PATIENT = config.gateway(config.line(queue="{limit: 1000, deadline: 60s}"))
+PATIENT = config.gateway(config.line(queue="{limit: 1000, deadline: 60s}"), modbus=config.MANY)
 FIVE_WORDS = bytes.fromhex("030A000A0014001E00280032")  # UW0..UW4 of the manual's example
 CONNECTIONS = 300
 MEMORY_LIMIT = 40 * 1024  # KiB

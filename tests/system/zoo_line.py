@@ -95,7 +95,7 @@ def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=
             device = f"tcp://{panels.names[0]}" if tcp else panels.names[0]
             keys = {"stations": config.station_ids(units), **keys}
             listed = config.line("zoo", device, baud=baud, **keys)
-            with harness.configured(config.gateway(listed)) as program:
+            with harness.configured(config.gateway(listed, modbus=config.MANY)) as program:
                 program.log.wait_for("line up")
                 yield Line(panels, program)
 

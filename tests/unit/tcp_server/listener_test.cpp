@@ -135,11 +135,15 @@ TEST_F(ListenerTest, P9AnAddressThatLeaksConnectionsLosesItsLongestIdleOneAndLoc
     start();
     Client first = connect();
     EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
+    clock.advance(1s);
     Client second = connect();
     EXPECT_EQ(second.ask(1, read_pdu(1)), reply_to_read(1));
+    clock.advance(1s);
     EXPECT_EQ(first.ask(1, read_pdu(1)), reply_to_read(1));
+    clock.advance(1s);
     Client third = connect();
     EXPECT_EQ(third.ask(1, read_pdu(1)), reply_to_read(1));
+    clock.advance(1s);
     Client fourth = connect();
     EXPECT_TRUE(second.sees_close()) << "it has asked nothing for longest";
     for (Client* one : {&first, &third, &fourth})
