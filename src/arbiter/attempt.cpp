@@ -47,9 +47,7 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       end_confirmed_(!timing.confirm_end) {}
 
 bool Attempt::takes_along(TimePoint now, const Job& job) const {
-    // Rates may differ by 2 %: its last bit may have left that much sooner.
-    const Duration spare = (timing_.sent - timing_.started) * 2 / 100;
-    const bool leaving = timing_.tolerance && now < timing_.sent - spare;
+    const bool leaving = timing_.tolerance && now < earliest_end();
     return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
            contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
 }

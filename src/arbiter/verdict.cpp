@@ -77,12 +77,13 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const bool may_be_owed = refusal && !group.probe &&
                              (attempt.refusal_was_rejected() ||
                               station.refuses_other(attempt.reply(), group.request.pdu()));
-    const bool too_early = early && !settings_.paced && pace_.believed();
+    const bool is_early = early && !settings_.paced && pace_.believed();
+    const bool is_too_early = is_early && attempt.replied_too_early();
     if (attempt.is_contested()) {
         attempt.reject_contested();
         return false;
     }
-    if (may_be_owed || station.is_copy(now, attempt, too_early)) {
+    if (may_be_owed || station.is_copy(now, attempt, is_too_early)) {
         attempt.reject_reply();
         return false;
     }
@@ -90,10 +91,10 @@ bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     const bool may_be_others =
         refusal && group.may_doubt_refusal() && !attempt.was_held() &&
         station.may_refuse_other(now, attempt.reply(), group.request.function());
-    const bool may_be_copy = station.may_be_copy(now, attempt);
+    const bool may_be_copy = station.may_be_copy(now, attempt, is_early);
     const bool may_be_echo =
         attempt.may_be_its_echo() && !attempt.was_held() &&
-        (too_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest()));
+        (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest()));
     if (may_be_copy || may_be_echo || may_be_others || waits) {
         const bool doubted =
             may_be_echo || may_be_others || (may_be_copy && group.may_doubt(attempt.reply()));

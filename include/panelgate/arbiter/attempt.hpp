@@ -35,6 +35,8 @@ enum class Verdict : std::uint8_t {
 /// known length is a hole. Pure.
 class Attempt {
   public:
+    static constexpr int kRatesDiffer = 2;  ///< percent, those of two devices on one line
+
     struct Timing {
         TimePoint started;        ///< handed over, to leave at once or after the line's lead
         TimePoint sent;           ///< last bit out, computed
@@ -104,6 +106,10 @@ class Attempt {
     /// back for so long. Not a repeated one: an answer to the first attempt may still come, and
     /// would be too old.
     bool takes_along(TimePoint now, const Job& job) const;
+    /// When its last bit may have left, by the clocks of the line's other devices.
+    TimePoint earliest_end() const {
+        return timing_.sent - (timing_.sent - timing_.started) * kRatesDiffer / 100;
+    }
 
     Group& group() { return group_; }
     const Group& group() const { return group_; }
@@ -114,6 +120,8 @@ class Attempt {
     /// Its first byte came before the request had left by our arithmetic. Noise in front of it
     /// tells nothing about it.
     bool replied_early() const { return first_byte_ < timing_.sent && noise_in_front_ == 0; }
+    /// ... and sooner than a clock that differs by kRatesDiffer explains.
+    bool replied_too_early() const { return replied_early() && first_byte_ < earliest_end(); }
     /// From the end of the request to the start of the reply, whose last byte came now.
     Duration waited(TimePoint now) const;
     /// From the end of the request to the first sign of a reply, as it reached us: adapters hold

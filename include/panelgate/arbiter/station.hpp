@@ -172,12 +172,13 @@ class Station {
         return too_early && !again && copies_.is_copy(now, attempt.reply());
     }
     /// It repeats one, and copies come from this station, or it has not shown yet that it gives
-    /// equal answers to different requests. What was doubted and comes again is no copy.
-    bool may_be_copy(TimePoint now, const Attempt& attempt) const {
+    /// equal answers to different requests, or it came `early`. What was doubted and comes again is
+    /// no copy.
+    bool may_be_copy(TimePoint now, const Attempt& attempt, bool early) const {
         const Group& group = attempt.group();
         if (attempt.was_held() || attempt.reply() == group.doubted) return false;
         const Bytes& pdu = group.request.pdu();
-        return copies_.repeats_itself(now, attempt.reply()) ||
+        return is_copy(now, attempt, early) || copies_.repeats_itself(now, attempt.reply()) ||
                copies_.suspicious(now, pdu, attempt.reply()) ||
                (is_quicker_than_ever(attempt.first_sign(now)) &&
                 copies_.repeats_other(now, pdu, attempt.reply()));
