@@ -292,6 +292,7 @@ bool Arbiter::start_next(TimePoint now) {
 
 void Arbiter::start(TimePoint now, Group group) {
     Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
+    ledger_.on_rested(quiet_.take_rested(now));
     if (++group.attempts == 1) group.started = now;
     group.transaction = ++transactions_;
     for (Job& job : group.jobs) {

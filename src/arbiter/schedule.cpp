@@ -63,7 +63,8 @@ TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
     const bool is_learned = echo_known_ || job.request.is_read();
     TimePoint clear = is_learned ? station->clear_at(job.request) : station->rested();
     if (can_prove(*station)) clear = std::min(clear, station->clear_at(station->proof()));
-    return std::max(clear, broadcasts_.over(job.request, station->broadcast_window()));
+    return std::max({clear, broadcasts_.over(job.request, station->broadcast_window()),
+                     stations.held_until(job.station)});
 }
 
 /// At once when the reply that its station owes is to this very request, else behind that (P1).

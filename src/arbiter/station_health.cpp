@@ -25,7 +25,8 @@ void StationHealth::on_damaged() {
     returns_ += silent_ > 0 ? 1u : 0u;
     silent_ = 0;
     state_ = Health::suspect;
-    known_ = true;
+    // Of a station that was never heard it may be anybody's noise.
+    known_ = last_heard_.has_value();
 }
 
 bool StationHealth::on_silence(TimePoint now, bool at_once) {

@@ -55,12 +55,20 @@ Duration Stations::patience(TimePoint now, const Group& group) {
     return wait;
 }
 
-bool Stations::has_company(TimePoint now, const Station& station) const {
-    const TimePoint since = std::max(station.failed(), now - kCompany);
-    return std::ranges::any_of(stations_, [&](const auto& entry) {
-        const auto answered = entry.second.health().last_heard();
-        return &entry.second != &station && answered && *answered > since;
-    });
+TimePoint Stations::company_until(const Station& station) const {
+    TimePoint until{};
+    for (const auto& [id, other] : stations_) {
+        const auto answered = other.health().last_heard();
+        if (&other != &station && answered && *answered > station.failed())
+            until = std::max(until, *answered + kCompany);
+    }
+    return until;
+}
+
+TimePoint Stations::held_until(std::uint8_t id) const {
+    const Station* station = find(id);
+    if (station == nullptr || !station->failing()) return {};
+    return std::min(station->affordable_at(), company_until(*station));
 }
 
 bool Stations::is_stranger(std::uint8_t id) const {

@@ -97,7 +97,7 @@ void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, St
             stations.on_back();
             ledger.event(Kind::online, part.station);
         }
-        if (heard.settled) quiet.lift(part.station);
+        if (heard.settled) quiet.lift(now, part.station);
     }
 }
 

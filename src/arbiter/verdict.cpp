@@ -202,7 +202,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     const bool affordable = stations_.affords_retry(now, station);
     stations_.on_failed(now, group, verdict, cost);
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
-        quiet_.quarantine(group.station, *until);
+        quiet_.quarantine(now, group.station, *until);
         station.on_line_rests(now, *until - now);
         ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
     }
@@ -252,7 +252,10 @@ void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
 Attempt Arbiter::take_active(TimePoint now) {
     Attempt attempt = std::move(*active_);
     active_.reset();
-    ledger_.on_ended(now, attempt, stations_.gap(attempt.group().station));
+    const Duration behind = attempt.is_broadcast() ? settings_.broadcast_turnaround
+                                                   : stations_.gap(attempt.group().station);
+    ledger_.on_ended(now, attempt, behind);
+    quiet_.take_rested(now);  // the attempt's own time
     ledger_.written(attempt.group(), true);
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().request))
         ledger_.event(Kind::echo, attempt.group().station);

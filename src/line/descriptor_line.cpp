@@ -9,6 +9,15 @@
 #include <utility>
 
 namespace panelgate::line {
+namespace {
+
+/// Bytes a second.
+std::size_t rate_of(const Settings& settings) {
+    const auto characters = settings.serial.baud / settings.serial.bits_per_character();
+    return std::max<std::size_t>(settings.input_rate, static_cast<std::size_t>(4 * characters));
+}
+
+}  // namespace
 
 DescriptorLine::DescriptorLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
                                Settings settings)
@@ -16,6 +25,8 @@ DescriptorLine::DescriptorLine(const boost::asio::any_io_executor& executor, rt:
       readiness_(executor, [this] { on_ready(); }),
       clock_(clock),
       next_opening_(clock.make_alarm()),
+      next_reading_(clock.make_alarm()),
+      budget_(rate_of(settings_)),
       reopen_(settings_.reopen_min, settings_.reopen_max) {}
 
 void DescriptorLine::start(Events& events) {
@@ -28,6 +39,7 @@ void DescriptorLine::stop() {
     if (alive_) *alive_ = false;
     events_ = nullptr;
     next_opening_->cancel();
+    next_reading_->cancel();
     cancel_open();
     close();
 }
@@ -46,6 +58,8 @@ std::string DescriptorLine::adopt(int fd) {
     std::string error = readiness_.watch(fd);
     if (error.empty()) {
         fd_ = fd;
+        floods_ = false;
+        next_reading_->cancel();
     } else {
         ::close(fd);
     }
@@ -128,9 +142,12 @@ void DescriptorLine::on_ready() {
 void DescriptorLine::read_all() {
     std::array<std::uint8_t, 1024> buffer;
     constexpr int kMaxReads = 16;  // a babbling line must not keep the loop from the others
-    for (int i = 0; i < kMaxReads; ++i) {
+    for (int i = 0; i < kMaxReads && !floods_; ++i) {
+        const TimePoint now = clock_.now();
+        if (!budget_.allows(now)) return let_rest(budget_.next());
         const ssize_t n = get(buffer);
         if (n > 0) {
+            budget_.spend(now, static_cast<std::size_t>(n));
             counters_.bytes_received += static_cast<std::uint64_t>(n);
             if (!std::exchange(has_brought_, true)) reopen_.succeeded();
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
@@ -144,10 +161,20 @@ void DescriptorLine::read_all() {
     }
 }
 
+void DescriptorLine::let_rest(TimePoint until) {
+    floods_ = true;
+    want_input();
+    next_reading_->arm(until, [this] {
+        floods_ = false;
+        want_input();
+    });
+}
+
 void DescriptorLine::write(ByteView bytes) {
     if (!is_open()) return;
     if (undelivered()) return reset(takes_nothing());
     counters_.bytes_sent += bytes.size();
+    budget_.on_sent();
     unsent_.assign(bytes.begin(), bytes.end());
     flush();
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include "input_budget.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/line/reopen.hpp"
 #include "panelgate/line/settings.hpp"
@@ -28,7 +29,10 @@ class DescriptorLine : public Line {
     void start(Events& events) final;
     void stop() final;
     void poll_input() final;
-    void hold_input(bool hold) final { readiness_.want_input(!hold); }
+    void hold_input(bool hold) final {
+        held_ = hold;
+        want_input();
+    }
     /// Resets the line when what was written before has not left (undelivered()).
     void write(ByteView bytes) override;
     bool undelivered() override { return !unsent_.empty(); }
@@ -83,6 +87,8 @@ class DescriptorLine : public Line {
     void close(bool discard = false);
     void on_ready();
     void read_all();
+    void let_rest(TimePoint until);
+    void want_input() { readiness_.want_input(!held_ && !floods_); }
     void flush();
 
     Settings settings_;
@@ -90,6 +96,10 @@ class DescriptorLine : public Line {
     Readiness readiness_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> next_opening_;
+    std::unique_ptr<rt::Alarm> next_reading_;
+    InputBudget budget_;
+    bool held_ = false;
+    bool floods_ = false;  ///< nothing is read until the budget allows it
     Reopen reopen_;
     Events* events_ = nullptr;
     std::shared_ptr<bool> alive_;

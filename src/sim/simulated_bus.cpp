@@ -12,6 +12,7 @@
 #include "panelgate/line/termios_setup.hpp"
 #include "panelgate/modbus/ascii_transcript.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/sim/collision.hpp"
 
 namespace panelgate::sim {
 
@@ -39,17 +40,29 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
         descriptor.assign(::dup(pty.master()));
     }
 
+    /// What one panel is about to say; it hears nothing until then.
+    struct Thought {
+        std::uint8_t station = 0;
+        TimePoint start;  ///< of the first start bit
+        Spoken spoken;
+    };
+
     void wait_readable();
     void read_all();
     void hear(TimePoint now, ByteView bytes);
-    void at(TimePoint when, void (State::*next)());
+    void arm();
+    void on_alarm();
     TimePoint request_over() const;
     void request_ended();
     Bytes heard_adu(Bytes wire) const;
+    bool thinks(std::uint8_t station) const;
     Bytes reply_to(ByteView adu);
-    void speak(Spoken spoken);
+    void think(std::uint8_t station, Spoken spoken);
+    void begin(Thought thought);
     TimePoint end_of(std::size_t byte) const;
-    void send_some();
+    TimePoint next_look() const;
+    void play(TimePoint until);
+    void send(TimePoint until);
 
     Settings settings;
     std::vector<Station> stations;
@@ -58,14 +71,18 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     rt::Clock& clock;
     std::unique_ptr<rt::Alarm> alarm;
     Bytes request;
-    TimePoint request_end;        ///< wire time of its last bit
+    TimePoint request_start;      ///< wire time of its first bit
+    TimePoint request_end;        ///< ... and of its last
     Duration longest_pause{};     ///< inside it
     bool foreign_format = false;  ///< part of it came at another rate
+    bool collided = false;        ///< a panel spoke meanwhile
     std::mt19937 chance;
-    Bytes reply;
+    std::vector<Thought> thoughts;    ///< one a station at most
+    Bytes reply;                      ///< on the wire
     std::vector<std::uint32_t> ends;  ///< of its bytes, in bit times
     std::size_t sent = 0;
     TimePoint reply_start;
+    TimePoint looked;
     bool stopped = false;
 };
 
@@ -85,20 +102,55 @@ void SimulatedBus::State::read_all() {
 }
 
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
-    if (!reply.empty()) return;  // a collision: neither side understands the other
+    play(now);
     const auto colon = std::find(bytes.rbegin(), bytes.rend(), ':');
     if (settings.serial.mode == SerialMode::ascii && colon != bytes.rend()) {  // it begins anew
         request.clear();
         bytes = bytes.last(static_cast<std::size_t>(colon - bytes.rbegin()) + 1);
     }
     const bool first = request.empty();
+    if (first) request_start = now;
+    collided = (!first && collided) || !reply.empty();
     foreign_format = (!first && foreign_format) || !line::tty_speaks(pty.master(), settings.serial);
     longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
     const bool ascii = settings.serial.mode == SerialMode::ascii;
     append_up_to(ascii ? kMaxAsciiRequest : kMaxRequest, request, bytes);
-    at(request_over(), &State::request_ended);
+    arm();
+}
+
+/// For what is next on the wire: a request's end, a reply's beginning, its bytes.
+void SimulatedBus::State::arm() {
+    TimePoint next = TimePoint::max();
+    if (!request.empty()) next = std::min(next, request_over());
+    if (!reply.empty()) next = std::min(next, next_look());
+    for (const Thought& thought : thoughts) next = std::min(next, thought.start);
+    if (next == TimePoint::max()) return alarm->cancel();
+    alarm->arm(next, [this] { on_alarm(); });
+}
+
+void SimulatedBus::State::on_alarm() {
+    const TimePoint now = clock.now();
+    if (!request.empty() && request_over() <= now) {
+        play(request_over());
+        request_ended();
+    }
+    play(now);
+    arm();
+}
+
+/// What the panels say until then.
+void SimulatedBus::State::play(TimePoint until) {
+    for (;;) {
+        const auto first = std::ranges::min_element(thoughts, {}, &Thought::start);
+        if (first == thoughts.end() || first->start > until) break;
+        Thought thought = std::move(*first);
+        thoughts.erase(first);
+        send(thought.start);
+        begin(std::move(thought));
+    }
+    send(until);
 }
 
 /// Silence ends a frame of RTU, its last character one of ASCII.
@@ -123,35 +175,58 @@ Bytes SimulatedBus::State::heard_adu(Bytes wire) const {
     return frame;
 }
 
-void SimulatedBus::State::at(TimePoint when, void (State::*next)()) {
-    alarm->arm(when, [this, next] { (this->*next)(); });
-}
-
 void SimulatedBus::State::request_ended() {
     Bytes wire = std::exchange(request, {});
+    if (collided) return;  // nobody understands it
     if (settings.echo && ::write(descriptor.native_handle(), wire.data(), wire.size()) < 0) return;
     if (foreign_format) return;
     const Bytes adu = heard_adu(std::move(wire));
-    const auto found = settings.faults.find(adu.empty() ? std::uint8_t{0} : adu[0]);
+    const std::uint8_t station = adu.empty() ? 0 : adu[0];
+    const auto found = settings.faults.find(station);
     const Misbehaviour faults = found == settings.faults.end() ? Misbehaviour{} : found->second;
-    speak(misbehave(faults, reply_to(adu), chance, settings.serial));
+    think(station, misbehave(faults, reply_to(adu), chance, settings.serial));
 }
 
-void SimulatedBus::State::speak(Spoken spoken) {
-    reply = std::move(spoken.adu);
-    if (reply.empty()) return;
-    ends = std::move(spoken.ends);
+bool SimulatedBus::State::thinks(std::uint8_t station) const {
+    return std::ranges::find(thoughts, station, &Thought::station) != thoughts.end();
+}
+
+void SimulatedBus::State::think(std::uint8_t station, Spoken spoken) {
+    if (spoken.adu.empty()) return;
     const auto bits = static_cast<std::uint32_t>(settings.serial.bits_per_character());
-    for (auto i = static_cast<std::uint32_t>(ends.size()); i < reply.size(); ++i)
-        ends.push_back((i + 1) * bits);
-    sent = 0;
-    reply_start =
+    for (auto i = static_cast<std::uint32_t>(spoken.ends.size()); i < spoken.adu.size(); ++i)
+        spoken.ends.push_back((i + 1) * bits);
+    const TimePoint start =
         request_end + silent_interval(settings.serial) + settings.think_time + spoken.delay;
-    at(reply_start, &State::send_some);
+    thoughts.push_back({station, start, std::move(spoken)});
+}
+
+/// A panel speaks whether the wire is free or not: over another one that still does, both are
+/// damaged.
+void SimulatedBus::State::begin(Thought thought) {
+    if (!request.empty() && thought.start < request_end) collided = true;
+    if (!reply.empty()) {
+        const auto bit = Duration(1s) / settings.serial.baud;
+        const TimePoint rest = sent == 0 ? reply_start : end_of(sent - 1);
+        const auto later =
+            static_cast<std::size_t>(std::max<Duration::rep>((thought.start - rest) / bit, 0));
+        HeardBytes heard =
+            collide(ByteView(reply).subspan(sent), thought.spoken.adu, later, settings.serial);
+        thought = {thought.station, rest, {std::move(heard.bytes), {}, std::move(heard.ends)}};
+    }
+    reply = std::move(thought.spoken.adu);
+    ends = std::move(thought.spoken.ends);
+    reply_start = thought.start;
+    looked = thought.start;
+    sent = 0;
 }
 
 TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
     return reply_start + Duration(1s) * ends[byte] / settings.serial.baud;
+}
+
+TimePoint SimulatedBus::State::next_look() const {
+    return std::min(end_of(reply.size() - 1), std::max(looked + kTick, end_of(sent)));
 }
 
 /// Empty when nobody answers: damage, a broadcast, an address that nobody has.
@@ -165,7 +240,7 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
         const auto faults = settings.faults.find(station.id());
         const bool dead = faults != settings.faults.end() && faults->second.dead;
         const modbus::CrcOrder order = settings.crc_orders.of(station.id());
-        if (dead || station.minds_pause(longest_pause, settings.serial) ||
+        if (dead || thinks(station.id()) || station.minds_pause(longest_pause, settings.serial) ||
             !modbus::crc_ok(adu, order))
             continue;
         if (adu[0] == 0) station.broadcast(now, wall, pdu);
@@ -175,24 +250,21 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
     return answer;
 }
 
-/// Hands over the bytes whose time has come.
-void SimulatedBus::State::send_some() {
-    std::size_t until = sent;
-    while (until < reply.size() && end_of(until) <= clock.now()) ++until;
-    if (until > sent) {
-        const ssize_t n = ::write(descriptor.native_handle(), reply.data() + sent, until - sent);
-        if (n < 0 && errno == EAGAIN) {  // nobody reads: a real line would not wait either
-            reply.clear();
-            return;
+/// Hands over the bytes whose time has come, but for those that came while the master spoke.
+void SimulatedBus::State::send(TimePoint until) {
+    looked = until;
+    Bytes due;
+    for (; sent < reply.size() && end_of(sent) <= until; ++sent) {
+        if (end_of(sent) > request_start && end_of(sent) <= request_end) {
+            collided = true;
+        } else {
+            due.push_back(reply[sent]);
         }
-        sent = until;
     }
-    if (sent == reply.size()) {
-        reply.clear();
-        return;
-    }
-    at(std::min(end_of(reply.size() - 1), std::max(clock.now() + kTick, end_of(sent))),
-       &State::send_some);
+    const bool nobody_reads = !due.empty() &&
+                              ::write(descriptor.native_handle(), due.data(), due.size()) < 0 &&
+                              errno == EAGAIN;  // a real line would not wait either
+    if (sent == reply.size() || nobody_reads) reply.clear();
 }
 
 SimulatedBus::SimulatedBus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,

@@ -49,6 +49,8 @@ class Ledger {
     void on_started(TimePoint now, const Job& job);
     /// An attempt is over; `gap`: the silence behind it, which nobody else can use.
     void on_ended(TimePoint now, const Attempt& attempt, Duration gap);
+    /// The whole line was left alone for so long: nobody could use that either.
+    void on_rested(Duration rest) { line_.busy += rest; }
     void on_client_gone(Client client) { shares_.forget(client); }
     void on_answered(TimePoint now, const Attempt& attempt, Duration think,
                      const Station::Replied& replied);

@@ -28,14 +28,21 @@ class ProbeBudget {
     /// Something without a reply ended at `now` after having kept the line for `cost`. Of the debt
     /// before so much is remembered as takes `most` to be paid.
     void spend(TimePoint now, Duration cost, Duration most = {}) {
-        const std::chrono::duration<double> time(to_seconds(cost) / share_);
-        const auto whole = std::chrono::duration_cast<Duration>(time);
+        const Duration whole = time_for(cost);
         const TimePoint began = now - cost;
         next_ = std::max(began + whole, std::min(std::max(next_, began) + whole, now + most));
     }
+    /// What was spent last costs so much more.
+    void add(Duration cost) { next_ += time_for(cost); }
     void clear() { next_ = {}; }
 
   private:
+    /// In which it is the share.
+    Duration time_for(Duration cost) const {
+        const std::chrono::duration<double> time(to_seconds(cost) / share_);
+        return std::chrono::duration_cast<Duration>(time);
+    }
+
     double share_;
     TimePoint next_{};
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 #include "panelgate/base/time.hpp"
 
@@ -60,14 +61,21 @@ class Quiet {
     std::uint8_t station() const { return station_; }
 
     /// Nobody but `station` may be asked until then, and only for the same again (P1).
-    void quarantine(std::uint8_t station, TimePoint until) {
+    void quarantine(TimePoint now, std::uint8_t station, TimePoint until) {
         if (until <= quarantined_until_) return;
+        if (now >= quarantined_until_) rested_until_ = now;
         quarantined_ = station;
         quarantined_until_ = until;
     }
     /// What the station owed has come.
-    void lift(std::uint8_t station) {
-        if (quarantined_ == station) quarantined_until_ = {};
+    void lift(TimePoint now, std::uint8_t station) {
+        if (quarantined_ == station) quarantined_until_ = std::min(quarantined_until_, now);
+    }
+    /// So much of its quarantines has passed since it was asked last.
+    Duration take_rested(TimePoint now) {
+        const TimePoint until = std::min(now, quarantined_until_);
+        return std::max(until - std::exchange(rested_until_, std::max(rested_until_, until)),
+                        Duration::zero());
     }
     TimePoint quarantined_until() const { return quarantined_until_; }
 
@@ -79,6 +87,7 @@ class Quiet {
     TimePoint begun_until_{};
     TimePoint noise_{};  ///< the first of the bytes that came without a pause
     TimePoint quarantined_until_{};
+    TimePoint rested_until_{};  ///< what take_rested() has told
     std::uint8_t station_ = 0;
     std::uint8_t quarantined_ = 0;
 };

@@ -224,8 +224,16 @@ class Station {
     }
     /// ... and all of it is paid.
     bool in_debt(TimePoint now) const { return !budget_.allows(now); }
+    /// What its failures took of the bus is within its share from then on.
+    TimePoint affordable_at() const {
+        const TimePoint paid = budget_.next() - kCredit * timeout_cost();
+        return failing() ? std::max(paid, failing_.next()) : paid;
+    }
     /// The whole line rests for so long because of it.
-    void on_line_rests(TimePoint now, Duration rest) { spend(now, rest); }
+    void on_line_rests(TimePoint now, Duration rest) {
+        spend(now, rest);
+        if (failing()) failing_.add(rest);
+    }
     bool may_retry(const Group& group) const;
     /// Its request goes again, behind silence or not: until that is over nobody is surprised.
     void on_retry(bool silent) { missed_ = silent; }

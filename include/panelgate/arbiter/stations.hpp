@@ -89,6 +89,9 @@ class Stations {
     /// silent, that keeps failing, or that nobody knows waits for them only while others want the
     /// line.
     bool may_spend(TimePoint now, const Job& job) const;
+    /// Until then a station that keeps failing waits for its share: others want the line, though
+    /// none of their requests may wait at this moment (a client that asks one by one).
+    TimePoint held_until(std::uint8_t id) const;
     /// An attempt failed that kept the line for `cost`.
     void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
     /// A read of this station that waits goes before its writes.
@@ -111,7 +114,11 @@ class Stations {
     std::optional<TimePoint> probe_at(const Station& station) const;
     bool is_stranger(std::uint8_t id) const;
     /// Another station has answered lately, and after this one failed: the line is well.
-    bool has_company(TimePoint now, const Station& station) const;
+    bool has_company(TimePoint now, const Station& station) const {
+        return now < company_until(station);
+    }
+    /// Others have answered behind its last failure: so long they are taken to want the line.
+    TimePoint company_until(const Station& station) const;
     /// How long a failing station's share of the bus has to add up to pay for one full silence.
     Duration surprise() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * unlisted_.response_timeout;

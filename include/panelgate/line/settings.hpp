@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -35,6 +36,10 @@ struct Settings {
     /// The line's master is somebody else: the device is opened for reading only, and write() does
     /// nothing. A connection is only read.
     bool listen_only = false;
+    /// Bytes a second that are read at most, but for bursts of a second; or four times what the
+    /// line's rate can bring, where that is more. A device that never stops must not keep the loop
+    /// from the other lines.
+    std::size_t input_rate = 64 * 1024;
     bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
     friend bool operator==(const Settings&, const Settings&) = default;
 };

@@ -17,8 +17,9 @@ namespace panelgate::sim {
 
 /// Panels on one RS-485 line behind a pseudo-terminal, paced at the line's baud: a request is whole
 /// after its wire time and t3.5 of silence, the reply's bytes arrive when a real line would bring
-/// them. A pause inside a request is noticed by panels that mind it (GT: 24 bit times). What is
-/// sent while a reply is under way collides and is lost, as on a real line.
+/// them. A pause inside a request is noticed by panels that mind it (GT: 24 bit times). Each panel
+/// thinks on its own, and hears nothing meanwhile; who speaks at the same time as another damages
+/// both, as on a real line.
 class SimulatedBus {
   public:
     /// Throws std::system_error when there is no pty left. The clock and the stations' profiles

@@ -1,6 +1,9 @@
 // What those that do not answer may cost (P4).
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "arbiter_fixture.hpp"
@@ -156,6 +159,46 @@ TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
     EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 0);
     bus.cancel(1);
     EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 1);
+}
+
+/// How much of the line station 17 takes, its own time and the rests behind it, when from the fifth
+/// second on each of its replies comes `late` behind its request; while one client asks another
+/// panel again and again: that one wants the line also in the moment between an answer and its next
+/// request.
+double share_of_late_panel(BusScript& bus, Duration late) {
+    std::multimap<TimePoint, std::uint8_t> replies;
+    std::size_t seen = 0;
+    std::optional<Ticket> healthy;
+    const TimePoint start = bus.now();
+    TimePoint poll = start;
+    while (bus.now() < start + 120s) {
+        if (bus.now() >= poll) {
+            bus.try_submit(17, kRead, 2, PriorityClass::poll);
+            poll = bus.now() + 1s;
+        }
+        if (!healthy || bus.answered(*healthy)) healthy = bus.submit(18, kRead);
+        bus.run_for(1ms);
+        for (; seen < bus.sent.size(); ++seen) {
+            const std::uint8_t station = bus.sent[seen].adu.front();
+            const bool is_late = station == 17 && bus.now() > start + 5s;
+            replies.emplace(bus.sent[seen].at + (is_late ? late : 5ms), station);
+        }
+        for (; !replies.empty() && replies.begin()->first <= bus.now();
+             replies.erase(replies.begin()))
+            bus.hear_reply(replies.begin()->second, kReply);
+    }
+    Duration taken{};
+    for (std::size_t i = 0; i + 1 < bus.sent.size(); ++i) {
+        if (bus.sent[i].adu.front() == 17) taken += bus.sent[i + 1].at - bus.sent[i].at;
+    }
+    return to_seconds(taken) / 120;
+}
+
+TEST_F(ArbiterTest, P4APanelThatAlwaysAnswersLateTakesAtMostAFifthOfTheLine) {
+    for (const Duration late : {600ms, 900ms, 1400ms}) {
+        BusScript script{settings};
+        EXPECT_LE(share_of_late_panel(script, late), 0.2) << to_milliseconds(late) << " ms";
+    }
 }
 
 }  // namespace

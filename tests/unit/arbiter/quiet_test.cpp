@@ -71,19 +71,31 @@ TEST_F(QuietTest, RestsAsLongAsTheLongestThatItWasToldAndUntilThatIsOver) {
 }
 
 TEST_F(QuietTest, P1AQuarantineLastsUntilTheLatestInstantThatItWasGiven) {
-    quiet_.quarantine(17, kStart + 500ms);
-    quiet_.quarantine(17, kStart + 400ms);
+    quiet_.quarantine(kStart, 17, kStart + 500ms);
+    quiet_.quarantine(kStart, 17, kStart + 400ms);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 500ms);
-    quiet_.quarantine(17, kStart + 600ms);
+    quiet_.quarantine(kStart, 17, kStart + 600ms);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 600ms);
 }
 
 TEST_F(QuietTest, P1OnlyTheStationThatOwesLiftsItsQuarantine) {
-    quiet_.quarantine(17, kStart + 500ms);
-    quiet_.lift(18);
+    quiet_.quarantine(kStart, 17, kStart + 500ms);
+    quiet_.lift(kStart, 18);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 500ms);
-    quiet_.lift(17);
+    quiet_.lift(kStart, 17);
     EXPECT_LE(quiet_.quarantined_until(), kStart);
+}
+
+TEST_F(QuietTest, TellsOnceHowMuchOfAQuarantineHasPassed) {
+    EXPECT_EQ(quiet_.take_rested(kStart + 1s), 0ms);
+    quiet_.quarantine(kStart + 1s, 17, kStart + 1500ms);
+    EXPECT_EQ(quiet_.take_rested(kStart + 1200ms), 200ms);
+    EXPECT_EQ(quiet_.take_rested(kStart + 1300ms), 100ms);
+    EXPECT_EQ(quiet_.take_rested(kStart + 3s), 200ms);
+    quiet_.quarantine(kStart + 4s, 17, kStart + 5s);
+    quiet_.lift(kStart + 4100ms, 17);
+    EXPECT_EQ(quiet_.take_rested(kStart + 9s), 100ms);
+    EXPECT_EQ(quiet_.take_rested(kStart + 9s), 0ms);
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ TEST_F(ScheduleTest, P1AStationThatOwesAReplyIsPassedOver) {
 
 TEST_F(ScheduleTest, P1WhileTheLineRestsNobodyIsAsked) {
     wait(2);
-    quiet.quarantine(1, now + 100ms);
+    quiet.quarantine(now, 1, now + 100ms);
     EXPECT_EQ(order(), "");
     EXPECT_EQ(schedule.next_start(stations, quiet), now + 100ms);
     now += 100ms;

@@ -1,0 +1,143 @@
+#include "panelgate/sim/simulated_bus.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <initializer_list>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/profile/load_profile.hpp"
+#include "support/hex.hpp"
+#include "support/manual_clock.hpp"
+
+namespace panelgate::sim {
+namespace {
+
+const Bytes kReadCounter = "03 00 00 00 01"_hex;
+
+Settings settings_38400() {
+    Settings settings;
+    settings.serial = {38400, 8, Parity::none, 1};
+    return settings;
+}
+
+/// A master at the pty of panels whose time passes when the test says so.
+class SimulatedBusTest : public testing::Test {
+  protected:
+    ~SimulatedBusTest() override {
+        if (master >= 0) ::close(master);
+    }
+    void start(std::initializer_list<std::uint8_t> ids) {
+        std::vector<Station> stations;
+        for (const std::uint8_t id : ids) stations.emplace_back(*profiles.find("generic"), id);
+        bus = std::make_unique<SimulatedBus>(context.get_executor(), clock, settings,
+                                             std::move(stations));
+        bus->start();
+        master = ::open(bus->device().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
+        ASSERT_GE(master, 0);
+    }
+    /// The panels have heard its first byte at this moment.
+    void say(std::uint8_t station, ByteView pdu = kReadCounter) {
+        const Bytes adu = modbus::encode_adu(station, pdu);
+        ASSERT_EQ(::write(master, adu.data(), adu.size()), std::ssize(adu));
+        context.restart();
+        while (context.run_one() == 0) context.restart();
+    }
+    Bytes heard() {
+        std::array<std::uint8_t, 512> buffer;
+        const ssize_t n = ::read(master, buffer.data(), buffer.size());
+        return n <= 0 ? Bytes{} : Bytes(buffer.begin(), buffer.begin() + n);
+    }
+    /// Of whom a good reply is there.
+    int answered() {
+        const Bytes adu = heard();
+        return adu.size() >= modbus::kMinAdu && modbus::crc_ok(adu) ? adu[0] : 0;
+    }
+    /// From the first bit of a request to the last of its reply.
+    Duration whole() const {
+        return wire_time(settings.serial, 8) + wire_time(settings.serial, 7) +
+               silent_interval(settings.serial) + settings.think_time;
+    }
+
+    profile::Catalogue profiles = profile::Catalogue::shipped();
+    Settings settings = settings_38400();
+    boost::asio::io_context context;
+    test::ManualClock clock;
+    std::unique_ptr<SimulatedBus> bus;
+    int master = -1;
+};
+
+TEST_F(SimulatedBusTest, AReplyIsWholeWhenItsLastBitHasLeft) {
+    start({1});
+    say(1);
+    clock.advance(whole() - 10us);
+    EXPECT_EQ(answered(), 0);
+    say(1);  // over its last byte
+    clock.advance(whole());
+    EXPECT_EQ(answered(), 0);
+    say(1);
+    clock.advance(whole());
+    EXPECT_EQ(answered(), 1);
+}
+
+TEST_F(SimulatedBusTest, APanelThatThinksForLongLeavesTheOthersAlone) {
+    settings.faults[2].slow = 900ms;
+    start({1, 2});
+    say(2);
+    clock.advance(50ms);
+    for (int i = 0; i < 3; ++i) {
+        say(1);
+        clock.advance(whole());
+        EXPECT_EQ(answered(), 1) << i;
+    }
+    clock.advance(1s);
+    EXPECT_EQ(answered(), 2);
+}
+
+TEST_F(SimulatedBusTest, APanelHearsNothingWhileItThinks) {
+    settings.faults[2].slow = 100ms;
+    start({2});
+    say(2);
+    clock.advance(50ms);
+    say(2);
+    clock.advance(1s);
+    EXPECT_EQ(heard().size(), 7U) << "one reply";
+}
+
+TEST_F(SimulatedBusTest, ALateReplyOverARequestDamagesBoth) {
+    settings.faults[2].slow = 100ms;
+    start({1, 2});
+    say(2);
+    clock.advance(100ms + wire_time(settings.serial, 8));
+    say(1);  // the reply begins while this leaves
+    clock.advance(1s);
+    EXPECT_EQ(answered(), 0);
+    say(1);
+    clock.advance(whole());
+    EXPECT_EQ(answered(), 1);
+}
+
+TEST_F(SimulatedBusTest, TwoPanelsThatSpeakAtOnceAreBothDamaged) {
+    settings.faults[2].slow = 100ms;
+    start({1, 2});
+    say(2);
+    const Duration before = wire_time(settings.serial, 8) + silent_interval(settings.serial);
+    clock.advance(100ms - before + wire_time(settings.serial, 2));
+    say(1);  // is over before the reply begins, and answered two characters behind that
+    clock.advance(1s);
+    EXPECT_EQ(answered(), 0);
+    say(1);
+    clock.advance(whole());
+    EXPECT_EQ(answered(), 1);
+}
+
+}  // namespace
+}  // namespace panelgate::sim
