@@ -277,8 +277,9 @@ class Discovery(Browser):
         self.complaints()  # a 400 is written to the console, too
 
 
-class Roles(Browser):
-    """Without a token everybody may look; a token is needed to write."""
+class Tokens(Browser):
+    """A gateway with an operator's and a viewer's token."""
+    anonymous = "viewer"
 
     @classmethod
     def gateway(cls):
@@ -288,13 +289,23 @@ class Roles(Browser):
         tokens = ", ".join(f"{{name: {name}, role: {role}, file: {folder / name}}}"
                            for name, role in (("ops", "operator"), ("eye", "viewer")))
         config = folder / "panelgate.yaml"
-        config.write_text(gateway(line(), http=f'listen: "127.0.0.1:0", anonymous: viewer, tokens: [{tokens}]'))
+        http = f'listen: "127.0.0.1:0", anonymous: {cls.anonymous}, tokens: [{tokens}]'
+        config.write_text(gateway(line(), http=http))
         return cls.enterClassContext(harness.Program("run", "-c", str(config)))
+
+    def give(self, token):
+        self.wait(lambda: self.all("#token"))
+        self.find("#token").clear()
+        self.find("#token").send_keys(token)
+        self.find("dialog button.primary").click()
 
     def enter(self, token):
         self.find("#role").click()
-        self.find("#token").send_keys(token)
-        self.find("dialog button.primary").click()
+        self.give(token)
+
+
+class Roles(Tokens):
+    """Without a token everybody may look; a token is needed to write."""
 
     def test_who_looks_cannot_write_and_a_token_of_an_operator_lets_one(self):
         self.open("request/press")
@@ -311,6 +322,33 @@ class Roles(Browser):
         self.assertIn("operator", self.text("#role"))
         kept = self.script("return [JSON.stringify(localStorage), document.cookie, location.href]")
         self.assertNotIn("4711", "".join(kept))
+        self.complaints()  # the refusals
+
+
+class Closed(Tokens):
+    """Nobody sees anything without a token: the page asks for it."""
+    anonymous = "none"
+
+    def test_the_page_asks_for_a_token_until_it_is_right_and_can_be_left(self):
+        self.driver.get(f"{self.origin}/#/")
+        self.give("wrong-and-long-enough")
+        self.wait(lambda: self.all("dialog .refusal"))
+        self.find("dialog .bar button").click()  # cancel
+        self.wait(lambda: self.all("main button.primary"))
+        self.assertNotIn("press", self.text("main"))
+        self.find("main button.primary").click()
+        self.give("let-me-look-please-4711")
+        self.wait(lambda: self.all(tile("press")))
+        streams = [url for url in self.requested() if "/api/v1/events" in url]
+        self.assertTrue(streams, "events come with the token, too")
+        self.driver.refresh()  # the tab knows it
+        self.wait(lambda: self.all(tile("press")))
+        self.assertIn("viewer", self.text("#role"))
+        self.find("#role").click()
+        self.wait(lambda: self.all("dialog .bar button"))
+        self.find("dialog .bar button").click()  # forget
+        self.wait(lambda: self.all("#token"))
+        self.assertFalse(self.all(tile("press")))
         self.complaints()  # the refusals
 
 

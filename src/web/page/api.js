@@ -14,9 +14,15 @@ export class Refused extends Error {
     }
 }
 
-async function ask(method, path, body, headers = {}) {
+/** What fetch() is to be told, with the token that we have. */
+export function asUs(method = 'GET', headers = {}) {
     const options = {method, headers: {...headers}, cache: 'no-store'};
     if (token) options.headers.Authorization = `Bearer ${token}`;
+    return options;
+}
+
+async function ask(method, path, body) {
+    const options = asUs(method);
     if (body !== undefined) {
         options.body = JSON.stringify(body);
         options.headers['Content-Type'] = 'application/json';
@@ -84,6 +90,12 @@ export async function useToken(given) {
         if (token) sessionStorage.setItem('panelgate.token', token);
         else sessionStorage.removeItem('panelgate.token');
     } catch { /* it is kept for as long as this page is */ }
+}
+
+/** Signs out; who may do nothing without a token is asked for one. */
+export function forgetToken() {
+    try { sessionStorage.removeItem('panelgate.token'); } catch { /* it was kept by this page alone */ }
+    location.reload();
 }
 
 export const hasToken = () => token !== null;

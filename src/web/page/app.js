@@ -68,7 +68,20 @@ function show() {
 function refresh() {
     banner.hidden = live.reachable;
     if (!live.reachable) text(banner, t('unreachable'));
+    if (live.refused) location.reload();  // our token is none any more: we are asked for another
     shown?.update?.();
+}
+
+/** Nothing is shown without a token: asks for one until there is one. */
+async function knock() {
+    await askToken();
+    while (!gateway.configuration) {
+        await new Promise((again) => {
+            replace(main, h('div', null, h('h1', null, 'panelgate'), h('p', null, t('token.required')),
+                h('button', {type: 'button', class: 'primary', onclick: again}, t('token.enter'))));
+        });
+        await askToken();
+    }
 }
 
 /** A token that this tab remembers may be none any more. */
@@ -77,8 +90,8 @@ async function enter() {
         await introduce();
     } catch (error) {
         if (error.status !== 401) throw error;
-        if (hasToken()) await useToken('').catch(() => askToken());
-        else await askToken();
+        if (hasToken()) await useToken('').catch(() => knock());
+        else await knock();
     }
 }
 
@@ -94,8 +107,8 @@ async function start() {
         return;
     }
     build();
-    if (!gateway.configuration) return;
     await first;
+    if (live.refused) await live.refresh();
     live.addEventListener('status', refresh);
     live.start();
     window.addEventListener('hashchange', () => { show(); main.focus(); });

@@ -1,6 +1,7 @@
 // What lines and stations are now. Asked once a second while the page is seen, and at once when an
 // event says that something has changed.
 import {get, offers, path} from './api.js';
+import {EventStream} from './event_stream.js';
 
 const PERIOD = 1000;  // ms
 const SOON = 60;      // ms: events of one moment are one reason to ask
@@ -12,6 +13,8 @@ class Live extends EventTarget {
     lines = [];
     stations = [];
     reachable = true;
+    /** The gateway wants a token that it knows. */
+    refused = false;
     #timer = null;
     #source = null;
     #asking = false;
@@ -33,7 +36,6 @@ class Live extends EventTarget {
     #seen() {
         if (document.hidden) {
             this.#source?.close();
-            this.#source = null;
             clearTimeout(this.#timer);
             return;
         }
@@ -43,10 +45,10 @@ class Live extends EventTarget {
 
     #listen() {
         if (!this.#started) return;
-        if (this.#source && this.#source.readyState !== EventSource.CLOSED) return;
+        if (this.#source && !this.#source.closed) return;
         const discovers = offers('POST /api/v1/lines/{}/discover');
         const types = ['station', 'line', 'transaction', 'point', ...discovers ? ['discovery'] : []];
-        this.#source = new EventSource(path('events') + `?types=${types}`);
+        this.#source = new EventStream(path('events') + `?types=${types}`, this.#source?.last);
         this.#source.addEventListener('discovery', (event) => this.#tell('discovery', JSON.parse(event.data)));
         for (const type of ['station', 'line', 'lost']) this.#source.addEventListener(type, () => this.#soon());
         this.#source.addEventListener('transaction', (event) => {
@@ -73,14 +75,16 @@ class Live extends EventTarget {
             this.lines = lines.lines;
             this.stations = stations.stations;
             this.reachable = true;
+            this.refused = false;
             this.#listen();
-        } catch {
-            this.reachable = false;
+        } catch (error) {
+            this.refused = error.status === 401;
+            this.reachable = this.refused;
         }
         this.#asking = false;
         this.#tell('status');
         clearTimeout(this.#timer);
-        if (!document.hidden) this.#timer = setTimeout(() => this.refresh(), this.#due ? SOON : PERIOD);
+        if (!document.hidden && !this.refused) this.#timer = setTimeout(() => this.refresh(), this.#due ? SOON : PERIOD);
     }
 
     #tell(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }

@@ -1,5 +1,5 @@
 // Who we are to the gateway. The token is kept for this tab alone.
-import {Refused, gateway, hasToken, useToken} from './api.js';
+import {Refused, forgetToken, gateway, hasToken, useToken} from './api.js';
 import {dialog, refusal} from './confirm.js';
 import {attribute, h, replace, text} from './dom.js';
 import {t, word} from './language.js';
@@ -10,7 +10,7 @@ export function askToken() {
         const input = h('input', {id: 'token', type: 'password', autocomplete: 'off', required: !hasToken()});
         const outcome = h('div');
         const form = h('form', {method: 'dialog'}, h('p', {class: 'muted'}, t('token.hint')), h('label', {for: 'token'}, t('token')), input, outcome,
-            h('div', {class: 'bar end'}, hasToken() ? h('button', {type: 'button', onclick: () => take('')}, t('token.forget')) : null,
+            h('div', {class: 'bar end'}, hasToken() ? h('button', {type: 'button', onclick: forgetToken}, t('token.forget')) : null,
                 h('button', {type: 'button', onclick: () => node.close()}, t('cancel')), h('button', {class: 'primary'}, t('token.use'))));
         const take = async (given) => {
             try {

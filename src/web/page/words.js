@@ -209,6 +209,7 @@ export const words = {
 "token": ["Token", "Token", "토큰", "トークン"],
 "tokens": ["Tokens", "Token", "토큰", "トークン"],
 "token.enter": ["Enter a token", "Token eingeben", "토큰 입력", "トークンを入力"],
+"token.required": ["This gateway shows nothing without a token.", "Dieses Gateway zeigt ohne Token nichts.", "이 게이트웨이는 토큰 없이는 아무것도 보여 주지 않습니다.", "このゲートウェイはトークンなしでは何も表示しません。"],
 "token.hint": ["It is kept for this tab only, and gone when the tab is closed.", "Es bleibt nur in diesem Tab und ist weg, wenn er geschlossen wird.", "이 탭에만 보관되며 탭을 닫으면 사라집니다.", "このタブにのみ保持され、閉じると消えます。"],
 "token.use": ["Use it", "Verwenden", "사용", "使用"],
 "token.forget": ["Forget it", "Vergessen", "삭제", "削除"],

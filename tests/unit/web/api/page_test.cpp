@@ -57,9 +57,13 @@ TEST_F(Page, IsNotSentAgainToWhoHasIt) {
     EXPECT_EQ(ask("GET", "/page/scope.js", "", known).status(), 200u);
 }
 
-TEST_F(Page, IsKeptFromWhoMayNotLook) {
+/// A browser's first request cannot bring a token: the page asks for one.
+TEST_F(Page, IsFreeToAllBecauseDataAreNotInIt) {
     settings.anonymous = Role::none;
-    EXPECT_EQ(get("/page/app.js").status(), 401u);
+    for (const char* free : {"/", "/page/app.js", "/docs"})
+        EXPECT_EQ(get(free).status(), 200u) << free;
+    for (const char* kept : {"/openapi.json", "/metrics", "/api/v1/lines", "/api/v1/configuration"})
+        EXPECT_EQ(get(kept).status(), 401u) << kept;
 }
 
 }  // namespace
