@@ -70,6 +70,7 @@ void hold_http(const Holder& top, const web::Settings& settings) {
     held.tell("anonymous", label(settings.anonymous));
     held.tell("hosts", settings.hosts.empty() ? "the machine's" : listed(settings.hosts, word));
     held.tell("allow", networks(settings.allow));
+    held.tell("max_connections_per_address", settings.max_connections_per_address);
     for (const web::Token& token : settings.tokens) {
         Holder one = held.item("tokens", token.name);
         one.tell("role", label(token.role));

@@ -166,6 +166,8 @@ constexpr auto kTexts = std::to_array<KeyText>({
      "Without a token: none, viewer (read), operator (read and write)."},
     {"http/hosts", "", "Its names in URLs; the machine's without."},
     {"http/allow", "", "Networks such as 192.168.1.0/24; everybody without."},
+    {"http/max_connections_per_address", "32",
+     "Then its longest idle one gives way; streams of events apart."},
     {"http/tokens", "", "Authorization: Bearer TOKEN."},
     {"http/tokens/name", "", "Unique."},
     {"http/tokens/role", "", "viewer reads, operator writes as well."},

@@ -341,6 +341,9 @@ void load_http(Loading& loading, MapReader& root) {
     load_hosts(loading, in, settings);
     load_allow(loading, in, settings.allow);
     load_tokens(loading, in, settings.tokens);
+    const auto share = in.integer("max_connections_per_address", 1,
+                                  static_cast<std::int64_t>(settings.max_connections));
+    if (share) settings.max_connections_per_address = static_cast<std::size_t>(*share);
     refuse_tls(in);
     refuse_empty(in, "hosts", "name at least one host, or leave it out for the machine's names");
     refuse_empty(in, "allow", kNoNetwork);

@@ -8,7 +8,8 @@ Places::Places(const Settings& settings) { apply(settings); }
 
 void Places::apply(const Settings& settings) {
     limit_ = settings.max_connections;
-    limit_of_address_ = settings.max_per_address;
+    limit_of_address_ = settings.max_connections_per_address;
+    limit_of_streams_ = settings.max_streams_per_address;
     limit_of_held_ = settings.max_held;
     limit_of_probes_ = settings.probe_places;
 }
@@ -18,7 +19,7 @@ Places::Arrival Places::admit(const std::string& address) const {
     if (placed(address) >= limit_of_address_) {
         arrival.leaves = longest(State::idle, false, &address);
         arrival.probes_only = !arrival.leaves;
-    } else if (held(address) >= limit_of_held_) {
+    } else if (in_state(address, State::wrong) >= limit_of_held_) {
         arrival.leaves = longest(State::wrong, false, &address);
     } else if (guests() >= limit_) {
         arrival.leaves = longest(State::wrong, false);
@@ -43,6 +44,14 @@ void Places::busy(Id id) { set(id, State::busy); }
 void Places::suspect(Id id) { set(id, State::suspect); }
 
 void Places::wrong(Id id) { set(id, State::wrong); }
+
+bool Places::stream(Id id) {
+    const auto guest = guests_.find(id);
+    if (guest == guests_.end()) return true;
+    if (in_state(guest->second.address, State::streaming) >= limit_of_streams_) return false;
+    set(id, State::streaming);
+    return true;
+}
 
 void Places::set(Id id, State state) {
     const auto guest = guests_.find(id);
@@ -73,13 +82,14 @@ std::size_t Places::guests() const { return guests_.size() - probes(); }
 std::size_t Places::placed(const std::string& address) const {
     return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
         const Guest& guest = entry.second;
-        return !guest.probes_only && guest.state != State::wrong && guest.address == address;
+        const bool takes_place = guest.state != State::wrong && guest.state != State::streaming;
+        return !guest.probes_only && takes_place && guest.address == address;
     }));
 }
 
-std::size_t Places::held(const std::string& address) const {
+std::size_t Places::in_state(const std::string& address, State state) const {
     return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
-        return entry.second.state == State::wrong && entry.second.address == address;
+        return entry.second.state == state && entry.second.address == address;
     }));
 }
 

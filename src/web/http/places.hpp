@@ -10,7 +10,8 @@
 
 namespace panelgate::web {
 
-/// Who may stay when many want to: so many connections, so many of them an address. Whoever is held
+/// Who may stay when many want to: so many connections, so many of them an address; those that
+/// stream events are open all day, have a limit of their own and never give way. Whoever is held
 /// for a wrong token takes no place of its address, which may have so many held besides: to be
 /// closed would tell it to try again. Who comes to a full house displaces, in this order: of an
 /// address without a place, whoever of it has had no request for longest; of one with too many
@@ -39,12 +40,14 @@ class Places {
     void suspect(Id id);
     /// It waits for no more than to be told that its token is wrong, and is closed then.
     void wrong(Id id);
+    /// From now on it streams events. False when its address has as many streams as it may have.
+    bool stream(Id id);
     bool is_held(Id id) const;
     void idle(Id id);
     void leave(Id id);
 
   private:
-    enum class State : std::uint8_t { idle, busy, suspect, wrong };
+    enum class State : std::uint8_t { idle, busy, suspect, wrong, streaming };
     struct Guest {
         std::string address;
         bool probes_only = false;
@@ -53,9 +56,10 @@ class Places {
     };
     void set(Id id, State state);
     std::size_t probes() const;
-    std::size_t guests() const;                            ///< other than probes
-    std::size_t placed(const std::string& address) const;  ///< of these, neither held
-    std::size_t held(const std::string& address) const;
+    std::size_t guests() const;  ///< other than probes
+    /// Of an address: neither held nor streaming.
+    std::size_t placed(const std::string& address) const;
+    std::size_t in_state(const std::string& address, State state) const;
     Arrival admit(const std::string& address) const;
     /// Of all, or of one address.
     std::optional<Id> longest(State state, bool probes_only,
@@ -64,6 +68,7 @@ class Places {
 
     std::size_t limit_ = 0;
     std::size_t limit_of_address_ = 0;
+    std::size_t limit_of_streams_ = 0;
     std::size_t limit_of_held_ = 0;
     std::size_t limit_of_probes_ = 0;
     std::map<Id, Guest> guests_;

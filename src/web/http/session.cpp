@@ -44,6 +44,12 @@ Problem no_place() {
     return made;
 }
 
+HttpResponse too_many_streams() {
+    Problem full = problem(503, "this address streams events on as many connections as it may");
+    full.headers.emplace_back("Retry-After", "5");
+    return to_response(full);
+}
+
 }  // namespace
 
 HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
@@ -83,6 +89,8 @@ asio::awaitable<bool> HttpSession::serve_one() {
     asio::awaitable<HttpResponse> answering = answer(std::move(message));
     HttpResponse response = co_await std::move(answering);
     bool more = false;
+    if (response.events && !head && !shared_->places.stream(caller_->id()))
+        response = too_many_streams();
     if (!caller_->has_left() && response.events && !head) {
         asio::awaitable<void> sending = send_events(std::move(response.events));
         co_await std::move(sending);

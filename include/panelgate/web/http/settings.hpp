@@ -49,7 +49,8 @@ struct Settings {
     std::vector<std::string> hosts;  ///< its names; empty: those of the machine
     std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;
-    std::size_t max_per_address = 32;      ///< of these
+    std::size_t max_connections_per_address = 32;  ///< of these, but for those that stream events
+    std::size_t max_streams_per_address = 48;      ///< that stream events
     std::size_t max_held = 64;             ///< and of an address that are told late of wrong tokens
     std::size_t probe_places = 16;         ///< beyond these: only what is free is answered there
     std::size_t max_body = 64 * 1024;      ///< bytes

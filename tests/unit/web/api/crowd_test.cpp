@@ -15,7 +15,7 @@ class Crowd : public HttpRig {
   protected:
     Crowd() {
         settings.max_connections = 6;
-        settings.max_per_address = 3;
+        settings.max_connections_per_address = 3;
         settings.probe_places = 2;
     }
     /// Connections that ask nothing.
@@ -28,7 +28,7 @@ class Crowd : public HttpRig {
     /// All places of the address have a request that is not answered.
     void keep_busy() {
         bus.script = [](const bus::Request&) { return std::nullopt; };
-        for (std::size_t i = 0; i < settings.max_per_address; ++i) {
+        for (std::size_t i = 0; i < settings.max_connections_per_address; ++i) {
             come(1);
             crowd.back().send(std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n");
             while (bus.open() == i) io.run_one();
@@ -42,7 +42,7 @@ TEST_F(Crowd, OfIdleConnectionsKeepsNobodyOut) {
     EXPECT_EQ(get("/healthz").status(), 200u);
     EXPECT_EQ(get("/api/v1/stations").status(), 200u);
     EXPECT_EQ(get(kRead).status(), 200u);
-    EXPECT_LE(server->connections(), settings.max_per_address);
+    EXPECT_LE(server->connections(), settings.max_connections_per_address);
 }
 
 TEST_F(Crowd, LosesWhoHasBeenIdleForLongest) {
@@ -59,7 +59,7 @@ TEST_F(Crowd, WithAllPlacesBusyLeavesProbesTheirAnswer) {
     EXPECT_EQ(get("/readyz").status(), 200u);
     come(40);
     EXPECT_EQ(get("/healthz").body(), "ok\n");
-    EXPECT_EQ(bus.open(), settings.max_per_address);
+    EXPECT_EQ(bus.open(), settings.max_connections_per_address);
 }
 
 TEST_F(Crowd, WithAllPlacesBusyRefusesTheOthersInWords) {
@@ -76,7 +76,7 @@ TEST_F(Crowd, WithAllPlacesBusyRefusesTheOthersInWords) {
     EXPECT_THAT(reply.at("detail").as_string().c_str(), HasSubstr("places"));
     client.socket().shutdown(tcp::socket::shutdown_send);
     EXPECT_EQ(client.receive().error, http::error::end_of_stream);
-    EXPECT_EQ(bus.open(), settings.max_per_address);
+    EXPECT_EQ(bus.open(), settings.max_connections_per_address);
 }
 
 TEST_F(Crowd, EndsAConnectionThatNeverAsks) {

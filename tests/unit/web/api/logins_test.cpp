@@ -60,11 +60,11 @@ TEST_F(LoginAttempts, ThatAreRightAreAnsweredAtOnceWhereWrongOnesAreHeld) {
 
 TEST_F(LoginAttempts, ThatAreHeldTakeNoPlaceFromThoseThatAreRight) {
     settings.logins.hold = 1h;
-    settings.max_per_address = 3;
+    settings.max_connections_per_address = 3;
     start();
     for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);
     std::list<Client> guessing;
-    for (unsigned i = 1; i <= settings.max_per_address; ++i) {
+    for (unsigned i = 1; i <= settings.max_connections_per_address; ++i) {
         guessing.push_back(connect());
         guessing.back().send(
             "GET /api/v1/lines HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer wrong\r\n\r\n");
@@ -72,7 +72,8 @@ TEST_F(LoginAttempts, ThatAreHeldTakeNoPlaceFromThoseThatAreRight) {
         now += 1h;  // another turn
     }
     EXPECT_EQ(status("right"), 200u);
-    EXPECT_EQ(server->connections(), settings.max_per_address + 1) << "they go on waiting";
+    EXPECT_EQ(server->connections(), settings.max_connections_per_address + 1)
+        << "they go on waiting";
     server.reset();
 }
 
@@ -90,7 +91,7 @@ TEST_F(LoginAttempts, ThatWereHeldEndTheirConnection) {
 
 TEST_F(LoginAttempts, OfAnAddressThatGuessesAreHeldAlsoWhereAllPlacesAreTaken) {
     settings.logins.hold = 1h;
-    settings.max_per_address = 1;
+    settings.max_connections_per_address = 1;
     settings.anonymous = Role::viewer;
     start();
     for (int i = 0; i < 3; ++i) EXPECT_EQ(status("wrong"), 401u);

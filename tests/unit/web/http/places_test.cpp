@@ -15,7 +15,8 @@ class PlacesTest : public ::testing::Test {
     PlacesTest() {
         Settings settings;
         settings.max_connections = 3;
-        settings.max_per_address = 2;
+        settings.max_connections_per_address = 2;
+        settings.max_streams_per_address = 2;
         settings.max_held = 2;
         settings.probe_places = 2;
         places.emplace(settings);
@@ -136,6 +137,21 @@ TEST_F(PlacesTest, HasThePlaceAgainOfWhoLeft) {
     places->busy(1);
     places->idle(1);
     EXPECT_TRUE(come(5, "a").probes_only);
+}
+
+/// A proxy is one address, and a tab holds a stream all day.
+TEST_F(PlacesTest, WhoStreamsEventsTakesNoPlaceOfItsAddress) {
+    for (Id id = 1; id <= 2; ++id) {
+        come(id, "a");
+        places->busy(id);
+        EXPECT_TRUE(places->stream(id));
+    }
+    const auto arrival = come(3, "a");
+    EXPECT_FALSE(arrival.probes_only);
+    EXPECT_FALSE(arrival.leaves);
+    EXPECT_FALSE(places->stream(3)) << "more than it may";
+    places->leave(1);
+    EXPECT_TRUE(places->stream(3));
 }
 
 }  // namespace
