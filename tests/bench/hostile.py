@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """What forty hostile clients cost a busy line at 38400 baud, and how long /readyz takes beside them.
 
-They send half of an ADU, garbage, headers without end or byte by byte, ask for the status without a
-pause, do not read, and come and go as often as they can: half of them on Modbus/TCP, half on HTTP,
+They send half of an ADU, garbage, headers without end or byte by byte, ask without a pause for the
+status and for whatever is long (configuration, /openapi.json, /docs, /metrics), do not read, and come and go as often as they can: half of them on Modbus/TCP, half on HTTP,
 none of them uses the line. Quiet and hostile times take turns, and in quiet ones the same clients
 attack another gateway, so that both meet the same machine.
 """
@@ -21,6 +21,7 @@ import time
 
 HERE = pathlib.Path(__file__).resolve()
 sys.path.insert(0, str(HERE.parents[1] / "system"))
+import config  # noqa: E402
 import harness  # noqa: E402
 from harness import PATIENCE, adu, read_registers  # noqa: E402
 from clients import percentile, with_clients  # noqa: E402
@@ -106,8 +107,14 @@ class Enemy:
         await reader.read(4096)
 
     async def poll_status(self, reader, writer, stop):
-        for path in itertools.cycle(("lines", "stations", "lines/zoo", "relays")):
-            writer.write(f"GET /api/v1/{path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+        await self.ask_again_and_again(STATUS, reader, writer, stop)
+
+    async def ask_what_is_long(self, reader, writer, stop):
+        await self.ask_again_and_again(LONG, reader, writer, stop)
+
+    async def ask_again_and_again(self, paths, reader, writer, stop):
+        for path in itertools.cycle(paths):
+            writer.write(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
             head = await reader.readuntil(b"\r\n\r\n")
             length = int(head.lower().split(b"content-length:")[1].split(b"\r\n")[0])
             await reader.readexactly(length)
@@ -116,18 +123,21 @@ class Enemy:
                 return
 
 
+STATUS = ("/api/v1/lines", "/api/v1/stations", "/api/v1/lines/zoo", "/api/v1/relays")
+LONG = ("/api/v1/configuration", "/openapi.json", "/metrics", "/docs")
 MODBUS = (Enemy.storm, Enemy.half, Enemy.garbage, Enemy.ask_own_unit, Enemy.never_read)
-HTTP = (Enemy.storm, Enemy.drip, Enemy.garbage, Enemy.long_header, Enemy.poll_status)
+HTTP = (Enemy.storm, Enemy.drip, Enemy.garbage, Enemy.long_header, Enemy.poll_status,
+        Enemy.ask_what_is_long)
 
 
 async def attack(modbus_port, http_port, kinds):
     """Until a line comes on stdin; tells what was done."""
     stop, enemies, tasks = asyncio.Event(), [], []
+    deeds = [each for pair in itertools.zip_longest(((modbus_port, deed) for deed in MODBUS),
+                                                    ((http_port, deed) for deed in HTTP))
+             for each in pair if each and (not kinds or each[1].__name__ in kinds)]
     for n in range(HOSTILE):
-        port, deeds = ((modbus_port, MODBUS), (http_port, HTTP))[n % 2]
-        deed = deeds[n // 2 % len(deeds)]
-        if kinds and deed.__name__ not in kinds:
-            continue
+        port, deed = deeds[n % len(deeds)]
         enemies.append((deed.__name__, Enemy(n, port)))
         tasks.append(asyncio.create_task(enemies[-1][1].run(deed, stop)))
     print("ready", flush=True)
@@ -217,10 +227,16 @@ async def one_phase(line, clients, phase, seconds):
         client.asked.clear()
 
 
-def measure(rounds=3, seconds=3.0, kinds=()):
-    """(quiet, hostile): a Phase each, which take turns."""
+def idle_lines(count):
+    """Lines with 31 stations of 10 points each, which nobody asks: all that is shown of them is
+    long."""
+    return config.wide_lines(count, 31, 10, every="60min")
+
+
+def measure(rounds=3, seconds=3.0, kinds=(), lines=0):
+    """(quiet, hostile): a Phase each, which take turns. `lines`: idle ones besides."""
     quiet, hostile = Phase(), Phase()
-    with odd_line(BAUD, tcp=True) as line, harness.demo() as other:
+    with odd_line(BAUD, tcp=True, others=idle_lines(lines)) as line, harness.demo() as other:
         before_all_others(0, line.zoo.pid, line.program.process.pid)
         for _ in range(rounds):
             for phase, attacked in ((quiet, other), (hostile, line.program)):
@@ -249,6 +265,8 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=5, help="of a phase (%(default)s)")
     parser.add_argument("--kinds", nargs="*", default=(), help="only these, such as storm half")
+    parser.add_argument("--lines", type=int, default=0,
+                        help="with 31 stations of 10 points each, besides (%(default)s)")
     parser.add_argument("--attack", nargs="+", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.attack:
@@ -257,7 +275,7 @@ def main():
         return
     print(f"{platform.machine()}, {os.cpu_count()} cores, Linux {platform.release()}, "
           f"{datetime.date.today()}")
-    print_table(*measure(options.rounds, options.seconds, options.kinds))
+    print_table(*measure(options.rounds, options.seconds, options.kinds, options.lines))
 
 
 if __name__ == "__main__":

@@ -32,17 +32,21 @@ def gateway(*lines, modbus=FREE_PORT, http=FREE_PORT, **keys):
     return text
 
 
-def wide(lines, stations, points, *, every="10s", device="sim"):
-    """A file of many lines with many stations (s1-1 ...) with many points (p0 ...). `{}` in the
-    device is the line's number."""
+def wide_lines(lines, stations, points, *, every="10s", device="sim"):
+    """Many lines with many stations (s1-1 ...) with many points (p0 ...). `{}` in the device is the
+    line's number."""
     def station(n, i):
         listed = ", ".join(f"{{name: p{p}, at: UW{100 + p}, unit: celsius, every: {every}}}"
                            for p in range(points))
         return f"{{id: {i}, name: s{n}-{i}, profile: autonics-gplp-s, points: [{listed}]}}"
-    made = [line(f"line{n}", device.format(n),
+    return [line(f"line{n}", device.format(n),
                  ", ".join(station(n, i) for i in range(1, stations + 1)))
             for n in range(1, lines + 1)]
-    return gateway(*made, modbus=None)
+
+
+def wide(*shape, **more):
+    """A file of wide_lines(), for REST alone."""
+    return gateway(*wide_lines(*shape, **more), modbus=None)
 
 
 # One more line, which nothing disturbs.

@@ -80,9 +80,11 @@ class Zoo:
 
 
 @contextlib.contextmanager
-def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=None, **keys):
+def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=None, others=(),
+             **keys):
     """Panels and a gateway; `habits`: {unit or "all": names}; `zoo`: more options of zoo_bus;
-    `wire_baud`: where it is not what the gateway thinks, 0: unpaced; `keys`: of the line, also
+    `wire_baud`: where it is not what the gateway thinks, 0: unpaced; `others`: more lines of the
+    gateway; `keys`: of the line, also
     `stations` where more than their ids is to be said."""
     with tempfile.TemporaryDirectory() as folder:
         numbers = ",".join(map(str, units))
@@ -94,8 +96,9 @@ def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=
         with Zoo(*options) as panels:
             device = f"tcp://{panels.names[0]}" if tcp else panels.names[0]
             keys = {"stations": config.station_ids(units), **keys}
+            first_line = config.MANY + (", lines: [zoo]" if others else "")
             listed = config.line("zoo", device, baud=baud, **keys)
-            with harness.configured(config.gateway(listed, modbus=config.MANY)) as program:
+            with harness.configured(config.gateway(listed, *others, modbus=first_line)) as program:
                 program.log.wait_for("line up")
                 yield Line(panels, program)
 

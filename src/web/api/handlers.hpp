@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 
 #include "key_book.hpp"
@@ -9,12 +10,16 @@
 
 namespace panelgate::web {
 
+class KeptAnswer;
+
 /// What handlers work on. The directory outlives every caller that has not left.
 struct Api {
     const Directory* directory = nullptr;
     std::shared_ptr<const Directory> keeps;  ///< the same, where it may be replaced
     Providers providers;
     std::shared_ptr<KeyBook> keys;  ///< never null
+    /// What get_configuration() has made, by the role of who asks. Never null.
+    std::shared_ptr<std::map<Role, std::shared_ptr<KeptAnswer>>> configuration;
 };
 using Handler = Handling (*)(HttpRequest request, const Api* api);
 

@@ -7,6 +7,7 @@
 #include "answer.hpp"
 #include "docs_page.hpp"
 #include "handlers.hpp"
+#include "kept_answer.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/problem.hpp"
 #include "scrape.hpp"
@@ -25,13 +26,16 @@ HttpResponse text_response(unsigned status, std::string body,
 
 }  // namespace
 
-Handling get_openapi(HttpRequest, const Api*) {
-    co_return text_response(200, openapi_text(), "application/json");
+Handling get_openapi(HttpRequest request, const Api*) {
+    static const auto kept = std::make_shared<KeptAnswer>(openapi_text(), "application/json");
+    return KeptAnswer::give(kept, std::move(request));
 }
 
-Handling get_docs(HttpRequest, const Api*) {
-    static const std::string page = docs_page(boost::json::parse(openapi_text()).as_object());
-    HttpResponse response = text_response(200, page, "text/html; charset=utf-8");
+Handling get_docs(HttpRequest request, const Api*) {
+    static const auto kept = std::make_shared<KeptAnswer>(
+        docs_page(boost::json::parse(openapi_text()).as_object()), "text/html; charset=utf-8");
+    Handling giving = KeptAnswer::give(kept, std::move(request));
+    HttpResponse response = co_await std::move(giving);
     response.headers.emplace_back("Content-Security-Policy", std::string(kDocsPolicy));
     co_return response;
 }

@@ -174,6 +174,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     request.arguments = std::move(found.arguments);
     Handling handling = found.route->handler(std::move(request));
     HttpResponse response = co_await std::move(handling);
+    response.probe = probe;
     co_return response;
 }
 

@@ -30,6 +30,7 @@ namespace http = boost::beast::http;
 namespace {
 
 constexpr std::size_t kReadSize = 4096;
+constexpr std::size_t kWhole = 64 * 1024;  ///< bytes of a body that go out in one piece
 /// What a client whose request was refused may still send before it is cut off.
 constexpr std::size_t kDrainLimit = 1024 * 1024;
 constexpr Duration kDrainTime = 2s;
@@ -60,6 +61,7 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
       probes_only_(probes_only),
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
       departure_(stream_.socket(), shared_->site->settings.half_close_grace),
+      turn_(stream_.get_executor()),
       last_moment_(stream_.get_executor()),
       time_to_read_(shared_->site->settings.request_timeout) {
     ErrorCode ignored;
@@ -88,6 +90,8 @@ asio::awaitable<bool> HttpSession::serve_one() {
     const bool head = message.method() == http::verb::head;
     asio::awaitable<HttpResponse> answering = answer(std::move(message));
     HttpResponse response = co_await std::move(answering);
+    asio::awaitable<void> waiting = wait_for_ration(&response);
+    co_await std::move(waiting);
     bool more = false;
     if (response.events && !head && !shared_->places.stream(caller_->id()))
         response = too_many_streams();
@@ -132,6 +136,18 @@ void HttpSession::set_busy(bool busy) {
         shared_->places.idle(caller_->id());
         departure_.request_ends();
     }
+}
+
+asio::awaitable<void> HttpSession::wait_for_ration(const HttpResponse* response) {
+    if (response->probe || stopping_ || !shared_->site->now) co_return;
+    const std::size_t body =
+        response->shared_body ? response->shared_body->size() : response->body.size();
+    const std::size_t bytes = std::max(body, response->made);
+    const Duration wait = shared_->ration.take(shared_->site->now(), caller_->address(), bytes);
+    if (wait == Duration::zero()) co_return;
+    ErrorCode ignored;
+    turn_.expires_after(wait);
+    co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
 /// Before the answer, which it cannot mix with: nothing is on its way, so all of it is taken.
@@ -221,6 +237,8 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
     ++shared_->counters.requests[response.status];
     sending_ = true;
     stream_.expires_after(time_to_read_);
+    if (!response.shared_body && response.body.size() > kWhole)
+        response.shared_body = std::make_shared<const std::string>(std::move(response.body));
     if (head || response.shared_body) {
         http::response<http::empty_body> message;
         set_head(message, response, keep_alive, shared_->site->product);
@@ -312,6 +330,7 @@ asio::ip::address HttpSession::peer() const {
 
 void HttpSession::stop(Duration reading) {
     stopping_ = true;
+    turn_.cancel();
     time_to_read_ = std::min(time_to_read_, reading);
     if (listener_ && listener_->wake) listener_->wake();
     if (!busy_) close();
@@ -325,6 +344,7 @@ void HttpSession::stop(Duration reading) {
 
 void HttpSession::abandon() {
     stopping_ = true;
+    turn_.cancel();
     if (listener_ && listener_->wake) listener_->wake();
     caller_->leave();
     departure_.request_ends();

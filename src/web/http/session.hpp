@@ -51,6 +51,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
     boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
+    boost::asio::awaitable<void> wait_for_ration(const HttpResponse* response);
     boost::asio::awaitable<void> drain();
     void set_busy(bool busy);
     void send_interim();
@@ -67,6 +68,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
     bool asked_before_ = false;              ///< it is not the first request that is waited for
     bool sending_ = false;                   ///< an answer, or events
+    boost::asio::steady_timer turn_;         ///< of its address
     boost::asio::steady_timer last_moment_;  ///< after stop(): to take the answer
     bool busy_ = false;                      ///< a whole request is here and not yet answered
     bool stopping_ = false;

@@ -8,6 +8,7 @@
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/site.hpp"
 #include "places.hpp"
+#include "ration.hpp"
 
 namespace panelgate::web {
 
@@ -17,7 +18,8 @@ struct Shared {
         : site(std::move(with_site)),
           hosts(site->settings, machine_names()),
           logins(site->settings.logins),
-          places(site->settings) {}
+          places(site->settings),
+          ration(site->settings.ration) {}
 
     /// Another one from now on; who works on the one before holds it.
     void serve(std::shared_ptr<const Site> other) {
@@ -25,12 +27,14 @@ struct Shared {
         hosts = HostNames(site->settings, machine_names());
         logins.apply(site->settings.logins);
         places.apply(site->settings);
+        ration.apply(site->settings.ration);
     }
 
     std::shared_ptr<const Site> site;
     HostNames hosts;
     Logins logins;
     Places places;
+    Ration ration;
     Counters counters;
 };
 

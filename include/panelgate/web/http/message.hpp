@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <string>
@@ -40,6 +41,8 @@ struct HttpResponse {
     std::string content_type = "application/json";
     std::string body;
     SharedText shared_body;  ///< not null: sent in place of `body`
+    std::size_t made = 0;    ///< bytes that were packed to make it
+    bool probe = false;      ///< of the program's health: waits for nothing
     std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
     /// Not null: there is no body, events follow for as long as the client listens.
     std::shared_ptr<EventHub::Listener> events;

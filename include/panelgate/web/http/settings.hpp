@@ -39,6 +39,16 @@ struct LoginSettings {
     friend bool operator==(const LoginSettings&, const LoginSettings&) = default;
 };
 
+/// What the answers to one address may take.
+struct RationSettings {
+    Duration request = 1ms;  ///< of an address's time, that each takes
+    std::size_t bytes_a_second = 8 * 1024 * 1024;
+    Duration burst = 250ms;       ///< of its time that need not have passed yet
+    Duration longest_wait = 2s;   ///< of an answer
+    std::size_t addresses = 256;  ///< from so many on those that have used up nothing are dropped
+    friend bool operator==(const RationSettings&, const RationSettings&) = default;
+};
+
 struct Settings {
     std::string address = "127.0.0.1";
     std::uint16_t port = 8080;  ///< 0: any free one
@@ -46,6 +56,7 @@ struct Settings {
     Role anonymous = Role::viewer;
     std::vector<Token> tokens;
     LoginSettings logins;
+    RationSettings ration;
     std::vector<std::string> hosts;  ///< its names; empty: those of the machine
     std::vector<Network> allow;      ///< empty: all
     std::size_t max_connections = 256;
