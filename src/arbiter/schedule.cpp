@@ -108,25 +108,27 @@ std::optional<Group> Schedule::next_retry(TimePoint now, const Stations& station
         return repeat_from(waiting, stations) <= now &&
                gap_is_over(now, waiting.station, stations, quiet);
     });
-    if (group) let_others_go_first();
+    if (group) let_others_go_first(now);
     return group;
 }
 
 /// Before the next retry.
-void Schedule::let_others_go_first() {
+void Schedule::let_others_go_first(TimePoint now) {
     others_.clear();
     turns_ = 0;
-    dear_ = dear_ && backlog_.has_retries();
+    if (!backlog_.has_retries()) patience_ = {};
+    others_until_ = now + std::max<Duration>(patience_, 20ms);
     if (!backlog_.has_retries() || quarantine_ == Quarantine::line) return;
     backlog_.queue().any_first([&](const Job& job) {
         others_.insert(job.station);
         return false;
     });
-    turns_ = dear_ ? others_.size() : 1;
+    constexpr Duration kDear = 100ms;
+    turns_ = patience_ > kDear ? others_.size() : 1;
 }
 
 bool Schedule::others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const {
-    if (turns_ == 0) return false;
+    if (turns_ == 0 || now >= others_until_) return false;
     const JobQueue::Test may = runnable(now, stations, quiet);
     return backlog_.queue().peek([&](const Job& job) {
         return others_.contains(job.station) && may(job) && stations.may_spend(now, job);
@@ -245,14 +247,13 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     return std::min(rested, sent + own.response_timeout + worst * 5 / 4);
 }
 
-void Schedule::retry(Group group, Duration patience) {
-    constexpr Duration kDear = 100ms;
+void Schedule::retry(TimePoint now, Group group, Duration patience) {
     const bool first = !backlog_.has_retries();
     const bool at_once = !group.confirms.empty();
     // A write that goes again has had its turn among the writes.
-    dear_ = dear_ || (patience > kDear && group.request.is_read());
+    if (group.request.is_read()) patience_ = std::max(patience_, patience);
     backlog_.retry(std::move(group));
-    if (first) let_others_go_first();
+    if (first) let_others_go_first(now);
     if (at_once) turns_ = 0;
 }
 

@@ -166,9 +166,9 @@ void Arbiter::ask_again(TimePoint now) {
     station.owe(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     if (in_time(now, group) && !group.abandoned()) {
-        if (!group.request.is_read()) return schedule_.retry(confirming(group, station), {});
+        if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
         ledger_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
-        return schedule_.retry(std::move(group), station.usual());
+        return schedule_.retry(now, std::move(group), station.usual());
     }
     for (const Job& job : group.jobs)
         ledger_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
@@ -215,7 +215,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
     } else if (in_time(now, group) && affordable && station.may_retry(group)) {
         station.on_retry(verdict == Verdict::silent);
-        schedule_.retry(std::move(group), stations_.patience(now, group));
+        schedule_.retry(now, std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {
         station.on_retry(verdict == Verdict::silent);
         give_back(group);  // nobody's health: the panel may only not take the length

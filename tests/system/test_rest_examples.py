@@ -32,6 +32,7 @@ OF_AN_INCIDENT = {"time", "errors", "complete", "frames", "decisions", "transact
 OF_A_RELOAD = {"at", "warnings"}
 OF_A_BUILD = {"commit", "compiler", "libraries"}
 OF_A_RELAY = {"state", "reads", "writes"}
+OF_A_POINT = {"time"}
 # Of panels that confirm and do not keep (verify_test.cpp), and of a line whose master speaks.
 UNSEEN = {("Written", "read_back"), ("Written", "verify_detail"), ("Problem", "read_back"),
           ("StationDetail", "heard")}
@@ -86,7 +87,7 @@ def settled(value):
     passing = set(PASSING)
     for mark, names in (("busy_seconds", OF_A_CLIENT), ("direction", OF_A_FRAME), ("repairs", OF_A_RELAY),
                         ("first_bit_out", OF_A_TRANSACTION), ("errors", OF_AN_INCIDENT),
-                        ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD)):
+                        ("rollback", OF_A_RELOAD), ("libraries", OF_A_BUILD), ("every_ms", OF_A_POINT)):
         passing |= names if mark in value else set()
     return {key: "~" if key in passing and one is not None else settled(one)
             for key, one in value.items()}

@@ -19,6 +19,11 @@ bool is_long_read(const Bytes& pdu, double most) {
     return is_read && (pdu[3] << 8 | pdu[4]) > static_cast<int>(most);
 }
 
+bool is_ignored(const Habit* ignore, const Bytes& pdu) {
+    return ignore != nullptr && Panel::is_write(pdu[0]) &&
+           (pdu[1] << 8 | pdu[2]) == static_cast<int>(ignore->a);
+}
+
 }  // namespace
 
 void Bus::on_frame(const Bytes& frame, const Character& last, bool is_ours) {
@@ -73,7 +78,8 @@ void Bus::serve(int unit, Station& station, const Bytes& pdu, Time end) {
     habits.next();
     const Habit* most = habits.find(Kind::max_registers);
     const bool is_too_long = most != nullptr && is_long_read(pdu, most->a);
-    if (!takes(habits, station, end) || (is_too_long && most->b < 1)) {
+    if (!takes(habits, station, end) || (is_too_long && most->b < 1) ||
+        is_ignored(habits.find(Kind::ignore), pdu)) {
         ++served.dropped;
         return;
     }

@@ -52,6 +52,7 @@ constexpr std::array kNames{
     Name{"noise", Kind::noise, 1000, 0, 0},
     Name{"master-other-polite", Kind::other_master, 500, 0, 0},
     Name{"reboot", Kind::reboot, 8, 4, 0},
+    Name{"ignore", Kind::ignore, 0, 0, 0},
     Name{"mute", Kind::mute, 0, 0, 0},
     Name{"dead", Kind::dead, 0, 0, 0},
     Name{"rate", Kind::rate, 0, 0, 0},

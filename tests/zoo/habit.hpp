@@ -46,6 +46,7 @@ enum class Kind {
     noise,            // random bytes on the line, every A ms or so
     other_master,     // another one asks this panel every A ms, when a reply has just ended
     reboot,           // silent for A s, then text, then fine for B s, and again
+    ignore,           // writes to address A are neither executed nor answered
     mute,             // executes, does not answer
     dead,             // does neither
     rate,             // its clock is A % fast; negative: slow

@@ -53,8 +53,9 @@ class Schedule {
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
     /// The same request goes again and is waited for `patience` long. While only its station rests,
-    /// others go first: one request, or, when the retry is dear, one to each station that waits.
-    void retry(Group group, Duration patience);
+    /// others go first, for no longer than it may take: one request, or, when the retry is dear, one
+    /// to each station that waits.
+    void retry(TimePoint now, Group group, Duration patience);
     /// The parts of a joined read go again, each by itself. Returns those whose client has left:
     /// they do not.
     Jobs give_back(Group& group);
@@ -62,7 +63,7 @@ class Schedule {
   private:
     std::optional<Group> next_retry(TimePoint now, const Stations& stations, Quiet& quiet);
     bool others_go_first(TimePoint now, const Stations& stations, const Quiet& quiet) const;
-    void let_others_go_first();
+    void let_others_go_first(TimePoint now);
     std::optional<Group> next_probe(TimePoint now, Stations& stations, Quiet& quiet) const;
     Next next_job(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
     std::optional<Next> proof_before(TimePoint now, const Job& job, const Stations& stations) const;
@@ -81,7 +82,8 @@ class Schedule {
     Ticket learned_for_ = 0;        ///< a read was sent for it, to find out about the echo (P8)
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
     std::size_t turns_ = 0;         ///< that it leaves to them, at most
-    bool dear_ = false;             ///< a retry may cost them much
+    Duration patience_{};           ///< that a retry may cost them
+    TimePoint others_until_{};      ///< it leaves them no more time than it may cost
 };
 
 }  // namespace panelgate::arbiter

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/json/object.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@ namespace panelgate::web {
 
 /// One of many reads: what is asked for, and what came of it.
 struct BatchRead {
+    boost::json::object item;  ///< as it was asked
     Items items;
     View view;
     std::optional<PointOfStation> point{};  ///< whose value it is

@@ -105,13 +105,23 @@ Parsed<std::string> string_member(const json::object& object, std::string_view n
     return std::string(member->get_string());
 }
 
-Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, modbus::Table table) {
-    const json::value* member = object.if_contains("values");
-    if (member == nullptr || !member->is_array() || member->get_array().empty()) {
+Parsed<json::array> values_member(const json::object& object) {
+    const json::value* const one = object.if_contains("value");
+    const json::value* const several = object.if_contains("values");
+    if (one != nullptr && several != nullptr)
+        return problem(400, R"(the body has "value" for one or "values" for several, not both)");
+    if (one != nullptr) return json::array{*one};
+    if (several == nullptr || !several->is_array() || several->get_array().empty()) {
         return problem(400, R"(the body must be {"values": [...]} with at least one value)");
     }
+    return several->get_array();
+}
+
+Parsed<std::vector<std::uint16_t>> values_member(const json::object& object, modbus::Table table) {
+    const auto values = values_member(object);
+    if (!values) return values.error();
     std::vector<std::uint16_t> cells;
-    for (const json::value& value : member->get_array()) {
+    for (const json::value& value : *values) {
         const auto parsed = cell(value, table);
         if (!parsed) return parsed.error();
         cells.push_back(*parsed);

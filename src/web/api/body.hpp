@@ -1,5 +1,6 @@
 #pragma once
 
+#include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
 #include <cstdint>
@@ -31,10 +32,14 @@ Parsed<std::int64_t> number_member(const boost::json::object& object, std::strin
                                    std::int64_t low, std::int64_t high);
 Parsed<std::string> string_member(const boost::json::object& object, std::string_view name);
 
+/// The member "values", or the one "value" in its place: at least one.
+Parsed<boost::json::array> values_member(const boost::json::object& object);
 /// The member "values" as cells of a table: bits are true, false, 0 or 1; registers are 0..65535,
 /// or -32768..-1 for their two's complement. At least one.
 Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
                                                  modbus::Table table);
+/// A new value of a point.
+Parsed<points::Value> value_of(const boost::json::value& value);
 /// The member "value": a point's new one.
 Parsed<points::Value> value_member(const boost::json::object& object);
 /// True or false; false where there is no such member.

@@ -40,7 +40,7 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
     if (!word) return word.error();
     const auto table = parse_table(*word, 400);
     if (!table) return table.error();
-    if (!is_writable(*table)) return problem(422, *word + " cannot be written");
+    if (!is_writable(*table)) return problem(422, *word + " cannot be written", "not-writable");
     const auto address = number_member(body, "address", 0, 0xFFFF);
     if (!address) return address.error();
     const auto cells = values_member(body, *table);

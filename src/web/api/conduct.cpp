@@ -1,5 +1,6 @@
 #include "conduct.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -21,9 +22,12 @@ std::string header(const HttpRequest& request, const char* name) {
     return found == request.headers.end() ? std::string() : found->second;
 }
 
-/// Behind a member's name that ends in _ms: its number.
+/// Behind a member's name that ends in _ms: its number; behind `time`: the instant.
 std::size_t end_of_age(std::string_view body, std::size_t at) {
     constexpr std::string_view kAge = "_ms\":";
+    constexpr std::string_view kTime = "\"time\":\"";
+    if (body.substr(at).starts_with(kTime))
+        return std::min(body.find('"', at + kTime.size()), body.size() - 1) + 1;
     if (!body.substr(at).starts_with(kAge)) return at;
     at += kAge.size();
     while (at < body.size() && body[at] != ',' && body[at] != '}') ++at;

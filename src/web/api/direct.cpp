@@ -18,7 +18,7 @@ Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line
     if (id == 0) return check_may_write(*line.bus, 0);
     const std::string name = line.name + ":" + std::to_string(id);
     const auto station = directory.find_station(name);
-    if (!station) return problem(404, "there is no station '" + name + "'");
+    if (!station) return problem(404, "there is no station '" + name + "'", "unknown-station");
     if (may) return {};
     return check_may_write(*line.bus, id);
 }

@@ -20,7 +20,7 @@ Parsed<std::vector<json::object>> entries_of(std::string_view text, std::size_t 
     if (items == nullptr || !items->is_array() || items->get_array().empty())
         return problem(400, R"(the body must be {"items": [...]} with at least one entry)");
     if (items->get_array().size() > most)
-        return problem(422, "at most " + std::to_string(most) + " entries in one list");
+        return problem(422, "at most " + std::to_string(most) + " entries in one list", "too-many");
     std::vector<json::object> entries;
     for (const json::value& item : items->get_array()) {
         if (!item.is_object())
@@ -35,12 +35,12 @@ bool names_point(const json::object& entry) { return has(entry, "point"); }
 Parsed<void> check_members(const json::object& entry, Members of_points, Members of_items) {
     std::vector<std::string_view> known;
     if (names_point(entry)) {
-        known = {"point"};
+        known = {"id", "point"};
         known.insert(known.end(), of_points);
     } else {
         if (!has(entry, "device") && !has(entry, "table"))
             return problem(400, R"(an entry has "point", "device" or "table")");
-        known = {"station"};
+        known = {"id", "station"};
         if (has(entry, "device")) {
             known.emplace_back("device");
         } else {

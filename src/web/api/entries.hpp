@@ -17,7 +17,8 @@ namespace panelgate::web {
 /// The entries of {"items": [...]}: objects, at least one, no more than `most`.
 Parsed<std::vector<boost::json::object>> entries_of(std::string_view body, std::size_t most);
 
-/// An entry names a point or items: {"point": "press/temperature"}.
+/// An entry names a point or items: {"point": "press/temperature"}. It may have an "id" of any
+/// form, for who asks: its result repeats the entry.
 bool names_point(const boost::json::object& entry);
 /// 400 for a member that no entry of its kind has: the names of what it wants, and these.
 Parsed<void> check_members(const boost::json::object& entry, Members of_points, Members of_items);

@@ -54,6 +54,7 @@ Handling get_station(HttpRequest request, const Api* api);
 Handling get_table(HttpRequest request, const Api* api);
 Handling put_table(HttpRequest request, const Api* api);
 Handling get_points(HttpRequest request, const Api* api);
+Handling get_all_points(HttpRequest request, const Api* api);
 Handling get_point(HttpRequest request, const Api* api);
 Handling put_point(HttpRequest request, const Api* api);
 Handling get_point_history(HttpRequest request, const Api* api);

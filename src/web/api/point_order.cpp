@@ -24,7 +24,7 @@ Parsed<PointOrder> plan(std::uint8_t station, const profile::PanelProfile& profi
 
 Problem problem_of(const points::WriteRefusal& refusal, const char* more) {
     if (refusal.malformed) return problem(400, refusal.message);
-    return problem(422, refusal.message + (refusal.inexact ? more : ""));
+    return problem(422, refusal.message + (refusal.inexact ? more : ""), "outside-limits");
 }
 
 Parsed<PointOrder> order_of(const bus::BusClient& bus, std::uint8_t station,

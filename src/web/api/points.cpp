@@ -1,15 +1,19 @@
 #include <boost/json/array.hpp>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "answer.hpp"
 #include "ask.hpp"
 #include "csv.hpp"
 #include "handlers.hpp"
+#include "panelgate/base/wall_time.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/query.hpp"
 #include "patience.hpp"
 #include "point_json.hpp"
@@ -24,11 +28,31 @@ using points::Point;
 
 constexpr std::string_view kColumns[] = {"name",   "value", "label", "unit",    "quality",
                                          "age_ms", "at",    "type",  "writable"};
+constexpr std::string_view kColumnsOfAll[] = {"line",  "station", "name",    "value",
+                                              "label", "unit",    "quality", "age_ms",
+                                              "at",    "type",    "writable"};
+
+/// What a form needs to write it, and how often it is read.
+void describe_settings(json::object& object, const Point& point) {
+    if (point.min) object["min"] = exact_number(point.min->text());
+    if (point.max) object["max"] = exact_number(point.max->text());
+    if (points::is_integer(point.type)) object["step"] = std::abs(point.scale);
+    if (!point.labels.empty()) {
+        json::object labels;
+        for (const auto& [raw, text] : point.labels) labels[std::to_string(raw)] = text;
+        object["labels"] = std::move(labels);
+    }
+    object["every_ms"] = whole_ms(point.every);
+}
 
 json::object describe(const Api& api, const points::StationPoints& station, const Point& point,
                       bool raw) {
-    const points::PointReading reading = station.read(point, api.providers.now());
+    const TimePoint now = api.providers.now();
+    const points::PointReading reading = station.read(point, now);
     json::object object = point_json(point, reading);
+    object["time"] = nullptr;
+    if (reading.age)
+        object["time"] = rfc3339(wall_time_of(now - *reading.age, now, api.providers.wall()));
     if (raw) {
         object["raw"] = nullptr;
         const auto& items = station.items(point);
@@ -38,7 +62,20 @@ json::object describe(const Api& api, const points::StationPoints& station, cons
     object["at"] = point.at;
     object["type"] = label(point.type);
     object["writable"] = point.writable;
+    describe_settings(object, point);
     return object;
+}
+
+/// A point and whose it is.
+using Owned = std::pair<const StationEntry*, const Point*>;
+
+std::vector<Owned> points_of_all(const Directory& directory) {
+    std::vector<Owned> all;
+    for (const StationEntry& station : directory.stations) {
+        if (station.points == nullptr) continue;
+        for (const Point& point : station.points->points()) all.emplace_back(&station, &point);
+    }
+    return all;
 }
 
 json::array describe(const std::vector<points::Interpretation>& all) {
@@ -72,6 +109,25 @@ Handling get_points(HttpRequest request, const Api* api) {
     table.count = all == nullptr ? 0 : all->points().size();
     table.entry = [api, all, with_raw = *raw](std::size_t i) {
         return describe(*api, *all, all->points()[i], with_raw);
+    };
+    Handling telling = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(telling);
+}
+
+Handling get_all_points(HttpRequest request, const Api* api) {
+    Table table;
+    table.name = "points";
+    table.columns = kColumnsOfAll;
+    auto all = points_of_all(*api->directory);
+    table.count = all.size();
+    table.entry = [api, all = std::move(all)](std::size_t i) {
+        const auto& [station, point] = all[i];
+        json::object object;
+        object["line"] = station->line;
+        object["station"] = station->name;
+        for (const auto& [name, value] : describe(*api, *station->points, *point, false))
+            object[name] = value;
+        return object;
     };
     Handling telling = table_answer(std::move(request), std::move(table));
     co_return co_await std::move(telling);

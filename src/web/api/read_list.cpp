@@ -20,40 +20,6 @@ namespace {
 constexpr Members kOfPoints = {"raw"};
 constexpr Members kOfItems = {"count", "type", "order", "length", "raw"};
 
-Parsed<unsigned> count_member(const json::object& entry, std::string_view name, unsigned most) {
-    if (!entry.contains(name)) return 1u;
-    const auto number = number_member(entry, name, 1, most);
-    if (!number) return number.error();
-    return static_cast<unsigned>(*number);
-}
-
-Parsed<std::optional<std::string>> text_member(const json::object& entry, std::string_view name) {
-    if (!entry.contains(name)) return std::optional<std::string>();
-    auto text = string_member(entry, name);
-    if (!text) return text.error();
-    return std::optional<std::string>(std::move(*text));
-}
-
-Parsed<Wording> wording_of(const json::object& entry) {
-    Wording wording;
-    auto type = text_member(entry, "type");
-    if (!type) return type.error();
-    wording.type = std::move(*type);
-    auto order = text_member(entry, "order");
-    if (!order) return order.error();
-    wording.order = std::move(*order);
-    const auto length = count_member(entry, "length", kMaxText);
-    if (!length) return length.error();
-    if (entry.contains("length")) wording.length = *length;
-    const auto count = count_member(entry, "count", modbus::kTableItems);
-    if (!count) return count.error();
-    wording.count = *count;
-    const auto raw = flag_member(entry, "raw");
-    if (!raw) return raw.error();
-    wording.raw = *raw;
-    return wording;
-}
-
 Parsed<BatchRead> point_read(const json::object& entry, const Directory& directory) {
     const auto raw = flag_member(entry, "raw");
     if (!raw) return raw.error();
@@ -98,11 +64,13 @@ Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
             values += read->items.span.count;
             if (values > most)
                 return problem(
-                    422, "at most " + std::to_string(most) + " registers and bits in one list");
+                    422, "at most " + std::to_string(most) + " registers and bits in one list",
+                    "too-many");
             reads.push_back(std::move(*read));
         } else {
             reads.emplace_back().problem = read.error();
         }
+        reads.back().item = entry;
     }
     return reads;
 }
@@ -123,13 +91,19 @@ json::object point_result(const BatchRead& read) {
     return told;
 }
 
-json::object result_of(const BatchRead& read) {
+json::object told_of(const BatchRead& read) {
     if (read.problem) return json_of(*read.problem);
     json::object told;
     told["status"] = 200;
     const json::object rest =
         read.point ? point_result(read) : describe(read.items, read.view, read.reading);
     for (const auto& [name, value] : rest) told[name] = value;
+    return told;
+}
+
+json::object result_of(const BatchRead& read) {
+    json::object told = told_of(read);
+    told["item"] = read.item;
     return told;
 }
 

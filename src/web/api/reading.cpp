@@ -82,7 +82,7 @@ Parsed<View> prepare_read(Items& items, const Wording& wording, unsigned max_tra
     const unsigned most =
         items.station.profile->max_count(read_function(items.span.table)) * max_transactions;
     if (items.span.count > most)
-        return problem(422, "at most " + std::to_string(most) + " at once");
+        return problem(422, "at most " + std::to_string(most) + " at once", "too-many");
     return view;
 }
 

@@ -61,6 +61,7 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/simulator/{}", put_simulated, kChange},
     {"GET", "/api/v1/events", get_events, kSee, kPlain, "types line station point"},
     {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
+    {"GET", "/api/v1/points", get_all_points, kSee, kTagged},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
     {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},

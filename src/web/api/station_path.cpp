@@ -24,9 +24,11 @@ Parsed<modbus::Table> parse_table(std::string_view word, unsigned status) {
     for (const modbus::Table table : modbus::kTables) {
         if (word == label(table)) return table;
     }
-    return problem(status, "there is no table '" + std::string(word) +
-                               "'; there are coils, discrete-inputs, input-registers and "
-                               "holding-registers");
+    return problem(status,
+                   "there is no table '" + std::string(word) +
+                       "'; there are coils, discrete-inputs, input-registers and "
+                       "holding-registers",
+                   "unknown-table");
 }
 
 Parsed<std::uint16_t> parse_address(std::string_view text) {
@@ -40,13 +42,13 @@ Parsed<std::uint16_t> parse_address(std::string_view text) {
 Parsed<const LineEntry*> find_line(const Directory& directory, const std::string& name) {
     const LineEntry* line = directory.find_line(name);
     if (line != nullptr) return line;
-    return problem(404, "there is no line '" + name + "'");
+    return problem(404, "there is no line '" + name + "'", "unknown-line");
 }
 
 Parsed<StationEntry> find_station(const Directory& directory, const std::string& name) {
     auto station = directory.find_station(name);
     if (station) return std::move(*station);
-    return problem(404, "there is no station '" + name + "'");
+    return problem(404, "there is no station '" + name + "'", "unknown-station");
 }
 
 Parsed<PointOfStation> find_point(const Directory& directory, const std::string& name,
@@ -56,7 +58,8 @@ Parsed<PointOfStation> find_point(const Directory& directory, const std::string&
     const points::Point* point =
         station->points != nullptr ? station->points->find(point_name) : nullptr;
     if (point == nullptr) {
-        return problem(404, "station '" + station->name + "' has no point '" + point_name + '\'');
+        return problem(404, "station '" + station->name + "' has no point '" + point_name + '\'',
+                       "unknown-point");
     }
     return PointOfStation{std::move(*station), point};
 }
@@ -83,7 +86,8 @@ Parsed<Items> item_of_notation(StationEntry station, std::string_view notation) 
     const auto item = profile::parse_notation(*station.profile, notation);
     if (!item) {
         const bool outside = item.error().kind == profile::NotationError::Kind::out_of_range;
-        return problem(outside ? 422 : 404, item.error().message);
+        return problem(outside ? 422 : 404, item.error().message,
+                       outside ? "unprocessable" : "unknown-notation");
     }
     Items items;
     items.station = std::move(station);

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "body.hpp"
 #include "panelgate/points/value.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/query.hpp"
@@ -39,6 +40,20 @@ Parsed<points::Type> type_of(const Wording& wording, bool bits) {
     return type;
 }
 
+Parsed<unsigned> count_member(const json::object& entry, std::string_view name, unsigned most) {
+    if (!entry.contains(name)) return 1u;
+    const auto number = number_member(entry, name, 1, most);
+    if (!number) return number.error();
+    return static_cast<unsigned>(*number);
+}
+
+Parsed<std::optional<std::string>> text_member(const json::object& entry, std::string_view name) {
+    if (!entry.contains(name)) return std::optional<std::string>();
+    auto text = string_member(entry, name);
+    if (!text) return text.error();
+    return std::optional<std::string>(std::move(*text));
+}
+
 }  // namespace
 
 Parsed<Wording> wording_of(const HttpRequest& request) {
@@ -51,6 +66,26 @@ Parsed<Wording> wording_of(const HttpRequest& request) {
         wording.length = *length;
     }
     const auto raw = query_flag(request, "raw");
+    if (!raw) return raw.error();
+    wording.raw = *raw;
+    return wording;
+}
+
+Parsed<Wording> wording_of(const json::object& entry) {
+    Wording wording;
+    auto type = text_member(entry, "type");
+    if (!type) return type.error();
+    wording.type = std::move(*type);
+    auto order = text_member(entry, "order");
+    if (!order) return order.error();
+    wording.order = std::move(*order);
+    const auto length = count_member(entry, "length", kMaxText);
+    if (!length) return length.error();
+    if (entry.contains("length")) wording.length = *length;
+    const auto count = count_member(entry, "count", modbus::kTableItems);
+    if (!count) return count.error();
+    wording.count = *count;
+    const auto raw = flag_member(entry, "raw");
     if (!raw) return raw.error();
     wording.raw = *raw;
     return wording;

@@ -26,6 +26,8 @@ inline constexpr unsigned kMaxText = 240;  ///< characters of a string
 
 /// From the queries type, order, length and raw.
 Parsed<Wording> wording_of(const HttpRequest& request);
+/// From the members of these names, and count.
+Parsed<Wording> wording_of(const boost::json::object& entry);
 
 /// How the items of a read are understood. Made of a wording and a table, so that both agree.
 struct View {

@@ -43,7 +43,8 @@ Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api)
 
 Handling put_items(HttpRequest request, Parsed<Items> items, const Api* api) {
     if (!items) co_return refused(request, items.error());
-    auto writing = write_of(*items, parse_object(request.body, {"values", "verify"}));
+    auto writing = write_of(*items, parse_object(request.body, {"values", "value", "type", "order",
+                                                                "length", "verify"}));
     boost::asio::awaitable<HttpResponse> done =
         carry_out(std::move(request), std::move(writing), api);
     co_return co_await std::move(done);

@@ -16,10 +16,11 @@ namespace json = boost::json;
 namespace {
 
 constexpr Members kOfPoints = {"value", "round", "verify"};
-constexpr Members kOfItems = {"values", "verify"};
+constexpr Members kOfItems = {"values", "value", "type", "order", "length", "verify"};
 
 /// One of many writes, and what came of it.
 struct BatchWrite {
+    json::object item;  ///< as it was asked
     std::optional<Writing> writing;
     json::object result;
 };
@@ -70,6 +71,7 @@ Parsed<std::vector<BatchWrite>> writes_of(const HttpRequest& request, const Api&
         if (!writing && writing.error().status == 400)
             return in_entry(writes.size(), writing.error());
         BatchWrite& write = writes.emplace_back();
+        write.item = entry;
         if (writing) {
             write.writing = std::move(*writing);
         } else {
@@ -109,7 +111,10 @@ Handling post_write(HttpRequest request, const Api* api) {
     boost::asio::awaitable<void> all = gather(std::move(lines));
     co_await std::move(all);
     json::array results;
-    for (BatchWrite& write : *writes) results.push_back(std::move(write.result));
+    for (BatchWrite& write : *writes) {
+        write.result["item"] = std::move(write.item);
+        results.push_back(std::move(write.result));
+    }
     json::object body;
     body["results"] = std::move(results);
     co_return json_response(200, body);

@@ -5,6 +5,8 @@
 #include <boost/json/array.hpp>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "answer.hpp"
 #include "ask.hpp"
@@ -14,6 +16,7 @@
 #include "panelgate/web/http/client_log.hpp"
 #include "reading.hpp"
 #include "refusal.hpp"
+#include "view.hpp"
 #include "write_plan.hpp"
 
 namespace panelgate::web {
@@ -21,7 +24,7 @@ namespace json = boost::json;
 namespace {
 
 Problem not_writable(modbus::Table table) {
-    Problem made = problem(405, std::string(label(table)) + " cannot be written");
+    Problem made = problem(405, std::string(label(table)) + " cannot be written", "not-writable");
     made.headers.emplace_back("Allow", "GET, HEAD");
     return made;
 }
@@ -40,10 +43,40 @@ Parsed<Writing> writing_of(const StationEntry& station, Bytes pdu, const json::o
     return made;
 }
 
+/// The registers of values of a type: "f32", "i32", ... A string has as many as its `length` says,
+/// or as it needs.
+Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus::Table table) {
+    const auto wording = wording_of(body);
+    if (!wording) return wording.error();
+    auto view = view_of(*wording, table);
+    if (!view) return view.error();
+    const auto values = values_member(body);
+    if (!values) return values.error();
+    std::vector<std::uint16_t> cells;
+    for (const json::value& one : *values) {
+        const auto value = value_of(one);
+        if (!value) return value.error();
+        const auto* text = std::get_if<std::string>(&*value);
+        if (text != nullptr && !wording->length)
+            view->value.length = static_cast<unsigned>(text->size() + text->size() % 2);
+        const auto registers = points::encode(view->value, *value);
+        if (!registers) return problem_of(registers.error(), "");
+        cells.insert(cells.end(), registers->begin(), registers->end());
+    }
+    return cells;
+}
+
+Parsed<std::vector<std::uint16_t>> cells_of(const json::object& body, modbus::Table table) {
+    const bool is_typed =
+        std::ranges::any_of(std::array{"type", "order", "length"},
+                            [&](const char* name) { return body.contains(name); });
+    return is_typed ? typed_cells(body, table) : values_member(body, table);
+}
+
 Parsed<Writing> plan(const Items& items, const Parsed<json::object>& body) {
     if (!is_writable(items.span.table)) return not_writable(items.span.table);
     if (!body) return body.error();
-    const auto cells = values_member(*body, items.span.table);
+    const auto cells = cells_of(*body, items.span.table);
     if (!cells) return cells.error();
     auto pdu = plan_write(items, *cells);
     if (!pdu) return pdu.error();

@@ -43,7 +43,7 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
                                 "'; if it shall be, name it in http: hosts");
     }
     if (header(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
-        return problem(403, "a page of another site may not ask this gateway");
+        return problem(403, "a page of another site may not ask this gateway", "foreign-page");
     }
     // Browsers name the site of whoever changes something, or wants to read the answer, also where
     // they tell nothing else (plain HTTP). A read costs time on a line, too.
@@ -51,7 +51,8 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
         !is_ours(header(request, "origin"), names, local))
         return problem(403,
                        "a page of another site may not ask this gateway; if it is one of yours, "
-                       "name its host in http: hosts");
+                       "name its host in http: hosts",
+                       "foreign-page");
     return std::nullopt;
 }
 

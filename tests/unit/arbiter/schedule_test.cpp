@@ -102,12 +102,12 @@ TEST_F(ScheduleTest, NothingGoesBeforeTheGapBehindTheLastBitIsOver) {
 }
 
 TEST_F(ScheduleTest, ARetryLeavesOneTurnToTheOthers) {
-    schedule.retry(failed(1), kCheap);
+    schedule.retry(now, failed(1), kCheap);
     EXPECT_EQ(order(), "r1") << "nobody else wants the line";
     wait(2);
     wait(2);
     wait(3);
-    schedule.retry(failed(1), kCheap);
+    schedule.retry(now, failed(1), kCheap);
     EXPECT_EQ(order(2), "2 r1");
 }
 
@@ -115,14 +115,23 @@ TEST_F(ScheduleTest, P4ADearRetryLeavesATurnToEachStationThatWaited) {
     wait(2);
     wait(3);
     wait(2);
-    schedule.retry(failed(1), kDear);
+    schedule.retry(now, failed(1), kDear);
     EXPECT_EQ(order(), "2 3 r1 2");
+}
+
+TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
+    wait(2);
+    wait(3);
+    schedule.retry(now, failed(1), kDear);
+    EXPECT_EQ(order(1), "2");
+    now += kDear;
+    EXPECT_EQ(order(), "r1 3") << "what the others took counts";
 }
 
 TEST_F(ScheduleTest, P4WhoHasManyClientsDoesNotHaveAllTurnsBeforeADearRetry) {
     for (int i = 0; i < 6; ++i) wait(2);
     wait(3);
-    schedule.retry(failed(1), kDear);
+    schedule.retry(now, failed(1), kDear);
     EXPECT_EQ(order(5), "2 3 r1 2 2") << "one for each of the stations that waited";
 }
 
@@ -130,14 +139,14 @@ TEST_F(ScheduleTest, WhereTheWholeLineRestsARetryGoesFirst) {
     settings.quarantine = Quarantine::line;
     rebuild();
     wait(2);
-    schedule.retry(failed(1), kDear);
+    schedule.retry(now, failed(1), kDear);
     EXPECT_EQ(order(), "r1 2");
 }
 
 TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
     wait(1, true);
     wait(1);
-    schedule.retry(failed(1), kCheap);
+    schedule.retry(now, failed(1), kCheap);
     EXPECT_EQ(order(), "r1 1 1");
 }
 

@@ -52,9 +52,10 @@ TEST_F(ApiBatch, ReadsNeighboursInOneRequestWithOneResultEach) {
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(reply.json(),
               json_of(R"({"results":[{"status":200,"station":"press","table":"holding-registers",
-        "address":10,"notation":"UW10","values":[10,11],"age_ms":0,"source":"bus"},
+        "address":10,"notation":"UW10","values":[10,11],"age_ms":0,"source":"bus",
+        "item":{"station":"press","device":"UW10","count":2}},
         {"status":200,"station":"press","name":"oil","value":3.5,"unit":"bar","quality":"good",
-         "age_ms":0,"source":"bus"}],"transactions":1})"));
+         "age_ms":0,"source":"bus","item":{"point":"press/oil"}}],"transactions":1})"));
     EXPECT_EQ(last_pdu(), "03 00 07 00 05");
 }
 
@@ -134,15 +135,17 @@ TEST_F(ApiBatch, IsAsLongAsTheSettingsSay) {
 
 TEST_F(ApiBatch, WritesInOrderWithOneResultEach) {
     add_meter();
-    const Reply reply = write(R"({"point":"press/oil","value":3.5},
+    const Reply reply = write(R"({"id":"a","point":"press/oil","value":3.5},
         {"station":"meter","table":"coils","address":1,"values":[1]},
         {"station":"press","device":"UW1","values":[1,2]},{"point":"press/oil","value":300})");
     EXPECT_EQ(reply.status(), 200u);
     EXPECT_EQ(result(reply, 0),
-              json_of(R"({"status":200,"transmitted":true,"confirmed":true,"value":3.5})"));
+              json_of(R"({"status":200,"transmitted":true,"confirmed":true,"value":3.5,
+                          "item":{"id":"a","point":"press/oil","value":3.5}})"));
     EXPECT_EQ(result(reply, 1).at("status"), 403);
     EXPECT_EQ(result(reply, 2).at("confirmed"), true);
     EXPECT_EQ(result(reply, 3).at("status"), 422);
+    EXPECT_EQ(result(reply, 3).at("item"), json_of(R"({"point":"press/oil","value":300})"));
     EXPECT_THAT(pdus(), ElementsAre("06 00 07 00 07", "10 00 01 00 02 04 00 01 00 02"));
 }
 

@@ -55,7 +55,8 @@ class ApiPoints : public HttpRig {
 TEST_F(ApiPoints, P10ShowsNothingForWhatWasNeverRead) {
     EXPECT_EQ(get(kOil).json(),
               json_of(R"({"name":"oil","value":null,"unit":"bar","quality":"bad","age_ms":null,)"
-                      R"("at":"UW7","type":"u16","writable":true})"));
+                      R"("time":null,"at":"UW7","type":"u16","writable":true,"min":0,"max":100,)"
+                      R"("step":1,"every_ms":1000})"));
     EXPECT_TRUE(bus.requests.empty());
 }
 
@@ -64,6 +65,11 @@ TEST_F(ApiPoints, ShowsWhatPollsHaveBroughtWithoutTouchingTheBus) {
     EXPECT_EQ(get(kOil).at("value"), 21);
     EXPECT_EQ(get(kOil).at("quality"), "good");
     EXPECT_EQ(get("/api/v1/stations/press/points").at("points").as_array().size(), 2u);
+    const auto all = get("/api/v1/points").at("points").as_array();
+    ASSERT_EQ(all.size(), 2u);
+    EXPECT_EQ(all[0].at("line"), "floor1");
+    EXPECT_EQ(all[0].at("station"), "press");
+    EXPECT_EQ(all[0].at("value"), 21);
     EXPECT_TRUE(bus.requests.empty());
 }
 

@@ -92,12 +92,39 @@ TEST_F(ApiWrite, RefusesValuesThatDoNotFit) {
     for (const char* body :
          {R"({"values":[65536]})", R"({"values":[-32769]})", R"({"values":[1.5]})",
           R"({"values":["1"]})", R"({"values":[true]})", R"({"values":[]})", R"({"values":7})",
-          R"({"value":7})", "[1]", "", "{", R"({"values":[18446744073709551615]})",
-          R"({"values":[1e999]})"}) {
+          R"({"value":7,"values":[7]})", "{}", "[1]", "", "{",
+          R"({"values":[18446744073709551615]})", R"({"values":[1e999]})"}) {
         EXPECT_EQ(put("press/holding-registers/1", body).status(), 400u) << body;
     }
     EXPECT_EQ(put("press/coils/1", R"({"values":[2]})").status(), 400u);
     EXPECT_EQ(put("press/holding-registers/65535", R"({"values":[1,2]})").status(), 422u);
+    EXPECT_TRUE(bus.requests.empty());
+}
+
+TEST_F(ApiWrite, TakesOneValueWithoutAList) {
+    EXPECT_EQ(put("press/devices/UW100", R"({"value":-2})").status(), 200u);
+    EXPECT_EQ(last_pdu(), "06 00 64 ff fe");
+}
+
+TEST_F(ApiWrite, WritesTypesByTheirOrder) {
+    EXPECT_EQ(put("press/devices/UW100", R"({"value":21.5,"type":"f32"})").status(), 200u);
+    EXPECT_EQ(last_pdu(), "10 00 64 00 02 04 41 ac 00 00");
+    const char* two = R"({"values":[21.5,-1],"type":"f32","order":"CDAB"})";
+    EXPECT_EQ(put("press/devices/UW100", two).status(), 200u);
+    EXPECT_EQ(last_pdu(), "10 00 64 00 04 08 00 00 41 ac 00 00 bf 80");
+    EXPECT_EQ(put("press/holding-registers/100", R"({"value":"AB","type":"string"})").status(),
+              200u);
+    EXPECT_EQ(last_pdu(), "06 00 64 41 42");
+}
+
+TEST_F(ApiWrite, RefusesTypesThatDoNotFit) {
+    for (const char* body :
+         {R"({"value":1e39,"type":"f32"})", R"({"value":70000,"type":"u16"})",
+          R"({"value":1,"type":"f33"})", R"({"value":1,"type":"f32","order":"XY"})",
+          R"({"value":"AB","type":"f32"})", R"({"value":1,"length":3})"}) {
+        const unsigned status = put("press/holding-registers/1", body).status();
+        EXPECT_TRUE(status == 400 || status == 422) << body << " " << status;
+    }
     EXPECT_TRUE(bus.requests.empty());
 }
 

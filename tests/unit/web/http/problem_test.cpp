@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <set>
+#include <string_view>
+
 namespace panelgate::web {
 namespace {
 
@@ -9,9 +13,10 @@ TEST(Problem, IsToldAsRfc9457HasIt) {
     const HttpResponse response = to_response(problem(404, "there is no line 'x'"));
     EXPECT_EQ(response.status, 404u);
     EXPECT_EQ(response.content_type, "application/problem+json");
-    EXPECT_EQ(response.body, R"({"type":"about:blank","title":"Not Found","status":404,)"
-                             R"("detail":"there is no line 'x'"})"
-                             "\n");
+    EXPECT_EQ(response.body,
+              R"({"type":"urn:panelgate:problem:not-found","title":"Not Found","status":404,)"
+              R"("detail":"there is no line 'x'"})"
+              "\n");
 }
 
 TEST(Problem, HasATypeAndFurtherMembersAndHeadersWhereThereAreSome) {
@@ -33,6 +38,19 @@ TEST(Problem, HasATitleForEveryStatusThatIsUsed) {
          {400u, 401u, 403u, 404u, 405u, 413u, 415u, 422u, 431u, 500u, 502u, 503u, 504u}) {
         EXPECT_EQ(to_response(problem(status, "")).body.find(R"("title":"Error")"),
                   std::string::npos)
+            << status;
+    }
+}
+
+TEST(Problem, HasATypeOfItsOwnForEachKindOfError) {
+    std::set<std::string_view> words;
+    for (const ProblemKind& kind : problem_kinds()) {
+        EXPECT_TRUE(words.insert(kind.word).second) << kind.word;
+        EXPECT_TRUE(kind.meaning.ends_with('.')) << kind.word;
+    }
+    for (const unsigned status : {400u, 401u, 403u, 404u, 405u, 409u, 413u, 415u, 421u, 422u, 431u,
+                                  500u, 502u, 503u, 504u}) {
+        EXPECT_EQ(std::ranges::count(problem_kinds(), status, &ProblemKind::of_status), 1)
             << status;
     }
 }
