@@ -147,8 +147,8 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
 Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred) {
     const std::shared_ptr<const Site> site = shared->site;
     Found found = find_route(request, site->routes);
-    const bool free = found.route != nullptr && found.route->needed == Role::none;
-    if (barred && !free) {
+    const bool probe = found.route != nullptr && found.route->probe;
+    if (barred && !probe) {
         // At once, it would come again at once: that is no slower than to guess.
         Duration hold = Duration::zero();
         if (barred->status == 503 && request.caller)
@@ -167,7 +167,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
         co_return to_response(*refused);
     }
     // Probes are answered whatever their makers add.
-    auto mistaken = free ? std::nullopt : check_queries(request, found.route->queries);
+    auto mistaken = probe ? std::nullopt : check_queries(request, found.route->queries);
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);
     request.role = role_of(request, site->settings);

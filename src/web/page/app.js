@@ -1,5 +1,5 @@
 // The page: what is shown where, in which language and theme.
-import {gateway, hasToken, introduce, offers, useToken} from './api.js';
+import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
 import {language, languages, store, stored, t} from './language.js';
 import {discoveryView} from './discovery.js';
@@ -12,7 +12,7 @@ import {requestView} from './request.js';
 import {scopeView} from './scope.js';
 import {settingsView} from './settings.js';
 import {stationView} from './station.js';
-import {askToken, roleButton} from './token.js';
+import {roleButton, signIn} from './token.js';
 
 const VIEWS = {'': overviewView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
     clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
@@ -31,24 +31,30 @@ function theme(chosen) {
     store('theme', chosen);
 }
 
+/** What there is whoever one is: names, and what is chosen, behind who one is. */
+function tools(...who) {
+    attribute(document.getElementById('nav'), 'aria-label', t('nav'));
+    attribute(document.getElementById('menu'), 'aria-label', t('menu'));
+    text(document.getElementById('skip'), t('skip'));
+    replace(document.getElementById('tools'), who,
+        choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
+        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+}
+
 function build() {
     const nav = document.getElementById('nav');
     const links = Object.entries(NAMED).filter(([name]) => !NEEDS[name] || offers(NEEDS[name])).map(([name, key]) =>
         h('a', {href: `#/${name}`, 'data-view': name}, t('nav.' + key)));
-    attribute(nav, 'aria-label', t('nav'));
     replace(nav, links);
     const menu = document.getElementById('menu');
-    attribute(menu, 'aria-label', t('menu'));
     menu.addEventListener('click', () => open(nav.hidden || !nav.classList.contains('open')));
     const open = (yes) => {
         nav.classList.toggle('open', yes);
         attribute(menu, 'aria-expanded', String(yes));
     };
     nav.addEventListener('click', () => open(false));
-    text(document.getElementById('skip'), t('skip'));
-    replace(document.getElementById('tools'), roleButton(),
-        choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
-        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+    tools(roleButton());
+    text(document.getElementById('version'), gateway.configuration.version);
 }
 
 function show() {
@@ -71,15 +77,25 @@ function refresh() {
     shown?.update?.();
 }
 
-/** A token that this tab remembers may be none any more. */
-async function enter() {
+/** introduce(); is who we are known? */
+async function known() {
     try {
         await introduce();
+        return true;
     } catch (error) {
         if (error.status !== 401) throw error;
-        if (hasToken()) await useToken('').catch(() => askToken());
-        else await askToken();
+        return false;
     }
+}
+
+/** Ends when we may look. A token that this tab remembers may be none any more. */
+async function enter() {
+    if (await known()) return;
+    const forgotten = hasToken();
+    forgetToken();
+    if (forgotten && await known()) return;
+    tools();
+    await signIn(main, forgotten);
 }
 
 async function start() {
@@ -94,13 +110,13 @@ async function start() {
         return;
     }
     build();
-    if (!gateway.configuration) return;
     await first;
+    if (live.refused) await live.refresh();
     live.addEventListener('status', refresh);
+    live.addEventListener('refused', () => location.reload());
     live.start();
     window.addEventListener('hashchange', () => { show(); main.focus(); });
     document.addEventListener('role', show);
-    document.getElementById('version').textContent = gateway.configuration.version;
     show();
     performance.mark('shown');
 }

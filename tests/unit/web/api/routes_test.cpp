@@ -43,7 +43,9 @@ TEST_P(AccessMatrix, Holds) {
     settings.anonymous = c.anonymous;
     EXPECT_EQ(read(c.token), c.read);
     EXPECT_EQ(status(c.token, "GET", "/metrics"), c.read);
-    EXPECT_EQ(status(c.token, "GET", "/"), c.read);
+    EXPECT_EQ(status(c.token, "GET", "/openapi.json"), c.read);
+    for (const char* page : {"/", "/page/app.js", "/docs"})
+        EXPECT_EQ(status(c.token, "GET", page), 200u) << page << " holds no data";
     EXPECT_EQ(write(c.token), c.write);
     EXPECT_EQ(broadcast(c.token), c.write == 200 ? 202 : c.write);
     EXPECT_EQ(raw(c.token), c.write);
