@@ -44,6 +44,7 @@ class Live extends EventTarget {
         this.#events?.close();
         this.#events = null;
         clearTimeout(this.#timer);
+        this.#tell('rest');
     }
 
     #listen() {

@@ -53,10 +53,11 @@ function tile(first) {
         attribute(state, 'class', `badge ${tone(station.state)}`);
         text(state, word('state', station.state));
         const line = live.line(station.line);
-        const traced = traceOf(station.line).timeline.of(station.id).slice(-KEPT);
-        const answered = traced.filter((one) => one.total !== null).map((one) => one.total);
-        spark.update(answered);
-        text(figure, duration(latency(traced).total.mean));
+        const {timeline} = traceOf(station.line);
+        const traced = timeline.of(station.id).slice(-KEPT);
+        const over = traced.filter((one) => one !== timeline.waiting);
+        spark.update(over.map((one) => one.total), {ticked: true});
+        text(figure, tone(station.state) === 'bad' ? '–' : duration(latency(traced).total.mean));
         text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
         const told = line?.told?.find((one) => one.station === station.id);
         text(finding, told ? findingText(told).said : '');
@@ -96,7 +97,7 @@ function card(first) {
         text(load, t('load', {percent: number(line.load_percent, 1)}));
         history.push(line.load_percent);
         if (history.length > HISTORY) history.shift();
-        spark.update(history, 0, LOADED);
+        spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
         const told = (line.told ?? []).map((one) => ({...one, key: `${one.cause} ${one.station} ${one.text}`}));
         list(findings, told, (one) => one.key, (one) => ({node: findingNote(one)}));

@@ -130,6 +130,7 @@ export const words = {
 "about.think": ["panel: thinks before it answers", "Panel: überlegt vor der Antwort", "패널: 응답 전 처리", "パネル: 応答前の処理"],
 "answered": ["Answered", "Beantwortet", "응답", "応答"],
 "latency.plot": ["Each transaction of {line}", "Jede Transaktion von {line}", "{line}의 각 트랜잭션", "{line} の各トランザクション"],
+"plot.failed": ["{count} failed", "{count} fehlgeschlagen", "실패 {count}", "失敗 {count}"],
 "latency.figures": ["{count} transactions: {mean} on average, 95 % within {high}, {failed} failed", "{count} Transaktionen: im Mittel {mean}, 95 % in {high}, {failed} fehlgeschlagen", "트랜잭션 {count}: 평균 {mean}, 95 % {high} 이내, 실패 {failed}", "トランザクション {count}: 平均 {mean}、95 % が {high} 以内、失敗 {failed}"],
 "point": ["Point", "Messwert", "포인트", "ポイント"],
 "value": ["Value", "Wert", "값", "値"],
