@@ -164,55 +164,6 @@ class Cost(Browser):
         self.assertLess(with_scope - without, 0.05)
 
 
-class Outage(Browser):
-    """What fails is seen: a tick for each, a gap, and a time axis that goes on."""
-
-    def setUp(self):
-        self.program.rest("PUT", "/api/v1/simulator/oven", {})
-
-    def tearDown(self):
-        self.program.rest("PUT", "/api/v1/simulator/oven", {})
-
-    def drawn(self, which):
-        return self.script("return Number(document.querySelector('.plot[data-to]')?.dataset[arguments[0]] ?? 0)", which)
-
-    def test_a_dead_panels_plot_has_ticks_and_goes_on_to_now(self):
-        self.open("station/oven")
-        self.wait(lambda: self.drawn("to"))
-        self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
-        self.wait(lambda: self.drawn("failed") >= 2 and "failed" in self.text(".plot-values"))
-        dead = self.drawn("to")
-        self.wait(lambda: self.drawn("to") > dead + 3000)
-        self.assertRegex(self.text(".plot-values"), r"wire –")
-        self.screenshot("outage-wide-light")
-        self.open("latency/floor1")
-        self.wait(lambda: self.drawn("failed") >= 1)
-        self.screenshot("outage-latency-wide-light")
-        self.assertEqual(self.complaints(), [])
-
-    def test_its_tile_ticks_and_boasts_of_no_latency(self):
-        self.open()
-        self.wait(lambda: " ms" in self.text(tile("oven") + " .figure"))
-        newest = "M120.0,20V28"
-        def ticks():
-            return self.find(tile("oven") + " .missing").get_attribute("d")
-        self.wait(lambda: not ticks().endswith(newest))
-        self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
-        self.wait(lambda: ticks().endswith(newest))
-        self.wait(lambda: self.text(tile("oven") + " .figure") == "–")
-
-    def test_a_points_plot_ends_with_its_gap(self):
-        row = 'tr[data-point="oven/temperature"]'
-        self.open("points")
-        self.wait(lambda: self.all(row + " td button"))
-        self.find(row + " td button").click()
-        self.wait(lambda: self.drawn("to"))
-        self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
-        self.wait(lambda: "–" in self.text(".plot-values"))
-        gap = self.drawn("to")
-        self.wait(lambda: self.drawn("to") > gap + 1000)
-
-
 class Request(Browser):
     def ask(self, notation, count):
         self.open("request/press")

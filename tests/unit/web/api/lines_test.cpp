@@ -41,12 +41,12 @@ TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
     bus.shares = {
         {"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12, "127.0.0.1", 20, 1, Outcome::timeout, 70ms},
-        {"poll of station 31", 500ms, 25, 4, {}, 4}};
+        {"http 10.0.0.9", 500ms, 25, 4, "10.0.0.9", 4, 0, {}, {}, 2s}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
               json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","address":"127.0.0.1","requests":20,
-        "failed":1,"last_error":"timeout","last_error_ms":70,"busy_seconds":1.5,"percent":75,
-        "transactions":12},{"name":"poll of station 31","address":null,"requests":4,"failed":0,
-        "last_error":null,"last_error_ms":null,"busy_seconds":0.5,"percent":25,
+        "failed":1,"last_error":"timeout","last_error_ms":70,"gone_ms":null,"busy_seconds":1.5,"percent":75,
+        "transactions":12},{"name":"http 10.0.0.9","address":"10.0.0.9","requests":4,"failed":0,
+        "last_error":null,"last_error_ms":null,"gone_ms":2000,"busy_seconds":0.5,"percent":25,
         "transactions":4}])"));
 }
 
