@@ -77,5 +77,34 @@ class Clients(Browser):
         self.wait(lambda: "left" in self.row("modbus_tcp 127.0.0.1"))
 
 
+class Findings(Browser):
+    """In the reader's language, with the numbers, by the station's name."""
+
+    def tearDown(self):
+        self.program.rest("PUT", "/api/v1/simulator/oven", {})
+        self.script("localStorage.clear()")
+
+    def test_they_are_said_in_every_language(self):
+        self.open()
+        self.program.rest("PUT", "/api/v1/simulator/oven", {"dead": 1})
+        for language, wrong, advice, evidence in (
+                ("de", "oven antwortet nicht", "Stecker", r"die letzten \d+ Anfragen"),
+                ("ko", "oven: 응답하지", "커넥터", r"마지막 요청 \d+개"),
+                ("ja", "oven:応答しません", "コネクター", r"直近の要求 \d+ 件"),
+                ("en", "oven does not answer", "plug", r"the last \d+ requests")):
+            with self.subTest(language=language):
+                self.script("localStorage.setItem('panelgate.language', arguments[0])", language)
+                self.open()
+                def said():
+                    return self.text('.finding[data-cause="station-silent"]')
+                self.wait(said)
+                self.assertIn(wrong, said())
+                self.assertIn(advice, said())
+                self.assertRegex(said(), evidence)
+                self.assertNotRegex(said(), r"[{}]|\b20\b")
+                if language != "en":
+                    self.assertFalse(self.all('.finding[data-cause="station-silent"] [lang="en"]'))
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -96,6 +97,8 @@ struct LineFinding {
     std::string advice;
     std::string evidence;  ///< the numbers behind it
     std::string name{};    ///< of the station, as the configuration has it; empty: the whole line
+    /// The numbers of these texts: counts, and durations in milliseconds ("timeout_ms").
+    std::map<std::string, std::uint64_t> figures{};
 };
 
 struct LineStatus {

@@ -40,6 +40,9 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
         object["text"] = finding.text;
         object["advice"] = finding.advice;
         object["evidence"] = finding.evidence;
+        json::object figures;
+        for (const auto& [name, value] : finding.figures) figures[name] = value;
+        object["figures"] = std::move(figures);
         list.push_back(std::move(object));
     }
     return list;

@@ -1,7 +1,8 @@
 // Lines with their load, and their stations as tiles.
 import {get, offers, path} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
-import {duration, language, number, t, word} from './language.js';
+import {findingNote, findingText} from './finding.js';
+import {duration, number, t, word} from './language.js';
 import {live} from './live.js';
 import {sparkline} from './plot.js';
 import {latency} from './timeline.js';
@@ -21,20 +22,6 @@ export function tone(state) {
 
 export function badge(kind, state) {
     return h('span', {class: `badge ${tone(state)}`}, word(kind, state));
-}
-
-/** What is wrong, in the reader's language; figures and advice are the gateway's own. */
-function findingText(finding) {
-    const key = `finding.${finding.cause}`;
-    const said = word('finding', finding.cause);
-    if (language === 'en' || said === finding.cause) return {lang: 'en', said: finding.text};
-    return {lang: language, said: t(key, {who: finding.name ?? t('finding.line')})};
-}
-
-export function findingNote(finding) {
-    const {lang, said} = findingText(finding);
-    return h('li', {class: 'finding'}, h('strong', {lang}, said), ' ',
-        h('span', {lang: 'en'}, finding.advice), finding.evidence ? h('small', {lang: 'en'}, finding.evidence) : null);
 }
 
 /** A station's tile: {node, update}. */
@@ -60,7 +47,7 @@ function tile(first) {
         text(figure, tone(station.state) === 'bad' ? '–' : duration(latency(traced).total.mean));
         text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
         const told = line?.told?.find((one) => one.station === station.id);
-        text(finding, told ? findingText(told).said : '');
+        text(finding, told ? findingText(told).text : '');
     }};
 }
 

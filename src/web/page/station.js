@@ -1,8 +1,9 @@
 // One station: how it does, what was found, how long it takes, its points and what to do with it.
 import {get, path} from './api.js';
 import {h, list, replace, text} from './dom.js';
+import {findingNote} from './finding.js';
 import {duration, number, t, word} from './language.js';
-import {badge, findingNote, linesWithFindings} from './overview.js';
+import {badge, linesWithFindings} from './overview.js';
 import {plot} from './plot.js';
 import {pointsTable} from './points.js';
 import {simulator} from './simulator.js';

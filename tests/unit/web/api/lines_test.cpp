@@ -28,14 +28,20 @@ TEST_F(ApiLines, ListsTheLines) {
 TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of("[]"));
     bus.line.findings = {{"wrong-baud", {}, "What is wrong.", "What to do.", "9 of 9"},
-                         {"gap-too-short", 31, "Why.", "How.", "5 of 6", "press"}};
+                         {"gap-too-short",
+                          31,
+                          "Why.",
+                          "How.",
+                          "5 of 6",
+                          "press",
+                          {{"silent_below", 5}, {"advised_ms", 10}}}};
     EXPECT_EQ(get("/api/v1/lines").at("lines").as_array()[0].at("findings"),
               json_of(R"(["wrong-baud","gap-too-short"])"));
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of(R"([
         {"cause":"wrong-baud","station":null,"name":null,"text":"What is wrong.","advice":"What to do.",
-         "evidence":"9 of 9"},
+         "evidence":"9 of 9","figures":{}},
         {"cause":"gap-too-short","station":31,"name":"press","text":"Why.","advice":"How.",
-         "evidence":"5 of 6"}])"));
+         "evidence":"5 of 6","figures":{"advised_ms":10,"silent_below":5}}])"));
 }
 
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
