@@ -5,7 +5,7 @@ import {language, languages, store, stored, t} from './language.js';
 import {discoveryView} from './discovery.js';
 import {latencyView} from './latency.js';
 import {live} from './live.js';
-import {overviewView} from './overview.js';
+import {overviewView, tone} from './overview.js';
 import {clientsView, relaysView} from './plain_views.js';
 import {pointsView} from './points.js';
 import {requestView} from './request.js';
@@ -57,6 +57,13 @@ function build() {
     text(document.getElementById('version'), gateway.configuration.version);
 }
 
+/** A tab that nobody looks at says how many do not answer. */
+function entitle() {
+    const silent = live.stations.filter((station) => tone(station.state) === 'bad').length;
+    const name = `${main.querySelector('h1')?.textContent.trim() ?? ''} · panelgate`;
+    document.title = silent > 0 ? `⚠ ${silent} · ${name}` : name;
+}
+
 function show() {
     const [, name = '', ...parts] = location.hash.split('/');
     const view = VIEWS[name] ? name : '';
@@ -66,7 +73,7 @@ function show() {
     replace(main, shown.node);
     shown.update?.();
     for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
-    document.title = `${main.querySelector('h1')?.textContent ?? ''} · panelgate`;
+    entitle();
     main.dataset.view = view;
     window.scrollTo(0, 0);
 }
@@ -74,6 +81,7 @@ function show() {
 function refresh() {
     banner.hidden = live.reachable;
     if (!live.reachable) text(banner, t('unreachable'));
+    entitle();
     shown?.update?.();
 }
 

@@ -44,7 +44,8 @@ function tile(first) {
         const traced = timeline.of(station.id).slice(-KEPT);
         const over = traced.filter((one) => one !== timeline.waiting);
         spark.update(over.map((one) => one.total), {ticked: true});
-        text(figure, tone(station.state) === 'bad' ? '–' : duration(latency(traced).total.mean));
+        const mean = tone(station.state) === 'bad' ? null : latency(traced).total.mean;
+        text(figure, mean === null ? '–' : t('answers.in', {time: duration(mean)}));
         text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
         const told = line?.told?.find((one) => one.station === station.id);
         text(finding, told ? findingText(told).text : '');

@@ -35,6 +35,7 @@ export const words = {
 "waiting": ["{count} waiting", "{count} warten", "대기 {count}", "待機 {count}"],
 "listens": ["only listens", "hört nur mit", "수신 전용", "傍受のみ"],
 "last": ["Last answer", "Letzte Antwort", "마지막 응답", "最終応答"],
+"answers.in": ["answers in {time}", "antwortet in {time}", "응답 {time}", "応答 {time}"],
 "last.answer": ["last answer {ago} ago", "letzte Antwort vor {ago}", "마지막 응답 {ago} 전", "最終応答 {ago} 前"],
 "no.lines": ["There are no lines.", "Es gibt keine Linien.", "라인이 없습니다.", "回線がありません。"],
 "no.station": ["There is no station '{name}'.", "Es gibt keine Station '{name}'.", "'{name}' 국이 없습니다.", "局「{name}」はありません。"],
