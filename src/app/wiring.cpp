@@ -87,6 +87,7 @@ std::vector<points::PolledStation> polled_stations(const config::Line& line) {
         if (station.points.empty() && station.polls.empty()) continue;
         points::PolledStation& entry = polled.emplace_back();
         entry.id = station.id;
+        entry.name = station.name;
         entry.wants = points::wants_of(station.points, station.polls);
         entry.limits = points::make_plan_limits(*station.profile, line.device.serial,
                                                 frame_gap(line, station.id));

@@ -204,7 +204,16 @@ void Bus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     state_->account.add_refused(station, pdu, client, state_->arbiter.client_names());
 }
 
+/// What it has asked stays in the list of clients, although its number is nobody's any more.
+void Bus::State::part(ClientId client) {
+    const auto used = arbiter.shares().of(client);
+    const auto asked = clients.of(client);
+    if (used.transactions == 0 && asked.requests == 0) return;
+    departed.leave(clock.now(), arbiter.client_names().of(client), used, asked);
+}
+
 void Bus::cancel(ClientId client) {
+    state_->part(client);
     state_->call(
         [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
     state_->clients.forget(client);
@@ -229,7 +238,9 @@ LineStatus Bus::status() const {
 }
 
 std::vector<ClientShare> Bus::clients() const {
-    return client_shares(state_->arbiter.shares(), state_->arbiter.client_names(), state_->clients,
+    const arbiter::Arbiter& arbiter = state_->arbiter;
+    return client_shares({arbiter.shares(), arbiter.client_names(), state_->clients,
+                          state_->departed, arbiter.counters().busy},
                          state_->clock.now());
 }
 

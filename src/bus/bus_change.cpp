@@ -36,6 +36,7 @@ void Bus::State::take(Settings next) {
     settings = std::move(next);
     rights = Rights(settings.stations);
     account.apply();
+    departed.apply(settings.clients);
     doctor.apply();
 }
 

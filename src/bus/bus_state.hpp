@@ -11,6 +11,7 @@
 #include "account.hpp"
 #include "answers.hpp"
 #include "client_accounts.hpp"
+#include "departed_clients.hpp"
 #include "line_doctor.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/base/pool.hpp"
@@ -44,6 +45,7 @@ struct Bus::State final : public line::Line::Events {
           arbiter(settings.arbiter),
           rights(settings.stations),
           account(settings),
+          departed(settings.clients),
           doctor(settings),
           load(c.now()),
           refusals(executor, clock),
@@ -63,6 +65,7 @@ struct Bus::State final : public line::Line::Events {
     void change_soon();
     void change_line();
     void transact(Request request, AnswerHandler handler);
+    void part(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
@@ -109,6 +112,7 @@ struct Bus::State final : public line::Line::Events {
     Rights rights;
     Account account;
     ClientAccounts clients;
+    DepartedClients departed;
     LineDoctor doctor;
     LoadMeter load;
     Refusals refusals;

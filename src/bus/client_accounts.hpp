@@ -39,6 +39,11 @@ class ClientAccounts {
         known->second.failed_at = now;
     }
     void forget(ClientId client) { accounts_.erase(client); }
+    /// Nothing asked yet: all zero.
+    Account of(ClientId client) const {
+        const auto known = accounts_.find(client);
+        return known == accounts_.end() ? Account{} : known->second;
+    }
     const std::map<ClientId, Account>& all() const { return accounts_; }
 
   private:

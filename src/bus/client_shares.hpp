@@ -1,10 +1,9 @@
 #pragma once
 
-#include <optional>
-#include <string>
 #include <vector>
 
 #include "client_accounts.hpp"
+#include "departed_clients.hpp"
 #include "panelgate/arbiter/bus_shares.hpp"
 #include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/base/time.hpp"
@@ -12,13 +11,16 @@
 
 namespace panelgate::bus {
 
-/// The greediest clients with their names.
-std::vector<ClientShare> client_shares(const arbiter::BusShares& shares,
-                                       const arbiter::ClientNames& names,
-                                       const ClientAccounts& accounts, TimePoint now);
+/// Where it stands what clients have used of a line.
+struct ClientUse {
+    const arbiter::BusShares& shares;
+    const arbiter::ClientNames& names;
+    const ClientAccounts& accounts;
+    DepartedClients& departed;
+    Duration busy{};  ///< of the line, whoever has used it
+};
 
-/// Of a client's name: a server's clients are called by its word and where they come from
-/// ("modbus_tcp 10.0.0.7:51234", "http ::1 token ops"). Nothing for others.
-std::optional<std::string> address_in(const std::string& name);
+/// The greediest clients with their names, a name once, and what is not theirs as the last.
+std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now);
 
 }  // namespace panelgate::bus

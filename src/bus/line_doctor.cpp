@@ -90,7 +90,8 @@ std::vector<FindingReport> LineDoctor::report() const {
 std::vector<LineFinding> LineDoctor::findings() const {
     std::vector<LineFinding> list;
     for (const doctor::Finding& f : doctor_.findings()) {
-        list.push_back({std::string(code(f.cause)), f.station, f.text, f.advice, f.evidence, {}});
+        list.push_back(
+            {std::string(code(f.cause)), f.station, f.text, f.advice, f.evidence, {}, f.figures});
         if (f.station) list.back().name = name_of(settings_.stations, *f.station);
     }
     return list;

@@ -104,7 +104,8 @@ void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
           advice,
           share_text(s.crc_swapped, s.damaged(), "damaged replies") +
               " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
-              " replies were right");
+              " replies were right",
+          {{"swapped", s.crc_swapped}, {"damaged", s.damaged()}, {"right", s.answered}});
 }
 
 void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
@@ -116,7 +117,8 @@ void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
           "Set `serial: {ascii_lower_case: take}` of the line; the standard has upper case only.",
           share_text(s.lower_case, s.damaged(), "damaged replies") +
               " are written in lower case; " + std::to_string(s.answered) +
-              " replies were right, as those without A to F are");
+              " replies were right, as those without A to F are",
+          {{"lower_case", s.lower_case}, {"damaged", s.damaged()}, {"right", s.answered}});
 }
 
 void find_all_damaged(Case& c) {
@@ -131,24 +133,24 @@ void find_all_damaged(Case& c) {
         c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
               "Set the parity, data and stop bits of the server's serial port as in the panels' "
               "communication settings.",
-              evidence);
+              evidence, damage_figures(s));
     } else if (cause == Cause::wrong_parity) {
         c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
               "Set `serial.parity`, data and stop bits as in the panels' communication settings "
               "(now " +
                   now + ").",
-              evidence);
+              evidence, damage_figures(s));
     } else if (cause == Cause::wrong_baud && c.facts.serial.mode == SerialMode::ascii) {
         c.add(cause, {}, "What comes is no Modbus ASCII: baud, data bits or parity differ.",
               "Set `serial` as in the panels' communication settings (now " + now +
                   "); panels that are set to RTU need `mode: rtu`.",
-              evidence);
+              evidence, damage_figures(s));
     } else if (cause == Cause::wrong_baud) {
         const bool breaks = c.window.uart && c.window.uart->breaks * 2 > c.window.uart->framing;
         c.add(cause, {}, "What comes is no Modbus at this speed: the baud differs.",
               std::string(breaks ? "A and B may be swapped. " : "") +
                   "Set `serial.baud` as in the panels' communication settings (now " + now + ").",
-              evidence);
+              evidence, damage_figures(s));
     }
 }
 
@@ -178,8 +180,10 @@ void find_noise(Case& c) {
         advice = "Bytes come when nobody speaks: look at the bias first. " + advice;
         evidence += "; " + std::to_string(s.strays) + " times bytes around or between replies";
     }
+    Figures figures = damage_figures(s);
+    if (strays) figures["strays"] = s.strays;
     c.add(Cause::noise, {}, "Some of what comes is damaged.", std::move(advice),
-          std::move(evidence));
+          std::move(evidence), std::move(figures));
 }
 
 /// What lies between changes lengths: telnet doubles bytes or takes them out. A wrong byte in a
@@ -197,7 +201,7 @@ void find_tcp_framing(Case& c) {
           "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "
           "`telnet(rfc2217)`), that no other client is connected to it, and that its own baud and "
           "serial format are the panels'; then look at the line behind it.",
-          damage_text(c, s));
+          damage_text(c, s), damage_figures(s));
 }
 
 }  // namespace panelgate::doctor

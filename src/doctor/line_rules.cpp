@@ -16,14 +16,16 @@ void find_echo(Case& c) {
         c.add(
             Cause::echo, {}, "The adapter hears what it sends, and `echo: off` denies it.",
             "Set `echo: auto` or `echo: on`, or switch the adapter's receiver off while it sends.",
-            std::to_string(c.all.echoes) + " requests came back as they were sent");
+            std::to_string(c.all.echoes) + " requests came back as they were sent",
+            {{"echoes", c.all.echoes}});
     }
     if (c.facts.echo == EchoMode::on && c.all.echoes == 0 &&
         c.all.collided + c.all.silent >= bar.enough(5) && c.all.collided >= bar.enough(3)) {
         c.add(Cause::echo, {}, "No request comes back, although `echo: on` says so.",
               "Set `echo: auto` or `echo: off`.",
               "instead of its echo something else followed " +
-                  share_text(c.all.collided, c.all.attempts(), "requests"));
+                  share_text(c.all.collided, c.all.attempts(), "requests"),
+              {{"collided", c.all.collided}, {"requests", c.all.attempts()}});
     }
 }
 
@@ -56,7 +58,7 @@ std::uint64_t strangers(const Case& c) {
 void find_no_answer(Case& c) {
     const Bar bar{c, Cause::no_answer_at_all};
     std::uint64_t mute = 0;
-    int stations = 0;
+    std::uint64_t stations = 0;
     for (const auto& [id, symptoms] : c.window.stations) {
         if (symptoms.attempts() == 0) continue;
         // A scan of unlisted addresses finds nobody: that says nothing about the line.
@@ -76,7 +78,7 @@ void find_no_answer(Case& c) {
         evidence += "; the driver counted " + std::to_string(c.window.uart->breaks) + " breaks";
     }
     c.add(Cause::no_answer_at_all, {}, "Nobody answers on this line.", std::move(advice),
-          std::move(evidence));
+          std::move(evidence), {{"stations", stations}, {"requests", mute}});
 }
 
 void find_other_master(Case& c) {
@@ -92,7 +94,10 @@ void find_other_master(Case& c) {
                   "none, a panel speaks unasked or with an address that is not its own.",
           std::to_string(c.all.requests) + " requests of somebody else, " + std::to_string(frames) +
               " frames of stations that were not asked, and " + std::to_string(c.all.attempts()) +
-              " requests of this gateway");
+              " requests of this gateway",
+          {{"foreign_requests", c.all.requests},
+           {"foreign_frames", frames},
+           {"requests", c.all.attempts()}});
 }
 
 void find_collision(Case& c) {
@@ -101,16 +106,20 @@ void find_collision(Case& c) {
     c.add(Cause::collision, {}, "Somebody speaks while the gateway does.",
           "Look for another master, for a panel that answers very late, and for a transceiver that "
           "does not release the line.",
-          share_text(c.all.collided, c.all.attempts(), "requests") + " came back changed");
+          share_text(c.all.collided, c.all.attempts(), "requests") + " came back changed",
+          {{"collided", c.all.collided}, {"requests", c.all.attempts()}});
 }
 
 void find_overrun(Case& c) {
     const Bar bar{c, Cause::overrun};
     if (!c.window.uart || c.window.uart->overruns < bar.enough(2)) return;
+    Figures figures = damage_figures(c.all);
+    figures["overruns"] = c.window.uart->overruns;
     c.add(Cause::overrun, {}, "The serial driver lost bytes.",
           "Give the gateway more of the processor, lower `serial.baud`, or use an adapter with a "
           "larger buffer.",
-          std::to_string(c.window.uart->overruns) + " overruns; " + damage_text(c, c.all));
+          std::to_string(c.window.uart->overruns) + " overruns; " + damage_text(c, c.all),
+          std::move(figures));
 }
 
 namespace {
@@ -129,7 +138,8 @@ void add_trailing(Case& c, std::optional<std::uint8_t> station, const std::strin
           "Look at when the transceiver stops sending and at the line's bias; if that cannot be "
           "changed, set `timing.frame_gap` so long that they have passed: 10ms, or more if this "
           "finding stays.",
-          share_text(s.trailed, s.answered, "replies") + " had bytes behind them");
+          share_text(s.trailed, s.answered, "replies") + " had bytes behind them",
+          {{"trailed", s.trailed}, {"replies", s.answered}});
 }
 
 }  // namespace

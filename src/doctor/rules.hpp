@@ -40,9 +40,9 @@ struct Case {
     }
     bool has_of_line(Cause cause) const { return has(cause, 0); }
     void add(Cause cause, std::optional<std::uint8_t> station, std::string text, std::string advice,
-             std::string evidence) {
-        findings.push_back(
-            {cause, station, std::move(text), std::move(advice), std::move(evidence)});
+             std::string evidence, Figures figures) {
+        findings.push_back({cause, station, std::move(text), std::move(advice), std::move(evidence),
+                            std::move(figures)});
     }
 };
 
@@ -93,6 +93,10 @@ std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what
 std::string duration_text(Duration duration);
 /// How the damage looked: "10 of right length, 2 shorter, …"; with the driver's error counts.
 std::string damage_text(const Case& c, const arbiter::Symptoms& symptoms);
+/// damaged, of replies, and as exact, short or long.
+Figures damage_figures(const arbiter::Symptoms& symptoms);
+/// As duration_text() has it.
+std::uint64_t whole_ms(Duration duration);
 /// Its name ("press"), "station 7" without one, or the ones without an entry; first in a sentence.
 std::string station_text(const Case& c, std::uint8_t station, bool first = false);
 

@@ -37,6 +37,8 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool twice = s.doubled * 2 >= s.answered && s.doubled > 0;
     const bool others_are_fine =
         c.all.answered > s.answered && c.all.damaged() == s.damaged() && c.all.doubled == s.doubled;
+    Figures figures = damage_figures(s);
+    figures["doubled"] = s.doubled;
     c.add(Cause::duplicate_address, station, "Two panels seem to have the address " + address + ".",
           std::string("Take the panel off the line: when the address still answers, find the other "
                       "one and change it. If nobody answers, ") +
@@ -44,7 +46,8 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
                        "`timing.frame_gap` so long that the second reply has passed."
                      : "look at this panel's cable and communication settings."),
           std::to_string(s.doubled) + " replies came twice; " + damage_text(c, s) +
-              (others_are_fine ? "; the other stations are fine" : ""));
+              (others_are_fine ? "; the other stations are fine" : ""),
+          std::move(figures));
 }
 
 /// Replies longer than they can be, that begin rightly: a second voice, which no cable adds.
@@ -62,16 +65,16 @@ void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
     const std::string line = " to those of the line (" + to_string(c.facts.serial) + ").";
     if (!c.facts.over_tcp && cause == Cause::wrong_parity)
         return c.add(cause, station, "All replies of " + who + " have wrong bytes.",
-                     "Set this panel's parity and data bits" + line, evidence);
+                     "Set this panel's parity and data bits" + line, evidence, damage_figures(s));
     if (!c.facts.over_tcp && cause == Cause::wrong_baud)
         return c.add(cause, station, "All that " + who + " sends is no Modbus at this speed.",
-                     "Set this panel's baud" + line, evidence);
+                     "Set this panel's baud" + line, evidence, damage_figures(s));
     c.add(
         Cause::damaged_replies, station, "Only the replies of " + who + " are damaged.",
         "Look at this panel's terminals, its branch of the cable and its shield; if the damage "
         "goes with the panel to another place, its transceiver is faulty" +
             std::string(always ? ", or its communication settings differ from the others'." : "."),
-        evidence);
+        evidence, damage_figures(s));
 }
 
 }  // namespace
@@ -124,12 +127,21 @@ void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const auto found = c.facts.response_timeouts.find(station);
     const Duration timeout =
         found == c.facts.response_timeouts.end() ? c.facts.response_timeout : found->second;
+    Figures figures{{"late", s.late},
+                    {"in_time", s.answered},
+                    {"lateness_ms", whole_ms(s.worst_lateness)},
+                    {"timeout_ms", whole_ms(timeout)}};
+    const Duration advised = enough_for(timeout + s.worst_lateness);
+    if (s.worst_lateness <= kClustered) figures["advised_ms"] = whole_ms(advised);
+    if (s.worst_lateness > kClustered || advised >= c.facts.deadline)
+        figures["deadline_ms"] = whole_ms(c.facts.deadline);
     c.add(Cause::timeout_too_short, named(station),
           "The replies of " + station_text(c, station) + " come after the response timeout.",
           timeout_advice(c.facts, timeout, s.worst_lateness),
           std::to_string(s.late) + " replies came up to " + duration_text(s.worst_lateness) +
               " after the timeout of " + duration_text(timeout) + "; " +
-              std::to_string(s.answered) + " in time");
+              std::to_string(s.answered) + " in time",
+          std::move(figures));
 }
 
 namespace {
@@ -187,7 +199,13 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
               ("requests after less than " + duration_text(split->below) + " of silence").c_str()) +
               " were not answered, after longer silence " +
               share_text(split->silent_above, split->silent_above + split->answered_above,
-                         "requests"));
+                         "requests"),
+          {{"silent_below", split->silent_below},
+           {"requests_below", split->silent_below + split->answered_below},
+           {"below_ms", whole_ms(split->below)},
+           {"silent_above", split->silent_above},
+           {"requests_above", split->silent_above + split->answered_above},
+           {"advised_ms", whole_ms(advised)}});
 }
 
 /// What it refuses is told by its own function only (AP 7): a stray frame may say anything.
@@ -202,7 +220,8 @@ void find_wrong_exception(Case& c, std::uint8_t station, const Symptoms& s) {
           "right code. Newer firmware may answer as the standard says.",
           share_text(s.wrong_exceptions, s.attempts(), "requests") +
               " were answered with an exception that names another function; " +
-              std::to_string(s.answered) + " replies were right");
+              std::to_string(s.answered) + " replies were right",
+          {{"refusals", s.wrong_exceptions}, {"requests", s.attempts()}, {"right", s.answered}});
 }
 
 void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
@@ -216,7 +235,8 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
           "where they take longer than `timing.broadcast_turnaround`: make that long enough, or "
           "write to each station by itself.",
           std::to_string(s.broadcast_replies) + " replies to " +
-              std::to_string(c.window.broadcasts) + " broadcasts");
+              std::to_string(c.window.broadcasts) + " broadcasts",
+          {{"replies", s.broadcast_replies}, {"broadcasts", c.window.broadcasts}});
 }
 
 /// A frame that is good, of the station that was asked, and not what was asked: the wire is fine.
@@ -231,7 +251,8 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
           "Compare the line's trace with the panel's manual: another function, length or address "
           "than was asked comes back. Another function or a shorter read may be what it can do.",
           share_text(s.wrong, s.attempts(), "requests") + " were answered so, " +
-              std::to_string(s.answered) + " rightly");
+              std::to_string(s.answered) + " rightly",
+          {{"wrong", s.wrong}, {"requests", s.attempts()}, {"right", s.answered}});
 }
 
 /// Late replies, doubled ones and another master's are known as such.
@@ -249,7 +270,8 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
               : "Look in its settings for what it sends by itself.",
           std::to_string(frames) + " good frames that belong to no request, " +
               std::to_string(s.attempts()) + " requests to it and " +
-              std::to_string(c.window.broadcasts) + " broadcasts");
+              std::to_string(c.window.broadcasts) + " broadcasts",
+          {{"frames", frames}, {"requests", s.attempts()}, {"broadcasts", c.window.broadcasts}});
 }
 
 void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
@@ -271,7 +293,8 @@ void find_silent_station(Case& c, std::uint8_t station, const Symptoms& s) {
               (by_crc ? " An Autonics GP with firmware of before June 2005 is silent until its "
                         "`crc_order: high_first` is set."
                       : ""),
-          "the last " + std::to_string(s.mute_in_a_row) + " requests to it without a reply");
+          "the last " + std::to_string(s.mute_in_a_row) + " requests to it without a reply",
+          {{"requests", s.mute_in_a_row}});
 }
 
 }  // namespace panelgate::doctor

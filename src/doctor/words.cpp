@@ -14,8 +14,19 @@ std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what
     return std::to_string(part) + " of " + std::to_string(whole) + " " + what + text.data();
 }
 
-std::string duration_text(Duration duration) {
-    return std::to_string(std::chrono::ceil<std::chrono::milliseconds>(duration).count()) + "ms";
+std::uint64_t whole_ms(Duration duration) {
+    return static_cast<std::uint64_t>(
+        std::chrono::ceil<std::chrono::milliseconds>(duration).count());
+}
+
+std::string duration_text(Duration duration) { return std::to_string(whole_ms(duration)) + "ms"; }
+
+Figures damage_figures(const arbiter::Symptoms& s) {
+    return {{"damaged", s.damaged()},
+            {"replies", s.damaged() + s.answered},
+            {"exact", s.damaged_exact},
+            {"short", s.damaged_short},
+            {"long", s.damaged_long}};
 }
 
 std::string damage_text(const Case& c, const arbiter::Symptoms& s) {

@@ -9,6 +9,7 @@ namespace panelgate::points {
 struct Poller::State : std::enable_shared_from_this<Poller::State> {
     struct Station {
         std::uint8_t id = 0;
+        std::string name;
         bus::ClientId client = bus::next_client_id();  ///< of its own: stations take turns
         PlanLimits limits;
         std::shared_ptr<StationPolls> polls;
@@ -68,6 +69,7 @@ void Poller::State::on_answer(Station& station, std::size_t read, const bus::Ans
 Poller::State::StationPtr Poller::State::make(PolledStation wanted) const {
     auto made = std::make_shared<Station>();
     made->id = wanted.id;
+    made->name = std::move(wanted.name);
     made->limits = wanted.limits;
     made->polls = std::make_shared<StationPolls>(std::move(wanted.wants), std::move(wanted.limits),
                                                  clock.now(), std::move(wanted.memory));
@@ -75,7 +77,9 @@ Poller::State::StationPtr Poller::State::make(PolledStation wanted) const {
 }
 
 void Poller::State::introduce(const Station& station) {
-    bus.name_client(station.client, "poll of station " + std::to_string(station.id));
+    const std::string called =
+        station.name.empty() ? "station " + std::to_string(station.id) : station.name;
+    bus.name_client(station.client, "poll of " + called);
 }
 
 void Poller::State::apply(std::vector<PolledStation> wanted) {
@@ -85,6 +89,8 @@ void Poller::State::apply(std::vector<PolledStation> wanted) {
         const bool known = found != before.end();
         if (known && (*found)->polls->wants() == one.wants && (*found)->limits == one.limits) {
             (*found)->polls->apply(std::move(one.memory));
+            (*found)->name = std::move(one.name);
+            if (running) introduce(**found);
             stations.push_back(*found);
             continue;
         }

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import {explain, hex, valuesOf} from '../../src/web/page/frame.js';
-import {Timeline, bytesOf, characterTime, latency} from '../../src/web/page/timeline.js';
+import {Timeline, bytesOf, characterTime, latency, plotted} from '../../src/web/page/timeline.js';
 
 const CHARACTER = 0.001;
 const frame = (sequence, at, direction, bytes, note) =>
@@ -109,4 +109,22 @@ test('a transaction that is over has better instants than the frames, and its qu
 test('what nobody knows is no zero', () => {
     assert.equal(latency(timeline([request(1, 10), reply(2, 10.03)]).exchanges).queue.mean, null);
     assert.equal(latency([]).total.mean, null);
+});
+
+test('a plot has a gap and a tick where nobody answered, and nothing of what is not over', () => {
+    const made = timeline([request(1, 10), reply(2, 10.03), request(3, 11), request(4, 12), reply(5, 12.03), request(6, 13)]);
+    const {rows, failed} = plotted(made.of(31), made.waiting);
+    assert.deepEqual(rows.map(([at]) => at), [10000, 11000, 12000]);
+    assert.deepEqual(rows.map(([, , wire]) => wire === null), [false, true, false]);
+    assert.deepEqual(failed, [11000]);
+    made.add({frames: [], decisions: [], transactions: [{sequence: 6, outcome: 'timeout', client: null, arrived: 13, first_bit_out: 13,
+        last_bit_out: 13.008, first_byte_in: null}]});
+    assert.deepEqual(plotted(made.of(31), made.waiting).failed, [11000, 13000], 'now it is over');
+});
+
+test('a refusal was measured and failed all the same; broadcasts fail nobody', () => {
+    const made = timeline([request(1, 10), reply(2, 10.03, '1F 83 02 AA AA'), request(3, 11, '00 05 00 01 FF 00 AA AA'), request(4, 12), reply(5, 12.03)]);
+    const {rows, failed} = plotted(made.exchanges, made.waiting);
+    assert.deepEqual([rows.length, failed], [2, [10000]]);
+    assert.ok(rows[0][2] > 0);
 });

@@ -1,7 +1,6 @@
 """The dashboard as people see it, in headless Chromium; skipped where there is none."""
 import os
 import pathlib
-import tempfile
 import unittest
 
 import harness
@@ -275,81 +274,6 @@ class Discovery(Browser):
         self.look("300")
         self.wait(lambda: "1 to 247" in self.text(".refusal"))
         self.complaints()  # a 400 is written to the console, too
-
-
-class Tokens(Browser):
-    """A gateway with an operator's and a viewer's token."""
-    anonymous = "viewer"
-
-    @classmethod
-    def gateway(cls):
-        folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
-        (folder / "ops").write_text("let-me-write-please-4711\n")
-        (folder / "eye").write_text("let-me-look-please-4711\n")
-        tokens = ", ".join(f"{{name: {name}, role: {role}, file: {folder / name}}}"
-                           for name, role in (("ops", "operator"), ("eye", "viewer")))
-        config = folder / "panelgate.yaml"
-        http = f'listen: "127.0.0.1:0", anonymous: {cls.anonymous}, tokens: [{tokens}]'
-        config.write_text(gateway(line(), http=http))
-        return cls.enterClassContext(harness.Program("run", "-c", str(config)))
-
-    def give(self, token):
-        self.wait(lambda: self.all("#token"))
-        self.find("#token").clear()
-        self.find("#token").send_keys(token)
-        self.find("dialog button.primary").click()
-
-    def enter(self, token):
-        self.find("#role").click()
-        self.give(token)
-
-
-class Roles(Tokens):
-    """Without a token everybody may look; a token is needed to write."""
-
-    def test_who_looks_cannot_write_and_a_token_of_an_operator_lets_one(self):
-        self.open("request/press")
-        self.wait(lambda: self.all("#role-needed"))
-        self.assertFalse(self.all("#write"))
-        self.enter("wrong-and-long-enough")
-        self.wait(lambda: self.all("dialog .refusal"))
-        self.find("dialog button[type=button]").click()
-        self.enter("let-me-look-please-4711")
-        self.wait(lambda: not self.all("dialog"))
-        self.assertFalse(self.all("#write"))
-        self.enter("let-me-write-please-4711")
-        self.wait(lambda: self.all("#write"))
-        self.assertIn("operator", self.text("#role"))
-        kept = self.script("return [JSON.stringify(localStorage), document.cookie, location.href]")
-        self.assertNotIn("4711", "".join(kept))
-        self.complaints()  # the refusals
-
-
-class Closed(Tokens):
-    """Nobody sees anything without a token: the page asks for it."""
-    anonymous = "none"
-
-    def test_the_page_asks_for_a_token_until_it_is_right_and_can_be_left(self):
-        self.driver.get(f"{self.origin}/#/")
-        self.give("wrong-and-long-enough")
-        self.wait(lambda: self.all("dialog .refusal"))
-        self.find("dialog .bar button").click()  # cancel
-        self.wait(lambda: self.all("main button.primary"))
-        self.assertNotIn("press", self.text("main"))
-        self.find("main button.primary").click()
-        self.give("let-me-look-please-4711")
-        self.wait(lambda: self.all(tile("press")))
-        streams = [url for url in self.requested() if "/api/v1/events" in url]
-        self.assertTrue(streams, "events come with the token, too")
-        self.driver.refresh()  # the tab knows it
-        self.wait(lambda: self.all(tile("press")))
-        self.assertIn("viewer", self.text("#role"))
-        self.find("#role").click()
-        self.wait(lambda: self.all("dialog .bar button"))
-        self.find("dialog .bar button").click()  # forget
-        self.wait(lambda: self.all("#token"))
-        self.assertFalse(self.all(tile("press")))
-        self.complaints()  # the refusals
 
 
 class Looks(Browser):

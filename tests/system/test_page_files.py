@@ -16,9 +16,15 @@ LARGEST = 150_000  # bytes of everything a browser fetches, packed
 LONGEST = 300      # lines of a file
 
 
+TABLES = ("words.js", "finding_words.js")
+
+
 def words():
-    text = (FOLDER / "words.js").read_text()
-    return json.loads(text[text.index("= ") + 2:text.rindex(";")])
+    table = {}
+    for name in TABLES:
+        text = (FOLDER / name).read_text()
+        table |= json.loads(text[text.index("= ") + 2:text.rindex(";")])
+    return table
 
 
 class Files(unittest.TestCase):
@@ -98,17 +104,30 @@ class Words(unittest.TestCase):
                 self.assertTrue(text.strip(), key)
                 self.assertEqual(sorted(re.findall(r"{\w+}", text)), sorted(re.findall(r"{\w+}", said[0])), key)
 
+    def test_every_cause_of_the_line_doctor_is_said_with_figures_that_it_has(self):
+        doctor = "".join(path.read_text() for path in (harness.ROOT / "src/doctor").glob("*.cpp"))
+        codes = re.findall(r'^    "([a-z-]+)",$', (harness.ROOT / "src/doctor/finding.cpp").read_text(), re.M)
+        figures = set(re.findall(r'\{"(\w+)",', doctor)) | set(re.findall(r'figures\["(\w+)"\]', doctor))
+        table = words()
+        damage = {"wrong-baud", "wrong-parity", "noise", "tcp-framing", "damaged-replies"}
+        for cause in codes:
+            self.assertLessEqual({f"finding.{cause}", f"advice.{cause}"}, set(table))
+            self.assertIn("evidence.damage" if cause in damage else f"evidence.{cause}", table)
+        for key, (english, *_) in table.items():
+            if key.startswith(("advice.", "evidence.")):
+                self.assertLessEqual(set(re.findall(r"{(\w+)}", english)), figures, key)
+
     def test_no_word_is_there_twice(self):
-        keys = re.findall(r'^"([^"]+)":', (FOLDER / "words.js").read_text(), re.M)
+        keys = re.findall(r'^"([^"]+)":', "".join((FOLDER / name).read_text() for name in TABLES), re.M)
         self.assertEqual(len(keys), len(set(keys)))
 
     def test_every_word_that_the_page_says_is_in_the_table_and_every_other_is_said(self):
-        code = "".join(path.read_text() for path in FOLDER.glob("*.js") if path.name != "words.js")
+        code = "".join(path.read_text() for path in FOLDER.glob("*.js") if path.name not in TABLES)
         table = words()
         said = set(re.findall(r"\bt\('([\w.-]+)'", code)) - {key for key in re.findall(r"\bt\('([\w.-]+\.)' \+", code)}
         self.assertEqual(said - set(table), set())
         quoted = set(re.findall(r"'([\w.-]+)'", code))
-        kinds = re.findall(r"\bt\('(\w+\.)' \+", code) + [f"{kind}." for kind in re.findall(r"word\('(\w+)'", code)] + ["state."]
+        kinds = re.findall(r"\bt\('(\w+\.)' \+", code) + [f"{kind}." for kind in re.findall(r"word\('(\w+)'", code)] + ["state.", "finding.", "advice.", "evidence."]
         unsaid = {key for key in table if key not in quoted and not any(key.startswith(kind) for kind in kinds)}
         self.assertEqual(unsaid, set())
 

@@ -1,5 +1,6 @@
 """What REST says and refuses, on the real program: who refused, who asks, when, and numbers."""
 import datetime
+import re
 import struct
 import unittest
 import urllib.error
@@ -142,7 +143,7 @@ class Rest(unittest.TestCase):
             whys = "\n".join(frame.get("why", "") for frame in frames)
             self.assertIn(f"read of modbus_tcp 127.0.0.1:{port} to station 31", whys)
             self.assertIn("read of http 127.0.0.1 to station 31", whys)
-            self.assertIn("poll of station 31", whys)
+            self.assertIn("poll of press", whys)
             self.assertNotRegex(whys, r"client \d")
             for frame in frames:
                 self.assertRegex(frame["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")
@@ -156,6 +157,27 @@ class Rest(unittest.TestCase):
             port = client.socket.getsockname()[1]
             names = [c["name"] for c in program.get("/api/v1/lines/floor1")[1]["clients"]]
             self.assertIn(f"modbus_tcp 127.0.0.1:{port}", names)
+
+    def test_who_has_hung_up_is_still_in_the_list_and_shares_add_up(self):
+        with harness.configured(PLANT) as program:
+            for _ in range(3):  # a connection each, as curl
+                program.values(PRESS + "devices/UW0")
+                with program.client() as client:
+                    client.ask(31, harness.read_registers(0))
+            def seen():
+                clients = program.get("/api/v1/lines/floor1")[1]["clients"]
+                return {c["name"]: c for c in clients}
+            while seen().get("modbus_tcp 127.0.0.1", {}).get("requests") != 3:
+                text_of(program, "/healthz")  # it has hung up, and that is heard soon
+            clients = seen()
+            gone = clients["modbus_tcp 127.0.0.1"]
+            self.assertGreaterEqual(gone["gone_ms"], 0)
+            self.assertGreater(gone["transactions"], 0)
+            self.assertGreaterEqual(clients["http 127.0.0.1"]["requests"], 3)
+            self.assertIn("poll of press", clients)
+            self.assertAlmostEqual(sum(c["percent"] for c in clients.values()), 100, delta=0.5)
+            told = re.search(r'bus_busy_seconds_total\{line="floor1"\} (\S+)', text_of(program, "/metrics"))
+            self.assertLessEqual(sum(c["busy_seconds"] for c in clients.values()), float(told.group(1)) + 0.001)
 
     def test_a_client_whose_first_request_is_a_broadcast_has_its_name(self):
         text = config.gateway(FREE_LINE, http=config.OPERATOR)

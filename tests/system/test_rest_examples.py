@@ -23,7 +23,7 @@ BASE = "http://127.0.0.1:8080"
 # What differs from run to run, or only tells how quick the machine is.
 PASSING = {"age_ms", "last_success_ms", "last_write_ms", "load_percent", "queue_depth", "samples",
            "bus_ms", "took_ms"}
-OF_A_CLIENT = {"name", "requests", "failed", "last_error", "last_error_ms", "busy_seconds", "percent",
+OF_A_CLIENT = {"name", "gone_ms", "requests", "failed", "last_error", "last_error_ms", "busy_seconds", "percent",
                "transactions"}
 OF_A_FRAME = {"sequence", "time", "at", "bytes", "why", "transaction"}
 OF_A_TRANSACTION = {"id", "sequence", "ended", "time", "client", "arrived", "granted", "first_bit_out", "last_bit_out",

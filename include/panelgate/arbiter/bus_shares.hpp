@@ -26,6 +26,11 @@ class BusShares {
         ++shares_[client].transactions;
     }
     void forget(Client client) { shares_.erase(client); }
+    /// Nothing used yet: all zero.
+    Share of(Client client) const {
+        const auto known = shares_.find(client);
+        return known == shares_.end() ? Share{} : known->second;
+    }
     const std::map<Client, Share>& all() const { return shares_; }
 
   private:

@@ -47,6 +47,7 @@ struct Settings {
     TraceSettings trace;
     IncidentSettings incidents;
     doctor::Settings doctor;
+    ClientSettings clients{};
 };
 
 /// Drives one line with one arbiter. Everything happens on the executor's one thread.

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -65,16 +67,27 @@ using AnswerHandler = InlineFunction<void(Answer), 48>;
 
 /// What one client has asked of a line, and used of its time (P9).
 struct ClientShare {
-    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"
+    std::string name;  ///< "modbus_tcp 10.0.0.7:51234"; of those who have left, without a port
     Duration busy{};
-    double percent = 0;  ///< of what all clients that are there have used
+    double percent = 0;  ///< of all the time that the line was busy
     std::uint64_t transactions = 0;
     std::optional<std::string> address{};  ///< without its port; nothing: it is no server's client
     std::uint64_t requests = 0;
     std::uint64_t failed = 0;             ///< of these, panels' exceptions too
     std::optional<Outcome> last_error{};  ///< of the last that failed
     Duration last_error_ago{};
+    std::optional<Duration> gone{};  ///< how long ago it has left; nothing: it is there
 };
+
+/// Who has hung up is still shown, by its name without a port.
+struct ClientSettings {
+    Duration remembered_for = 10min;
+    std::size_t remembered = 256;  ///< names at most; the one that left first gives way
+};
+
+/// The name of the row that has what no other has: of those who are shown no more, and of the
+/// gateway's own probes.
+constexpr std::string_view kOtherClients = "others";
 
 /// What the line doctor takes for a cause of errors.
 struct LineFinding {
@@ -84,6 +97,8 @@ struct LineFinding {
     std::string advice;
     std::string evidence;  ///< the numbers behind it
     std::string name{};    ///< of the station, as the configuration has it; empty: the whole line
+    /// The numbers of these texts: counts, and durations in milliseconds ("timeout_ms").
+    std::map<std::string, std::uint64_t> figures{};
 };
 
 struct LineStatus {
@@ -149,7 +164,8 @@ class BusClient {
     virtual void cancel(ClientId client) = 0;
 
     virtual LineStatus status() const = 0;
-    /// What each client has used of the line: the greediest first, at most 100.
+    /// What each client has used of the line: the greediest first, at most 100, and behind them
+    /// what no other row has. Together they are what the line has done.
     virtual std::vector<ClientShare> clients() const { return {}; }
     virtual StationStatus station_status(std::uint8_t station) const = 0;
     /// What became of all requests to a station that the configuration lists.

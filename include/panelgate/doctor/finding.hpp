@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -34,6 +35,9 @@ enum class Cause : std::uint8_t {
 /// "wrong-baud": the word in REST and in the log. It never changes.
 std::string_view code(Cause cause);
 
+/// "late" -> 5, "timeout_ms" -> 300: counts, and durations in whole milliseconds, rounded up.
+using Figures = std::map<std::string, std::uint64_t>;
+
 /// One likely cause, in words for people.
 struct Finding {
     Cause cause = Cause::noise;
@@ -41,6 +45,7 @@ struct Finding {
     std::string text;                     ///< what is wrong
     std::string advice;                   ///< what to do
     std::string evidence;                 ///< the numbers behind it
+    Figures figures{};                    ///< ... for whoever says it in another language
 
     bool is_about_the_same(const Finding& other) const {
         return cause == other.cause && station == other.station;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
@@ -19,6 +20,7 @@ struct PolledStation {
     std::vector<Want> wants;
     PlanLimits limits;
     SharedMemory memory{};
+    std::string name{};  ///< of the station, for people; empty: it is called by its id
 };
 
 /// Runs the polls of one line through its bus, as requests of the class `poll`: one under way a

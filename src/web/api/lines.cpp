@@ -40,6 +40,9 @@ json::array describe(const std::vector<bus::LineFinding>& findings) {
         object["text"] = finding.text;
         object["advice"] = finding.advice;
         object["evidence"] = finding.evidence;
+        json::object figures;
+        for (const auto& [name, value] : finding.figures) figures[name] = value;
+        object["figures"] = std::move(figures);
         list.push_back(std::move(object));
     }
     return list;
@@ -60,6 +63,8 @@ json::array describe(const std::vector<bus::ClientShare>& clients) {
             object["last_error"] = label(*client.last_error);
             object["last_error_ms"] = whole_ms(client.last_error_ago);
         }
+        object["gone_ms"] = nullptr;
+        if (client.gone) object["gone_ms"] = whole_ms(*client.gone);
         object["busy_seconds"] = to_seconds(client.busy);
         object["percent"] = std::round(client.percent * 10) / 10;
         object["transactions"] = client.transactions;

@@ -15,6 +15,10 @@ constexpr Role kSee = Role::viewer;
 constexpr Role kChange = Role::operator_;
 constexpr std::string_view kReading = "count type order length raw";
 
+/// A page holds no data of the plant: whoever may connect gets it, and its token asks for the rest.
+constexpr Role kPage = Role::none;
+constexpr bool kProbe = true;
+
 constexpr Manner kPlain{};
 constexpr Manner kTagged{.tagged = true};
 constexpr Manner kAsks{.asks = true};
@@ -28,14 +32,15 @@ struct Row {
     Role needed;
     Manner manner = {};
     std::string_view queries = {};  ///< with a blank between them
+    bool probe = false;
 };
 constexpr Row kRows[] = {
-    {"GET", "/", get_index, kFree},  // the page asks for a token; it has no data of its own
-    {"GET", "/page/{}", get_page, kFree},
-    {"GET", "/docs", get_docs, kFree},
+    {"GET", "/", get_index, kPage},
+    {"GET", "/page/{}", get_page, kPage},
+    {"GET", "/docs", get_docs, kPage},
     {"GET", "/openapi.json", get_openapi, kSee},
-    {"GET", "/healthz", get_healthz, kFree},
-    {"GET", "/readyz", get_readyz, kFree},
+    {"GET", "/healthz", get_healthz, kFree, kPlain, {}, kProbe},
+    {"GET", "/readyz", get_readyz, kFree, kPlain, {}, kProbe},
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/version", get_version, kSee},
     {"GET", "/api/v1/configuration", get_configuration, kSee, kTagged},
@@ -94,8 +99,7 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
         const auto call = [api, &row](HttpRequest request) {
             return conduct(std::move(request), api.get(), row.handler, row.manner);
         };
-        const bool probe = row.handler == get_healthz || row.handler == get_readyz;
-        made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), probe});
+        made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe});
     }
     return made;
 }

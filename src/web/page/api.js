@@ -1,4 +1,5 @@
 // The gateway's REST interface, and who we are to it.
+import {EventText} from './event_text.js';
 
 let token = null;
 try { token = sessionStorage.getItem('panelgate.token'); } catch { /* private window */ }
@@ -14,28 +15,33 @@ export class Refused extends Error {
     }
 }
 
-/** What fetch() is to be told, with the token that we have. */
-export function asUs(method = 'GET', headers = {}) {
-    const options = {method, headers: {...headers}, cache: 'no-store'};
-    if (token) options.headers.Authorization = `Bearer ${token}`;
-    return options;
-}
-
-async function ask(method, path, body) {
-    const options = asUs(method);
-    if (body !== undefined) {
-        options.body = JSON.stringify(body);
-        options.headers['Content-Type'] = 'application/json';
-    }
-    let response;
+/** fetch() with our token. */
+async function send(path, options = {}) {
+    const headers = {...options.headers};
+    if (token) headers.Authorization = `Bearer ${token}`;
     try {
-        response = await fetch(path, options);
+        return await fetch(path, {...options, headers, cache: 'no-store'});
     } catch {
         throw new Refused(0, {title: 'unreachable'});
     }
+}
+
+/** What an answer says; throws where it is a refusal. */
+async function parsedOf(response) {
     const given = response.headers.get('Content-Type') ?? '';
     const parsed = given.includes('json') ? await response.json() : {detail: await response.text()};
     if (!response.ok) throw new Refused(response.status, parsed);
+    return parsed;
+}
+
+async function ask(method, path, body) {
+    const options = {method};
+    if (body !== undefined) {
+        options.body = JSON.stringify(body);
+        options.headers = {'Content-Type': 'application/json'};
+    }
+    const response = await send(path, options);
+    const parsed = await parsedOf(response);
     costs.set(parsed, response.headers.get('Panelgate-Transactions')?.split(',').map(transaction) ?? []);
     return parsed;
 }
@@ -55,6 +61,31 @@ export const get = (path) => ask('GET', path);
 export const put = (path, body) => ask('PUT', path, body);
 export const remove = (path) => ask('DELETE', path);
 export const post = (path, body) => ask('POST', path, body);
+
+/** An answer as a file, for a link carries no token. */
+export async function getFile(target) {
+    const response = await send(target);
+    return response.ok ? response.blob() : parsedOf(response);
+}
+
+/**
+ * Server-sent events: told(type, data) for each, ended() when there are no more; close() ends them
+ * without a word. EventSource would not do, for it carries no token.
+ */
+export function follow(target, told, ended) {
+    const stop = new AbortController();
+    const read = async () => {
+        const response = await send(target, {signal: stop.signal});
+        if (!response.ok) return;
+        const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+        const text = new EventText();
+        for (let part = await reader.read(); !part.done; part = await reader.read()) {
+            for (const {type, data} of text.add(part.value)) told(type, data);
+        }
+    };
+    read().catch(() => {}).finally(() => stop.signal.aborted || ended());
+    return {close: () => stop.abort()};
+}
 
 /** /api/v1/... with each part encoded. */
 export function path(...parts) {
@@ -76,26 +107,30 @@ export async function introduce() {
     gateway.build = offers('GET /api/v1/version') ? await get(path('version')) : null;
 }
 
-/** Takes another token, or none for ''; throws when the gateway does not know it. */
+/** Takes another token; throws when the gateway does not know it. */
 export async function useToken(given) {
     const before = token;
-    token = given || null;
+    token = given;
     try {
         await introduce();
     } catch (error) {
         token = before;
         throw error;
     }
+    keep();
+}
+
+function keep() {
     try {
         if (token) sessionStorage.setItem('panelgate.token', token);
         else sessionStorage.removeItem('panelgate.token');
     } catch { /* it is kept for as long as this page is */ }
 }
 
-/** Signs out; who may do nothing without a token is asked for one. */
+/** From here on we are nobody in particular. */
 export function forgetToken() {
-    try { sessionStorage.removeItem('panelgate.token'); } catch { /* it was kept by this page alone */ }
-    location.reload();
+    token = null;
+    keep();
 }
 
 export const hasToken = () => token !== null;

@@ -1,18 +1,18 @@
 // The page: what is shown where, in which language and theme.
-import {gateway, hasToken, introduce, offers, useToken} from './api.js';
+import {forgetToken, gateway, hasToken, introduce, offers} from './api.js';
 import {attribute, choice, h, replace, text} from './dom.js';
 import {language, languages, store, stored, t} from './language.js';
 import {discoveryView} from './discovery.js';
 import {latencyView} from './latency.js';
 import {live} from './live.js';
-import {overviewView} from './overview.js';
+import {overviewView, tone} from './overview.js';
 import {clientsView, relaysView} from './plain_views.js';
 import {pointsView} from './points.js';
 import {requestView} from './request.js';
 import {scopeView} from './scope.js';
 import {settingsView} from './settings.js';
 import {stationView} from './station.js';
-import {askToken, roleButton} from './token.js';
+import {roleButton, signIn} from './token.js';
 
 const VIEWS = {'': overviewView, scope: scopeView, latency: latencyView, points: pointsView, relays: relaysView,
     clients: clientsView, request: requestView, discovery: discoveryView, settings: settingsView, station: stationView};
@@ -31,24 +31,37 @@ function theme(chosen) {
     store('theme', chosen);
 }
 
+/** What there is whoever one is: names, and what is chosen, behind who one is. */
+function tools(...who) {
+    attribute(document.getElementById('nav'), 'aria-label', t('nav'));
+    attribute(document.getElementById('menu'), 'aria-label', t('menu'));
+    text(document.getElementById('skip'), t('skip'));
+    replace(document.getElementById('tools'), who,
+        choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
+        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+}
+
 function build() {
     const nav = document.getElementById('nav');
     const links = Object.entries(NAMED).filter(([name]) => !NEEDS[name] || offers(NEEDS[name])).map(([name, key]) =>
         h('a', {href: `#/${name}`, 'data-view': name}, t('nav.' + key)));
-    attribute(nav, 'aria-label', t('nav'));
     replace(nav, links);
     const menu = document.getElementById('menu');
-    attribute(menu, 'aria-label', t('menu'));
     menu.addEventListener('click', () => open(nav.hidden || !nav.classList.contains('open')));
     const open = (yes) => {
         nav.classList.toggle('open', yes);
         attribute(menu, 'aria-expanded', String(yes));
     };
     nav.addEventListener('click', () => open(false));
-    text(document.getElementById('skip'), t('skip'));
-    replace(document.getElementById('tools'), roleButton(),
-        choice(t('language'), languages, language, (chosen) => { store('language', chosen); location.reload(); }),
-        choice(t('theme'), THEMES.map((name) => [name, t('theme.' + name)]), stored('theme') ?? 'auto', theme));
+    tools(roleButton());
+    text(document.getElementById('version'), gateway.configuration.version);
+}
+
+/** A tab that nobody looks at says how many do not answer. */
+function entitle() {
+    const silent = live.stations.filter((station) => tone(station.state) === 'bad').length;
+    const name = `${main.querySelector('h1')?.textContent.trim() ?? ''} · panelgate`;
+    document.title = silent > 0 ? `⚠ ${silent} · ${name}` : name;
 }
 
 function show() {
@@ -60,7 +73,7 @@ function show() {
     replace(main, shown.node);
     shown.update?.();
     for (const link of document.querySelectorAll('#nav a')) attribute(link, 'aria-current', link.dataset.view === view ? 'page' : null);
-    document.title = `${main.querySelector('h1')?.textContent ?? ''} · panelgate`;
+    entitle();
     main.dataset.view = view;
     window.scrollTo(0, 0);
 }
@@ -68,31 +81,29 @@ function show() {
 function refresh() {
     banner.hidden = live.reachable;
     if (!live.reachable) text(banner, t('unreachable'));
-    if (live.refused) location.reload();  // our token is none any more: we are asked for another
+    entitle();
     shown?.update?.();
 }
 
-/** Nothing is shown without a token: asks for one until there is one. */
-async function knock() {
-    await askToken();
-    while (!gateway.configuration) {
-        await new Promise((again) => {
-            replace(main, h('div', null, h('h1', null, 'panelgate'), h('p', null, t('token.required')),
-                h('button', {type: 'button', class: 'primary', onclick: again}, t('token.enter'))));
-        });
-        await askToken();
+/** introduce(); is who we are known? */
+async function known() {
+    try {
+        await introduce();
+        return true;
+    } catch (error) {
+        if (error.status !== 401) throw error;
+        return false;
     }
 }
 
-/** A token that this tab remembers may be none any more. */
+/** Ends when we may look. A token that this tab remembers may be none any more. */
 async function enter() {
-    try {
-        await introduce();
-    } catch (error) {
-        if (error.status !== 401) throw error;
-        if (hasToken()) await useToken('').catch(() => knock());
-        else await knock();
-    }
+    if (await known()) return;
+    const forgotten = hasToken();
+    forgetToken();
+    if (forgotten && await known()) return;
+    tools();
+    await signIn(main, forgotten);
 }
 
 async function start() {
@@ -110,10 +121,10 @@ async function start() {
     await first;
     if (live.refused) await live.refresh();
     live.addEventListener('status', refresh);
+    live.addEventListener('refused', () => location.reload());
     live.start();
     window.addEventListener('hashchange', () => { show(); main.focus(); });
     document.addEventListener('role', show);
-    document.getElementById('version').textContent = gateway.configuration.version;
     show();
     performance.mark('shown');
 }

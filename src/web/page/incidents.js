@@ -1,6 +1,7 @@
 // What the flight recorder has frozen around errors, to be taken away.
 import {get, offers, path} from './api.js';
 import {h, list, table} from './dom.js';
+import {download} from './download.js';
 import {t, time, word} from './language.js';
 import {live} from './live.js';
 
@@ -13,7 +14,7 @@ export function incidents(line) {
     const shown = table(t('incidents'), [[t('time')], [t('station')], [t('kind')], [t('errors'), 'number'], ['']]);
     node.append(h('h2', null, t('incidents')), shown.node);
     const row = (one) => {
-        const away = (ending, name) => h('a', {href: path('lines', line, 'incidents', one.id + ending), download: `${line}-${one.id}${ending || '.json'}`}, name);
+        const away = (ending, name) => download(path('lines', line, 'incidents', one.id + ending), `${line}-${one.id}${ending || '.json'}`, name);
         return {node: h('tr', null, h('td', {class: 'figure'}, time(Date.parse(one.time) / 1000)),
             h('td', null, live.at(line, one.station)?.name ?? String(one.station ?? '')), h('td', null, word('cause', one.cause)),
             h('td', {class: 'number'}, String(one.errors)), h('td', null, away('', 'JSON'), ' ', away('.pcapng', 'pcapng')))};

@@ -1,5 +1,8 @@
 // The language of the page, from the one table of words.
-import {words} from './words.js';
+import {words as findings} from './finding_words.js';
+import {words as others} from './words.js';
+
+const words = {...others, ...findings};
 
 export const languages = [['en', 'English'], ['de', 'Deutsch'], ['ko', '한국어'], ['ja', '日本語']];
 const column = Object.fromEntries(languages.map(([name], index) => [name, index]));
@@ -24,9 +27,12 @@ document.documentElement.lang = language;
 /** The words of a key; {name} stands for a value. A key that nobody has is shown as it is. */
 export function t(key, values = {}) {
     const all = words[key];
-    const said = all ? all[column[language]] : key;
-    return said.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+    const text = all ? all[column[language]] : key;
+    return text.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
 }
+
+/** Has the table this key? */
+export const said = (key) => key in words;
 
 /** The words for one of the gateway's own ("online"); its own where the table has none. */
 export function word(kind, name) {

@@ -3,8 +3,8 @@ import {attribute, choice, h, list, text} from './dom.js';
 import {duration, number, t} from './language.js';
 import {live} from './live.js';
 import {plot} from './plot.js';
-import {latency} from './timeline.js';
-import {traceOf} from './trace.js';
+import {latency, plotted} from './timeline.js';
+import {gatewayNow, traceOf} from './trace.js';
 
 const LOOKED_AT = 200;  // transactions of a station
 const PLOTTED = 600;
@@ -30,9 +30,8 @@ function row(first) {
 
 function split(line) {
     const trace = traceOf(line);
-    const rows = () => trace.timeline.exchanges.filter((one) => one.total !== null).slice(-PLOTTED)
-        .map((one) => [new Date(one.request.wall * 1000), one.queue ?? 0, one.wire, one.think]);
-    return plot({title: t('latency.plot', {line}), unit: 'ms', labels: PARTS.map((part) => t(part)), colours: ['c3', 'c0', 'c1'], stacked: true, rows});
+    const read = () => plotted(trace.timeline.exchanges.slice(-PLOTTED), trace.timeline.waiting);
+    return plot({title: t('latency.plot', {line}), unit: 'ms', labels: PARTS.map((part) => t(part)), colours: ['c3', 'c0', 'c1'], stacked: true, read, now: gatewayNow});
 }
 
 export function latencyView({argument}) {

@@ -1,7 +1,6 @@
 // What lines and stations are now. Asked once a second while the page is seen, and at once when an
 // event says that something has changed.
-import {get, offers, path} from './api.js';
-import {EventStream} from './event_stream.js';
+import {follow, get, offers, path} from './api.js';
 
 const PERIOD = 1000;  // ms
 const SOON = 60;      // ms: events of one moment are one reason to ask
@@ -13,10 +12,9 @@ class Live extends EventTarget {
     lines = [];
     stations = [];
     reachable = true;
-    /** The gateway wants a token that it knows. */
-    refused = false;
+    refused = false;  // who we are may not see it
     #timer = null;
-    #source = null;
+    #events = null;
     #asking = false;
     #started = false;
     #due = false;
@@ -35,28 +33,33 @@ class Live extends EventTarget {
     /** The browser has few connections to one host: a page that nobody sees keeps none. */
     #seen() {
         if (document.hidden) {
-            this.#source?.close();
-            clearTimeout(this.#timer);
+            this.#rest();
             return;
         }
         this.#listen();
         this.refresh();
     }
 
+    #rest() {
+        this.#events?.close();
+        this.#events = null;
+        clearTimeout(this.#timer);
+        this.#tell('rest');
+    }
+
     #listen() {
-        if (!this.#started) return;
-        if (this.#source && !this.#source.closed) return;
+        if (!this.#started || this.#events) return;
         const discovers = offers('POST /api/v1/lines/{}/discover');
         const types = ['station', 'line', 'transaction', 'point', ...discovers ? ['discovery'] : []];
-        this.#source = new EventStream(path('events') + `?types=${types}`, this.#source?.last);
-        this.#source.addEventListener('discovery', (event) => this.#tell('discovery', JSON.parse(event.data)));
-        for (const type of ['station', 'line', 'lost']) this.#source.addEventListener(type, () => this.#soon());
-        this.#source.addEventListener('transaction', (event) => {
-            const told = JSON.parse(event.data);
-            const now = this.stations.find((s) => s.line === told.line && s.name === told.station);
-            if (now && CONTRADICTS[told.outcome]?.includes(now.state)) this.#soon();
-        });
-        this.#source.addEventListener('point', (event) => this.#tell('point', JSON.parse(event.data)));
+        this.#events = follow(path('events') + `?types=${types}`, (type, data) => this.#take(type, JSON.parse(data)),
+            () => { this.#events = null; });
+    }
+
+    #take(type, told) {
+        if (type === 'discovery' || type === 'point') return this.#tell(type, told);
+        if (type !== 'transaction') return this.#soon();
+        const now = this.stations.find((s) => s.line === told.line && s.name === told.station);
+        if (now && CONTRADICTS[told.outcome]?.includes(now.state)) this.#soon();
     }
 
     #soon() {
@@ -78,13 +81,21 @@ class Live extends EventTarget {
             this.refused = false;
             this.#listen();
         } catch (error) {
-            this.refused = error.status === 401;
-            this.reachable = this.refused;
+            if (error.status === 401) return this.#refuse();
+            this.reachable = false;
         }
         this.#asking = false;
         this.#tell('status');
         clearTimeout(this.#timer);
-        if (!document.hidden && !this.refused) this.#timer = setTimeout(() => this.refresh(), this.#due ? SOON : PERIOD);
+        if (!document.hidden) this.#timer = setTimeout(() => this.refresh(), this.#due ? SOON : PERIOD);
+    }
+
+    /** To ask again is no use without another token. */
+    #refuse() {
+        this.#asking = false;
+        this.refused = true;
+        this.#rest();
+        this.#tell('refused');
     }
 
     #tell(type, detail) { this.dispatchEvent(new CustomEvent(type, {detail})); }

@@ -1,7 +1,8 @@
 // Lines with their load, and their stations as tiles.
 import {get, offers, path} from './api.js';
 import {attribute, h, list, replace, text} from './dom.js';
-import {duration, language, number, t, word} from './language.js';
+import {findingNote, findingText} from './finding.js';
+import {duration, number, t, word} from './language.js';
 import {live} from './live.js';
 import {sparkline} from './plot.js';
 import {latency} from './timeline.js';
@@ -23,20 +24,6 @@ export function badge(kind, state) {
     return h('span', {class: `badge ${tone(state)}`}, word(kind, state));
 }
 
-/** What is wrong, in the reader's language; figures and advice are the gateway's own. */
-function findingText(finding) {
-    const key = `finding.${finding.cause}`;
-    const said = word('finding', finding.cause);
-    if (language === 'en' || said === finding.cause) return {lang: 'en', said: finding.text};
-    return {lang: language, said: t(key, {who: finding.name ?? t('finding.line')})};
-}
-
-export function findingNote(finding) {
-    const {lang, said} = findingText(finding);
-    return h('li', {class: 'finding'}, h('strong', {lang}, said), ' ',
-        h('span', {lang: 'en'}, finding.advice), finding.evidence ? h('small', {lang: 'en'}, finding.evidence) : null);
-}
-
 /** A station's tile: {node, update}. */
 function tile(first) {
     const name = h('span', {class: 'name'}, first.name);
@@ -53,13 +40,15 @@ function tile(first) {
         attribute(state, 'class', `badge ${tone(station.state)}`);
         text(state, word('state', station.state));
         const line = live.line(station.line);
-        const traced = traceOf(station.line).timeline.of(station.id).slice(-KEPT);
-        const answered = traced.filter((one) => one.total !== null).map((one) => one.total);
-        spark.update(answered);
-        text(figure, duration(latency(traced).total.mean));
+        const {timeline} = traceOf(station.line);
+        const traced = timeline.of(station.id).slice(-KEPT);
+        const over = traced.filter((one) => one !== timeline.waiting);
+        spark.update(over.map((one) => one.total), {ticked: true});
+        const mean = tone(station.state) === 'bad' ? null : latency(traced).total.mean;
+        text(figure, mean === null ? '–' : t('answers.in', {time: duration(mean)}));
         text(facts, t('last.answer', {ago: duration(station.last_success_ms)}));
         const told = line?.told?.find((one) => one.station === station.id);
-        text(finding, told ? findingText(told).said : '');
+        text(finding, told ? findingText(told).text : '');
     }};
 }
 
@@ -96,7 +85,7 @@ function card(first) {
         text(load, t('load', {percent: number(line.load_percent, 1)}));
         history.push(line.load_percent);
         if (history.length > HISTORY) history.shift();
-        spark.update(history, 0, LOADED);
+        spark.update(history, {most: LOADED});
         text(facts, [line.device, line.mode === 'listen' ? t('listens') : null, t('waiting', {count: line.queue_depth})].filter(Boolean).join(' · '));
         const told = (line.told ?? []).map((one) => ({...one, key: `${one.cause} ${one.station} ${one.text}`}));
         list(findings, told, (one) => one.key, (one) => ({node: findingNote(one)}));

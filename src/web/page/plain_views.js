@@ -48,13 +48,23 @@ const CLIENT = [
         : t('ago', {what: word('outcome', client.last_error), ago: duration(client.last_error_ms)})],
 ];
 
+/** The gateway's own in the reader's language; servers' clients are called as the log does. */
+export function clientName(name) {
+    if (name === 'others') return t('clients.others');
+    const poll = /^poll of (.+)$/.exec(name);
+    return poll ? t('clients.poll', {station: poll[1]}) : name;
+}
+
 function clientRow(first) {
-    const share = h('meter', {min: 0, max: 100, 'aria-label': t('share.of', {name: first.name})});
+    const name = clientName(first.name);
+    const gone = h('small', {class: 'muted'});
+    const share = h('meter', {min: 0, max: 100, 'aria-label': t('share.of', {name})});
     const percent = h('span', {class: 'figure'});
     const told = CLIENT.filter(([, tells]) => tells(first));
     const cells = told.map(() => h('td', {class: 'number'}));
-    return {node: h('tr', null, h('th', {scope: 'row'}, first.name), h('td', null, h('div', {class: 'share'}, percent, share)), cells), update: (client) => {
+    return {node: h('tr', {'data-client': first.name}, h('th', {scope: 'row'}, name, ' ', gone), h('td', null, h('div', {class: 'share'}, percent, share)), cells), update: (client) => {
         share.value = client.percent;
+        text(gone, (client.gone_ms ?? null) === null ? '' : t('clients.gone', {ago: duration(client.gone_ms)}));
         text(percent, `${number(client.percent, 1)} %`);
         told.forEach(([, , value], i) => text(cells[i], value(client)));
     }};

@@ -5,11 +5,11 @@ import {live} from './live.js';
 
 const MANY = 200;        // points, of which fewer values are remembered each
 const kept = () => histories.size > MANY ? 120 : 3600;  // values of a point
-const histories = new Map();  // "press/temperature" -> [[ms since 1970, number]]
+const histories = new Map();  // "press/temperature" -> [[ms since 1970, number, or null: unknown from here on]]
 
 export const keyOf = (station, name) => `${station}/${name}`;
 
-/** What is kept of a point: [[ms since 1970, number]], the oldest first. */
+/** What is kept of a point: [[ms since 1970, number or null]], the oldest first; null: a gap begins. */
 export const historyOf = (key) => histories.get(key) ?? [];
 
 export function remember(key, value, at = Date.now()) {
@@ -22,9 +22,18 @@ export function remember(key, value, at = Date.now()) {
     while (values.length > kept()) values.shift();
 }
 
+/** From here on nobody knows the value. */
+export function rememberGap(key, at = Date.now()) {
+    const values = histories.get(key);
+    if (values && values.at(-1)[1] !== null && at > values.at(-1)[0]) values.push([at, null]);
+}
+
 live.addEventListener('point', ({detail}) => {
-    if (detail.quality === 'good') remember(keyOf(detail.station, detail.name), detail.value, Date.now() - (detail.age_ms ?? 0));
+    const key = keyOf(detail.station, detail.name);
+    if (detail.quality === 'good') remember(key, detail.value, Date.now() - (detail.age_ms ?? 0));
+    else rememberGap(key);
 });
+live.addEventListener('rest', () => { for (const key of histories.keys()) rememberGap(key); });
 
 export function shownValue(point) {
     if (point.value === null || point.value === undefined) return '–';
@@ -40,7 +49,7 @@ export async function recall(station, name) {
         const {samples} = await get(path('stations', station, 'points', name, 'history'));
         const seen = histories.get(key) ?? [];
         const from = seen[0]?.[0] ?? Infinity;
-        const before = samples.filter((one) => one.value !== null).map((one) => [Date.parse(one.time), Number(one.value)]).filter(([at]) => at < from);
+        const before = samples.map((one) => [Date.parse(one.time), one.value === null ? null : Number(one.value)]).filter(([at]) => at < from);
         histories.set(key, [...before, ...seen].slice(-kept()));
     } catch { /* the plot begins now */ }
 }

@@ -5,7 +5,7 @@ import {attribute, h, list, table, text} from './dom.js';
 import {duration, t, word} from './language.js';
 import {live} from './live.js';
 import {plot, sparkline} from './plot.js';
-import {historyOf, keyOf, recall, remember, shownValue} from './point_values.js';
+import {historyOf, keyOf, recall, remember, rememberGap, shownValue} from './point_values.js';
 
 const ASK = 2000;        // ms between two rounds of all stations
 const PACE = 40;         // ms between two stations
@@ -26,7 +26,7 @@ function row(station, first, pick) {
         attribute(quality, 'class', `badge ${point.quality === 'good' ? 'good' : point.quality === 'stale' ? 'warn' : 'bad'}`);
         text(quality, word('quality', point.quality));
         text(age, duration(point.age_ms === null ? null : point.age_ms + Date.now() - point.heard));
-        spark.update(historyOf(key).slice(-120).map(([, one]) => one), Infinity);
+        spark.update(historyOf(key).slice(-120).map(([, one]) => one), {least: Infinity});
     }};
 }
 
@@ -57,6 +57,7 @@ class Points {
         if (!before && point.at === undefined) return;  // an event before the first list
         this.#points.set(key, {...before, ...point, station, heard: Date.now()});
         if (point.quality === 'good') remember(key, point.value, Date.now() - (point.age_ms ?? 0));
+        else rememberGap(key);
     }
 
     /** All points of all stations now and then; in between events tell. */
@@ -80,8 +81,8 @@ class Points {
     #pick(station, point) {
         this.#plot?.stop();
         const key = keyOf(station, point.name);
-        const rows = () => historyOf(key).map(([at, value]) => [new Date(at), value]);
-        this.#plot = plot({title: key, unit: word('unit', point.unit), labels: [point.name], colours: ['c0'], steps: point.type === 'bool', rows});
+        const read = () => ({rows: historyOf(key)});
+        this.#plot = plot({title: key, unit: word('unit', point.unit), labels: [point.name], colours: ['c0'], steps: point.type === 'bool', read, now: Date.now});
         this.place.replaceChildren(h('section', {class: 'card'}, this.#plot.node));
         this.#plot.update();
         recall(station, point.name).then(() => this.#plot.update());

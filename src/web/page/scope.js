@@ -1,6 +1,7 @@
 // The bus scope: what was on a line's wire when.
 import {offers, path} from './api.js';
 import {attribute, choice, h, list, table, text} from './dom.js';
+import {download} from './download.js';
 import {showFrame} from './frame_view.js';
 import {incidents} from './incidents.js';
 import {duration, t, time, word} from './language.js';
@@ -57,9 +58,9 @@ class Scope {
     #controls() {
         const button = (label, name, action) =>
             h('button', {type: 'button', 'aria-label': name, title: name, onclick: action}, label);
-        const exports = [h('a', {class: 'button', href: path('lines', this.line, 'trace') + '?last=500', download: `${this.line}.json`}, 'JSON')];
+        const exports = [download(path('lines', this.line, 'trace') + '?last=500', `${this.line}.json`, 'JSON', {class: 'button'})];
         if (offers('GET /api/v1/lines/{}/trace.pcapng')) {
-            exports.unshift(h('a', {class: 'button', href: path('lines', this.line, 'trace.pcapng'), download: `${this.line}.pcapng`}, t('export')));
+            exports.unshift(download(path('lines', this.line, 'trace.pcapng'), `${this.line}.pcapng`, t('export'), {class: 'button'}));
         }
         return h('div', {class: 'bar'}, this.pause, button('◀', t('earlier'), () => this.#pan(-0.3)),
             button('▶', t('later'), () => this.#pan(0.3)), button('−', t('zoom.out'), () => this.#zoom(2)),

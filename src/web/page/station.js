@@ -1,13 +1,14 @@
 // One station: how it does, what was found, how long it takes, its points and what to do with it.
 import {get, path} from './api.js';
 import {h, list, replace, text} from './dom.js';
+import {findingNote} from './finding.js';
 import {duration, number, t, word} from './language.js';
-import {badge, findingNote, linesWithFindings} from './overview.js';
+import {badge, linesWithFindings} from './overview.js';
 import {plot} from './plot.js';
 import {pointsTable} from './points.js';
 import {simulator} from './simulator.js';
-import {latency} from './timeline.js';
-import {traceOf} from './trace.js';
+import {latency, plotted} from './timeline.js';
+import {gatewayNow, traceOf} from './trace.js';
 import {live} from './live.js';
 
 function facts(station) {
@@ -19,9 +20,11 @@ function facts(station) {
 
 function latencyPlot(station) {
     const trace = traceOf(station.line);
-    const rows = () => trace.timeline.of(station.id).filter((one) => one.total !== null)
-        .map((one) => [new Date(one.request.wall * 1000), one.wire, one.think]);
-    const made = plot({title: t('nav.latency'), unit: 'ms', labels: [t('wire'), t('think')], colours: ['c0', 'c1'], stacked: true, rows});
+    const read = () => {
+        const {rows, failed} = plotted(trace.timeline.of(station.id), trace.timeline.waiting);
+        return {rows: rows.map(([at, , wire, think]) => [at, wire, think]), failed};
+    };
+    const made = plot({title: t('nav.latency'), unit: 'ms', labels: [t('wire'), t('think')], colours: ['c0', 'c1'], stacked: true, read, now: gatewayNow});
     return {...made, watch: (changed) => trace.watch(() => { made.update(); changed(); })};
 }
 

@@ -100,6 +100,9 @@ export class Timeline {
         measured(exchange);
     }
 
+    /** What nobody knows the end of yet: the last request, while it waits for its reply. */
+    get waiting() { return this.#open?.outcome === undefined ? this.#open : null; }
+
     /** The last exchanges with a station, the oldest first. */
     of(station) { return this.#stations.get(station) ?? []; }
 
@@ -154,6 +157,22 @@ function decision(told) {
     const rest = RESTS.exec(told.text);
     return {...told, wall: Date.parse(told.time) / 1000, rest: rest ? Number(rest[1]) / 1000 : 0,
         station: rest ? Number(rest[2]) : null};
+}
+
+/**
+ * Exchanges as a plot shows them, without `waiting` and broadcasts: rows [ms since 1970, queue, wire,
+ * think], null where nothing was measured, and in `failed` when those were asked that failed.
+ */
+export function plotted(exchanges, waiting) {
+    const rows = [];
+    const failed = [];
+    for (const one of exchanges) {
+        if (one === waiting || one.broadcast) continue;
+        const at = one.request.wall * 1000;
+        rows.push(one.total === null ? [at, null, null, null] : [at, one.queue ?? 0, one.wire, one.think]);
+        if (one.failed) failed.push(at);
+    }
+    return {rows, failed};
 }
 
 /** Of the last exchanges of a station: how many, and mean and 95 % of each part, in

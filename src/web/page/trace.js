@@ -5,6 +5,18 @@ import {Timeline, characterTime} from './timeline.js';
 const PERIOD = 400;  // ms
 const PAGE = 500;    // entries the gateway gives at once
 
+const WANDERS = 30000;  // ms that the clocks may differ more than they did, before that counts
+
+let ahead = null;  // ms that the gateway's clock is ahead of ours, at least
+
+/** What the gateway's clock on the wall says, in ms since 1970: frames that were just told are hardly older. */
+export const gatewayNow = () => Date.now() + (ahead ?? 0);
+
+function hear(frame) {
+    const least = Date.parse(frame.time) - Date.now();
+    if (ahead === null || least > ahead || least < ahead - WANDERS) ahead = least;
+}
+
 class Trace extends EventTarget {
     #line;
     #next = null;
@@ -35,6 +47,7 @@ class Trace extends EventTarget {
             const page = await get(path('lines', this.#line, 'trace') + '?' + asked);
             const count = page.frames.length + page.decisions.length + (page.transactions?.length ?? 0);
             full = this.#next !== null && count >= PAGE;
+            if (this.#next !== null && !full && page.frames.length > 0) hear(page.frames.at(-1));
             if (page.next < (this.#next ?? 0)) this.timeline = new Timeline(this.timeline.character);
             this.#next = page.next;
             if (count > 0) {

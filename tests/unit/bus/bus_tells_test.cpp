@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -40,9 +41,9 @@ class BusTellsTest : public testing::Test {
         bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
     }
     /// Asks and runs the loop until answered.
-    void ask(std::uint8_t station, const Bytes& pdu) {
+    void ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1) {
         std::optional<Answer> got;
-        bus->transact({.station = station, .request = test::request_of(pdu), .client = 1},
+        bus->transact({.station = station, .request = test::request_of(pdu), .client = client},
                       [&](Answer answer) { got = std::move(answer); });
         EXPECT_TRUE(test::run_until(io, clock, [&] { return got.has_value(); }));
     }
@@ -53,6 +54,20 @@ class BusTellsTest : public testing::Test {
     test::MemoryLine* line = nullptr;
     std::unique_ptr<Bus> bus;
 };
+
+TEST_F(BusTellsTest, WhoHasHungUpKeepsItsRow) {
+    bus->start();
+    for (ClientId client = 1; client <= 3; ++client) {
+        bus->name_client(client, "modbus_tcp 10.0.0.7:500" + std::to_string(client));
+        ask(17, kRead, client);
+        bus->cancel(client);
+    }
+    const auto clients = bus->clients();
+    ASSERT_EQ(clients.size(), 1u);
+    EXPECT_EQ(clients[0].name, "modbus_tcp 10.0.0.7");
+    EXPECT_EQ(clients[0].percent, 100);
+    EXPECT_TRUE(clients[0].gone);
+}
 
 TEST_F(BusTellsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
     std::vector<WriteEvent> told;

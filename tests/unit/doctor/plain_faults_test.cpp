@@ -83,5 +83,21 @@ TEST_F(Diagnose, EachPlainFaultAloneIsNamedRightlyOrNotAtAll) {
     }
 }
 
+/// Texts and figures are two tellings of the same numbers.
+TEST_F(Diagnose, EachFigureStandsInTheWordsToo) {
+    for (const bool over_tcp : {false, true}) {
+        facts.over_tcp = over_tcp;
+        for (const Fault& fault : plain_faults()) {
+            for (const Finding& f : findings(fault.stations)) {
+                EXPECT_FALSE(f.figures.empty()) << code(f.cause);
+                for (const auto& [name, value] : f.figures) {
+                    EXPECT_THAT(f.evidence + f.advice, ::testing::HasSubstr(std::to_string(value)))
+                        << code(f.cause) << ' ' << name;
+                }
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace panelgate::doctor

@@ -19,12 +19,10 @@ using Handling = boost::asio::awaitable<HttpResponse>;
 struct Route {
     std::string_view verb;     ///< "GET" stands for HEAD, too
     std::string_view pattern;  ///< {} stands for any one segment
-    Role needed = Role::none;  ///< none: it shows no data of the plant
+    Role needed = Role::none;  ///< none: free to all who may connect and call us by our name
     std::function<Handling(HttpRequest)> handler;
     std::vector<std::string_view> queries{};  ///< that it understands; any other is refused
-    /// Of the program's health: answered also when everything else is barred, to whatever name and
-    /// with whatever queries it is asked.
-    bool probe = false;
+    bool probe = false;  ///< answered to any name, with any query, and when all else is barred
 };
 
 /// What a server serves. Shared by its sessions; the first route that fits is taken.

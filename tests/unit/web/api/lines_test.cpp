@@ -28,25 +28,31 @@ TEST_F(ApiLines, ListsTheLines) {
 TEST_F(ApiLines, TellsCausesInTheListAndFindingsOfALine) {
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of("[]"));
     bus.line.findings = {{"wrong-baud", {}, "What is wrong.", "What to do.", "9 of 9"},
-                         {"gap-too-short", 31, "Why.", "How.", "5 of 6", "press"}};
+                         {"gap-too-short",
+                          31,
+                          "Why.",
+                          "How.",
+                          "5 of 6",
+                          "press",
+                          {{"silent_below", 5}, {"advised_ms", 10}}}};
     EXPECT_EQ(get("/api/v1/lines").at("lines").as_array()[0].at("findings"),
               json_of(R"(["wrong-baud","gap-too-short"])"));
     EXPECT_EQ(get("/api/v1/lines/floor1").at("findings"), json_of(R"([
         {"cause":"wrong-baud","station":null,"name":null,"text":"What is wrong.","advice":"What to do.",
-         "evidence":"9 of 9"},
+         "evidence":"9 of 9","figures":{}},
         {"cause":"gap-too-short","station":31,"name":"press","text":"Why.","advice":"How.",
-         "evidence":"5 of 6"}])"));
+         "evidence":"5 of 6","figures":{"advised_ms":10,"silent_below":5}}])"));
 }
 
 TEST_F(ApiLines, P9ShowsWhatEachClientHasUsedOfALine) {
     bus.shares = {
         {"modbus_tcp 127.0.0.1:5000", 1500ms, 75, 12, "127.0.0.1", 20, 1, Outcome::timeout, 70ms},
-        {"poll of station 31", 500ms, 25, 4, {}, 4}};
+        {"http 10.0.0.9", 500ms, 25, 4, "10.0.0.9", 4, 0, {}, {}, 2s}};
     EXPECT_EQ(get("/api/v1/lines/floor1").at("clients").as_array(),
               json_of(R"([{"name":"modbus_tcp 127.0.0.1:5000","address":"127.0.0.1","requests":20,
-        "failed":1,"last_error":"timeout","last_error_ms":70,"busy_seconds":1.5,"percent":75,
-        "transactions":12},{"name":"poll of station 31","address":null,"requests":4,"failed":0,
-        "last_error":null,"last_error_ms":null,"busy_seconds":0.5,"percent":25,
+        "failed":1,"last_error":"timeout","last_error_ms":70,"gone_ms":null,"busy_seconds":1.5,"percent":75,
+        "transactions":12},{"name":"http 10.0.0.9","address":"10.0.0.9","requests":4,"failed":0,
+        "last_error":null,"last_error_ms":null,"gone_ms":2000,"busy_seconds":0.5,"percent":25,
         "transactions":4}])"));
 }
 

@@ -57,13 +57,27 @@ TEST_F(Page, IsNotSentAgainToWhoHasIt) {
     EXPECT_EQ(ask("GET", "/page/scope.js", "", known).status(), 200u);
 }
 
-/// A browser's first request cannot bring a token: the page asks for one.
-TEST_F(Page, IsFreeToAllBecauseDataAreNotInIt) {
+TEST_F(Page, IsFreeToWhoMayNotLookButNotUnderAForeignName) {
     settings.anonymous = Role::none;
-    for (const char* free : {"/", "/page/app.js", "/docs"})
-        EXPECT_EQ(get(free).status(), 200u) << free;
-    for (const char* kept : {"/openapi.json", "/metrics", "/api/v1/lines", "/api/v1/configuration"})
-        EXPECT_EQ(get(kept).status(), 401u) << kept;
+    for (const char* path : {"/", "/page/app.js", "/docs"}) {
+        EXPECT_EQ(get(path).status(), 200u) << path;
+        EXPECT_EQ(ask("GET", path, "", "Origin: http://evil.example\r\n").status(), 403u);
+        const std::string foreign =
+            "GET " + std::string(path) + " HTTP/1.1\r\nHost: evil.example\r\n\r\n";
+        Client client = connect();
+        client.send(foreign);
+        EXPECT_EQ(client.receive().status(), 421u) << path;
+    }
+    EXPECT_EQ(get("/api/v1/lines").status(), 401u);
+    EXPECT_EQ(get("/page/nothing.js").status(), 404u);
+}
+
+TEST_F(Page, NamesNothingOfThePlant) {
+    for (const char* path : {"/", "/docs"}) {
+        const std::string body = get(path).body();
+        EXPECT_THAT(body, Not(HasSubstr("floor2"))) << path;
+        EXPECT_THAT(body, Not(HasSubstr("/dev/"))) << path;
+    }
 }
 
 }  // namespace

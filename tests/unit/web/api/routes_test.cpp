@@ -44,7 +44,8 @@ TEST_P(AccessMatrix, Holds) {
     EXPECT_EQ(read(c.token), c.read);
     EXPECT_EQ(status(c.token, "GET", "/metrics"), c.read);
     EXPECT_EQ(status(c.token, "GET", "/openapi.json"), c.read);
-    EXPECT_EQ(status(c.token, "GET", "/"), 200u);
+    for (const char* page : {"/", "/page/app.js", "/docs"})
+        EXPECT_EQ(status(c.token, "GET", page), 200u) << page << " holds no data";
     EXPECT_EQ(write(c.token), c.write);
     EXPECT_EQ(broadcast(c.token), c.write == 200 ? 202 : c.write);
     EXPECT_EQ(raw(c.token), c.write);

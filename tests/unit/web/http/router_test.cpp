@@ -115,7 +115,7 @@ TEST_F(Router, AnswersOnlyProbesToWhoIsBarred) {
     add("GET", "/a", Role::viewer);
     barred = problem(503, "no place");
     EXPECT_EQ(ask("GET", {"healthz"}).status, 200u);
-    EXPECT_EQ(ask("GET", {"page"}).status, 503u) << "free, and no probe";
+    EXPECT_EQ(ask("GET", {"page"}).status, 503u) << "free is not for everybody's name and place";
     for (const char* method : {"GET", "POST", "OPTIONS"}) {
         EXPECT_EQ(ask(method, {"a"}).status, 503u) << method;
         EXPECT_EQ(ask(method, {"nothing"}).status, 503u) << method;

@@ -1,0 +1,42 @@
+// What the line doctor has found, in the reader's language: made of the finding's cause and figures.
+import {h} from './dom.js';
+import {language, said, t} from './language.js';
+
+/** Causes that concern the whole line, or may; all others without a station are of one that is not listed. */
+const OF_LINES = ['echo', 'no-answer-at-all', 'wrong-baud', 'wrong-parity', 'other-master', 'collision', 'overrun', 'noise',
+    'tcp-framing', 'trailing-bytes'];
+
+function who({cause, name}) {
+    return name ?? t(OF_LINES.includes(cause) ? 'finding.line' : 'finding.unlisted');
+}
+
+/** The keys of its sentences, the best first: the same cause may ask for another advice. */
+function adviceKeys({cause, figures}) {
+    if (cause !== 'timeout-too-short' || !('deadline_ms' in figures)) return [cause];
+    return [`${cause}.${'advised_ms' in figures ? 'deadline' : 'slow'}`];
+}
+
+function evidenceKeys({cause, figures}) {
+    return [cause === 'echo' && 'collided' in figures ? 'echo.none' : cause, 'damaged' in figures ? 'damage' : cause];
+}
+
+/** {lang, text}: a sentence of the table, or the gateway's own where it has none, or says it in English anyway. */
+function sentence(kind, keys, finding, own) {
+    const key = keys.map((name) => `${kind}.${name}`).find(said);
+    if (language === 'en' || !key) return {lang: 'en', text: own};
+    const text = t(key, {...finding.figures, who: who(finding)});
+    return /\{\w+\}/.test(text) ? {lang: 'en', text: own} : {lang: language, text};
+}
+
+/** What is wrong: {lang, text}. */
+export const findingText = (finding) => sentence('finding', [finding.cause], finding, finding.text);
+
+/** What is wrong, what to do, and why that is thought. */
+export function findingNote(finding) {
+    const known = {...finding, figures: finding.figures ?? {}};
+    const wrong = findingText(known);
+    const advice = sentence('advice', adviceKeys(known), known, finding.advice);
+    const evidence = sentence('evidence', evidenceKeys(known), known, finding.evidence);
+    return h('li', {class: 'finding', 'data-cause': finding.cause}, h('strong', {lang: wrong.lang}, wrong.text), ' ',
+        h('span', {lang: advice.lang}, advice.text), evidence.text ? h('small', {lang: evidence.lang}, evidence.text) : null);
+}
