@@ -1,5 +1,6 @@
 #include "connection_limits.hpp"
 
+#include <algorithm>
 #include <vector>
 
 #include "panelgate/rt/descriptors.hpp"
@@ -31,12 +32,14 @@ std::string words(const config::Config& config, const std::vector<std::size_t>& 
 }  // namespace
 
 std::string fit_connections(config::Config& config, std::size_t limit) {
-    const std::size_t reserve =
+    const std::size_t wanted =
         kOwnDescriptors +
         kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size());
+    // Of few, clients have a quarter: the gateway seldom needs all that is kept back.
+    const std::size_t reserve = std::min(wanted, limit - limit / 4);
     std::vector<std::size_t> asked;
     for (const std::size_t* most : maxima(config)) asked.push_back(*most);
-    const auto granted = rt::share_descriptors(limit > reserve ? limit - reserve : 0, asked);
+    const auto granted = rt::share_descriptors(limit - reserve, asked);
     if (granted == asked) return {};
     std::size_t at = 0;
     for (std::size_t* most : maxima(config)) *most = granted[at++];

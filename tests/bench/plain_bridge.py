@@ -80,9 +80,12 @@ class Wire:
         while True:
             length = reply_length(self._bytes)
             if length is not None and len(self._bytes) >= length:
-                frame = self._bytes[:length]
-                fits = frame[0] == asked[0] and frame[1] & 0x7F == asked[1]
-                return frame[1:-2] if fits and crc(frame[:-2]) == frame[-2:] else None
+                frame, self._bytes = self._bytes[:length], self._bytes[length:]
+                if crc(frame[:-2]) != frame[-2:]:
+                    return None
+                if frame[0] == asked[0] and frame[1] & 0x7F == asked[1]:
+                    return frame[1:-2]
+                continue  # somebody else's, or late
             if not await self._more():
                 return None
 

@@ -1,5 +1,9 @@
 #include "key_book.hpp"
 
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <string>
 #include <vector>
 
 namespace panelgate::web {
@@ -11,11 +15,12 @@ std::size_t size_of(const HttpResponse& answer) {
     return size;
 }
 
-Problem full() {
+Problem full(Duration wait) {
     Problem made = problem(503,
                            "too many writes with an Idempotency-Key are remembered; send this "
                            "one later, or without a key");
-    made.headers.emplace_back("Retry-After", "60");
+    const auto seconds = std::chrono::ceil<std::chrono::seconds>(wait).count();
+    made.headers.emplace_back("Retry-After", std::to_string(std::max<std::int64_t>(seconds, 1)));
     return made;
 }
 
@@ -42,7 +47,7 @@ std::variant<KeyBook::Fresh, HttpResponse, Problem> KeyBook::begin(TimePoint now
     const std::size_t own = count == of_client_.end() ? 0 : count->second;
     if (entries_.size() >= settings_.max_keys || own >= settings_.max_keys_of_client ||
         bytes_ >= settings_.max_kept)
-        return full();
+        return full(until_one_ends(now, own >= settings_.max_keys_of_client ? &key.first : nullptr));
     ++of_client_[key.first];
     entries_[key] = {request, std::move(worker)};
     return Fresh{};
@@ -67,6 +72,13 @@ void KeyBook::dismiss() {
     for (const auto& [key, entry] : entries_)
         if (entry.worker) workers.push_back(entry.worker);
     for (const auto& worker : workers) worker->leave();
+}
+
+Duration KeyBook::until_one_ends(TimePoint now, const std::string* client) const {
+    const auto first = std::ranges::find_if(over_, [&](const auto& entry) {
+        return client == nullptr || entry.second.first == *client;
+    });
+    return first == over_.end() ? Duration::zero() : first->first + settings_.keys_kept - now;
 }
 
 void KeyBook::forget_old(TimePoint now) {

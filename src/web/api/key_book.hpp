@@ -49,6 +49,8 @@ class KeyBook {
         HttpResponse answer{};
     };
 
+    /// Of one client, or, null, of any. None is over: no time.
+    Duration until_one_ends(TimePoint now, const std::string* client) const;
     void forget_old(TimePoint now);
     void erase(std::map<Key, Entry>::iterator entry);
 

@@ -61,6 +61,12 @@ std::optional<std::string> host_of_authority(std::string_view authority) {
     return host;
 }
 
+std::string port_of_authority(std::string_view authority) {
+    const std::size_t host = authority.starts_with('[') ? authority.find(']') : 0;
+    const std::size_t colon = authority.find(':', host);
+    return colon == authority.npos ? std::string() : std::string(authority.substr(colon + 1));
+}
+
 std::vector<std::string> machine_names() {
     std::array<char, 256> buffer{};
     if (::gethostname(buffer.data(), buffer.size() - 1) != 0) return {};
@@ -72,6 +78,7 @@ std::vector<std::string> machine_names() {
 
 HostNames::HostNames(const Settings& settings, const std::vector<std::string>& machine) {
     names_.insert("localhost");
+    for (const std::string& host : settings.hosts) configured_.insert(to_lower(host));
     const auto add = [this](const std::string& host) {
         boost::system::error_code error;
         const ip::address address = ip::make_address(host, error);

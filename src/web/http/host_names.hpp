@@ -14,6 +14,8 @@ namespace panelgate::web {
 /// The host of "NAME", "NAME:PORT", "[ADDRESS]:PORT": in lower case, without brackets and without
 /// the dot at the end. Nothing when it is none.
 std::optional<std::string> host_of_authority(std::string_view authority);
+/// Its port; "" where it names none.
+std::string port_of_authority(std::string_view authority);
 
 /// What this machine calls itself, without asking a name server.
 std::vector<std::string> machine_names();
@@ -27,9 +29,12 @@ class HostNames {
     /// `host` is of host_of_authority(); `local` is the connection's address at our end. Always
     /// ours are that address, the one that is listened on, and the loopback, by address and name.
     bool knows(const std::string& host, const boost::asio::ip::address& local) const;
+    /// The configuration names it: a proxy may have another port there.
+    bool is_configured(const std::string& host) const { return configured_.contains(host); }
 
   private:
     std::set<std::string> names_;
+    std::set<std::string> configured_;
     std::set<boost::asio::ip::address> addresses_;
 };
 

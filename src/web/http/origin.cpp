@@ -25,13 +25,17 @@ bool follows_link(const HttpRequest& request) {
            header(request, "sec-fetch-dest") == "document" && is_page(request);
 }
 
-/// "http://gateway:8080"; "null" is nobody's.
-bool is_ours(std::string_view origin, const HostNames& names,
+/// "http://gateway:8080"; "null" is nobody's. Another port is another site, which may be anybody's
+/// on this machine; but for names that the configuration has, by which a proxy is called.
+bool is_ours(std::string_view origin, const HttpRequest& request, const HostNames& names,
              const boost::asio::ip::address& local) {
     const std::size_t scheme = origin.find("://");
     if (scheme == std::string_view::npos) return false;
-    const auto host = host_of_authority(origin.substr(scheme + 3));
-    return host && names.knows(*host, local);
+    const std::string_view authority = origin.substr(scheme + 3);
+    const auto host = host_of_authority(authority);
+    if (!host || !names.knows(*host, local)) return false;
+    return names.is_configured(*host) || request.host.empty() ||
+           port_of_authority(authority) == request.port;
 }
 
 }  // namespace
@@ -48,7 +52,7 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
     // Browsers name the site of whoever changes something, or wants to read the answer, also where
     // they tell nothing else (plain HTTP). A read costs time on a line, too.
     if (request.method != "OPTIONS" && request.headers.contains("origin") &&
-        !is_ours(header(request, "origin"), names, local))
+        !is_ours(header(request, "origin"), request, names, local))
         return problem(403,
                        "a page of another site may not ask this gateway; if it is one of yours, "
                        "name its host in http: hosts",

@@ -17,6 +17,7 @@ namespace panelgate::web {
 struct HttpRequest {
     std::string method;
     std::string host;                               ///< lower case; empty: HTTP/1.0 without one
+    std::string port;                               ///< of the Host; empty where it names none
     std::vector<std::string> path;                  ///< segments, percent-decoded
     std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
     std::map<std::string, std::string> headers;     ///< those that are read, names in lower case
