@@ -21,7 +21,7 @@ def sooner(rules):
     """The same rules with windows and `for` a sixtieth as long."""
     def scaled(found):
         return found[1] + found[2] + {"m": "s", "h": "m"}[found[3]]
-    return re.sub(r"(\[|for: )(\d+)([mh])\b", scaled, rules)
+    return re.sub(r"(\[|for: |offset )(\d+)([mh])\b", scaled, rules)
 
 
 class Prometheus(harness.Helper):

@@ -23,9 +23,10 @@ MANY = 60  # requests at once: the gateway takes 80 of a client before it answer
 DEMO_FAULTS = {"filler": {"dead": True},       # StationOffline, RelayFails
                "mixer": {"duplicate": 0.5}}    # AddressDoubled
 BOX_FAULTS = {"shaken": {"truncate": 0.5},     # Errors
-              # Given up after 100 ms and here before the next poll: LateRepliesRise
-              "tardy": {"late": 0.3, "late_by_ms": 200},
               "sluggish": {"slow_ms": 700}}    # LineOverloaded, LatencyBurnsFast and -Slowly
+# Given up after 100 ms and here before the next poll: LateRepliesRise, when all has been well for
+# half an hour (half a minute here).
+LATE_FAULTS = {"tardy": {"late": 0.3, "late_by_ms": 200}}
 
 
 def box(adapter):
@@ -153,7 +154,15 @@ class Scraped(unittest.TestCase):
                 if alert["state"] == "firing":
                     texts[alert["labels"]["alertname"]] = alert["annotations"]
             return texts.keys() >= expected
-        prometheus.until(all_fired, meanwhile, lambda: f"silent: {expected - texts.keys()}")
+
+        def silent():
+            return f"silent: {expected - texts.keys()}"
+        expected -= {"PanelgateLateRepliesRise"}
+        prometheus.until(all_fired, meanwhile, silent)
+        prometheus.until(lambda: prometheus.query("panelgate_late_frames_total offset 25s"), meanwhile)
+        set_faults(plant.box.ports[1], LATE_FAULTS)
+        expected |= {"PanelgateLateRepliesRise"}
+        prometheus.until(all_fired, meanwhile, silent)
         for name, annotations in texts.items():
             self.assertEqual(set(annotations), {"summary", "description", "runbook"}, name)
             self.assertNotRegex(" ".join(annotations.values()), "<no value>|error", name)
