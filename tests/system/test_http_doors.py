@@ -108,23 +108,25 @@ class Places(Doors):
             for path in ("/healthz", "/readyz", "/api/v1/stations", PRESS + "UW0"):
                 self.assertEqual(self.status("GET", path), 200, path)
 
-    def test_with_all_places_of_an_address_busy_it_is_refused_in_words_and_probes_are_answered(self):
+    def test_streams_of_events_leave_their_address_its_places(self):
         with contextlib.ExitStack() as crowd:
             for _ in range(32):
                 crowd.enter_context(Connection(self.port)).ask("GET", "/healthz")
-            streams = [crowd.enter_context(Connection(self.port)) for _ in range(32)]
-            for stream in streams:
+            for _ in range(48):
+                stream = crowd.enter_context(Connection(self.port))
                 stream.send("GET", "/api/v1/events")
                 self.assertEqual(stream._file.readline(), b"HTTP/1.1 200 OK\r\n")
-            refused = self.ask("PUT", PRESS + "UW100", body={"values": [1]})
+            self.assertEqual(self.ask("PUT", PRESS + "UW100", body={"values": [1]}).status, 200)
+            refused = self.ask("GET", "/api/v1/events")
             self.assertEqual(refused.status, 503)
             self.assertEqual(refused.headers["content-type"], "application/problem+json")
-            self.assertEqual(refused.headers["retry-after"], "1")
+            self.assertEqual(refused.headers["retry-after"], "5")
             self.assertEqual(refused.json()["status"], 503)
-            for path in ("/healthz", "/readyz"):
+            for path in ("/healthz", "/readyz", "/api/v1/stations"):
                 self.assertEqual(self.status("GET", path), 200, path)
             with Connection(self.port, "127.0.0.2") as other:
-                self.assertEqual(other.ask("GET", "/api/v1/stations").status, 200)
+                other.send("GET", "/api/v1/events")
+                self.assertEqual(other._file.readline(), b"HTTP/1.1 200 OK\r\n")
 
 
 class HalfClosed(Doors):
