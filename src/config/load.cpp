@@ -190,8 +190,9 @@ std::string name_pattern() { return pattern_of(kNameLetters); }
 
 std::optional<std::string> load_name(MapReader& in, bool required) {
     auto name = required ? in.required_text("name") : in.text("name");
-    in.looks_like("name", "^(?!(?:" + std::string(kAll) + '|' + std::string(kOther) + ")$)" +
-                              name_pattern().substr(1),
+    in.looks_like("name",
+                  "^(?!(?:" + std::string(kAll) + '|' + std::string(kOther) + ")$)" +
+                      name_pattern().substr(1),
                   true);
     if (name && (*name == kAll || *name == kOther)) {
         in.problem("name", "name must not be '" + *name +

@@ -53,8 +53,8 @@ class Schedule {
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
     /// The same request goes again and is waited for `patience` long. While only its station rests,
-    /// others go first, for no longer than it may take: one request, or, when the retry is dear, one
-    /// to each station that waits.
+    /// others go first, for no longer than it may take: one request, or, when the retry is dear,
+    /// one to each station that waits.
     void retry(TimePoint now, Group group, Duration patience);
     /// The parts of a joined read go again, each by itself. Returns those whose client has left:
     /// they do not.

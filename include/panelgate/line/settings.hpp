@@ -39,7 +39,7 @@ struct Settings {
     /// Bytes a second that are read at most, but for bursts of a second; or four times what the
     /// line's rate can bring, where that is more. A device that never stops must not keep the loop
     /// from the other lines.
-    std::size_t input_rate = 64 * 1024;
+    std::size_t input_rate = 2 * 1024 * 1024;
     bool simulated = false;  ///< a pty of our own, which takes no parity: no word about that
     friend bool operator==(const Settings&, const Settings&) = default;
 };

@@ -47,7 +47,8 @@ std::variant<KeyBook::Fresh, HttpResponse, Problem> KeyBook::begin(TimePoint now
     const std::size_t own = count == of_client_.end() ? 0 : count->second;
     if (entries_.size() >= settings_.max_keys || own >= settings_.max_keys_of_client ||
         bytes_ >= settings_.max_kept)
-        return full(until_one_ends(now, own >= settings_.max_keys_of_client ? &key.first : nullptr));
+        return full(
+            until_one_ends(now, own >= settings_.max_keys_of_client ? &key.first : nullptr));
     ++of_client_[key.first];
     entries_[key] = {request, std::move(worker)};
     return Fresh{};

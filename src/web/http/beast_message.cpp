@@ -48,8 +48,8 @@ Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
 HttpRequest to_request(BeastRequest&& message, Target target, std::string host) {
     HttpRequest request;
     request.host = std::move(host);
-    request.port = port_of_authority(
-        target.authority ? *target.authority : std::string(message[http::field::host]));
+    request.port = port_of_authority(target.authority ? *target.authority
+                                                      : std::string(message[http::field::host]));
     request.method = message.method_string();
     request.path = std::move(target.path);
     request.query = std::move(target.query);
