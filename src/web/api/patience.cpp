@@ -32,9 +32,7 @@ std::optional<Duration> wait_of(std::string_view prefer) {
         const auto equals = preference.find('=');
         if (equals == preference.npos || trimmed(preference.substr(0, equals)) != "wait") continue;
         const auto seconds = to_number(unquoted(trimmed(preference.substr(equals + 1))));
-        // Nobody can answer in no time: a preference that cannot be met is passed over (RFC 7240
-        // 2).
-        if (!seconds || *seconds == 0) return std::nullopt;
+        if (!seconds) return std::nullopt;
         return std::chrono::seconds(std::min(*seconds, kLongest));
     }
     return std::nullopt;

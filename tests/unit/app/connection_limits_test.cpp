@@ -32,8 +32,8 @@ TEST_F(ConnectionLimits, LeaveDevicesProbesAndTheLogTheirDescriptors) {
 
 TEST_F(ConnectionLimits, LetSomebodyInEvenWithHardlyAny) {
     fit_connections(config, 64);
-    EXPECT_EQ(modbus(), 1u);
-    EXPECT_EQ(http(), 1u);
+    EXPECT_EQ(modbus(), 12u);
+    EXPECT_EQ(http(), 3u);
     config.http.reset();
     EXPECT_EQ(fit_connections(config, 64), "");
 }

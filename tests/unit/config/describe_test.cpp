@@ -45,7 +45,8 @@ TEST(Describe, KnowsWhatTheLoaderLooksAtItself) {
     EXPECT_TRUE(shape("lines").required);
     EXPECT_EQ(shape("http/allow").fewest, 1U);
     EXPECT_EQ(shape("http/tokens").may_be_null, false);
-    EXPECT_EQ(shape("lines/stations/name").pattern, "^[abcdefghijklmnopqrstuvwxyz0123456789-]+$");
+    EXPECT_EQ(shape("lines/stations/name").pattern,
+              "^(?!(?:all|other)$)[abcdefghijklmnopqrstuvwxyz0123456789-]+$");
     EXPECT_TRUE(shape("lines/stations/name").may_be_number);
     EXPECT_FALSE(shape("http/listen").may_be_number);
     EXPECT_EQ(shape("lines/stations/simulate/late").most, 1.0);

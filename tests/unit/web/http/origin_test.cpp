@@ -57,8 +57,11 @@ TEST_F(Origin, OfAnotherSiteChangesAndReadsNothing) {
     for (const char* origin :
          {"http://gateway:8080", "https://GATEWAY", "http://192.168.1.7:8080"}) {
         request.headers["origin"] = origin;
+        request.port = "8080";
         EXPECT_EQ(refusal(), 0u) << origin;
     }
+    request.headers["origin"] = "http://localhost:9999";
+    EXPECT_EQ(refusal(), 403u) << "another port is another site";
 }
 
 TEST_F(Origin, MayBeAPageOfOursAndNoneOfAnotherSite) {
