@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "panelgate/base/reserved_names.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {
@@ -62,7 +63,7 @@ void LineDoctor::judge(TimePoint now, const LineCounts& counts) {
 void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
     const std::string cause(code(finding.cause));
     const std::string station =
-        finding.station ? name_of(settings_.stations, *finding.station) : "all";
+        finding.station ? name_of(settings_.stations, *finding.station) : std::string(kAllStations);
     if (is_new) {
         rt::log(rt::LogLevel::warn, "line finding",
                 {{"line", settings_.name},
@@ -82,8 +83,9 @@ void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
 std::vector<FindingReport> LineDoctor::report() const {
     std::vector<FindingReport> list;
     for (const doctor::Finding& f : doctor_.findings())
-        list.push_back({std::string(code(f.cause)),
-                        f.station ? name_of(settings_.stations, *f.station) : "all"});
+        list.push_back({std::string(code(f.cause)), f.station
+                                                        ? name_of(settings_.stations, *f.station)
+                                                        : std::string(kAllStations)});
     return list;
 }
 

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "panelgate/base/reserved_names.hpp"
 #include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 
@@ -29,7 +30,7 @@ RequestCounters::RequestCounters(const Stations& stations) { apply(stations); }
 void RequestCounters::apply(const Stations& stations) {
     std::map<std::uint8_t, StationReport> before = std::exchange(stations_, {});
     stations_[0] = std::move(before[0]);
-    stations_[0].station = "other";
+    stations_[0].station = kOtherStations;
     for (const auto& [id, station] : stations) {
         stations_[id] = std::move(before[id]);
         stations_[id].station = station.name;

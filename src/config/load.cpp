@@ -172,10 +172,6 @@ void tell(const yaml::Problems& unset, const yaml::Problems& found, yaml::Proble
 
 }  // namespace
 
-/// Words that stand for stations without a name of their own.
-constexpr std::string_view kAll = "all";
-constexpr std::string_view kOther = "other";
-
 std::span<const std::string_view> serving_keys() { return kServing; }
 
 bool is_name(std::string_view text) {
@@ -188,17 +184,9 @@ std::string pattern_of(std::string_view letters) {
 
 std::string name_pattern() { return pattern_of(kNameLetters); }
 
-std::optional<std::string> load_name(MapReader& in, bool required) {
+std::optional<std::string> load_name(MapReader& in, bool required, const std::string& pattern) {
     auto name = required ? in.required_text("name") : in.text("name");
-    in.looks_like("name",
-                  "^(?!(?:" + std::string(kAll) + '|' + std::string(kOther) + ")$)" +
-                      name_pattern().substr(1),
-                  true);
-    if (name && (*name == kAll || *name == kOther)) {
-        in.problem("name", "name must not be '" + *name +
-                               "': metrics and findings call by it what has no name of its own");
-        return std::nullopt;
-    }
+    in.looks_like("name", pattern, true);
     if (!name || is_name(*name)) return name;
     in.problem("name",
                "name must be of a-z, 0-9 and '-', not " + yaml::quote(*name) + name_hint(*name));

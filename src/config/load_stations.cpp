@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <utility>
 
+#include "panelgate/base/reserved_names.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/yaml/quote.hpp"
@@ -89,8 +90,14 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
             in.problem("name", "there is a station '" + automatic + "' already; give this a name");
         return automatic;
     }
-    const auto name = load_name(in, false);
+    const std::string reserved = std::string(kAllStations) + '|' + std::string(kOtherStations);
+    const auto name = load_name(in, false, "^(?!(?:" + reserved + ")$)" + name_pattern().substr(1));
     if (!name) return automatic;
+    if (*name == kAllStations || *name == kOtherStations) {
+        in.problem("name", "name must not be '" + *name +
+                               "': metrics and findings call by it what has no name of its own");
+        return automatic;
+    }
     if (!loading.station_names.insert(*name).second) {
         in.problem("name",
                    "there are two stations '" + *name + "'; names are unique over all lines");

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "panelgate/config/config.hpp"
+#include "panelgate/config/describe.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
@@ -32,8 +33,10 @@ struct Loading {
 bool is_name(std::string_view text);
 /// A regular expression of texts of these letters, a '-' among them the last.
 std::string pattern_of(std::string_view letters);
-/// The key `name`; nothing when it is absent or not a name (then a problem).
-std::optional<std::string> load_name(yaml::MapReader& in, bool required);
+/// The key `name`; nothing when it is absent or not a name (then a problem). `pattern`: what the
+/// schema says of it.
+std::optional<std::string> load_name(yaml::MapReader& in, bool required,
+                                     const std::string& pattern = name_pattern());
 /// "; write big-press" for "Big Press"; "" when nothing of it is left.
 std::string name_hint(std::string_view typed);
 /// The key `access`: true for read_only.
