@@ -142,8 +142,9 @@ void DescriptorLine::on_ready() {
 void DescriptorLine::read_all() {
     std::array<std::uint8_t, 1024> buffer;
     constexpr int kMaxReads = 16;  // a babbling line must not keep the loop from the others
-    for (int i = 0; i < kMaxReads && !floods_; ++i) {
-        const TimePoint now = clock_.now();
+    if (floods_) return;
+    const TimePoint now = clock_.now();
+    for (int i = 0; i < kMaxReads; ++i) {
         if (!budget_.allows(now)) return let_rest(budget_.next());
         const ssize_t n = get(buffer);
         if (n > 0) {

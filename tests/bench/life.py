@@ -18,7 +18,6 @@ import os
 import pathlib
 import platform
 import random
-import struct
 import subprocess
 import sys
 import tempfile

@@ -8,23 +8,18 @@ plain_bridge.py TTY BAUD: prints its port, and serves until stdin ends.
 import asyncio
 import contextlib
 import os
+import pathlib
 import struct
 import sys
 import termios
 import time
 import tty
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system"))
+from harness import crc  # noqa: E402
+
 TIMEOUT = 0.5  # s, for the reply to begin, and between its pieces
 READS = (1, 2, 3, 4)
-
-
-def crc(data):
-    register = 0xFFFF
-    for byte in data:
-        register ^= byte
-        for _ in range(8):
-            register = register >> 1 ^ 0xA001 if register & 1 else register >> 1
-    return struct.pack("<H", register)
 
 
 def reply_length(frame):

@@ -96,9 +96,9 @@ def odd_line(baud, units=range(1, 6), habits=None, tcp=False, zoo=(), wire_baud=
         with Zoo(*options) as panels:
             device = f"tcp://{panels.names[0]}" if tcp else panels.names[0]
             keys = {"stations": config.station_ids(units), **keys}
-            first_line = config.MANY + (", lines: [zoo]" if others else "")
+            listener = config.MANY + (", lines: [zoo]" if others else "")
             listed = config.line("zoo", device, baud=baud, **keys)
-            with harness.configured(config.gateway(listed, *others, modbus=first_line)) as program:
+            with harness.configured(config.gateway(listed, *others, modbus=listener)) as program:
                 program.log.wait_for("line up")
                 yield Line(panels, program)
 

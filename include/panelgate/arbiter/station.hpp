@@ -214,21 +214,20 @@ class Station {
     bool failing() const { return failed_in_a_row_ >= kFailing && !health_.offline(); }
     /// So many of its last attempts were in vain that another one would surprise nobody.
     bool flaky() const { return std::popcount(lately_) >= kFlaky; }
-    /// What its failures took of the bus lately is within its share, but for the odd one that
+    /// What its failures took of the bus is within its share from then on, but for the odd one that
     /// nobody could foresee.
-    bool may_spend(TimePoint now, const modbus::Request* write = nullptr) const {
-        const Duration credit = kCredit * timeout_cost();
-        const bool was_ignored = write != nullptr && is_ignored(*write);
-        return budget_.allows(now, credit) && (!was_ignored || writes_.allows(now, credit)) &&
-               (!failing() || failing_.allows(now));
-    }
-    /// ... and all of it is paid.
-    bool in_debt(TimePoint now) const { return !budget_.allows(now); }
-    /// What its failures took of the bus is within its share from then on.
     TimePoint affordable_at() const {
         const TimePoint paid = budget_.next() - kCredit * timeout_cost();
         return failing() ? std::max(paid, failing_.next()) : paid;
     }
+    /// ... is so now; and so is what a write took that it ignored.
+    bool may_spend(TimePoint now, const modbus::Request* write = nullptr) const {
+        const bool was_ignored = write != nullptr && is_ignored(*write);
+        return now >= affordable_at() &&
+               (!was_ignored || writes_.allows(now, kCredit * timeout_cost()));
+    }
+    /// ... and all of it is paid.
+    bool in_debt(TimePoint now) const { return !budget_.allows(now); }
     /// The whole line rests for so long because of it.
     void on_line_rests(TimePoint now, Duration rest) {
         spend(now, rest);

@@ -88,8 +88,7 @@ HttpResponse json_response(unsigned status, const json::value& body) {
 }
 
 Problem problem_of(Fault fault, bool transmitted) {
-    Problem made = problem(status_of(fault), detail_of(fault, transmitted));
-    made.kind = label(fault);
+    Problem made = problem(status_of(fault), detail_of(fault, transmitted), label(fault));
     made.extensions["modbus_exception"] = static_cast<std::uint8_t>(modbus::to_exception(fault));
     made.extensions["transmitted"] = transmitted;
     if (made.status == 503) made.headers.emplace_back("Retry-After", "1");
@@ -101,8 +100,7 @@ Problem problem_of_exception(std::uint8_t code, const profile::PanelProfile& pro
     detail += modbus::describe_exception(code);
     const std::string meaning = meaning_of(code, profile);
     if (!meaning.empty()) detail += " (" + meaning + ")";
-    Problem made = problem(code >= 1 && code <= 4 ? 422 : 502, std::move(detail));
-    made.kind = "exception";
+    Problem made = problem(code >= 1 && code <= 4 ? 422 : 502, std::move(detail), "exception");
     made.extensions["modbus_exception"] = code;
     made.extensions["transmitted"] = true;
     return made;

@@ -38,8 +38,6 @@ Parsed<boost::json::array> values_member(const boost::json::object& object);
 /// or -32768..-1 for their two's complement. At least one.
 Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
                                                  modbus::Table table);
-/// A new value of a point.
-Parsed<points::Value> value_of(const boost::json::value& value);
 /// The member "value": a point's new one.
 Parsed<points::Value> value_member(const boost::json::object& object);
 /// True or false; false where there is no such member.

@@ -53,11 +53,7 @@ void add_vary(HttpResponse& response, const std::string& name) {
 }
 
 void set_tag(HttpResponse& response, const std::string& if_none_match) {
-    const std::string tag = tag_of(response.body);
-    response.headers.emplace_back("ETag", tag);
-    if (!names_tag(if_none_match, tag)) return;
-    response.status = 304;
-    response.body.clear();
+    if (tell_tag(response, if_none_match, tag_of(response.body))) response.body.clear();
 }
 
 Handling handled(HttpRequest request, const Api* api, Handler handler, Manner manner) {
@@ -97,6 +93,13 @@ bool names_tag(std::string_view if_none_match, std::string_view tag) {
     return false;
 }
 
+bool tell_tag(HttpResponse& response, std::string_view if_none_match, const std::string& tag) {
+    response.headers.emplace_back("ETag", tag);
+    const bool known = names_tag(if_none_match, tag);
+    if (known) response.status = 304;
+    return known;
+}
+
 Handling conduct(HttpRequest request, const Api* api, Handler handler, Manner manner) {
     const std::shared_ptr<Caller> caller = request.caller;
     const std::size_t gzip_from = api->providers.settings.gzip_from;
@@ -110,8 +113,7 @@ Handling conduct(HttpRequest request, const Api* api, Handler handler, Manner ma
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(*wait).count();
         response.headers.emplace_back("Preference-Applied", "wait=" + std::to_string(seconds));
     }
-    if (manner.tagged && response.status == 200 && !response.shared_body)
-        set_tag(response, if_none_match);
+    if (manner.tagged && response.status == 200) set_tag(response, if_none_match);
     if (!is_packable(response, gzip_from)) co_return response;
     add_vary(response, "Accept-Encoding");
     if (!takes_gzip) co_return response;

@@ -11,11 +11,8 @@ Handling get_events(HttpRequest request, const Api* api) {
     if (!filter) co_return to_response(filter.error());
     auto listener =
         api->providers.events->listen(std::move(*filter), request.headers["last-event-id"]);
-    if (!listener) {
-        Problem full = problem(503, "too many listen to events already");
-        full.headers.emplace_back("Retry-After", "5");
-        co_return to_response(full);
-    }
+    if (!listener)
+        co_return to_response(passing_problem(503, "too many listen to events already", 5));
     HttpResponse response;
     response.content_type = "text/event-stream";
     response.events = std::move(listener);

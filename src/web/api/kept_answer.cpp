@@ -17,12 +17,9 @@ boost::asio::awaitable<HttpResponse> KeptAnswer::give(std::shared_ptr<KeptAnswer
                                                       HttpRequest request) {
     HttpResponse response;
     response.content_type = self->content_type_;
-    response.headers.emplace_back("ETag", self->tag_);
+    const bool known = tell_tag(response, request.headers["if-none-match"], self->tag_);
     response.headers.emplace_back("Vary", "Accept-Encoding");
-    if (names_tag(request.headers["if-none-match"], self->tag_)) {
-        response.status = 304;
-        co_return response;
-    }
+    if (known) co_return response;
     response.shared_body = self->text_;
     if (!accepts_gzip(request.headers["accept-encoding"])) co_return response;
     if (!self->packed_) {

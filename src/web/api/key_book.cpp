@@ -16,18 +16,16 @@ std::size_t size_of(const HttpResponse& answer) {
 }
 
 Problem full(Duration wait) {
-    Problem made = problem(503,
+    const std::int64_t seconds = std::chrono::ceil<std::chrono::seconds>(wait).count();
+    return passing_problem(503,
                            "too many writes with an Idempotency-Key are remembered; send this "
-                           "one later, or without a key");
-    const auto seconds = std::chrono::ceil<std::chrono::seconds>(wait).count();
-    made.headers.emplace_back("Retry-After", std::to_string(std::max<std::int64_t>(seconds, 1)));
-    return made;
+                           "one later, or without a key",
+                           std::max<std::int64_t>(seconds, 1));
 }
 
 Problem under_way() {
-    Problem made = problem(409, "the first request with this Idempotency-Key is still under way");
-    made.headers.emplace_back("Retry-After", "1");
-    return made;
+    return passing_problem(409, "the first request with this Idempotency-Key is still under way",
+                           1);
 }
 
 }  // namespace

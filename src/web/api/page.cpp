@@ -19,17 +19,14 @@ constexpr const char* kPolicy =
 HttpResponse answer(const HttpRequest& request, const PageFile& file) {
     HttpResponse response;
     response.content_type = file.type;
-    const std::string tag = "W/\"" + std::string(file.hash) + '"';
-    response.headers.emplace_back("ETag", tag);
+    const auto asked = request.headers.find("if-none-match");
+    const bool known = tell_tag(response, asked == request.headers.end() ? "" : asked->second,
+                                "W/\"" + std::string(file.hash) + '"');
     response.headers.emplace_back("Cache-Control", "no-cache");
     response.headers.emplace_back("Vary", "Accept-Encoding");
     response.headers.emplace_back("Content-Security-Policy", kPolicy);
     response.headers.emplace_back("Referrer-Policy", "no-referrer");
-    const auto known = request.headers.find("if-none-match");
-    if (known != request.headers.end() && names_tag(known->second, tag)) {
-        response.status = 304;
-        return response;
-    }
+    if (known) return response;
     const auto coding = request.headers.find("accept-encoding");
     const std::string_view packed(reinterpret_cast<const char*>(file.packed.data()),
                                   file.packed.size());

@@ -29,8 +29,7 @@ std::string detail_of(const bus::Refusal& refusal) {
 }
 
 Problem refused(unsigned status, bus::Rule rule, std::string detail) {
-    Problem made = problem(status, std::move(detail));
-    made.kind = "refused";
+    Problem made = problem(status, std::move(detail), "refused");
     made.extensions["rule"] = label(rule);
     made.extensions["transmitted"] = false;
     return made;

@@ -101,16 +101,16 @@ HttpResponse answer_of(const ReloadVerdict& verdict) {
         case ReloadOutcome::unchanged:
             break;
         case ReloadOutcome::invalid: {
-            Problem made = problem(422, "the configuration has faults; nothing has changed");
-            made.kind = "invalid-configuration";
+            Problem made = problem(422, "the configuration has faults; nothing has changed",
+                                   "invalid-configuration");
             made.extensions = describe(verdict);
             return to_response(made);
         }
         case ReloadOutcome::failed:
         case ReloadOutcome::refused: {
             const bool refused = verdict.outcome == ReloadOutcome::refused;
-            Problem made = problem(409, verdict.why + "; nothing has changed");
-            made.kind = refused ? "reload-weaker" : "reload-failed";
+            Problem made = problem(409, verdict.why + "; nothing has changed",
+                                   refused ? "reload-weaker" : "reload-failed");
             made.extensions = describe(verdict);
             return to_response(made);
         }

@@ -43,7 +43,7 @@ constexpr Row kRows[] = {
     {"GET", "/readyz", get_readyz, kFree, kPlain, {}, kProbe},
     {"GET", "/metrics", get_metrics, kSee},
     {"GET", "/api/v1/version", get_version, kSee},
-    {"GET", "/api/v1/configuration", get_configuration, kSee, kTagged},
+    {"GET", "/api/v1/configuration", get_configuration, kSee},
     {"GET", "/api/v1/reload", get_reload, kSee},
     {"POST", "/api/v1/reload", post_reload, kChange, kOnce, "rollback weaker"},
     {"GET", "/api/v1/lines", get_lines, kSee, kTagged},

@@ -65,11 +65,8 @@ Handling get_metrics(HttpRequest request, const Api* api) {
     boost::asio::awaitable<SharedText> making =
         scrape(request.caller, api->providers.metrics, gzip);
     SharedText text = co_await std::move(making);
-    if (!text) {
-        Problem busy = problem(503, "the metrics cannot be made now; try again");
-        busy.headers.emplace_back("Retry-After", "1");
-        co_return to_response(busy);
-    }
+    if (!text)
+        co_return to_response(passing_problem(503, "the metrics cannot be made now; try again", 1));
     HttpResponse response = text_response(200, {}, api->providers.metrics_type);
     response.shared_body = std::move(text);
     response.headers.emplace_back("Vary", "Accept-Encoding");

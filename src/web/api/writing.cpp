@@ -13,6 +13,7 @@
 #include "body.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/web/api/point_order.hpp"
+#include "panelgate/web/api/value_json.hpp"
 #include "panelgate/web/http/client_log.hpp"
 #include "reading.hpp"
 #include "refusal.hpp"

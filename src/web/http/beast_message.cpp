@@ -9,6 +9,14 @@
 
 namespace panelgate::web {
 namespace http = boost::beast::http;
+namespace {
+
+/// What the request is to: that of an absolute target, else the Host.
+std::string authority_of(const BeastRequest& message, const Target& target) {
+    return target.authority ? *target.authority : std::string(message[http::field::host]);
+}
+
+}  // namespace
 
 std::optional<Target> target_of(const BeastRequest& message) {
     const bool of_server = message.method() == http::verb::options && message.target() == "*";
@@ -38,9 +46,7 @@ Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
         return problem(400, "a request of HTTP/1.1 must have a Host");
     }
     if (named == 0 && !target.authority) return std::string();
-    const std::string authority =
-        target.authority ? *target.authority : std::string(message[http::field::host]);
-    auto host = host_of_authority(authority);
+    auto host = host_of_authority(authority_of(message, target));
     if (!host) return problem(400, "the Host must be a name or an address, with a port or without");
     return *host;
 }
@@ -48,8 +54,7 @@ Parsed<std::string> host_of(const BeastRequest& message, const Target& target) {
 HttpRequest to_request(BeastRequest&& message, Target target, std::string host) {
     HttpRequest request;
     request.host = std::move(host);
-    request.port = port_of_authority(target.authority ? *target.authority
-                                                      : std::string(message[http::field::host]));
+    request.port = port_of_authority(authority_of(message, target));
     request.method = message.method_string();
     request.path = std::move(target.path);
     request.query = std::move(target.query);

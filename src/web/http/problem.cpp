@@ -104,6 +104,12 @@ Problem problem(unsigned status, std::string detail, std::string_view kind) {
     return made;
 }
 
+Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds) {
+    Problem made = problem(status, std::move(detail));
+    made.headers.emplace_back("Retry-After", std::to_string(seconds));
+    return made;
+}
+
 Problem unknown_name(const std::string& what, const std::string& name,
                      std::span<const std::string_view> known) {
     std::string text = "unknown " + what + " '" + excerpt(name) + '\'';

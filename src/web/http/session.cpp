@@ -40,15 +40,12 @@ constexpr int kHeldEvents = 128 * 1024;
 constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 Problem no_place() {
-    Problem made = problem(503, "all places of this server are taken; only probes are answered");
-    made.headers.emplace_back("Retry-After", "1");
-    return made;
+    return passing_problem(503, "all places of this server are taken; only probes are answered", 1);
 }
 
 HttpResponse too_many_streams() {
-    Problem full = problem(503, "this address streams events on as many connections as it may");
-    full.headers.emplace_back("Retry-After", "5");
-    return to_response(full);
+    return to_response(
+        passing_problem(503, "this address streams events on as many connections as it may", 5));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <boost/json/object.hpp>
 #include <boost/system/result.hpp>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -37,6 +38,8 @@ std::span<const ProblemKind> problem_kinds();
 
 /// `kind`: a word of problem_kinds().
 Problem problem(unsigned status, std::string detail, std::string_view kind = {});
+/// ... that is over in so many seconds: with Retry-After.
+Problem passing_problem(unsigned status, std::string detail, std::int64_t seconds);
 /// 400 for what nobody knows here; names the nearest of what is known, or all of it. `what` is
 /// "member", "query".
 Problem unknown_name(const std::string& what, const std::string& name,
