@@ -39,7 +39,7 @@ foreach(FILE ${FILES})
     string(APPEND ROWS "    {\"${NAME}\", \"${TYPE_${ENDING}}\", \"${HASH}\", kFile${NUMBER}},\n")
     math(EXPR NUMBER "${NUMBER} + 1")
 endforeach()
-file(WRITE ${OUTPUT} "#include \"page_file.hpp\"
+file(WRITE ${OUTPUT} "#include \"page.hpp\"
 
 namespace panelgate::web {
 namespace {

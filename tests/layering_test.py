@@ -2,8 +2,8 @@
 """layering_test.py SOURCE_ROOT: the rules of src/README.md that can be held against the text.
 
 The table "Who may include whom" against every #include, every name of another module and the
-DEPENDS of src/CMakeLists.txt; who reads a clock; how long files and functions are. First it plants
-violations in a small tree and sees that each is found.
+DEPENDS of src/CMakeLists.txt; who reads a clock; how long files and functions are, and that a header
+has a reason to be a file. First it plants violations in a small tree and sees that each is found.
 """
 import pathlib
 import re
@@ -31,7 +31,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 CLOCK = re.compile(r"::now\s*\(")
 DETACHED = re.compile(r"\bdetached\b")
 STRING = re.compile(r'"(?:\\.|[^"\\])*"')
-MAX_LINES = 400
+MAX_LINES = 500
+MIN_ROOM = 120  # lines of header and source together: below, one user is no reason for a file
 MAX_FUNCTION = {"src": 40, "include": 40, "tests": 60}
 
 
@@ -143,6 +144,42 @@ class Tree:
                 yield f"src/CMakeLists.txt:1: {module}: {name} {wrong}"
 
 
+def users_of_headers(root):
+    """{header: files that include it}, its own source left out; both as paths below the root."""
+    users = {}
+    for top in ("src", "include", "tests"):
+        for file in sorted((root / top).rglob("*.[ch]pp")):
+            path = file.relative_to(root)
+            for found in filter(None, map(INCLUDE.match, file.read_text().splitlines())):
+                header = found[2]
+                if header.startswith("panelgate/"):
+                    header = "include/" + header
+                elif top == "src":
+                    header = (path.parent / header).as_posix()
+                elif top == "tests":  # a private header of the module that is tested
+                    header = f"src/{path.parent.relative_to('tests/unit').as_posix()}/{header}" \
+                        if path.parts[1] == "unit" else header
+                if pathlib.Path(header).stem != path.stem or top == "tests":
+                    users.setdefault(header, set()).add(path.as_posix())
+    return users
+
+
+def judge_rooms(root):
+    """A header has two users, a test, or a room's size with its source: else it lives with its user.
+    Settings and counters are for others by their name."""
+    users = users_of_headers(root)
+    for top in ("src", "include"):
+        for file in sorted((root / top).rglob("*.hpp")):
+            path = file.relative_to(root).as_posix()
+            module = path.removeprefix("src/").removeprefix("include/panelgate/")
+            source = root / "src" / pathlib.Path(module).with_suffix(".cpp")
+            lines = sum(p.read_text().count("\n") for p in (file, source) if p.exists())
+            using = users.get(path, set())
+            if file.stem not in ("settings", "counters") and lines < MIN_ROOM and len(using) == 1 \
+                    and not any(user.startswith("tests/") for user in using):
+                yield f"{path}:1: {lines} lines with one user: they belong in {using.pop()}"
+
+
 def judge_lengths(file, top):
     text = file.read_text()
     lines = text.count("\n")
@@ -166,7 +203,7 @@ def check(root):
             path = file.relative_to(root).as_posix()
             found = list(judge_lengths(file, top)) + (list(tree.judge_file(file)) if top != "tests" else [])
             problems += [f"{path}:{number}: {problem}" for number, problem in found]
-    return count, problems + list(tree.judge_depends())
+    return count, problems + list(tree.judge_depends()) + list(judge_rooms(root))
 
 
 TABLE = """## Who may include whom
@@ -205,12 +242,13 @@ PLANTED = {
     "src/web/http/j.cpp": '#include "panelgate/web/api/api.hpp"',
     "src/web/http/k.cpp": '#include "panelgate/bus/bus.hpp"',
     "src/tcp_server/l.cpp": "void f(arbiter::Host host);",
-    "src/base/m.cpp": "namespace panelgate {\n" + LONG + "\n}",
+    "src/base/m.cpp": '#include "closet.hpp"\n' "namespace panelgate {\n" + LONG + "\n}",
     "include/panelgate/base/n.hpp": "class A {\n  public:\n    explicit A(int x) : x_{x}, y_(x) {\n"
                                     + "        ++x_;\n" * 40 + "    }\n};",
     "tests/unit/o_test.cpp": "TEST(Thing, IsLong) {\n" + "    ++i;  // }\n" * 60 + "}",
     "tests/unit/p_test.cpp": "\n" * MAX_LINES + "int x;",
     "tests/q.py": "def f():\n" + "    pass\n" * 60,
+    "src/base/closet.hpp": "int r();",
 }
 HARMLESS = {
     "src/README.md": TABLE,
@@ -220,6 +258,12 @@ HARMLESS = {
     "src/bus/fine.cpp": '#include "panelgate/rt/clock.hpp"\nauto t = clock.now();  // not ::now(), web::now\narbiter::Job j;',
     "src/config/fine.cpp": '#include "panelgate/web/http/settings.hpp"\n#include "panelgate/bus/point.hpp"\n'
                            "#include <vector>\nweb::Settings s; std::string_view t = \"sim::x\";",
+    "src/base/tested.hpp": "int r();",
+    "src/base/uses_tested.cpp": '#include "tested.hpp"',
+    "tests/unit/base/tested_test.cpp": '#include "tested.hpp"',
+    "src/base/room.hpp": "int r();",
+    "src/base/room.cpp": '#include "room.hpp"\n' + "int x;\n" * MIN_ROOM,
+    "src/base/uses_room.cpp": '#include "room.hpp"',
     "src/rt/fine.cpp": "auto t = std::chrono::steady_clock::now();",
     "src/yaml/document.cpp": "#include <yaml-cpp/yaml.h>",
     "src/base/fine.cpp": "struct T {\n" + "    int x = '{';\n" * 60 + "};\n" + LONG.replace("    ++i;\n", "", 1)

@@ -7,9 +7,7 @@
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/plan/advice.hpp"
-#include "panelgate/plan/line.hpp"
 #include "panelgate/plan/line_plan.hpp"
-#include "panelgate/plan/warnings.hpp"
 
 namespace panelgate::app {
 

@@ -1,5 +1,4 @@
 #include <unistd.h>
-
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -12,6 +11,7 @@
 #include "starter.hpp"
 
 namespace panelgate::app {
+
 namespace {
 
 ExitCode cannot_write(const OutputFile& output) {
@@ -74,6 +74,18 @@ ExitCode init(const ScanOptions& options, const OutputFile& output) {
     if (cut_short)
         std::cerr << "panelgate: incomplete: " << searched.cut_short << "; what was not reached "
                   << "is missing in it\n";
+    return searched.code;
+}
+
+ExitCode scan(const ScanOptions& options) {
+    const Searched searched = search(options);
+    if (!searched.result) return searched.code;
+    if (options.yaml)
+        std::cout << scan::report_yaml(searched.device, *searched.result, searched.profiles_dir);
+    else
+        std::cout << scan::report_text(options.device, *searched.result, searched.cut_short);
+    std::cout << std::flush;
+    tell_advice(options, *searched.result);
     return searched.code;
 }
 

@@ -8,15 +8,16 @@
 
 #include "commands.hpp"
 #include "http_door.hpp"
-#include "panelgate/base/endpoint_text.hpp"
-#include "question.hpp"
+#include "panelgate/base/network.hpp"
 
 namespace panelgate::app {
+
 namespace {
 
 namespace json = boost::json;
 
-constexpr Duration kPatience = 60s;             // a large file on a small machine
+constexpr Duration kPatience = 60s;  // a large file on a small machine
+constexpr Duration kHealthTimeout = 2s;
 constexpr std::size_t kMost = 8 * 1024 * 1024;  // bytes of the verdict
 
 std::string text_in(const json::object& object, std::string_view name) {
@@ -106,6 +107,21 @@ ExitCode reload(const ReloadOptions& options) {
     if (said.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file
                   << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
+    return kNotReady;
+}
+
+ExitCode health(const std::string& file, const std::string& http) {
+    const auto door = http_door(file, http);
+    if (const auto* none = std::get_if<NoDoor>(&door)) {
+        std::cerr << "panelgate: " << (none->code == kUsage ? "" : "not ready: ") << none->why
+                  << '\n';
+        return none->code == kUsage ? kUsage : kNotReady;
+    }
+    const auto& [address, port] = std::get<config::Endpoint>(door);
+    const std::string why = ask_whether_ready(address, port, kHealthTimeout);
+    if (why.empty()) return kFine;
+    std::cerr << "panelgate: not ready: http://" << endpoint_text(address, port)
+              << "/readyz: " << why << '\n';
     return kNotReady;
 }
 

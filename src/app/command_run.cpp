@@ -12,15 +12,13 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "file_watch.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
 #include "panelgate/config/endpoint.hpp"
-#include "panelgate/config/reachable.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/rt/punctual.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/rt/service_manager.hpp"
 #include "prepare.hpp"
 #include "reloader.hpp"

@@ -1,15 +1,160 @@
 #include "discoveries.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/scan/options.hpp"
 #include "panelgate/scan/report.hpp"
-#include "panelgate/web/api/event_text.hpp"
+#include "panelgate/web/api/events.hpp"
 
 namespace panelgate::app {
+
+namespace {
+
+constexpr const char* kName = "discovery";
+constexpr int kHundred = 100;
+/// As a scan has at first: most panels think for less. Whoever needs longer speaks into the next
+/// transaction, and may be heard there or not.
+constexpr Duration kPatience = 100ms;
+
+using Reply = scan::Discovery::Reply;
+
+/// Only what was asked can be silent: a refusal tells nothing about the address.
+Reply reply_of(const bus::Answer& answer) {
+    if (answer.pdu) return Reply::answered;
+    switch (answer.pdu.error()) {
+        case Fault::timeout:
+        case Fault::line_lost:
+            return answer.transmitted ? Reply::silent : Reply::unsent;
+        case Fault::offline:
+            return answer.transmitted ? Reply::silent : Reply::refused;
+        case Fault::damaged:
+            return Reply::damaged;
+        case Fault::denied:
+        case Fault::malformed:
+        case Fault::not_routed:
+        case Fault::busy:
+        case Fault::expired:
+        case Fault::line_down:
+        case Fault::cancelled:
+            return Reply::unsent;
+    }
+    return Reply::unsent;
+}
+
+}  // namespace
+
+LineDiscovery::LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
+                             std::shared_ptr<const profile::Catalogue> profiles,
+                             scan::DiscoverySettings settings, std::function<void()> told)
+    : clock_(clock),
+      bus_(bus),
+      profiles_(std::move(profiles)),
+      discovery_(*profiles_, settings, clock.now()),
+      share_percent_(static_cast<unsigned>(std::lround(settings.share * kHundred))),
+      told_(std::move(told)),
+      client_(bus::next_client_id()),
+      alarm_(clock.make_alarm()),
+      began_(clock.now()),
+      ended_(began_) {}
+
+void LineDiscovery::start() {
+    bus_.name_client(client_, kName);
+    step();
+}
+
+void LineDiscovery::step() {
+    if (state_ != State::running) return;
+    if (discovery_.done()) ask_the_late();
+    if (discovery_.gave_up()) return end(State::stopped, "the line takes no questions");
+    if (discovery_.done()) return end(State::done, {});
+    const TimePoint now = clock_.now();
+    if (const auto request = discovery_.question(now)) return ask(*request);
+    alarm_->arm(discovery_.due(), [this] { step(); });
+}
+
+void LineDiscovery::ask(const scan::ReadRequest& request) {
+    Bytes pdu(request.pdu().begin(), request.pdu().end());
+    bus::Request wanted{
+        .station = request.station(),
+        .request = *modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide),
+        .client = client_,
+        .poll = true,
+        .patience = kPatience,
+        .search = true};
+    asked_ = clock_.now();
+    paid_ = used();
+    bus_.transact(std::move(wanted), [self = weak_from_this()](const bus::Answer& answer) {
+        if (const auto still_there = self.lock()) still_there->on_answer(answer);
+    });
+}
+
+void LineDiscovery::on_answer(const bus::Answer& answer) {
+    if (state_ != State::running) return;
+    const TimePoint now = clock_.now();
+    scan::Discovery::Answer told;
+    told.reply = reply_of(answer);
+    if (answer.pdu) told.pdu = *answer.pdu;
+    // Where the bus does not say, it may have been all of the time.
+    const Duration cost = used() - paid_;
+    const bool unknown = answer.transmitted && cost <= Duration::zero();
+    told.cost = unknown ? now - asked_ : std::max(cost, Duration::zero());
+    discovery_.on_answer(now, told);
+    told_();
+    step();
+}
+
+/// A reply that came when nobody waited for it any more.
+void LineDiscovery::ask_the_late() {
+    const auto silent = discovery_.silent();
+    for (const std::uint8_t station : silent) {
+        const auto heard = bus_.station_status(station).last_reply;
+        if (heard && clock_.now() - *heard >= began_) discovery_.ask_late(station);
+    }
+}
+
+Duration LineDiscovery::used() const {
+    const auto clients = bus_.clients();
+    const auto found = std::ranges::find(clients, kName, &bus::ClientShare::name);
+    return found == clients.end() ? Duration::zero() : found->busy;
+}
+
+void LineDiscovery::end(State state, std::string why) {
+    if (state_ != State::running) return;
+    ended_ = clock_.now();
+    bus_total_ = used();
+    state_ = state;
+    why_ = std::move(why);
+    alarm_->cancel();
+    bus_.cancel(client_);
+    told_();
+}
+
+web::DiscoveryReport LineDiscovery::report() const {
+    web::DiscoveryReport report;
+    report.state = state_;
+    report.share_percent = share_percent_;
+    report.asked = discovery_.asked();
+    report.refused = discovery_.refused();
+    report.of = discovery_.of();
+    if (state_ == State::running) report.remaining = discovery_.remaining(clock_.now());
+    for (const scan::StationFinding& finding : discovery_.findings()) {
+        web::DiscoveredStation& station = report.stations.emplace_back();
+        station.id = finding.station;
+        for (const scan::Candidate& candidate : finding.candidates)
+            station.profiles.push_back(candidate.profile);
+        station.evidence = scan::evidence_text(finding);
+    }
+    report.bus = state_ == State::running ? used() : bus_total_;
+    report.took = (state_ == State::running ? clock_.now() : ended_) - began_;
+    report.why = why_;
+    return report;
+}
+
 namespace {
 
 constexpr double kPercent = 0.01;

@@ -7,15 +7,62 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
-#include "line_discovery.hpp"
+#include "panelgate/base/time.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/web/api/discovery_source.hpp"
+#include "panelgate/scan/discovery.hpp"
+#include "panelgate/web/api/sources.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "plant.hpp"
 
 namespace panelgate::app {
+
+/// One search on one line: asks the bus what a scan::Discovery wants asked, as a client of the
+/// lowest class, and pays with what the bus says that it has used. One thread.
+class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
+  public:
+    using State = web::DiscoveryReport::State;
+
+    /// Clock and bus outlive it. `told` is called after each step.
+    LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
+                  std::shared_ptr<const profile::Catalogue> profiles,
+                  scan::DiscoverySettings settings, std::function<void()> told);
+
+    void start();
+    /// Nothing more is asked; what waits for the line is taken back.
+    void stop(const std::string& why) { end(State::stopped, why); }
+    State state() const { return state_; }
+    const scan::Discovery& discovery() const { return discovery_; }
+    /// All but the YAML.
+    web::DiscoveryReport report() const;
+
+  private:
+    void step();
+    void ask(const scan::ReadRequest& request);
+    void on_answer(const bus::Answer& answer);
+    void ask_the_late();
+    Duration used() const;
+    void end(State state, std::string why);
+
+    rt::Clock& clock_;
+    bus::BusClient& bus_;
+    std::shared_ptr<const profile::Catalogue> profiles_;
+    scan::Discovery discovery_;
+    unsigned share_percent_;
+    std::function<void()> told_;
+    bus::ClientId client_;
+    std::unique_ptr<rt::Alarm> alarm_;
+    State state_ = State::running;
+    std::string why_;
+    TimePoint began_;
+    TimePoint ended_;
+    TimePoint asked_{};
+    Duration bus_total_{};  ///< what it has used of the line, when it has ended
+    Duration paid_{};       ///< what it had used of the line before the question that is open
+};
 
 /// The last search for stations of each line. What it is given outlives it, but for the buses'
 /// last answers.

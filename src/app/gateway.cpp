@@ -10,13 +10,31 @@
 #include <variant>
 
 #include "build_info.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/log.hpp"
+#include "plant.hpp"
 #include "prepare.hpp"
 #include "reloader.hpp"
-#include "service_status.hpp"
-#include "wiring.hpp"
+#include "running_line.hpp"
 
 namespace panelgate::app {
+
+/// What `systemctl status` shows: "2 of 3 lines up, listening on modbus_tcp 127.0.0.1:502, http
+/// 127.0.0.1:8080". `standing` and `missing` are those of Openings.
+std::string service_status(const Plant& plant, const std::string& standing,
+                           const std::string& missing);
+
+std::string service_status(const Plant& plant, const std::string& standing,
+                           const std::string& missing) {
+    const auto& lines = plant.lines();
+    const auto up =
+        std::ranges::count_if(lines, [](const Line& line) { return line.bus->status().up; });
+    std::string text = std::to_string(up) + " of " + std::to_string(lines.size()) +
+                       (lines.size() == 1 ? " line up" : " lines up");
+    if (!standing.empty()) text += ", listening on " + standing;
+    if (!missing.empty()) text += ", waiting to listen on " + missing;
+    return text;
+}
 
 namespace {
 

@@ -10,23 +10,20 @@
 #include <vector>
 
 #include "discoveries.hpp"
-#include "line_histories.hpp"
 #include "northbound.hpp"
-#include "openings.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/points/relays.hpp"
 #include "panelgate/rt/asio_clock.hpp"
-#include "panelgate/rt/loop_lag.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "running_line.hpp"
 #include "scene.hpp"
 #include "scrapes.hpp"
 #include "servers.hpp"
-#include "showing.hpp"
 
 namespace panelgate::app {
 

@@ -1,15 +1,106 @@
 #include "http_door.hpp"
 
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
+#include <cstddef>
 #include <optional>
+#include <set>
+#include <string_view>
+#include <vector>
 
 #include "commands.hpp"
-#include "listen_in_text.hpp"
 #include "load.hpp"
-#include "panelgate/config/reachable.hpp"
+#include "panelgate/base/network.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::app {
+
+namespace {
+
+constexpr std::string_view kHttp = "http:";
+constexpr std::string_view kListen = "listen:";
+constexpr std::string_view kBlank = " \t";
+
+bool is_one_of(std::string_view set, char c) { return set.find(c) != std::string_view::npos; }
+
+std::string_view trimmed(std::string_view text) {
+    return text.substr(std::min(text.find_first_not_of(kBlank), text.size()));
+}
+
+std::string_view without_comment(std::string_view line) {
+    if (trimmed(line).starts_with('#')) return {};
+    return line.substr(0, line.find(" #"));
+}
+
+std::vector<std::string_view> lines_of(std::string_view text) {
+    std::vector<std::string_view> lines;
+    while (!text.empty()) {
+        const std::size_t end = text.find_first_of("\r\n");
+        lines.push_back(without_comment(text.substr(0, end)));
+        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    }
+    return lines;
+}
+
+/// What stands behind a key, without quotes.
+std::string value_in(std::string_view text) {
+    text = trimmed(text);
+    const bool quoted = text.starts_with('"') || text.starts_with('\'');
+    const std::string_view ends = quoted ? text.substr(0, 1) : std::string_view(" \t,}");
+    if (quoted) text.remove_prefix(1);
+    return std::string(text.substr(0, text.find_first_of(ends)));
+}
+
+/// `listen:` directly inside the outermost braces of a line.
+std::optional<std::string> in_braces(std::string_view line) {
+    int depth = 0;
+    for (std::size_t at = 0; at < line.size(); ++at) {
+        if (is_one_of("{[", line[at])) ++depth;
+        if (is_one_of("}]", line[at])) --depth;
+        const bool begins = at > 0 && is_one_of(" \t{,", line[at - 1]);
+        if (depth == 1 && begins && line.substr(at).starts_with(kListen))
+            return value_in(line.substr(at + kListen.size()));
+    }
+    return std::nullopt;
+}
+
+/// `listen:` as far to the right as the first key of the block.
+std::optional<std::string> in_block(const std::vector<std::string_view>& lines, std::size_t first) {
+    std::optional<std::size_t> indent;
+    for (std::size_t i = first; i < lines.size(); ++i) {
+        const std::string_view key = trimmed(lines[i]);
+        if (key.empty()) continue;
+        const std::size_t here = lines[i].size() - key.size();
+        if (here == 0) break;
+        if (!indent) indent = here;
+        if (here == *indent && key.starts_with(kListen))
+            return value_in(key.substr(kListen.size()));
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::string http_listen_in(std::string_view text) {
+    text.remove_prefix(byte_order_mark(text));
+    const std::vector<std::string_view> lines = lines_of(text);
+    std::set<std::string> found;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        if (!lines[i].starts_with(kHttp)) continue;
+        const std::string_view rest = trimmed(lines[i].substr(kHttp.size()));
+        found.insert((rest.empty() ? in_block(lines, i + 1) : in_braces(rest)).value_or(""));
+    }
+    return found.size() == 1 ? *found.begin() : "";
+}
+
 namespace {
 
 config::Endpoint usual() {
@@ -70,6 +161,112 @@ std::variant<config::Endpoint, NoDoor> http_door(const std::string& file, const 
     if (auto* endpoint = std::get_if<config::Endpoint>(&door))
         endpoint->address = config::reachable(endpoint->address);
     return door;
+}
+
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+constexpr std::size_t kShown = 200;  // bytes of a line that is told
+constexpr std::string_view kEndOfHead = "\r\n\r\n";
+
+class Question {
+  public:
+    Question(const std::string& request, std::size_t most,
+             const std::function<bool(const Said&)>& enough)
+        : request_(request), most_(most), enough_(enough) {}
+
+    Said put(const asio::ip::tcp::endpoint& target, Duration patience) {
+        socket_.async_connect(target, [this](const error_code& error) {
+            if (error) return end(error);
+            say();
+        });
+        io_.run_for(patience);
+        return said_;
+    }
+
+  private:
+    void say() {
+        asio::async_write(socket_, asio::buffer(request_),
+                          [this](const error_code& error, std::size_t) {
+                              if (error) return end(error);
+                              listen();
+                          });
+    }
+    void listen() {
+        socket_.async_read_some(asio::buffer(buffer_),
+                                [this](const error_code& error, std::size_t size) {
+                                    said_.text.append(buffer_, size);
+                                    if (error) return end(error);
+                                    if (!enough_(said_) && said_.text.size() < most_) listen();
+                                });
+    }
+    void end(const error_code& error) { said_.error = error; }
+
+    const std::string& request_;
+    std::size_t most_;
+    const std::function<bool(const Said&)>& enough_;
+    asio::io_context io_{1};
+    asio::ip::tcp::socket socket_{io_};
+    char buffer_[4096]{};
+    Said said_;
+};
+
+}  // namespace
+
+std::string first_line(std::string_view text) {
+    const std::string_view line = text.substr(0, text.find_first_of("\r\n")).substr(0, kShown);
+    std::string shown = as_utf8(line);
+    std::ranges::replace_if(
+        shown, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+    return shown;
+}
+
+std::string Said::status() const {
+    const std::string line = first_line(text);
+    return line.substr(std::min(line.find(' ') + 1, line.size()));
+}
+
+std::string_view Said::body() const {
+    const std::size_t head = text.find(kEndOfHead);
+    if (head == std::string::npos) return {};
+    return std::string_view(text).substr(head + kEndOfHead.size());
+}
+
+/// Who may not connect is shut out in either way.
+std::string Said::silence() const {
+    if (!error) return "no answer in time";
+    const bool shut_out = error == asio::error::eof || error == asio::error::connection_reset;
+    if (!shut_out) return error.message();
+    return "closed without an answer (does its `allow` let this machine in?)";
+}
+
+Said ask(const std::string& address, std::uint16_t port, const std::string& request,
+         Duration patience, std::size_t most, const std::function<bool(const Said&)>& enough) {
+    return Question(request, most, enough).put({asio::ip::make_address(address), port}, patience);
+}
+
+namespace {
+
+constexpr std::size_t kMost = 4096;  // bytes of the answer
+
+bool is_ready(const Said& said) {
+    const bool whole = said.text.find("\r\n") != std::string::npos;
+    return whole && said.is_http() && (said.status() + ' ').starts_with("200 ");
+}
+
+}  // namespace
+
+std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience) {
+    const std::string request = "GET /readyz HTTP/1.1\r\nHost: " + endpoint_text(address, port) +
+                                "\r\nConnection: close\r\n\r\n";
+    const Said said = ask(address, port, request, patience, kMost, is_ready);
+    if (is_ready(said)) return {};
+    if (said.text.empty()) return said.silence();
+    if (!said.is_http()) return "an answer that is no HTTP: " + first_line(said.text);
+    const std::string why = first_line(said.body());
+    return said.status() + (why.empty() ? "" : ": " + why);
 }
 
 }  // namespace panelgate::app

@@ -5,11 +5,16 @@
 #include <string_view>
 #include <vector>
 
-#include "exit_code.hpp"
+#include "commands.hpp"
 #include "panelgate/config/config.hpp"
+#include "panelgate/profile/load_profile.hpp"
 #include "panelgate/yaml/document.hpp"
 
 namespace panelgate::app {
+
+/// The shipped profiles, and those of --profiles DIR when it is not empty; nothing, and told, when
+/// something is wrong there.
+std::optional<profile::Catalogue> load_catalogue(const std::string& dir);
 
 /// A configuration, or the exit code to end with; then stderr has said why.
 struct Loaded {

@@ -8,12 +8,11 @@
 #include <string_view>
 #include <vector>
 
-#include "panelgate/bus/station_ref.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/config/config.hpp"
-#include "panelgate/points/station_history.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
-#include "panelgate/tcp_server/unit_map.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 namespace panelgate::bus {
 class BusClient;

@@ -1,16 +1,83 @@
 #include "prepare.hpp"
 
+#include <algorithm>
+#include <cstdint>
 #include <memory>
+#include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "address_families.hpp"
 #include "capacity.hpp"
-#include "connection_limits.hpp"
 #include "inventory.hpp"
-#include "panelgate/rt/descriptors.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/process.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::app {
+
+namespace {
+
+template <class Settings>
+void separate(Settings& settings, const std::set<std::uint16_t>& ports_of_four) {
+    const bool all_of_six =
+        config::is_any_address(settings.address) && config::is_ipv6(settings.address);
+    settings.ipv6_only = all_of_six && ports_of_four.contains(settings.port);
+}
+
+}  // namespace
+
+void separate_families(config::Config& config) {
+    std::set<std::uint16_t> ports_of_four;
+    for (const tcp_server::Settings& settings : config.modbus_tcp)
+        if (!config::is_ipv6(settings.address)) ports_of_four.insert(settings.port);
+    if (config.http && !config::is_ipv6(config.http->address))
+        ports_of_four.insert(config.http->port);
+    ports_of_four.erase(0);  // any free one: never the same
+    for (tcp_server::Settings& settings : config.modbus_tcp) separate(settings, ports_of_four);
+    if (config.http) separate(*config.http, ports_of_four);
+}
+
+namespace {
+
+/// `max_connections` of every listener, by the order of the configuration; the last is HTTP's.
+std::vector<std::size_t*> maxima(config::Config& config) {
+    std::vector<std::size_t*> found;
+    for (tcp_server::Settings& settings : config.modbus_tcp)
+        found.push_back(&settings.max_connections);
+    if (config.http) found.push_back(&config.http->max_connections);
+    return found;
+}
+
+std::string words(const config::Config& config, const std::vector<std::size_t>& granted) {
+    std::string text;
+    std::size_t at = 0;
+    const auto add = [&](const std::string& listener) {
+        if (!text.empty()) text += ", ";
+        text += listener + " " + std::to_string(granted[at++]);
+    };
+    for (const tcp_server::Settings& settings : config.modbus_tcp) add(settings.name());
+    if (config.http) add("http " + config.http->name());
+    return text;
+}
+
+}  // namespace
+
+std::string fit_connections(config::Config& config, std::size_t limit) {
+    const std::size_t wanted =
+        kOwnDescriptors +
+        kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size());
+    // Of few, clients have a quarter: the gateway seldom needs all that is kept back.
+    const std::size_t reserve = std::min(wanted, limit - limit / 4);
+    std::vector<std::size_t> asked;
+    for (const std::size_t* most : maxima(config)) asked.push_back(*most);
+    const auto granted = rt::share_descriptors(limit - reserve, asked);
+    if (granted == asked) return {};
+    std::size_t at = 0;
+    for (std::size_t* most : maxima(config)) *most = granted[at++];
+    return words(config, granted);
+}
+
 namespace {
 
 /// Before the first one is opened.

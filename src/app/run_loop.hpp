@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <functional>
 
-#include "exit_code.hpp"
+#include "commands.hpp"
 #include "panelgate/base/time.hpp"
 
 namespace panelgate::app {

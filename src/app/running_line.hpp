@@ -12,15 +12,39 @@
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/line_bus.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/points/heard_values.hpp"
 #include "panelgate/points/poller.hpp"
+#include "panelgate/points/relays.hpp"
+#include "panelgate/points/settings.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "plant.hpp"
 
 namespace panelgate::app {
+
+// What the configuration means to each module.
+
+bus::Settings bus_settings(const config::Line& line);
+/// The stations that have points or poll blocks.
+std::vector<points::PolledStation> polled_stations(const config::Line& line);
+/// Which items are shown elsewhere as well.
+points::SharedMemory memory_of(const profile::ProfileRef& panel);
+/// The panel has function 15 or 16 for this table.
+bool takes_multiple(const profile::PanelProfile& panel, modbus::Table table);
+/// A relay whose ends the plant has: the configuration was checked.
+points::RelayRoute route_of(const Plant& plant, const points::Relay& relay);
+
+/// A simulated bus with the configured stations of a line.
+std::shared_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
+                                                 rt::Clock& clock, const config::Line& line);
+
+/// How REST reaches the faults of a simulated panel; null for a real one (no bus).
+std::shared_ptr<const web::SimulatedPanel> simulated_panel(
+    const std::shared_ptr<sim::SimulatedBus>& bus, std::uint8_t station);
 
 /// Whoever is told what happens on a line, by its name.
 struct LineWatch {

@@ -1,19 +1,27 @@
-#include "schema_json.hpp"
-
 #include <algorithm>
 #include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
 #include <boost/json/parse.hpp>
 #include <cstdint>
+#include <iostream>
 #include <map>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "commands.hpp"
 #include "panelgate/config/describe.hpp"
+#include "panelgate/web/http/json_text.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::app {
+
+/// A JSON Schema (2020-12) of the configuration, made of what the loader asks for
+/// (config::describe()). Whatever the loader takes is valid; of what it refuses, unknown keys and
+/// values of the wrong kind are not.
+boost::json::object schema_json();
+
 namespace {
 
 namespace json = boost::json;
@@ -284,5 +292,10 @@ class Schema {
 }  // namespace
 
 json::object schema_json() { return Schema().whole(); }
+
+ExitCode schema() {
+    std::cout << web::json_text(schema_json()) << '\n';
+    return kFine;
+}
 
 }  // namespace panelgate::app

@@ -9,7 +9,7 @@
 
 #include "panelgate/metrics/exposition.hpp"
 #include "panelgate/rt/worker.hpp"
-#include "panelgate/web/api/metrics_source.hpp"
+#include "panelgate/web/api/sources.hpp"
 
 namespace panelgate::app {
 

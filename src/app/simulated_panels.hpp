@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -8,15 +9,48 @@
 
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/rt/acceptor.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/sim/simulated_bus.hpp"
 #include "panelgate/web/api/directory.hpp"
 #include "panelgate/web/api/server.hpp"
 #include "panelgate/web/http/event_hub.hpp"
-#include "pty_link.hpp"
-#include "tcp_bridge.hpp"
 
 namespace panelgate::app {
+
+/// A symbolic link to a pty, there for as long as the object lives. An existing link is replaced in
+/// one step; anything else in its place is left alone and an error.
+class PtyLink {
+  public:
+    /// Throws std::system_error.
+    PtyLink(std::string link, const std::string& target);
+    ~PtyLink();
+    PtyLink(const PtyLink&) = delete;
+    PtyLink& operator=(const PtyLink&) = delete;
+
+  private:
+    std::string link_;
+    std::string target_;
+};
+
+/// Offers a pty as a serial device server would: RTU frames over TCP, one client at a time; a new
+/// one takes the place of the old. One thread.
+class TcpBridge {
+  public:
+    /// Listens. Throws std::system_error.
+    TcpBridge(const boost::asio::any_io_executor& executor, const config::Endpoint& endpoint,
+              const std::string& device);
+    ~TcpBridge();
+    TcpBridge(const TcpBridge&) = delete;
+    TcpBridge& operator=(const TcpBridge&) = delete;
+
+    std::uint16_t port() const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;
+    rt::Acceptor acceptor_;
+};
 
 /// What a link begins with that is no path.
 inline constexpr std::string_view kTcpLink = "tcp://";

@@ -1,6 +1,9 @@
 #include "panelgate/arbiter/arbiter.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 #include "explain.hpp"
@@ -8,6 +11,34 @@
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
+
+void Reception::stamp(TimePoint now, Job& job) {
+    const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
+    const std::size_t reply =
+        std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
+    const Duration needed = job.station == kBroadcast ? frame_time(serial_, request)
+                                                      : frame_time(serial_, request + reply, 2) +
+                                                            silent_interval(serial_);
+    job.ticket = ++last_ticket_;
+    job.arrived = now;
+    job.deadline = now + std::min(deadline_, job.within);
+    job.start_by = job.deadline - needed;
+}
+
+std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const Job& job,
+                                                            Duration max_age) {
+    if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
+    const auto& span = job.request.span();
+    if (!span) return std::nullopt;
+    auto hit = memory_.find({job.station, *span}, now, max_age);
+    if (!hit) return std::nullopt;
+    return FromMemory{++last_ticket_, std::move(*hit)};
+}
+
+void Reception::on_read(const Group& group, const Bytes& reply, Duration max_age) {
+    if (group.span && max_age > Duration::zero())
+        memory_.store({group.station, *group.span}, reply, group.started);
+}
 
 namespace {
 
@@ -344,6 +375,41 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
     if (!up_ || held_ || resetting_) return next;
     if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
     return next;
+}
+
+// What must always hold, whatever has been heard or asked. Tests call it after every verb.
+
+namespace {
+
+void must(bool holds, const char* what) {
+    if (holds) return;
+    std::fprintf(stderr, "invariant broken: %s\n", what);
+    std::abort();
+}
+
+}  // namespace
+
+void Arbiter::check_invariants() const {
+    const Backlog& backlog = schedule_.backlog();
+    must(backlog.queue().waiting() >= backlog.queue().size(), "those that count are among all");
+    must(up_ || !active_, "a line that is down carries nothing");
+    must(up_ || backlog.empty(), "a line that is down has nothing waiting");
+    must(up_ || !resetting_, "a line that is down is not to be reset");
+    backlog.each_retry([&](const Group& group) {
+        must(!group.abandoned(), "somebody waits for each retry");
+        must(group.attempts > 0, "what is repeated was sent before");
+        must(stations_.find(group.station) != nullptr, "its station is known");
+    });
+    if (active_) {
+        const Group& group = active_->group();
+        must(group.attempts > 0, "what is on the wire was sent");
+        must(active_->deadline() >= active_->timing().started, "an attempt ends behind its start");
+        must(!group.probe || group.jobs.empty(), "nobody waits for a probe");
+        for (const Job& job : group.jobs) must(job.attempts > 0, "its jobs are on the wire");
+        for (const Job& job : group.jobs) must(job.station == group.station, "of one station");
+    }
+    must(!next_deadline() || !active_ || *next_deadline() <= active_->deadline(),
+         "somebody looks at the attempt when its time is over");
 }
 
 }  // namespace panelgate::arbiter

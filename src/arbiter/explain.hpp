@@ -2,10 +2,10 @@
 
 #include <string>
 
-#include "panelgate/arbiter/client_names.hpp"
-#include "panelgate/arbiter/group.hpp"
+#include "panelgate/arbiter/actions.hpp"
+#include "panelgate/arbiter/attempt.hpp"
+#include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/reason.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 namespace panelgate::arbiter {
 
@@ -190,6 +191,293 @@ bool JobQueue::has(Client client, std::uint8_t station) const {
 std::optional<TimePoint> JobQueue::first_expiry() const {
     if (expiries_.empty()) return std::nullopt;
     return *expiries_.begin();
+}
+
+// The lanes of the queue and its accounts: who waits where, who is in which round, what counts.
+
+JobQueue::Entry JobQueue::entry_of(Job job) {
+    std::optional<ReadSpan> span;
+    const auto& items = job.request.span();
+    if (items && !job.alone && job.station != 0) span = {job.station, *items};
+    return {std::move(job), span};
+}
+
+/// A client stays where it is as long as something of it waits.
+JobQueue::HostKey JobQueue::host_of(const Job& job) const {
+    const auto home = home_.find(job.client);
+    if (home != home_.end()) return home->second;
+    return job.host == 0 ? HostKey{true, job.client} : HostKey{false, job.host};
+}
+
+/// Who is new comes in at the end of all rounds.
+JobQueue::Lane& JobQueue::open_lane(const Place& place) {
+    const auto open = [this](auto& map, const auto& key) -> auto& {
+        const auto [it, added] = map.try_emplace(key);
+        if (added) it->second.turns.fill(++turns_);
+        return it->second;
+    };
+    Origin& origin = open(hosts_, place.host);
+    Source& source = open(origin.sources, place.client);
+    home_.emplace(place.client, place.host);
+    return open(source.lanes, place.station);
+}
+
+void JobQueue::put_back(Job job) { insert(entry_of(std::move(job))); }
+
+/// Where its ticket belongs: at the end when it is new, ahead when it was taken before.
+void JobQueue::insert(Entry entry) {
+    const Place place{host_of(entry.job), entry.job.client, entry.job.station};
+    Lane& lane = open_lane(place);
+    if (!lane.jobs.empty()) delist(place);
+    expiries_.insert(entry.job.start_by);
+    if (entry.span) {
+        reads_.add(entry.job, *entry.span, [this](Client client, int by) { count(client, by); });
+    } else {
+        count(entry.job.client, 1);
+    }
+    auto at = lane.jobs.end();
+    while (at != lane.jobs.begin() && std::prev(at)->job.ticket > entry.job.ticket) --at;
+    if (at == lane.jobs.end()) {
+        lane.jobs.push_back(std::move(entry));
+    } else {
+        lane.jobs.insert(at, std::move(entry));
+    }
+    enlist(place);
+}
+
+Job JobQueue::take(const Place& place, std::size_t index) {
+    Lane& lane = hosts_.at(place.host).sources.at(place.client).lanes.at(place.station);
+    delist(place);
+    const auto at = lane.jobs.begin() + static_cast<std::ptrdiff_t>(index);
+    forget(*at);
+    Job job = std::move(at->job);
+    lane.jobs.erase(at);
+    if (lane.jobs.empty()) {
+        close(place);
+    } else {
+        enlist(place);
+    }
+    return job;
+}
+
+void JobQueue::forget(const Entry& entry) {
+    expiries_.erase(expiries_.find(entry.job.start_by));
+    if (entry.span) {
+        reads_.remove(entry.job, *entry.span, [this](Client client, int by) { count(client, by); });
+    } else {
+        count(entry.job.client, -1);
+    }
+}
+
+void JobQueue::count(Client client, int by) {
+    Origin& origin = hosts_.at(home_.at(client));
+    const auto change = static_cast<std::size_t>(by);  // wraps, and back
+    origin.sources.at(client).counting += change;
+    origin.counting += change;
+    size_ += change;
+}
+
+/// The class of its first job decides in which rounds a lane takes part.
+void JobQueue::enlist(const Place& place) {
+    Origin& origin = hosts_.at(place.host);
+    Source& source = origin.sources.at(place.client);
+    const Lane& lane = source.lanes.at(place.station);
+    const std::size_t rank = rank_of(lane.jobs.front().job);
+    source.rounds[rank].emplace(lane.turns[rank], place.station);
+    origin.rounds[rank].emplace(source.turns[rank], place.client);
+    rounds_[rank].emplace(origin.turns[rank], place.host);
+}
+
+void JobQueue::delist(const Place& place) {
+    Origin& origin = hosts_.at(place.host);
+    Source& source = origin.sources.at(place.client);
+    const Lane& lane = source.lanes.at(place.station);
+    const std::size_t rank = rank_of(lane.jobs.front().job);
+    source.rounds[rank].erase(lane.turns[rank]);
+    if (!source.rounds[rank].empty()) return;
+    origin.rounds[rank].erase(source.turns[rank]);
+    if (origin.rounds[rank].empty()) rounds_[rank].erase(origin.turns[rank]);
+}
+
+void JobQueue::close(const Place& place) {
+    Origin& origin = hosts_.at(place.host);
+    Source& source = origin.sources.at(place.client);
+    source.lanes.erase(place.station);
+    if (!source.lanes.empty()) return;
+    origin.sources.erase(place.client);
+    home_.erase(place.client);
+    if (origin.sources.empty()) hosts_.erase(place.host);
+}
+
+bool JobQueue::source_consistent(Client client, const HostKey& host, const Source& source) const {
+    std::size_t counting = 0;
+    std::array<std::size_t, kRanks> enlisted{};
+    for (const auto& [station, lane] : source.lanes) {
+        if (lane.jobs.empty()) return false;
+        const std::size_t rank = rank_of(lane.jobs.front().job);
+        const auto turn = source.rounds[rank].find(lane.turns[rank]);
+        if (turn == source.rounds[rank].end() || turn->second != station) return false;
+        ++enlisted[rank];
+        for (std::size_t i = 0; i < lane.jobs.size(); ++i) {
+            const auto& [job, span] = lane.jobs[i];
+            if (job.client != client || job.station != station) return false;
+            if (i > 0 && lane.jobs[i - 1].job.ticket >= job.ticket) return false;
+            if (!span || reads_.counts(job.ticket, *span)) ++counting;
+        }
+    }
+    for (std::size_t rank = 0; rank < kRanks; ++rank) {
+        const auto& round = hosts_.at(host).rounds[rank];
+        const auto turn = round.find(source.turns[rank]);
+        const bool listed = turn != round.end() && turn->second == client;
+        if (enlisted[rank] != source.rounds[rank].size() || listed == source.rounds[rank].empty())
+            return false;
+    }
+    return !source.lanes.empty() && counting == source.counting && home_.at(client) == host;
+}
+
+bool JobQueue::consistent() const {
+    std::size_t counting = 0;
+    std::size_t waiting = 0;
+    std::size_t clients = 0;
+    for (const auto& [host, origin] : hosts_) {
+        std::size_t of_host = 0;
+        for (const auto& [client, source] : origin.sources) {
+            if (!source_consistent(client, host, source)) return false;
+            of_host += source.counting;
+            ++clients;
+            for (const auto& [station, lane] : source.lanes) waiting += lane.jobs.size();
+        }
+        if (origin.sources.empty() || of_host != origin.counting) return false;
+        counting += of_host;
+        for (std::size_t rank = 0; rank < kRanks; ++rank) {
+            const auto turn = rounds_[rank].find(origin.turns[rank]);
+            const bool listed = turn != rounds_[rank].end() && turn->second == host;
+            if (listed == origin.rounds[rank].empty()) return false;
+        }
+    }
+    return counting == size_ && waiting == expiries_.size() && clients == home_.size() &&
+           reads_.consistent();
+}
+
+// Who is let into the queue, and who has to leave it for that.
+
+JobQueue::Admission JobQueue::push(Job job) {
+    Admission admission;
+    if (waiting() >= kMost) return admission;
+    Entry entry = entry_of(std::move(job));
+    if (!entry.span || !reads_.carries(*entry.span)) {
+        if (counting_of(entry.job.client) >= settings_.per_client) return admission;
+        if (size_ >= settings_.limit && !make_room(entry.job, admission.shed)) return {};
+    }
+    admission.taken = true;
+    insert(std::move(entry));
+    return admission;
+}
+
+/// When the victim carried others, these count in its place and may have to go as well. Tried on a
+/// copy: either there is room in the end, or nothing changes.
+bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
+    const auto first = find_victim(newcomer);
+    if (!first) return false;
+    if (first->merit.makes_room) {
+        shed.push_back(take(first->place, first->index));
+        return true;
+    }
+    JobQueue after = *this;
+    while (after.size_ >= settings_.limit) {
+        const auto victim = after.find_victim(newcomer);
+        if (!victim) return false;
+        shed.push_back(after.take(victim->place, victim->index));
+    }
+    *this = std::move(after);
+    return true;
+}
+
+std::size_t JobQueue::counting_of(Client client) const {
+    const auto home = home_.find(client);
+    return home == home_.end() ? 0 : hosts_.at(home->second).sources.at(client).counting;
+}
+
+std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const {
+    const HostKey own = host_of(newcomer);
+    const auto origin = hosts_.find(own);
+    const std::size_t of_host = origin == hosts_.end() ? 0 : origin->second.counting;
+    const std::size_t of_client = counting_of(newcomer.client);
+    const bool write = newcomer.priority == PriorityClass::write;
+    const auto writes_too = [&](const Holder& holder) {
+        return write || 2 * holder.origin.counting > size_;
+    };
+    auto victim = greediest(
+        [&](const Holder& holder) { return holder.origin.counting > of_host + 1; }, writes_too);
+    if (victim) return victim;
+    victim = greediest(
+        [&](const Holder& holder) {
+            return holder.host == own && holder.source.counting > of_client + 1;
+        },
+        writes_too);
+    // Writes come first, but the places of reads that every fifth turn needs are not theirs.
+    if (victim || !write || kReadTurn * reads_.counting() <= settings_.limit) return victim;
+    return greediest(
+        [&](const Holder& holder) {
+            return holder.host == own ? holder.source.counting >= of_client
+                                      : holder.origin.counting >= of_host;
+        },
+        [](const Holder&) { return false; });
+}
+
+/// The victim of the greediest client that has one. Among equals the newest request loses: if it
+/// were always the same client's, nothing of that client would ever be served.
+std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
+                                                    const Ask& writes_too) const {
+    std::optional<Victim> best;
+    std::pair<std::size_t, std::size_t> most;
+    for (const auto& [host, origin] : hosts_) {
+        for (const auto& [client, source] : origin.sources) {
+            const std::pair load(origin.counting, source.counting);
+            const Holder holder{host, origin, client, source};
+            if ((best && load < most) || !may_lose(holder)) continue;
+            const auto victim = victim_of(holder, writes_too(holder));
+            if (!victim || (best && load == most && victim->merit < best->merit)) continue;
+            best = victim;
+            most = load;
+        }
+    }
+    return best;
+}
+
+std::optional<JobQueue::Victim> JobQueue::victim_of(const Holder& holder, bool writes_too) const {
+    std::optional<Victim> best;
+    for (const auto& [station, lane] : holder.source.lanes) {
+        const auto victim = victim_in(holder, station);
+        if (!victim || (victim->merit.is_write && !writes_too)) continue;
+        if (!best || best->merit < victim->merit) best = victim;
+    }
+    return best;
+}
+
+/// The newest of a lane whose removal makes room; if none does, because others would count in its
+/// place, the newest that counts. Only reads stay behind it, so order is not broken by its loss;
+/// for the same reason nothing younger may wait on the other side of a broadcast.
+std::optional<JobQueue::Victim> JobQueue::victim_in(const Holder& holder,
+                                                    std::uint8_t station) const {
+    const auto& lanes = holder.source.lanes;
+    const auto& jobs = lanes.at(station).jobs;
+    std::optional<Victim> found;
+    for (std::size_t i = jobs.size(); i-- > 0;) {
+        const auto& [job, span] = jobs[i];
+        const bool frees = !span || reads_.frees(job.ticket, *span);
+        if (!frees && (found || !reads_.counts(job.ticket, *span))) continue;
+        const std::size_t rank = rank_of(job);
+        found = Victim{Place{holder.host, holder.client, station}, i,
+                       Merit{rank == 0, frees, rank, job.ticket}};
+        if (frees) break;
+    }
+    const auto younger_beyond = [&](const auto& other) {
+        const bool beyond = other.first != station && (station == 0 || other.first == 0);
+        return beyond && other.second.jobs.back().job.ticket > found->merit.ticket;
+    };
+    if (found && std::ranges::any_of(lanes, younger_beyond)) return std::nullopt;
+    return found;
 }
 
 }  // namespace panelgate::arbiter

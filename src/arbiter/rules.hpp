@@ -7,10 +7,9 @@
 
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::arbiter {
 

@@ -4,9 +4,155 @@
 #include <iterator>
 #include <utility>
 
+#include "panelgate/modbus/function.hpp"
 #include "rules.hpp"
 
 namespace panelgate::arbiter {
+
+namespace {
+
+/// Items of one read that this station is known to answer.
+std::uint32_t known_length(const Station& station, const modbus::Span& span) {
+    const StationSettings& settings = station.settings();
+    const std::uint32_t limit =
+        modbus::is_bit_table(span.table) ? settings.max_bits : settings.max_registers;
+    return settings.vouched ? limit : std::min(limit, station.longest_read(span.table));
+}
+
+}  // namespace
+
+Group Sharing::gather(Job leader, const Station& station, JobQueue& queue) const {
+    Group group{.station = leader.station, .request = leader.request};
+    if (share_ && !leader.alone) group.span = leader.request.span();
+    group.jobs.push_back(std::move(leader));
+    while (group.span) {
+        const std::uint32_t before = group.span->count;
+        for (Job& job : queue.take_all(group.station, [&](const Job& other) {
+                 if (!joins(group, other, station)) return false;
+                 group.span = join(*group.span, *other.request.span());
+                 return true;
+             })) {
+            group.jobs.push_back(std::move(job));
+        }
+        if (group.span->count == before) break;
+    }
+    if (group.span && group.span != group.request.span())
+        group.request = modbus::Request::read(*group.span);
+    return group;
+}
+
+bool Sharing::joins(const Group& group, const Job& job, const Station& station) const {
+    if (job.alone || job.station != group.station) return false;
+    const auto& span = job.request.span();
+    if (!span || !group.span->touches(*span)) return false;
+    if (group.span->contains(*span)) return true;
+    const modbus::Span both = join(*group.span, *span);
+    if (station.owes() && station.is_ambiguous(modbus::Request::read(both))) return false;
+    // The whole of one that contains all the others has been asked for by a client.
+    if (both != *span && both.count > known_length(station, both)) return false;
+    return std::none_of(refused_.begin(), refused_.end(), [&](const ReadSpan& refused) {
+        return ReadSpan{job.station, both}.contains(refused);
+    });
+}
+
+Jobs Sharing::split(Group& group) {
+    const auto stays = [&](const Job& job) { return job.request == group.request || job.gone; };
+    if (group.joined()) {
+        if (refused_.size() >= kRemembered) refused_.pop_front();
+        refused_.push_back({group.station, *group.span});
+    }
+    Jobs parts;
+    for (auto job = group.jobs.rbegin(); job != group.jobs.rend(); ++job) {
+        if (stays(*job)) continue;
+        job->alone = true;
+        parts.push_back(*job);
+    }
+    std::erase_if(group.jobs, [&](const Job& job) { return !stays(job); });
+    return parts;
+}
+
+Bytes Sharing::part_for(const Group& group, const Bytes& reply, const Job& job) {
+    if (job.request == group.request || modbus::exception_of(reply)) return reply;
+    return slice_reply(*group.span, reply, *job.request.span());
+}
+
+namespace {
+
+void append(Jobs& jobs, Jobs more) {
+    jobs.insert(jobs.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+}
+
+}  // namespace
+
+bool Backlog::has(Client client, std::uint8_t station) const {
+    const auto theirs = [&](const Job& job) {
+        return job.client == client && job.station == station;
+    };
+    return queue_.has(client, station) || std::ranges::any_of(retries_, [&](const Group& group) {
+               return std::ranges::any_of(group.jobs, theirs);
+           });
+}
+
+std::optional<Group> Backlog::take_retry(const InlineFunction<bool(const Group&), 48>& may_go) {
+    const auto next = std::ranges::find_if(retries_, may_go);
+    if (next == retries_.end()) return std::nullopt;
+    Group group = std::move(*next);
+    retries_.erase(next);
+    return group;
+}
+
+void Backlog::each_retry(const InlineFunction<void(const Group&), 48>& show) const {
+    for (const Group& group : retries_) show(group);
+}
+
+Jobs Backlog::remove_retries(const JobQueue::Test& match) {
+    Jobs removed;
+    for (auto group = retries_.begin(); group != retries_.end();) {
+        std::ranges::copy_if(group->jobs, std::back_inserter(removed), match);
+        std::erase_if(group->jobs, match);
+        if (!group->abandoned()) {
+            ++group;
+            continue;
+        }
+        append(removed, std::exchange(group->jobs, {}));  // of those who left while it was sent
+        dropped_.push_back(std::move(*group));
+        group = retries_.erase(group);
+    }
+    return removed;
+}
+
+Jobs Backlog::cancel(Client client) {
+    const auto theirs = [&](const Job& job) { return job.client == client; };
+    Jobs removed = queue_.remove_if(theirs);
+    append(removed, remove_retries(theirs));
+    return removed;
+}
+
+Jobs Backlog::expire(TimePoint now) {
+    Jobs removed = remove_retries([&](const Job& job) { return job.deadline <= now; });
+    const auto first = queue_.first_expiry();
+    if (!first || now < *first) return removed;
+    append(removed, queue_.remove_if([&](const Job& job) { return job.start_by <= now; }));
+    return removed;
+}
+
+std::optional<TimePoint> Backlog::first_expiry() const {
+    std::optional<TimePoint> first = queue_.first_expiry();
+    for (const Group& group : retries_) {
+        for (const Job& job : group.jobs) {
+            if (!first || job.deadline < *first) first = job.deadline;
+        }
+    }
+    return first;
+}
+
+Jobs Backlog::clear() {
+    const auto all = [](const Job&) { return true; };
+    Jobs removed = remove_retries(all);
+    append(removed, queue_.remove_if(all));
+    dropped_.clear();
+    return removed;
+}
 
 namespace {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::arbiter {

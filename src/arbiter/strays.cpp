@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "rules.hpp"

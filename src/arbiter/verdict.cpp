@@ -6,7 +6,7 @@
 
 #include "explain.hpp"
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::arbiter {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "panelgate/base/reserved_names.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::bus {

@@ -3,13 +3,16 @@
 #include <optional>
 #include <string>
 
-#include "panelgate/arbiter/client_names.hpp"
-#include "panelgate/arbiter/transaction_numbers.hpp"
+#include "panelgate/arbiter/actions.hpp"
+#include "panelgate/arbiter/job.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/outcome.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/bus/bus.hpp"
 
 namespace panelgate::bus {
+
+/// One line in the log, with what to do about it.
+void log_event(const Settings& settings, const arbiter::StationEvent& event);
 
 /// What the log is to say of a client's write when it has ended.
 struct Deed {

@@ -1,7 +1,6 @@
 #include "panelgate/config/endpoint.hpp"
 
 #include <arpa/inet.h>
-
 #include <algorithm>
 #include <array>
 
@@ -9,6 +8,7 @@
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
+
 namespace {
 
 /// 32 or 128 for an address of that family, 0 for anything else.

@@ -8,15 +8,14 @@
 #include <vector>
 
 #include "check_doors.hpp"
-#include "check_texts.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
-#include "panelgate/base/suggest.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/describe.hpp"
-#include "panelgate/config/profiles_dir.hpp"
-#include "panelgate/yaml/merge_keys.hpp"
-#include "panelgate/yaml/quote.hpp"
+#include "panelgate/config/real_files.hpp"
+#include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/variables.hpp"
 #include "templates.hpp"
 
 namespace panelgate::config {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "loader.hpp"
 
 namespace panelgate::config {
@@ -9,5 +11,11 @@ namespace panelgate::config {
 void load_access(Loading& loading, yaml::MapReader& in, tcp_server::Settings& settings);
 /// These keys with nothing behind them. Call it when all keys have been read.
 void refuse_empty_access(yaml::MapReader& in);
+
+/// The key `hosts` of `http`: names and addresses, without ports.
+void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings);
+
+/// The key `tokens` of `http`. Secrets are read from their files.
+void load_tokens(Loading& loading, yaml::MapReader& in, std::vector<web::Token>& tokens);
 
 }  // namespace panelgate::config

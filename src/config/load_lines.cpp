@@ -5,14 +5,13 @@
 #include <string_view>
 #include <utility>
 
-#include "line_hints.hpp"
-#include "load_port.hpp"
+#include "hints.hpp"
 #include "load_serial.hpp"
 #include "load_stations.hpp"
 #include "loader.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/settings.hpp"
-#include "panelgate/yaml/quote.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {
 namespace {

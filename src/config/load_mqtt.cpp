@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "loader.hpp"
-#include "panelgate/base/utf8.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/line/settings.hpp"
-#include "panelgate/yaml/quote.hpp"
+#include "panelgate/yaml/document.hpp"
 
 namespace panelgate::config {
 namespace {

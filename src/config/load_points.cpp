@@ -2,13 +2,12 @@
 #include <array>
 #include <cstdint>
 
-#include "check_points.hpp"
 #include "load_stations.hpp"
 #include "panelgate/base/decimal.hpp"
-#include "panelgate/base/number_text.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/notation.hpp"
-#include "panelgate/yaml/quote.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "point_limits.hpp"
 
 namespace panelgate::config {

@@ -6,10 +6,17 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
-#include "line_hints.hpp"
+#include "hints.hpp"
+#include "load_access.hpp"
+#include "loader.hpp"
+#include "panelgate/base/serial_format.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::config {
+
 namespace {
 
 using yaml::MapReader;
@@ -75,6 +82,165 @@ bool load_serial(Loading& loading, MapReader& line, SerialFormat& format,
     format.stop_bits = static_cast<int>(in.integer("stop_bits", 1, 2).value_or(format.stop_bits));
     in.finish();
     return loading.problems.list().size() == before;
+}
+
+namespace {
+
+using modbus::Framing;
+using serial_server::OnFailure;
+using serial_server::Settings;
+using tcp_server::BroadcastMode;
+
+constexpr std::string_view kExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
+constexpr std::string_view kListExample = "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
+
+void load_manners(MapReader& in, Settings& settings) {
+    constexpr std::array<std::pair<std::string_view, Framing>, 2> kFramings{
+        {{"rtu", Framing::rtu}, {"ascii", Framing::ascii}}};
+    constexpr std::array<std::pair<std::string_view, BroadcastMode>, 2> kBroadcasts{
+        {{"silent", BroadcastMode::silent}, {"deny", BroadcastMode::deny}}};
+    constexpr std::array<std::pair<std::string_view, OnFailure>, 2> kFailures{
+        {{"exception", OnFailure::exception}, {"silence", OnFailure::silence}}};
+    constexpr std::array<std::pair<std::string_view, EchoMode>, 3> kEchoes{
+        {{"auto", EchoMode::automatic}, {"on", EchoMode::on}, {"off", EchoMode::off}}};
+    settings.access.framing = in.choice<Framing>("framing", kFramings).value_or(Framing::rtu);
+    settings.access.broadcast =
+        in.choice<BroadcastMode>("broadcast", kBroadcasts).value_or(BroadcastMode::silent);
+    settings.on_failure =
+        in.choice<OnFailure>("on_failure", kFailures).value_or(settings.on_failure);
+    settings.echo = in.choice<EchoMode>("echo", kEchoes).value_or(settings.echo);
+    settings.response_timeout = in.duration("response_timeout", 1ms, 10min);
+}
+
+void check_name(Loading& loading, MapReader& in, const Settings& settings) {
+    const auto same = [&](const Settings& other) { return other.name == settings.name; };
+    if (!settings.name.empty() && std::ranges::any_of(loading.config.serial_masters, same))
+        in.problem("name", "there are two serial masters '" + settings.name + '\'');
+}
+
+/// Two users of one device would take each other's bytes. What is none has been told.
+void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
+    if (!port.device.starts_with('/')) return;
+    for (const Line& line : loading.config.lines) {
+        if (line.device.device != port.device) continue;
+        in.problem("device", "line '" + line.name +
+                                 "' has this device already; a master needs a port of its own");
+        return;
+    }
+    for (const Settings& other : loading.config.serial_masters) {
+        if (other.device.device != port.device) continue;
+        in.problem("device", "serial master '" + other.name + "' has this device already");
+        return;
+    }
+}
+
+void check_units(MapReader& in, const Settings& settings) {
+    in.keyed_by("units", '^' + yaml::integer_pattern(1, modbus::kMaxStation) + '$');
+    for (const auto& [unit, target] : settings.access.units) {
+        if (unit != 0 && unit <= modbus::kMaxStation) continue;
+        in.problem("units",
+                   "a master on a serial line asks units 1 to 247, not " + std::to_string(unit));
+    }
+}
+
+/// Of the stations that it can reach, by their own ids or by units.
+template <class Use>
+void each_station(const Config& config, const Settings& settings, Use use) {
+    for (const Line& line : config.lines) {
+        const bool own = std::ranges::count(settings.access.lines, line.name) > 0;
+        for (std::size_t i = 0; i < line.stations.size(); ++i) {
+            const auto is_it = [&](const auto& unit) {
+                return unit.second.line == line.name && unit.second.station == line.stations[i].id;
+            };
+            if (own || std::ranges::any_of(settings.access.units, is_it))
+                use(line, line.stations[i], line.arbiter.stations[i]);
+        }
+    }
+}
+
+Duration longest_read(const Line& line, const arbiter::StationSettings& station) {
+    const std::size_t bytes =
+        std::max<std::size_t>(2 * station.max_registers, (station.max_bits + 7) / 8);
+    return frame_time(line.device.serial,
+                      modbus::kReadRequestAdu + modbus::kReadReplyOverhead + bytes, 2);
+}
+
+/// What a panel may still answer comes too late for a master that waits for less.
+void warn_of_timeout(Loading& loading, MapReader& in, const Settings& settings) {
+    if (!settings.response_timeout) return;
+    Duration needed{};
+    std::string who;
+    each_station(
+        loading.config, settings,
+        [&](const Line& line, const Station& station, const arbiter::StationSettings& timing) {
+            const Duration own = timing.response_timeout + longest_read(line, timing) +
+                                 silent_interval(settings.device.serial);
+            if (own <= needed) return;
+            needed = own;
+            who = station.name;
+        });
+    if (needed <= *settings.response_timeout) return;
+    const auto text = yaml::format_milliseconds(needed);
+    loading.warn(in.mark("response_timeout"),
+                 "station '" + who + "' may take " + text +
+                     " to answer on its line, and this master waits for " +
+                     yaml::format_duration(*settings.response_timeout) +
+                     ": set its timeout to more than " + text +
+                     " (and what other clients' requests take), or lower response_timeout of the "
+                     "station");
+}
+
+void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
+    bool reaches_any = !settings.access.units.empty();
+    each_station(loading.config, settings, [&](const auto&...) { reaches_any = true; });
+    if (reaches_any) return;
+    const std::vector<std::string>& lines = settings.access.lines;
+    loading.warn(in.mark(), "serial master '" + settings.name +
+                                "' reaches nobody: it is answered for listed stations and units "
+                                "only; add stations to the line, or units: {31: " +
+                                (lines.empty() ? "LINE" : lines.front()) + "/31}");
+}
+
+/// What `framing` says; its faults are told where it is read.
+SerialMode mode_of(const Node& master) {
+    const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
+    const bool ascii =
+        framing != master.entries.end() && framing->value.scalar != modbus::label(Framing::rtu);
+    return ascii ? SerialMode::ascii : SerialMode::rtu;
+}
+
+/// Keys that people write where a line has them.
+constexpr std::array<yaml::Elsewhere, 2> kElsewhere{
+    {{"mode", {}, {}, "its mode is its framing: write framing: ascii, or leave it out for RTU"},
+     {"baud", "serial", {}}}};
+
+Settings load_master(Loading& loading, const Node& node) {
+    MapReader in(node, loading.problems, "a serial master", kExample);
+    in.elsewhere(kElsewhere);
+    Settings settings;
+    settings.access.diagnostics_unit.reset();
+    settings.name = load_name(in, true).value_or("");
+    check_name(loading, in, settings);
+    const bool serial_known = load_port(loading, in, settings.device, mode_of(node));
+    check_device(loading, in, settings.device);
+    load_access(loading, in, settings.access);
+    check_units(in, settings);
+    load_manners(in, settings);
+    refuse_empty_access(in);
+    in.finish();
+    if (!loading.problems.empty()) return settings;
+    if (serial_known) warn_of_timeout(loading, in, settings);
+    warn_of_nobody(loading, in, settings);
+    return settings;
+}
+
+}  // namespace
+
+void load_serial_masters(Loading& loading, MapReader& root) {
+    const Node* list = root.sequence("serial_masters", kListExample);
+    if (list == nullptr) return;
+    for (const Node& node : list->items)
+        loading.config.serial_masters.push_back(load_master(loading, node));
 }
 
 }  // namespace panelgate::config

@@ -3,21 +3,131 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "loader.hpp"
-#include "mbusd_lines.hpp"
-#include "mbusd_number.hpp"
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/config/endpoint.hpp"
+#include "panelgate/yaml/document.hpp"
 #include "panelgate/yaml/map_reader.hpp"
-#include "panelgate/yaml/quote.hpp"
 
 namespace panelgate::config {
+
+struct MbusdNumber {
+    std::int64_t value = 0;
+    bool plain = true;  ///< decimal, without anything behind it: nobody reads it otherwise
+};
+
+/// A number as mbusd reads it (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for 8,
+/// and whatever stands behind the digits is ignored. Nothing where there is no digit, of which
+/// mbusd makes 0, and of what is negative or beyond 2^31 - 1.
+std::optional<MbusdNumber> mbusd_number(std::string_view text);
+
+/// One NAME = VALUE of an mbusd.conf.
+struct MbusdLine {
+    std::string name;
+    std::string value;
+    yaml::Mark mark;        ///< of the name
+    yaml::Mark value_mark;  ///< or of the end of the line
+};
+
+/// A line that begins with '#' is a comment, as is nothing else: what stands behind a value is part
+/// of it. A line ends with LF, CR or both; a byte order mark before the first is skipped. Lines
+/// that are none are added to `problems`.
+std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems);
+
+namespace {
+
+bool is_hex_digit(char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F');
+}
+
+int base_of(std::string_view digits) {
+    if (digits.size() < 2 || digits[0] != '0') return 10;
+    const bool is_hex =
+        digits.size() > 2 && (digits[1] == 'x' || digits[1] == 'X') && is_hex_digit(digits[2]);
+    return is_hex ? 16 : 8;
+}
+
+}  // namespace
+
+std::optional<MbusdNumber> mbusd_number(std::string_view text) {
+    std::string_view digits = text.substr(text.starts_with('+') ? 1 : 0);
+    const int base = base_of(digits);
+    if (base == 16) digits.remove_prefix(2);
+    std::uint32_t value = 0;
+    const char* end = digits.data() + digits.size();
+    const auto [stop, error] = std::from_chars(digits.data(), end, value, base);
+    constexpr std::uint32_t kMost = std::numeric_limits<std::int32_t>::max();
+    if (error != std::errc() || value > kMost) return std::nullopt;
+    return MbusdNumber{value, base == 10 && stop == end};
+}
+
+namespace {
+
+constexpr std::string_view kBlanks = " \t\f\v";
+
+std::string_view without_blanks(std::string_view text) {
+    const std::size_t first = text.find_first_not_of(kBlanks);
+    if (first == text.npos) return {};
+    return text.substr(first, text.find_last_not_of(kBlanks) + 1 - first);
+}
+
+bool has_control_character(std::string_view text) {
+    return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+}
+
+void take_line(std::string_view whole, int number, std::vector<MbusdLine>& lines,
+               yaml::Problems& problems) {
+    const std::string_view typed = without_blanks(whole);
+    if (typed.empty() || typed[0] == '#') return;
+    const auto column = [&](std::string_view part) {
+        return part.empty() ? static_cast<int>(whole.size()) + 1
+                            : static_cast<int>(part.data() - whole.data()) + 1;
+    };
+    const std::size_t sign = typed.find('=');
+    const std::string_view name = without_blanks(typed.substr(0, sign));
+    const yaml::Mark mark{number, column(typed)};
+    if (sign == typed.npos || name.empty()) {
+        problems.add(mark,
+                     "a line must be NAME = VALUE such as speed = 19200, or a comment that "
+                     "begins with '#', not " +
+                         yaml::quote(typed));
+        return;
+    }
+    const std::string_view value = without_blanks(typed.substr(sign + 1));
+    if (has_control_character(value)) {
+        problems.add({number, column(value)},
+                     std::string(name) + " must be plain text; it holds control characters");
+        return;
+    }
+    lines.push_back({std::string(name), std::string(value), mark, {number, column(value)}});
+}
+
+}  // namespace
+
+std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems) {
+    std::vector<MbusdLine> lines;
+    text.remove_prefix(byte_order_mark(text));
+    for (int number = 1; !text.empty(); ++number) {
+        const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+        take_line(text.substr(0, end), number, lines, problems);
+        text.remove_prefix(end);
+        text.remove_prefix(text.starts_with("\r\n") ? 2 : text.empty() ? 0 : 1);
+    }
+    return lines;
+}
+
 namespace {
 
 /// mbusd's settings, with its defaults (cfg.c, cfg_init(); README).

@@ -3,10 +3,15 @@
 #include <cstdint>
 #include <string>
 
+#include "loader.hpp"
 #include "panelgate/points/point.hpp"
 #include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::config {
+
+/// Warns of what is legal and does nothing: a limit of what nobody may write, an order of words
+/// where there is only one.
+void warn_of_idle_keys(Loading& loading, yaml::MapReader& in, const points::Point& point);
 
 /// Raw numbers of a whole type, as far as 64 signed bits hold them.
 struct RawRange {

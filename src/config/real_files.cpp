@@ -7,13 +7,13 @@
 #include <sys/statvfs.h>
 #include <sys/vfs.h>
 #include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 namespace panelgate::config {
 
@@ -109,6 +109,26 @@ bool RealFiles::is_readable_by_all(const std::string& path) const {
     std::error_code error;
     const fs::perms rights = fs::status(path, error).permissions();
     return !error && (rights & fs::perms::others_read) != fs::perms::none;
+}
+
+std::vector<std::string> add_profiles(const std::string& dir, const Files& files,
+                                      profile::Catalogue& catalogue, yaml::Problems& problems) {
+    const auto paths = files.list_yaml(dir);
+    if (!paths) return {"cannot list the directory " + dir};
+    std::vector<std::string> unreadable;
+    for (const std::string& path : *paths) {
+        const auto text = files.read(path);
+        if (!text) {
+            unreadable.push_back("cannot read " + path);
+            continue;
+        }
+        yaml::Problems own(path);
+        auto profile =
+            profile::load_profile(*text, std::filesystem::path(path).stem().string(), own);
+        problems.take(own);
+        if (profile) catalogue.add(std::move(*profile));
+    }
+    return unreadable;
 }
 
 }  // namespace panelgate::config

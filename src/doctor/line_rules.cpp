@@ -1,5 +1,3 @@
-// What concerns everybody on the line.
-
 #include <optional>
 #include <string>
 #include <vector>
@@ -7,6 +5,8 @@
 #include "rules.hpp"
 
 namespace panelgate::doctor {
+
+// What concerns everybody on the line.
 
 using arbiter::Symptoms;
 
@@ -156,6 +156,206 @@ void find_trailing_bytes(Case& c) {
         return add_trailing(c, {}, "all stations", c.all);
     for (const std::uint8_t id : found)
         add_trailing(c, named(id), station_text(c, id), c.window.stations.at(id));
+}
+
+// Replies that came and were damaged: by what, the whole line's or one panel's.
+
+namespace {
+
+/// Nearly everything that comes is damaged: one in ten may be good by chance.
+bool is_all_damaged(const Case& c, const Symptoms& s) {
+    const Bar bar{c, cause_of_damage(c, s)};
+    return s.damaged() >= bar.enough(5) && s.answered * 10 <= s.damaged();
+}
+
+double share(std::uint64_t part, std::uint64_t whole) {
+    return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// What one address or another cause explains tells nothing about the line.
+Symptoms unexplained(const Case& c) {
+    Sample rest;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        const bool explained =
+            c.has(Cause::duplicate_address, id) || c.has(Cause::damaged_replies, id) ||
+            (id != 0 && c.has(Cause::wrong_baud, id)) ||
+            (id != 0 && c.has(Cause::wrong_parity, id)) || is_told_by_its_frames(c, id);
+        if (explained) continue;
+        Symptoms& own = rest.stations[id] = symptoms;
+        if (c.has_of_line(Cause::trailing_bytes) || c.has(Cause::trailing_bytes, id))
+            own.strays -= std::min(own.strays, own.trailed);
+    }
+    return rest.total();
+}
+
+/// All of few damaged replies came from one of several stations: it may be that one, or chance.
+bool may_be_one_station(const Case& c, const Symptoms& s) {
+    constexpr std::uint64_t kFew = 8;
+    if (s.damaged() >= kFew) return false;
+    bool one = false, others = false;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        one = one || symptoms.damaged() == s.damaged();
+        others = others || (symptoms.answered > 0 && symptoms.damaged() == 0);
+    }
+    return one && others;
+}
+
+/// One damaged frame in a thousand is life; one in a hundred is a fault.
+bool is_too_often(const Case& c, const Bar& bar, const Symptoms& s, std::uint64_t damaged) {
+    return damaged >= bar.enough(3) && (bar.low || !may_be_one_station(c, s)) &&
+           share(damaged, damaged + s.answered) >= (bar.low ? 0.003 : 0.01);
+}
+
+/// A long reply is hit more often than by its length alone: what reflections do.
+bool hits_long_replies(const Symptoms& s) {
+    const std::uint64_t short_damaged = s.damaged() - s.long_damaged;
+    const std::uint64_t short_answered = s.answered - s.long_answered;
+    constexpr std::uint64_t kEnough = 10;
+    return s.long_damaged >= 3 && short_answered >= kEnough &&
+           share(s.long_damaged, s.long_damaged + s.long_answered) >
+               3 * share(short_damaged, short_damaged + short_answered);
+}
+
+bool has_better_than_noise(const Case& c) {
+    return c.has(Cause::echo) || c.has_of_line(Cause::wrong_baud) || c.has(Cause::other_master) ||
+           c.has(Cause::collision) || c.has_of_line(Cause::wrong_parity);
+}
+
+}  // namespace
+
+/// The length tells the pace, and zeros tell bytes that the parity check has thrown away.
+Cause cause_of_damage(const Case& c, const Symptoms& s) {
+    const bool same_pace = s.damaged_exact * 5 >= s.damaged() * 4;
+    // Bytes that pass a wrong parity check all have the same parity; what noise leaves has both.
+    const std::uint64_t left = s.damaged_bytes - s.damaged_zeros;
+    const bool alike = std::min(s.damaged_odd, left - s.damaged_odd) * 20 <= left;
+    const bool checked = c.facts.serial.parity != Parity::none;
+    if (c.window.uart && c.window.uart->parity + c.window.uart->framing >= 5) {
+        const line::UartErrors& uart = *c.window.uart;
+        return uart.parity > uart.framing ? Cause::wrong_parity : Cause::wrong_baud;
+    }
+    if (c.facts.serial.mode == SerialMode::ascii)  // what is damaged has no bytes to count
+        return s.damaged_heads * 2 >= s.damaged() ? Cause::noise : Cause::wrong_baud;
+    if (checked && same_pace && alike && s.damaged_zeros * 4 >= s.damaged_bytes)
+        return Cause::wrong_parity;
+    if (s.damaged_heads * 2 >= s.damaged()) return Cause::noise;
+    return same_pace ? Cause::wrong_parity : Cause::wrong_baud;
+}
+
+void find_crc_order(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::wrong_crc_order, named(station)};
+    if (s.crc_swapped < bar.enough(3) || s.crc_swapped * 2 <= s.damaged()) return;
+    const bool set = c.facts.crc_high_first.contains(station);
+    const std::string advice =
+        set ? "Leave its `crc_order` out, or set it to `low_first`, the standard's; of the profile "
+              "autonics-gp-2005-old the newer one is autonics-gp-2005."
+            : std::string(station == 0 ? "List it, and set" : "Set") +
+                  " its `crc_order: high_first`; Autonics GP panels with firmware of before June "
+                  "2005 have the profile autonics-gp-2005-old, which sets it.";
+    c.add(Cause::wrong_crc_order, named(station),
+          "The replies of " + station_text(c, station) + " carry the CRC's " +
+              (set ? "low" : "high") + " byte first.",
+          advice,
+          share_text(s.crc_swapped, s.damaged(), "damaged replies") +
+              " are right but for the order of the CRC's bytes; " + std::to_string(s.answered) +
+              " replies were right",
+          {{"swapped", s.crc_swapped}, {"damaged", s.damaged()}, {"right", s.answered}});
+}
+
+void find_lower_case(Case& c, std::uint8_t station, const Symptoms& s) {
+    const Bar bar{c, Cause::ascii_lower_case, named(station)};
+    if (c.facts.serial.mode != SerialMode::ascii) return;
+    if (s.lower_case < bar.enough(3) || s.lower_case * 2 <= s.damaged()) return;
+    c.add(Cause::ascii_lower_case, named(station),
+          "The replies of " + station_text(c, station) + " have lower-case hex digits.",
+          "Set `serial: {ascii_lower_case: take}` of the line; the standard has upper case only.",
+          share_text(s.lower_case, s.damaged(), "damaged replies") +
+              " are written in lower case; " + std::to_string(s.answered) +
+              " replies were right, as those without A to F are",
+          {{"lower_case", s.lower_case}, {"damaged", s.damaged()}, {"right", s.answered}});
+}
+
+void find_all_damaged(Case& c) {
+    const Symptoms s = unexplained(c);
+    if (!is_all_damaged(c, s) || c.has(Cause::echo)) return;
+    const Cause cause = cause_of_damage(c, s);
+    const std::string evidence = damage_text(c, s);
+    const std::string now = to_string(c.facts.serial);
+    if (c.facts.over_tcp) {
+        // Another length may as well be what lies between.
+        if (cause != Cause::wrong_parity || s.damaged_exact != s.damaged()) return;
+        c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
+              "Set the parity, data and stop bits of the server's serial port as in the panels' "
+              "communication settings.",
+              evidence, damage_figures(s));
+    } else if (cause == Cause::wrong_parity) {
+        c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
+              "Set `serial.parity`, data and stop bits as in the panels' communication settings "
+              "(now " +
+                  now + ").",
+              evidence, damage_figures(s));
+    } else if (cause == Cause::wrong_baud && c.facts.serial.mode == SerialMode::ascii) {
+        c.add(cause, {}, "What comes is no Modbus ASCII: baud, data bits or parity differ.",
+              "Set `serial` as in the panels' communication settings (now " + now +
+                  "); panels that are set to RTU need `mode: rtu`.",
+              evidence, damage_figures(s));
+    } else if (cause == Cause::wrong_baud) {
+        const bool breaks = c.window.uart && c.window.uart->breaks * 2 > c.window.uart->framing;
+        c.add(cause, {}, "What comes is no Modbus at this speed: the baud differs.",
+              std::string(breaks ? "A and B may be swapped. " : "") +
+                  "Set `serial.baud` as in the panels' communication settings (now " + now + ").",
+              evidence, damage_figures(s));
+    }
+}
+
+void find_noise(Case& c) {
+    if (has_better_than_noise(c) || c.has(Cause::tcp_framing)) return;
+    const Bar bar{c, Cause::noise};
+    const Symptoms s = unexplained(c);
+    const bool overrun =
+        c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
+    // Over TCP replies are cut short where the connection stalls, and their rests come alone.
+    const std::uint64_t damaged = c.facts.over_tcp ? s.damaged_exact : s.damaged();
+    const bool damage = is_too_often(c, bar, s, damaged);
+    const bool strays =
+        !c.facts.over_tcp && s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
+    if (overrun || (!damage && !strays)) return;
+    std::string advice =
+        "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
+        "what runs beside the cable.";
+    if (c.facts.over_tcp) advice = "On the line behind the server: " + advice;
+    std::string evidence = damage_text(c, s);
+    if (hits_long_replies(s)) {
+        advice = "Long replies suffer most: look at the termination first. " + advice;
+        evidence += "; " + share_text(s.long_damaged, s.long_damaged + s.long_answered,
+                                      "replies of 32 bytes and more damaged");
+    }
+    if (strays) {
+        advice = "Bytes come when nobody speaks: look at the bias first. " + advice;
+        evidence += "; " + std::to_string(s.strays) + " times bytes around or between replies";
+    }
+    Figures figures = damage_figures(s);
+    if (strays) figures["strays"] = s.strays;
+    c.add(Cause::noise, {}, "Some of what comes is damaged.", std::move(advice),
+          std::move(evidence), std::move(figures));
+}
+
+/// What lies between changes lengths: telnet doubles bytes or takes them out. A wrong byte in a
+/// reply of the right length comes from the wire behind the server, and one that is cut short from
+/// a connection that stalls, unless nothing else ever comes.
+void find_tcp_framing(Case& c) {
+    if (has_better_than_noise(c)) return;
+    const Bar bar{c, Cause::tcp_framing};
+    const Symptoms s = unexplained(c);
+    const bool never_right = is_all_damaged(c, s) && s.damaged_exact * 2 < s.damaged() &&
+                             s.silent + s.disturbed <= s.damaged();
+    const std::uint64_t changed = never_right ? s.damaged() : s.damaged_long;
+    if (!is_too_often(c, bar, s, changed)) return;
+    c.add(Cause::tcp_framing, {}, "Bytes are changed on the way from the server.",
+          "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "
+          "`telnet(rfc2217)`), that no other client is connected to it, and that its own baud and "
+          "serial format are the panels'; then look at the line behind it.",
+          damage_text(c, s), damage_figures(s));
 }
 
 }  // namespace panelgate::doctor

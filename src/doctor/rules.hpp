@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/doctor/diagnose.hpp"
+#include "panelgate/doctor/doctor.hpp"
 
 namespace panelgate::doctor {
 

@@ -1,21 +1,80 @@
 #pragma once
 
 #include <sys/types.h>
-
+#include <algorithm>
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
-#include "input_budget.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/line/reopen.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "readiness.hpp"
 
 namespace panelgate::line {
+
+/// How much of what a device says is read: replies to what was sent, and besides them no more than
+/// a rate, but for a burst of kBurst at that rate. What is beyond stays with the kernel, and over
+/// TCP with the sender. Pure.
+class InputBudget {
+  public:
+    static constexpr Duration kBurst = 1s;
+    static constexpr std::size_t kReply = 1024;  ///< bytes, more than any is
+
+    /// `rate`: bytes a second, more than 0.
+    explicit InputBudget(std::size_t rate) : rate_(rate) {}
+
+    bool allows(TimePoint now) const { return paid_ <= now + kBurst; }
+    void spend(TimePoint now, std::size_t bytes) {
+        paid_ = std::max(paid_, now) + Duration(1s) * bytes / rate_;
+    }
+    void on_sent() { paid_ -= Duration(1s) * kReply / rate_; }
+    /// Behind a burst half of it is waited for, so that reading goes in few large pieces.
+    TimePoint next() const { return paid_ - kBurst / 2; }
+
+  private:
+    std::size_t rate_;
+    TimePoint paid_{};
+};
+
+/// Says when a descriptor can be read or written, and can be told not to: an event loop's own watch
+/// would wake for each byte, wanted or not. It stands between the two, as an epoll set of one.
+/// Loss of the device is always said. One thread; the descriptor is its owner's.
+class Readiness {
+  public:
+    /// `ready` is called from the loop: what it may read and write is then there, or was.
+    Readiness(const boost::asio::any_io_executor& executor, std::function<void()> ready);
+    ~Readiness();
+    Readiness(const Readiness&) = delete;
+    Readiness& operator=(const Readiness&) = delete;
+
+    /// Watches for input from now on. An error text when it cannot; a plain file, which is always
+    /// ready, is not watched.
+    std::string watch(int fd);
+    /// No longer: before the descriptor is closed.
+    void forget();
+    /// Does nothing while nothing is watched.
+    void want_input(bool wanted);
+    void want_output(bool wanted);
+
+  private:
+    void want(std::uint32_t events);
+    void wait();
+
+    boost::asio::posix::stream_descriptor epoll_;
+    std::function<void()> ready_;
+    int fd_ = -1;
+    std::uint32_t events_ = 0;
+    bool waiting_ = false;  ///< the loop watches the set
+    std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
+};
 
 /// What lines on a non-blocking descriptor have in common: one read loop, writes in one piece,
 /// never more than one frame that has not left, closing at the first sign of loss and opening again

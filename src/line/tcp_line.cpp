@@ -5,24 +5,160 @@
 #include <netinet/tcp.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-
+#include <atomic>
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/connect.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/execution/outstanding_work.hpp>
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
+#include <boost/system/error_code.hpp>
 #include <charconv>
+#include <csignal>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 
 #include "descriptor_line.hpp"
-#include "name_lookup.hpp"
-#include "panelgate/rt/keep_alive.hpp"
+#include "panelgate/line/settings.hpp"
+#include "panelgate/rt/acceptor.hpp"
 
 namespace panelgate::line {
-namespace {
+
+/// Finds the addresses of one host. A name server may be silent for half a minute, and nobody can
+/// take the question back: so each look-up has a thread of its own, at most one for an object, that
+/// nobody waits for, also at the program's end. All else happens in the one thread that runs the
+/// executor; nothing is told after cancel() or the object's end.
+class NameLookup {
+  public:
+    using Addresses = boost::asio::ip::tcp::resolver::results_type;
+    using Found =
+        std::function<void(const boost::system::error_code& error, const Addresses& addresses)>;
+    /// Threads of the whole program; who comes when all are held by silent servers is told to try
+    /// again.
+    static constexpr int kMostThreads = 64;
+
+    NameLookup(boost::asio::any_io_executor executor, TcpEndpoint endpoint);
+    ~NameLookup();
+    NameLookup(const NameLookup&) = delete;
+    NameLookup& operator=(const NameLookup&) = delete;
+
+    /// Takes the place of what was asked before. A question that is still open is not asked twice:
+    /// its answer is this one's, too.
+    void ask(Found found);
+    void cancel();
+    bool waits() const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;  ///< the thread's share of it
+};
 
 namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
+
+struct NameLookup::State : std::enable_shared_from_this<NameLookup::State> {
+    State(asio::any_io_executor e, TcpEndpoint of)
+        : executor(std::move(e)), loop(executor), endpoint(std::move(of)) {}
+
+    void start();
+    void look_up();
+    void tell(const error_code& error, const Addresses& addresses);
+
+    asio::any_io_executor executor;
+    std::mutex mutex;                           ///< of `loop`, all that the thread shares
+    std::optional<asio::any_io_executor> loop;  ///< nothing: nobody is there any more
+    const TcpEndpoint endpoint;
+    std::optional<asio::any_io_executor> work;  ///< the loop has something to wait for
+    Found found;
+    bool under_way = false;
+};
+
+namespace {
+
+std::atomic<int> threads;
+
+/// The calling thread waits for as long as the system's resolver does.
+std::pair<error_code, NameLookup::Addresses> resolve(const TcpEndpoint& endpoint) {
+    asio::io_context own;
+    tcp::resolver resolver(own);
+    error_code error;
+    auto addresses =
+        resolver.resolve(endpoint.host, endpoint.port, tcp::resolver::numeric_service, error);
+    return {error, std::move(addresses)};
+}
+
+}  // namespace
+
+/// In the thread. The loop may have ended meanwhile, and only the lock tells.
+void NameLookup::State::look_up() {
+    sigset_t all;
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are the loop's
+    auto [error, addresses] = resolve(endpoint);
+    --threads;
+    const std::lock_guard lock(mutex);
+    if (!loop) return;
+    asio::post(*loop, [self = shared_from_this(), why = error, results = std::move(addresses)] {
+        self->tell(why, results);
+    });
+}
+
+void NameLookup::State::start() {
+    under_way = true;
+    error_code failed;
+    if (++threads > kMostThreads) {
+        failed = asio::error::try_again;
+    } else {
+        try {
+            std::thread([self = shared_from_this()] { self->look_up(); }).detach();
+        } catch (const std::system_error& error) {
+            failed = error.code();
+        }
+    }
+    if (!failed) return;
+    --threads;
+    asio::post(executor, [self = shared_from_this(), failed] { self->tell(failed, {}); });
+}
+
+void NameLookup::State::tell(const error_code& error, const Addresses& addresses) {
+    under_way = false;
+    work.reset();
+    if (const Found asked = std::exchange(found, nullptr)) asked(error, addresses);
+}
+
+NameLookup::NameLookup(asio::any_io_executor executor, TcpEndpoint endpoint)
+    : state_(std::make_shared<State>(std::move(executor), std::move(endpoint))) {}
+
+NameLookup::~NameLookup() {
+    cancel();
+    const std::lock_guard lock(state_->mutex);
+    state_->loop.reset();
+}
+
+void NameLookup::ask(Found found) {
+    state_->found = std::move(found);
+    state_->work = asio::prefer(state_->executor, asio::execution::outstanding_work.tracked);
+    if (!state_->under_way) state_->start();
+}
+
+void NameLookup::cancel() {
+    state_->found = nullptr;
+    state_->work.reset();
+}
+
+bool NameLookup::waits() const { return state_->found != nullptr; }
+
+namespace {
 
 constexpr Duration kConnectTimeout = 5s;
 

@@ -5,14 +5,9 @@
 #include <utility>
 
 #include "families.hpp"
-#include "http_families.hpp"
-#include "mqtt_families.hpp"
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/base/outcome.hpp"
-#include "panelgate/base/priority.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/line/counters.hpp"
-#include "point_families.hpp"
-#include "serial_families.hpp"
 
 namespace panelgate::metrics {
 namespace {

@@ -1,8 +1,9 @@
 #include "families.hpp"
 
 #include <prometheus/text_serializer.h>
-
+#include <cstdint>
 #include <sstream>
+#include <string>
 #include <vector>
 
 namespace panelgate::metrics {
@@ -55,6 +56,161 @@ Family make_gauge(std::string name, std::string help) {
 
 Family make_histogram(std::string name, std::string help) {
     return {std::move(name), std::move(help), MetricType::Histogram};
+}
+
+void add_http(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.http) return;
+    Family requests =
+        make_counter("panelgate_http_requests_total", "HTTP requests answered, by status.");
+    for (const auto& [code, count] : snapshot.http->requests) {
+        requests.counter({{"code", std::to_string(code)}}, count);
+    }
+    Family failures = make_counter("panelgate_login_failures_total",
+                                   "HTTP requests with a token that nobody has.");
+    failures.counter({}, snapshot.http->login_failures);
+    out.push_back(requests.take());
+    out.push_back(failures.take());
+}
+
+namespace {
+
+void add_counter(Families& out, const char* name, const char* help, std::uint64_t value) {
+    Family family = make_counter(name, help);
+    family.counter({}, value);
+    out.push_back(family.take());
+}
+
+void add_writes(Families& out, const mqtt::Counters& mqtt) {
+    Family writes =
+        make_counter("panelgate_mqtt_writes_total", "Writes of points that came by the broker.");
+    writes.counter({{"outcome", "ok"}}, mqtt.writes_ok);
+    writes.counter({{"outcome", "refused"}}, mqtt.writes_refused);
+    writes.counter({{"outcome", "failed"}}, mqtt.writes_failed);
+    out.push_back(writes.take());
+}
+
+}  // namespace
+
+void add_mqtt(Families& out, const Snapshot& snapshot) {
+    if (!snapshot.mqtt) return;
+    const mqtt::Counters& mqtt = *snapshot.mqtt;
+    Family connected =
+        make_gauge("panelgate_mqtt_connected", "1 while the broker has accepted the gateway.");
+    connected.gauge({}, mqtt.connected ? 1 : 0);
+    out.push_back(connected.take());
+    Family stored =
+        make_gauge("panelgate_mqtt_stored", "Changes that the broker has not acknowledged yet.");
+    stored.gauge({}, static_cast<double>(mqtt.stored));
+    out.push_back(stored.take());
+    add_counter(out, "panelgate_mqtt_published_total",
+                "Messages handed to the broker, repetitions included.", mqtt.published);
+    add_counter(out, "panelgate_mqtt_dropped_total",
+                "Changes lost because the broker was away for longer than the store lasts.",
+                mqtt.dropped);
+    add_counter(out, "panelgate_mqtt_results_dropped_total",
+                "Answers to writes lost because too many waited for the broker.",
+                mqtt.results_dropped);
+    add_counter(out, "panelgate_mqtt_reconnects_total",
+                "Connections to the broker after the first.", mqtt.reconnects);
+    add_writes(out, mqtt);
+}
+
+void add_points(Families& out, const Snapshot& snapshot) {
+    Family value = make_gauge("panelgate_point_value",
+                              "Value of a point; absent when the last attempt to read it failed.");
+    Family age = make_gauge("panelgate_point_age_seconds",
+                            "Time since a point was read; absent when it never was.");
+    for (const points::PointSample& point : snapshot.points) {
+        const Labels labels{
+            {"line", point.line}, {"station", point.station}, {"point", point.point}};
+        if (point.age) age.gauge(labels, *point.age);
+        if (!point.value) continue;
+        Labels with_unit = labels;
+        with_unit.push_back({"unit", point.unit});
+        value.gauge(std::move(with_unit), *point.value);
+    }
+    out.push_back(value.take());
+    out.push_back(age.take());
+}
+
+void add_relays(Families& out, const Snapshot& snapshot) {
+    Family up = make_gauge("panelgate_relay_up", "1 when the last transfer of a relay succeeded.");
+    Family reads = make_counter("panelgate_relay_reads_total", "Reads of a relay's source.");
+    Family writes = make_counter("panelgate_relay_writes_total", "Writes of a relay's target.");
+    Family repairs = make_counter("panelgate_relay_repairs_total",
+                                  "Writes of a relay's target that somebody else had written.");
+    Family failures =
+        make_counter("panelgate_relay_failures_total", "Reads and writes of a relay that failed.");
+    for (const points::RelaySample& relay : snapshot.relays) {
+        up.gauge({{"relay", relay.relay}}, relay.ok ? 1 : 0);
+        const auto side = [&](Family& family, const char* name, std::uint64_t count) {
+            family.counter({{"relay", relay.relay}, {"side", name}}, static_cast<double>(count));
+        };
+        reads.counter({{"relay", relay.relay}}, static_cast<double>(relay.reads));
+        writes.counter({{"relay", relay.relay}}, static_cast<double>(relay.writes));
+        repairs.counter({{"relay", relay.relay}}, static_cast<double>(relay.repairs));
+        side(failures, "source", relay.read_failures);
+        side(failures, "target", relay.write_failures);
+    }
+    out.push_back(up.take());
+    out.push_back(reads.take());
+    out.push_back(writes.take());
+    out.push_back(repairs.take());
+    out.push_back(failures.take());
+}
+
+namespace {
+
+using serial_server::Counters;
+
+struct MasterCounter {
+    const char* name;
+    const char* help;
+    std::uint64_t Counters::* field;
+};
+constexpr MasterCounter kCounters[] = {
+    {"panelgate_serial_master_requests_total",
+     "Requests of a serial master to units that are served, broadcasts and repetitions included.",
+     &Counters::requests},
+    {"panelgate_serial_master_broadcasts_total", "Broadcasts of a serial master.",
+     &Counters::broadcasts},
+    {"panelgate_serial_master_repeated_total",
+     "Requests of a serial master that got the answer of the same one before.",
+     &Counters::repeated},
+    {"panelgate_serial_master_replies_total", "Replies sent to a serial master.",
+     &Counters::replies},
+    {"panelgate_serial_master_exceptions_total", "Exceptions among the replies.",
+     &Counters::exceptions},
+    {"panelgate_serial_master_silent_total", "Failures that a serial master was told by silence.",
+     &Counters::silent},
+    {"panelgate_serial_master_superseded_total",
+     "Requests given up because the serial master had begun to talk again.", &Counters::superseded},
+    {"panelgate_serial_master_late_total",
+     "Replies not sent because the serial master's timeout had passed.", &Counters::late},
+    {"panelgate_serial_master_foreign_frames_total",
+     "Good frames to and of units that are not served on a serial master's port.",
+     &Counters::foreign},
+    {"panelgate_serial_master_damaged_frames_total",
+     "Bytes on a serial master's port that became no good frame, counted once a frame.",
+     &Counters::damaged},
+    {"panelgate_serial_master_reopens_total",
+     "Successful opens of a serial master's port after the first.", &Counters::reopens},
+};
+
+}  // namespace
+
+void add_serial_masters(Families& out, const Snapshot& snapshot) {
+    if (snapshot.serial_masters.empty()) return;
+    Family up = make_gauge("panelgate_serial_master_up", "1 while a serial master's port is open.");
+    for (const Counters& master : snapshot.serial_masters)
+        up.gauge({{"master", master.master}}, master.up ? 1 : 0);
+    out.push_back(up.take());
+    for (const MasterCounter& counter : kCounters) {
+        Family family = make_counter(counter.name, counter.help);
+        for (const Counters& master : snapshot.serial_masters)
+            family.counter({{"master", master.master}}, master.*counter.field);
+        out.push_back(family.take());
+    }
 }
 
 }  // namespace panelgate::metrics

@@ -1,12 +1,11 @@
 #pragma once
 
 #include <prometheus/metric_family.h>
-
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "panelgate/base/histogram.hpp"
+#include "panelgate/base/series.hpp"
 #include "panelgate/metrics/exposition.hpp"
 
 namespace panelgate::metrics {
@@ -51,5 +50,17 @@ class Family {
 Family make_counter(std::string name, std::string help);
 Family make_gauge(std::string name, std::string help);
 Family make_histogram(std::string name, std::string help);
+
+/// Nothing when there is no HTTP server.
+void add_http(Families& out, const Snapshot& snapshot);
+
+/// Of the broker; nothing without one.
+void add_mqtt(Families& out, const Snapshot& snapshot);
+
+void add_points(Families& out, const Snapshot& snapshot);
+void add_relays(Families& out, const Snapshot& snapshot);
+
+/// Of masters on serial ports; nothing where there are none.
+void add_serial_masters(Families& out, const Snapshot& snapshot);
 
 }  // namespace panelgate::metrics

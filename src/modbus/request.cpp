@@ -8,6 +8,7 @@
 #include "panelgate/modbus/rtu_request_framer.hpp"
 
 namespace panelgate::modbus {
+
 namespace {
 
 constexpr std::size_t kFileReference = 7;                    // type, file, record, length

@@ -1,26 +1,186 @@
 #include "panelgate/mqtt/client.hpp"
 
+#include <sys/socket.h>
 #include <unistd.h>
-
+#include <array>
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/post.hpp>
 #include <cerrno>
+#include <csignal>
 #include <cstring>
+#include <functional>
+#include <memory>
+#include <mutex>
 #include <optional>
+#include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "connection.hpp"
-#include "dialling.hpp"
-#include "open_messages.hpp"
 #include "panelgate/line/reopen.hpp"
 #include "panelgate/rt/log.hpp"
 
 namespace panelgate::mqtt {
 
+/// Makes connections beside the loop: names are looked up, and a silent network is waited for, in a
+/// thread of their own that nobody waits for, also at the program's end. One at a time.
+class Dialling {
+  public:
+    /// With the connection, and why it could not be made.
+    using Done = std::function<void(std::shared_ptr<Connection>, const std::string& failed)>;
+
+    explicit Dialling(boost::asio::any_io_executor executor);
+    ~Dialling();
+    Dialling(const Dialling&) = delete;
+    Dialling& operator=(const Dialling&) = delete;
+
+    /// `done` comes from the loop, once, unless cancel() or the end of this object is sooner. Not
+    /// while one is under way.
+    void connect(std::shared_ptr<Connection> connection, Message will, Done done);
+    void cancel();
+    bool under_way() const;
+
+  private:
+    struct State;
+    std::shared_ptr<State> state_;  ///< the thread's share of it
+};
+
 namespace asio = boost::asio;
 using asio::posix::stream_descriptor;
 using boost::system::error_code;
+
+struct Leaving::State : std::enable_shared_from_this<Leaving::State> {
+    State(asio::any_io_executor executor, int socket, rt::Clock& clock,
+          std::shared_ptr<Connection> c)
+        : descriptor(std::move(executor), socket),
+          connection(std::move(c)),
+          alarm(clock.make_alarm()) {}
+
+    void send();
+    void drain();
+    bool discard();
+    void end();
+
+    stream_descriptor descriptor;
+    std::shared_ptr<Connection> connection;
+    std::unique_ptr<rt::Alarm> alarm;
+    bool done = false;
+};
+
+void Leaving::State::send() {
+    if (connection->wants_write()) {
+        descriptor.async_wait(stream_descriptor::wait_write,
+                              [self = shared_from_this()](const error_code& error) {
+                                  if (self->done) return;
+                                  if (error || !self->connection->write().empty())
+                                      return self->end();
+                                  self->send();
+                              });
+        return;
+    }
+    ::shutdown(descriptor.native_handle(), SHUT_WR);
+    drain();
+}
+
+void Leaving::State::drain() {
+    descriptor.async_wait(stream_descriptor::wait_read,
+                          [self = shared_from_this()](const error_code& error) {
+                              if (self->done) return;
+                              if (error || !self->discard()) return self->end();
+                              self->drain();
+                          });
+}
+
+/// False: the broker has closed as well, or there is no connection any more.
+bool Leaving::State::discard() {
+    std::array<char, 4096> nobody_reads{};
+    while (true) {
+        const auto size = ::recv(descriptor.native_handle(), nobody_reads.data(),
+                                 nobody_reads.size(), MSG_DONTWAIT);
+        if (size < 0) return errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR;
+        if (size == 0) return false;
+        if (static_cast<std::size_t>(size) < nobody_reads.size()) return true;
+    }
+}
+
+void Leaving::State::end() {
+    if (std::exchange(done, true)) return;
+    alarm->cancel();
+    error_code ignored;
+    descriptor.close(ignored);
+    connection.reset();
+}
+
+Leaving::Leaving(asio::any_io_executor executor, int socket, rt::Clock& clock,
+                 std::shared_ptr<Connection> connection, Duration within)
+    : state_(std::make_shared<State>(std::move(executor), socket, clock, std::move(connection))) {
+    state_->alarm->arm(clock.now() + within, [state = state_.get()] { state->end(); });
+    state_->send();
+}
+
+Leaving::~Leaving() { state_->end(); }
+
+bool Leaving::done() const { return state_->done; }
+
+struct Dialling::State : std::enable_shared_from_this<Dialling::State> {
+    explicit State(asio::any_io_executor executor) : loop(std::move(executor)) {}
+
+    void dial(std::shared_ptr<Connection> connection, const Message& will);
+    void tell(std::shared_ptr<Connection> connection, const std::string& failed);
+
+    std::mutex mutex;                           ///< of `loop`, all that the thread shares
+    std::optional<asio::any_io_executor> loop;  ///< nothing: nobody is there any more
+    Done done;
+    bool under_way = false;
+};
+
+/// In the thread. The loop may have ended meanwhile, and only the lock tells.
+void Dialling::State::dial(std::shared_ptr<Connection> connection, const Message& will) {
+    sigset_t all;
+    sigfillset(&all);
+    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are the loop's
+    std::string failed = connection->connect(will);
+    const std::lock_guard lock(mutex);
+    if (!loop) return;
+    asio::post(*loop, [self = shared_from_this(), made = std::move(connection),
+                       why = std::move(failed)]() mutable { self->tell(std::move(made), why); });
+}
+
+void Dialling::State::tell(std::shared_ptr<Connection> connection, const std::string& failed) {
+    under_way = false;
+    if (const Done asked = std::exchange(done, nullptr)) asked(std::move(connection), failed);
+}
+
+Dialling::Dialling(asio::any_io_executor executor)
+    : state_(std::make_shared<State>(std::move(executor))) {}
+
+Dialling::~Dialling() {
+    cancel();
+    const std::lock_guard lock(state_->mutex);
+    state_->loop.reset();
+}
+
+void Dialling::connect(std::shared_ptr<Connection> connection, Message will, Done done) {
+    state_->done = std::move(done);
+    state_->under_way = true;
+    try {
+        std::thread([state = state_, made = connection, last = std::move(will)]() mutable {
+            state->dial(std::move(made), last);
+        }).detach();
+    } catch (const std::system_error& error) {
+        asio::post(*state_->loop, [state = state_, made = std::move(connection),
+                                   why = std::string(error.code().message())]() mutable {
+            state->tell(std::move(made), why);
+        });
+    }
+}
+
+void Dialling::cancel() { state_->done = nullptr; }
+
+bool Dialling::under_way() const { return state_->under_way; }
 
 namespace {
 constexpr Duration kLook = 1s;  // libmosquitto wants to be looked after so often

@@ -1,7 +1,6 @@
 #include "connection.hpp"
 
 #include <mosquitto.h>
-
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -9,6 +8,7 @@
 #include <utility>
 
 namespace panelgate::mqtt {
+
 namespace {
 
 /// The C library's state, for as long as the program runs.

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "panelgate/mqtt/settings.hpp"
-#include "panelgate/mqtt/wording.hpp"
+#include "panelgate/mqtt/subjects.hpp"
 
 namespace panelgate::mqtt {
 

@@ -8,6 +8,7 @@
 #include "sparkplug.hpp"
 
 namespace panelgate::mqtt {
+
 namespace {
 
 // Numbers that no change ever has

@@ -1,6 +1,6 @@
 #include "panelgate/mqtt/settings.hpp"
 
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
 
 namespace panelgate::mqtt {
 

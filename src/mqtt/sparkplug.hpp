@@ -3,7 +3,7 @@
 #include <map>
 
 #include "panelgate/mqtt/settings.hpp"
-#include "panelgate/mqtt/wording.hpp"
+#include "panelgate/mqtt/subjects.hpp"
 #include "sparkplug_payload.hpp"
 
 namespace panelgate::mqtt {

@@ -1,12 +1,281 @@
 #include "panelgate/plan/advice.hpp"
 
 #include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "changes.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/plan/line_plan.hpp"
+#include "panelgate/points/settings.hpp"
+#include "panelgate/yaml/map_reader.hpp"
 
 namespace panelgate::plan {
+
+/// Something that could be done, and the line on which it is done.
+struct Change {
+    std::string what;
+    Line line;
+};
+
+/// Another rate: the lowest that is enough, else the highest that all panels have.
+std::optional<Change> quicker(const Line& line);
+/// The dearest read alone, where that is enough and it need not become ten times as rare. What is
+/// changed is all that is asked of this station from its first item to its last.
+std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan);
+/// All intervals by one factor; a refresh of a relay stays.
+std::optional<Change> all_rarer(const Line& line, const LinePlan& plan);
+/// One relay in the place of several. Points and poll blocks are joined anyway.
+std::optional<Change> fewer_relays(const Line& line);
+
+namespace {
+
+/// The panel takes them in one request, and its memory has them in one piece.
+bool can_read(const Line& line, const Relay::End& end) {
+    const Station& station = line.stations[end.station];
+    const profile::Area* area = station.profile->find_area(end.span.table, end.span.first);
+    return area != nullptr && area->readable.contains(end.span.first, end.span.count) &&
+           end.span.count <= limits_of(line, station).of(end.span.table).max_items;
+}
+
+bool can_write(const Line& line, const Relay::End& end) {
+    const profile::PanelProfile& panel = *line.stations[end.station].profile;
+    const profile::Area* area = panel.find_area(end.span.table, end.span.first);
+    const auto function = modbus::is_bit_table(end.span.table) ? modbus::kWriteMultipleCoils
+                                                               : modbus::kWriteMultipleRegisters;
+    return area != nullptr && area->writable &&
+           area->writable->contains(end.span.first, end.span.count) &&
+           end.span.count <= panel.max_count(function);
+}
+
+/// What one relay writes another one may read: joined with its neighbour it could close a circle.
+bool is_read_on(const Line& line, std::size_t station) {
+    return std::ranges::any_of(line.relays, [&](const Relay& relay) {
+        return relay.from && relay.from->station == station;
+    });
+}
+
+/// One relay in the place of both.
+std::optional<Relay> merged(const Line& line, const Relay& a, const Relay& b) {
+    if (!a.continues_in(b) || is_read_on(line, a.to->station)) return std::nullopt;
+    Relay both = a;
+    both.from->span.count += b.from->span.count;
+    both.to->span.count += b.to->span.count;
+    if (!can_read(line, *both.from) || !can_write(line, *both.to)) return std::nullopt;
+    return both;
+}
+
+/// Joins the first two that can be; false when there are none.
+bool merge_two(Line& line, std::string& which) {
+    for (Relay& first : line.relays) {
+        for (auto next = line.relays.begin(); next != line.relays.end(); ++next) {
+            const auto both = merged(line, first, *next);
+            if (!both) continue;
+            which += (which.empty() ? "" : ", ") + first.name + " and " + next->name;
+            first = *both;
+            line.relays.erase(next);
+            return true;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
+std::optional<Change> fewer_relays(const Line& line) {
+    Line made = line;
+    std::string which;
+    while (merge_two(made, which)) {
+    }
+    if (which.empty()) return std::nullopt;
+    return Change{"one relay instead of " + which, std::move(made)};
+}
+
+namespace {
+
+constexpr std::array kRates{2400, 4800, 9600, 19200, 38400, 57600, 115200};
+
+bool all_have(const Line& line, int baud) {
+    return std::ranges::all_of(line.stations, [&](const Station& station) {
+        return profile::allows(station.profile->serial.baud, baud);
+    });
+}
+
+}  // namespace
+
+std::optional<Change> quicker(const Line& line) {
+    std::optional<Change> found;
+    for (const int baud : kRates) {
+        if (baud <= line.serial.baud || !all_have(line, baud)) continue;
+        found = Change{"serial: {baud: " + std::to_string(baud) + "} (of all panels, too)",
+                       at_rate(line, baud)};
+        if (verdict(make_plan(found->line)) == Verdict::fine) break;
+    }
+    return found;
+}
+
+namespace {
+
+using yaml::format_duration;
+
+constexpr int kRarest = 10;          // times, of one read alone
+constexpr int kMostTenths = 10'000;  // of the factor for all
+
+bool is_enough(const Line& line) { return verdict(make_plan(line)) == Verdict::fine; }
+
+/// Reads that serve the same: several of a block that is cut.
+struct Dearest {
+    const Poll* first = nullptr;
+    Duration wire{};
+    double load = 0;
+};
+
+Dearest dearest_of(const LinePlan& plan) {
+    std::map<std::pair<std::string, std::vector<std::size_t>>, Dearest> reads;
+    for (const Poll& poll : plan.polls) {
+        Dearest& sum = reads[{poll.station, poll.asked}];
+        if (sum.first == nullptr) sum.first = &poll;
+        sum.wire += poll.wire;
+        sum.load += poll.load;
+    }
+    const auto dearest =
+        std::ranges::max_element(reads, {}, [](const auto& entry) { return entry.second.load; });
+    return dearest == reads.end() ? Dearest() : dearest->second;
+}
+
+/// What a read serves, as a range of one station's items.
+struct Scope {
+    std::size_t station = 0;
+    const Asked* first = nullptr;
+    const Asked* last = nullptr;
+
+    bool holds(const Asked& asked) const {
+        const modbus::Span& span = asked.want.span;
+        return span.table == first->want.span.table && span.first >= first->want.span.first &&
+               span.first <= last->want.span.first;
+    }
+};
+
+Scope scope_of(const Line& line, const Poll& poll) {
+    const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
+    Scope scope{static_cast<std::size_t>(station - line.stations.begin()), nullptr, nullptr};
+    for (const std::size_t index : poll.asked) {
+        const Asked& asked = station->asked[index];
+        const std::uint32_t at = asked.want.span.first;
+        if (scope.first == nullptr || at < scope.first->want.span.first) scope.first = &asked;
+        if (scope.last == nullptr || at > scope.last->want.span.first) scope.last = &asked;
+    }
+    return scope;
+}
+
+Line with(const Line& line, const Scope& scope, Duration every) {
+    Line made = line;
+    for (Asked& asked : made.stations[scope.station].asked) {
+        if (scope.holds(asked)) asked.want.every = std::max(asked.want.every, every);
+    }
+    return made;
+}
+
+/// "100ms", or "100ms to 130ms": what is asked more often than that now.
+std::string intervals_of(const Line& line, const Scope& scope, Duration every) {
+    Duration shortest = every;
+    Duration longest{};
+    for (const Asked& asked : line.stations[scope.station].asked) {
+        if (!scope.holds(asked) || asked.want.every >= every) continue;
+        shortest = std::min(shortest, asked.want.every);
+        longest = std::max(longest, asked.want.every);
+    }
+    const std::string text = format_duration(shortest);
+    return longest > shortest ? text + " to " + format_duration(longest) : text;
+}
+
+std::string text_of(const Poll& poll, const Scope& scope) {
+    const std::string text = "read " + poll.station + ' ' + scope.first->notation;
+    if (scope.first->want.span.first != scope.last->want.span.first)
+        return text + " to " + scope.last->notation;
+    return text + " (" + std::to_string(scope.first->want.span.count) + ')';
+}
+
+/// Of what may at most be left for the dearest read.
+double left_for(const Dearest& dearest, const LinePlan& plan) {
+    return std::min(kHigh - plan.load, kFull - plan.most) + dearest.load;
+}
+
+/// The least factor with which it is enough, in tenths and not below `first`; 0 = there is none.
+int tenths_of(const Line& line, int first) {
+    const auto enough = [&](int tenths) { return is_enough(at_intervals(line, tenths / 10.0)); };
+    int low = first - 1;
+    int high = first;
+    while (!enough(high)) {
+        if (high >= kMostTenths) return 0;
+        low = high;
+        high = std::min(2 * high, kMostTenths);
+    }
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        (enough(middle) ? high : low) = middle;
+    }
+    return high;
+}
+
+bool reaches_slowest(const Line& line) {
+    const auto is_slowest = [](Duration every) { return every >= points::kSlowest; };
+    return std::ranges::any_of(line.relays, is_slowest, &Relay::every) ||
+           std::ranges::any_of(line.stations, [&](const Station& station) {
+               return std::ranges::any_of(
+                   station.asked, [&](const Asked& asked) { return is_slowest(asked.want.every); });
+           });
+}
+
+/// What a reader of "all intervals" might take for one, or could not set.
+std::string exceptions_of(const Line& line) {
+    std::string text;
+    if (reaches_slowest(line)) text = "24h at most";
+    const auto has_refresh = [](const Relay& relay) { return relay.to && relay.refresh; };
+    if (std::ranges::any_of(line.relays, has_refresh))
+        text += std::string(text.empty() ? "" : ", ") + "refresh as it is";
+    return text.empty() ? text : " (" + text + ')';
+}
+
+}  // namespace
+
+std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan) {
+    const Dearest dearest = dearest_of(plan);
+    if (dearest.load <= 0) return std::nullopt;
+    const Duration now = dearest.first->every;
+    const Duration rarest = std::min<Duration>(kRarest * now, points::kSlowest);
+    const double left = left_for(dearest, plan);
+    if (left * kRarest < dearest.load) return std::nullopt;
+    const Scope scope = scope_of(line, *dearest.first);
+    Duration every = rounded_up(std::chrono::duration_cast<Duration>(
+        std::chrono::duration<double>(to_seconds(dearest.wire) / left)));
+    for (; every <= rarest; every = rounded_up(every + every / 20)) {
+        if (every <= now) continue;
+        Line made = with(line, scope, every);
+        if (!is_enough(made)) continue;
+        return Change{text_of(*dearest.first, scope) + " every " + format_duration(every) +
+                          " instead of " + intervals_of(line, scope, every),
+                      std::move(made)};
+    }
+    return std::nullopt;
+}
+
+std::optional<Change> all_rarer(const Line& line, const LinePlan& plan) {
+    const double least = std::max(plan.load / kHigh, plan.most / kFull);  // nothing shrinks faster
+    if (least * 10 > kMostTenths) return std::nullopt;
+    const int tenths = tenths_of(line, std::max(11, static_cast<int>(std::ceil(least * 10))));
+    if (tenths == 0) return std::nullopt;
+    Line made = at_intervals(line, tenths / 10.0);
+    const std::string besides = exceptions_of(made);
+    return Change{"all intervals " + number_text(tenths / 10.0) + " times as long" + besides,
+                  std::move(made)};
+}
 
 std::vector<Advice> advise(const Line& line, const LinePlan& plan) {
     std::vector<Advice> all;
@@ -23,6 +292,118 @@ std::vector<Advice> advise(const Line& line, const LinePlan& plan) {
     }
     std::ranges::sort(all, {}, [&](const Advice& one) { return std::pair(judged(one), one.what); });
     return all;
+}
+
+namespace {
+
+using yaml::format_milliseconds;
+
+constexpr std::size_t kNamed = 3;  // stations of one warning
+
+bool is_asked(const LinePlan& plan, const Station& station) {
+    const auto is_its = [&](const auto& request) { return request.station == station.name; };
+    return std::ranges::any_of(plan.polls, is_its) || std::ranges::any_of(plan.relays, is_its);
+}
+
+/// From the end of a request to the start of its reply: silence tells the panel that it has ended.
+Duration answers_after(const Line& line, const Station& station) {
+    return silent_interval(line.serial) + station.think_time;
+}
+
+bool is_too_late(const Line& line, const Station& station) {
+    return answers_after(line, station) > station.response_timeout;
+}
+
+std::string named(const std::vector<std::string>& names) {
+    std::string all;
+    for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i)
+        all += (i == 0 ? "'" : ", '") + names[i] + '\'';
+    if (names.size() > kNamed) all += " and " + std::to_string(names.size() - kNamed) + " more";
+    return all;
+}
+
+/// One for all stations that are alike.
+void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::string>& told) {
+    std::map<std::pair<Duration, Duration>, std::vector<std::string>> alike;
+    for (const Station& station : line.stations) {
+        if (is_asked(plan, station) && is_too_late(line, station))
+            alike[{station.think_time, station.response_timeout}].push_back(station.name);
+    }
+    for (const auto& [times, names] : alike) {
+        const auto& [think, timeout] = times;
+        const Duration after = silent_interval(line.serial) + think;
+        told.push_back(
+            "line " + line.name + ": think_time " + yaml::format_duration(think) + " of " +
+            named(names) + " makes replies begin " + format_milliseconds(after) +
+            " after a request, above the response_timeout of " + yaml::format_duration(timeout) +
+            ": each poll and relay there would time out; set response_timeout above " +
+            format_milliseconds(after) + ", or think_time lower where the panel is quicker");
+    }
+}
+
+/// A request that goes out again and again, and whose items could be fewer.
+struct Transaction {
+    std::string what;
+    Duration wire{};
+    const Poll* poll = nullptr;  ///< nothing: of a relay
+};
+
+std::vector<Transaction> longest_two(const LinePlan& plan) {
+    std::vector<Transaction> all;
+    for (const Poll& poll : plan.polls) {
+        all.push_back({"the poll of " + poll.station + ' ' + poll.read + " (count " +
+                           std::to_string(poll.count) + ')',
+                       poll.wire, &poll});
+    }
+    for (const RelayLoad& relay : plan.relays) {
+        if (relay.request == RelayLoad::Request::reread) continue;  // polls
+        all.push_back({"the " + std::string(label(relay.request)) + " of relay " + relay.relay,
+                       relay.wire, nullptr});
+    }
+    std::ranges::sort(all, std::ranges::greater(),
+                      [](const Transaction& one) { return std::pair(one.wire, one.what); });
+    all.resize(std::min<std::size_t>(all.size(), 2));
+    return all;
+}
+
+/// Items of a block with which its read takes no longer; 0 where it is none, or none would do.
+std::uint32_t most_items(const Line& line, const Poll& poll, Duration within) {
+    const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
+    if (poll.asked.size() != 1) return 0;
+    const points::PlanLimits limits = limits_of(line, *station);
+    const modbus::Table table = station->asked[poll.asked.front()].want.span.table;
+    std::uint32_t most = poll.count;
+    while (most > 0 && points::read_cost(limits, table, most) > within) --most;
+    return most;
+}
+
+void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::string>& told) {
+    const std::vector<Transaction> longest = longest_two(plan);
+    if (longest.empty()) return;
+    const Duration before = longest.size() > 1 ? longest[1].wire : Duration::zero();
+    const Duration both = longest[0].wire + before;
+    if (both <= line.deadline) return;
+    std::string warning = "line " + line.name + ": " + longest[0].what + " takes " +
+                          format_milliseconds(longest[0].wire) + " at " + to_string(line.serial);
+    if (longest.size() > 1)
+        warning += ", and " + longest[1].what + ' ' + format_milliseconds(before);
+    warning += longest.size() > 1 ? ": one behind the other they miss" : ": it misses";
+    warning += " the queue's deadline of " + yaml::format_duration(line.deadline) +
+               "; set queue: {deadline: " + yaml::format_duration(rounded_up(both)) + '}';
+    const Poll* poll = longest[0].poll;
+    const std::uint32_t most =
+        poll == nullptr ? 0 : most_items(line, *poll, line.deadline - before);
+    if (most > 0) warning += ", or read at most " + std::to_string(most) + " at once";
+    told.push_back(std::move(warning));
+}
+
+}  // namespace
+
+std::vector<std::string> warnings(const Line& line, const LinePlan& plan) {
+    std::vector<std::string> told;
+    warn_of_timeouts(line, plan, told);
+    if (told.empty()) warn_of_deadline(line, plan, told);  // else think times are in the way
+    return told;
 }
 
 }  // namespace panelgate::plan

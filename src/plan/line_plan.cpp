@@ -1,14 +1,66 @@
 #include "panelgate/plan/line_plan.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/points/poll_schedule.hpp"
+#include "panelgate/points/settings.hpp"
+#include "panelgate/points/station_polls.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::plan {
+
+namespace {
+
+Duration times_as_long(Duration every, double times) {
+    const double made = std::round(static_cast<double>(every.count()) * times);
+    const double most = static_cast<double>(points::kSlowest.count());
+    return Duration(static_cast<Duration::rep>(std::clamp(made, 1.0, most)));
+}
+
+bool follows(const Relay::End& end, const Relay::End& next) {
+    return end.station == next.station && end.span.table == next.span.table &&
+           end.span.end() == next.span.first;
+}
+
+}  // namespace
+
+bool Relay::continues_in(const Relay& other) const {
+    if (!from || !to || !other.from || !other.to) return false;
+    return every == other.every && refresh == other.refresh && !single &&
+           follows(*from, *other.from) && follows(*to, *other.to);
+}
+
+Duration gap_of(const Line& line, const Station& station) {
+    return station.frame_gap.value_or(profile::automatic_gap(line.serial, *station.profile));
+}
+
+points::PlanLimits limits_of(const Line& line, const Station& station) {
+    points::PlanLimits limits =
+        points::make_plan_limits(*station.profile, line.serial, gap_of(line, station));
+    limits.think_time = station.think_time;
+    return limits;
+}
+
+Line at_rate(const Line& line, int baud) {
+    Line made = line;
+    made.serial.baud = baud;
+    return made;
+}
+
+Line at_intervals(const Line& line, double times) {
+    Line made = line;
+    for (Station& station : made.stations) {
+        for (Asked& asked : station.asked)
+            asked.want.every = times_as_long(asked.want.every, times);
+    }
+    for (Relay& relay : made.relays) relay.every = times_as_long(relay.every, times);
+    return made;
+}
+
 namespace {
 
 double share(Duration wire, Duration every) { return to_seconds(wire) / to_seconds(every); }
@@ -193,6 +245,44 @@ LinePlan make_plan(const Line& line) {
     plan.dead = worst_case(line, plan);
     plan.client_read = client_read(line);
     return plan;
+}
+
+namespace {
+
+constexpr int kDoublings = 40;
+constexpr int kHalvings = 24;
+
+LinePlan at(const Line& line, double times) { return make_plan(at_intervals(line, 1 / times)); }
+
+/// Where all load is in proportion.
+double proportional(const LinePlan& plan) {
+    return std::min(kHigh / plan.load, kFull / std::max(plan.most, plan.load));
+}
+
+/// What a refresh or a limit of extra turns holds down lets the rest go further, or less far.
+double search(const Line& line, double first) {
+    const auto is_fine = [&](double times) { return verdict(at(line, times)) == Verdict::fine; };
+    double low = first;
+    double high = first;
+    for (int i = 0; i < kDoublings && !is_fine(low); ++i) high = std::exchange(low, low / 2);
+    for (int i = 0; i < kDoublings && high == low && is_fine(high * 2); ++i) low = high *= 2;
+    if (high == low) high *= 2;
+    for (int i = 0; i < kHalvings; ++i) {
+        const double middle = (low + high) / 2;
+        (is_fine(middle) ? low : high) = middle;
+    }
+    return low;
+}
+
+}  // namespace
+
+std::optional<HighestRate> highest_rate(const Line& line, const LinePlan& plan) {
+    if (plan.load <= 0) return std::nullopt;
+    HighestRate found{proportional(plan), false};
+    if (!line.relays.empty()) found.times = search(line, found.times);
+    const LinePlan then = at(line, found.times);
+    found.changing = then.most / kFull > then.load / kHigh;
+    return found;
 }
 
 }  // namespace panelgate::plan

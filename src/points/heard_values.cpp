@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"

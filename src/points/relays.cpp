@@ -1,14 +1,34 @@
 #include "panelgate/points/relays.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <set>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::points {
+
+std::string_view label(RelayState state) {
+    switch (state) {
+        case RelayState::waiting:
+            return "waiting";
+        case RelayState::ok:
+            return "ok";
+        case RelayState::source_failing:
+            return "source failing";
+        case RelayState::target_failing:
+            return "target failing";
+    }
+    std::abort();
+}
+
+std::string text_of(const RelayStatus& relay) {
+    std::string text(label(relay.state));
+    return relay.why.empty() ? text : text + ": " + relay.why;
+}
 
 namespace {
 

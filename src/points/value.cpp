@@ -8,10 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "panelgate/base/number_text.hpp"
+#include "panelgate/base/text.hpp"
 #include "registers.hpp"
-#include "scaling.hpp"
-#include "text.hpp"
 
 namespace panelgate::points {
 namespace {

@@ -1,8 +1,10 @@
 #include "panelgate/profile/panel_profile.hpp"
 
 #include <algorithm>
+#include <chrono>
 
 namespace panelgate::profile {
+
 namespace {
 
 /// Items in one request as the Application Protocol has it (AP 6.1 to 6.17).
@@ -48,6 +50,16 @@ const Area* PanelProfile::find_area(modbus::Table table, std::uint32_t address) 
 unsigned PanelProfile::max_count(std::uint8_t function) const {
     const FunctionRule* rule = find_function(function);
     return rule != nullptr && rule->max_count > 0 ? rule->max_count : standard_limit(function);
+}
+
+Duration asked_gap(const SerialFormat& serial, const PanelProfile& profile) {
+    if (serial.mode == SerialMode::ascii) return {};
+    const double characters = profile.timing.frame_gap_characters;
+    return std::chrono::duration_cast<Duration>(characters * character_time(serial));
+}
+
+Duration automatic_gap(const SerialFormat& serial, const PanelProfile& profile) {
+    return std::max(silent_interval(serial), asked_gap(serial, profile));
 }
 
 }  // namespace panelgate::profile

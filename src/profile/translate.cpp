@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
 
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/translation.hpp"
+#include "panelgate/modbus/response.hpp"
 
 namespace panelgate::profile {
+
 namespace {
 
 using modbus::Table;
@@ -54,6 +58,56 @@ std::optional<modbus::Request> translate(const PanelProfile& profile,
     if (request.is_read() && !(asked && sent && is_same_memory(profile, *asked, sent->table)))
         return std::nullopt;
     return other;
+}
+
+namespace {
+
+constexpr std::uint32_t kBitsPerWord = 16;
+
+/// What of the items lies in the area, by whichever of its tables.
+std::optional<modbus::Span> part_in(const Area& area, const modbus::Span& items) {
+    if (!area.reaches(items.table)) return std::nullopt;
+    const std::uint32_t first = std::max(items.first, area.readable.first);
+    const std::uint32_t end = std::min(items.end(), area.readable.last + 1);
+    if (first >= end) return std::nullopt;
+    return modbus::Span{area.table, first, end - first};
+}
+
+void add_by_all_tables(const Area& area, modbus::Span items, std::vector<modbus::Span>& shown) {
+    shown.push_back(items);
+    for (const modbus::Table table : area.also) {
+        items.table = table;
+        shown.push_back(items);
+    }
+}
+
+void add_bits_of(const PanelProfile& profile, const Area& words, const modbus::Span& items,
+                 std::vector<modbus::Span>& shown) {
+    for (const Area& bits : profile.areas) {
+        if (bits.view_of != words.name) continue;
+        add_by_all_tables(
+            bits, {bits.table, items.first * kBitsPerWord, items.count * kBitsPerWord}, shown);
+    }
+}
+
+}  // namespace
+
+std::vector<modbus::Span> shown_as(const PanelProfile& profile, const modbus::Span& written) {
+    std::vector<modbus::Span> shown{written};
+    for (const Area& area : profile.areas) {
+        const auto items = part_in(area, written);
+        if (!items) continue;
+        add_by_all_tables(area, *items, shown);
+        add_bits_of(profile, area, *items, shown);
+        if (area.view_of.empty()) continue;
+        const Area& words = *profile.find_area(std::string_view(area.view_of));
+        const std::uint32_t first = items->first / kBitsPerWord;
+        const std::uint32_t last = (items->end() - 1) / kBitsPerWord;
+        const modbus::Span viewed{words.table, first, last - first + 1};
+        add_by_all_tables(words, viewed, shown);
+        add_bits_of(profile, words, viewed, shown);
+    }
+    return shown;
 }
 
 }  // namespace panelgate::profile

@@ -1,13 +1,62 @@
 #include "panelgate/rt/acceptor.hpp"
 
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <algorithm>
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace panelgate::rt {
+
+void set_up_socket(int socket, const KeepAlive& keep_alive) {
+    const auto set = [socket](int level, int name, int value) {
+        ::setsockopt(socket, level, name, &value, sizeof value);
+    };
+    set(IPPROTO_TCP, TCP_NODELAY, 1);
+    set(SOL_SOCKET, SO_KEEPALIVE, 1);
+    set(IPPROTO_TCP, TCP_KEEPIDLE, static_cast<int>(keep_alive.silence.count()));
+    set(IPPROTO_TCP, TCP_KEEPINTVL, static_cast<int>(keep_alive.pause.count()));
+    set(IPPROTO_TCP, TCP_KEEPCNT, keep_alive.probes);
+}
+
+namespace {
+
+namespace ip = boost::asio::ip;
+
+AddressBytes as_v6(const ip::address& address) {
+    if (address.is_v6()) return address.to_v6().to_bytes();
+    return ip::make_address_v6(ip::v4_mapped, address.to_v4()).to_bytes();
+}
+
+}  // namespace
+
+AccessList::AccessList(const std::vector<Network>& allowed) {
+    for (const Network& network : allowed) {
+        boost::system::error_code error;
+        const ip::address address = ip::make_address(network.address, error);
+        const unsigned widest = !error && address.is_v4() ? 32 : 128;
+        if (error || network.prefix > widest) {
+            throw std::invalid_argument("not a network: " + network.address + "/" +
+                                        std::to_string(network.prefix));
+        }
+        allowed_.push_back({as_v6(address), network.prefix + (128 - widest)});
+    }
+}
+
+bool AccessList::allows(const ip::address& peer) const {
+    if (allowed_.empty()) return true;
+    const AddressBytes address = as_v6(peer);
+    return std::ranges::any_of(allowed_, [&](const Entry& entry) {
+        return same_prefix(address, entry.address, entry.prefix);
+    });
+}
 
 namespace asio = boost::asio;
 using asio::ip::tcp;

@@ -1,7 +1,6 @@
 #include "panelgate/rt/asio_clock.hpp"
 
 #include <sys/timerfd.h>
-
 #include <algorithm>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <cerrno>
@@ -11,7 +10,6 @@
 #include <utility>
 
 #include "panelgate/base/pool.hpp"
-#include "panelgate/rt/lead_time.hpp"
 
 namespace panelgate::rt {
 

@@ -10,11 +10,9 @@
 #include <memory>
 #include <utility>
 
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
 #include "panelgate/rt/clock.hpp"
-#include "panelgate/rt/journal.hpp"
 #include "panelgate/rt/log_output.hpp"
-#include "panelgate/rt/log_repeats.hpp"
 #include "panelgate/rt/log_throttle.hpp"
 
 namespace panelgate::rt {

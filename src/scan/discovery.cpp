@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <utility>
 
-#include "examination.hpp"
 #include "recogniser.hpp"
 
 namespace panelgate::scan {

@@ -6,8 +6,8 @@
 #include <set>
 #include <utility>
 
-#include "lists.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "plan.hpp"
 
 namespace panelgate::scan {
 namespace {

@@ -6,7 +6,6 @@
 #include <numeric>
 #include <set>
 
-#include "lists.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scan {

@@ -1,15 +1,22 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/scan/settings.hpp"
 
 namespace panelgate::scan {
+
+/// Keeps a list without repetitions, in the order of first mention.
+template <class T>
+void append_new(std::vector<T>& list, const T& value) {
+    if (std::ranges::find(list, value) == list.end()) list.push_back(value);
+}
 
 /// What is worth trying, the most likely first: what most profiles have as their default, the
 /// standard's 19200 8E1 (serial line V1.02, 2.5.1), then the usual rates with each parity. Only

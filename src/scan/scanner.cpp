@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "duplicates.hpp"
-#include "lists.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "plan.hpp"
 #include "state.hpp"
 
 namespace panelgate::scan {

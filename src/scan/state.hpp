@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "attempt.hpp"
-#include "examination.hpp"
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
+#include "panelgate/scan/result.hpp"
 #include "panelgate/scan/scanner.hpp"
 #include "plan.hpp"
+#include "recogniser.hpp"
 
 namespace panelgate::scan {
 
@@ -106,5 +107,9 @@ struct Scanner::State {
     std::unique_ptr<Examination> examination;
     Result result;
 };
+
+/// Decides, with all stations known, which addresses two stations share and whether the line is
+/// noisy instead: damage at one address among good ones is a collision, damage everywhere is not.
+void tell_duplicates(Result& result);
 
 }  // namespace panelgate::scan

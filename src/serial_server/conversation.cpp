@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/framing.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::serial_server {

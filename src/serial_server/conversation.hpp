@@ -10,9 +10,9 @@
 #include "hearing.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/modbus/serial_adu.hpp"
+#include "panelgate/base/words.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/serial_server/counters.hpp"
 #include "panelgate/serial_server/settings.hpp"
 

@@ -2,11 +2,15 @@
 
 #include <utility>
 
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/framing.hpp"
-#include "rtu_hearing.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_request_framer.hpp"
 
 namespace panelgate::serial_server {
+
 namespace {
 
 /// ASCII says by itself where a frame begins and ends, and whose it is.
@@ -41,5 +45,122 @@ std::unique_ptr<Hearing> make_hearing(const Settings& settings, const Units& ser
         return std::make_unique<AsciiHearing>(settings.access);
     return std::make_unique<RtuHearing>(served);
 }
+
+namespace {
+
+using Length = modbus::ReplyLength;
+
+}  // namespace
+
+void RtuHearing::feed(TimePoint, ByteView bytes) {
+    silent_ = false;
+    heard_.feed(bytes);
+}
+
+std::optional<modbus::SerialAdu> RtuHearing::next() {
+    while (!heard_.empty()) {
+        const Judgement judgement = judge(heard_.view(), aligned_);
+        if (judgement.kind == Judgement::Kind::open) break;
+        std::size_t wrong = 1;
+        if (judgement.kind == Judgement::Kind::frame) {
+            const bool is_last = judgement.size == heard_.size();
+            const bool counts = aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_);
+            if (counts && may_take(judgement.size)) return take(judgement.size);
+            if (is_last && !silent_) break;
+            if (counts) wrong = judgement.size;
+        }
+        step_over(wrong);
+    }
+    if (silent_ && heard_.empty()) trust();
+    return std::nullopt;
+}
+
+/// Of a good frame at the front.
+bool RtuHearing::may_take(std::size_t size) const {
+    const ByteView frame = heard_.view().first(size);
+    return sure() || !concerns_us(frame[0]) || modbus::is_pure_read(modbus::pdu_of(frame));
+}
+
+RtuHearing::Judgement RtuHearing::judge(ByteView start, bool aligned) const {
+    const Judgement request = weigh(modbus::usual_request_length(start), start, aligned);
+    if (request.kind == Judgement::Kind::frame || concerns_us(start[0])) return request;
+    const Judgement reply = weigh(modbus::reply_length(start), start, aligned);
+    return reply.kind == Judgement::Kind::nothing ? request : reply;
+}
+
+RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool aligned) const {
+    using Kind = Judgement::Kind;
+    if (length.kind == Length::Kind::need_more)
+        return {silent_ && !aligned ? Kind::nothing : Kind::open};
+    if (length.kind == Length::Kind::by_silence) {
+        const bool may_be = aligned && start.size() <= modbus::kMaxRtuAdu;
+        if (may_be && silent_ && modbus::crc_ok(start)) return {Kind::frame, start.size()};
+        return {may_be ? Kind::open : Kind::nothing};
+    }
+    if (length.length > modbus::kMaxLongRtuAdu) return {};
+    if (length.length > start.size()) return {Kind::open};
+    if (!modbus::crc_ok(start.first(length.length))) return {};
+    return {Kind::frame, length.length};
+}
+
+void RtuHearing::on_silence() {
+    if (heard_.empty()) trust();
+    if (std::exchange(silent_, true) || heard_.empty()) return;
+    if (!knows_rest()) step_to_last();
+}
+
+/// By its header. An exception is too short to hide anything, and glitches look like one.
+bool RtuHearing::knows_rest() const {
+    const ByteView all = heard_.view();
+    if (all.empty()) return false;
+    const auto goes_on = [&](const Length& length) {
+        return length.kind == Length::Kind::known && length.length > all.size() &&
+               length.length <= modbus::kMaxLongRtuAdu;
+    };
+    if (goes_on(modbus::request_length(all))) return true;
+    const bool exception = all.size() > 1 && (all[1] & modbus::kExceptionBit) != 0;
+    return !exception && !concerns_us(all[0]) && goes_on(modbus::reply_length(all));
+}
+
+/// What waits for more gives way to a good frame that ends with what was heard.
+bool RtuHearing::step_to_last() {
+    const ByteView all = heard_.view();
+    if (all.empty() || judge(all, aligned_).kind == Judgement::Kind::frame) return true;
+    for (std::size_t start = 1; start + modbus::kMinAdu <= all.size(); ++start) {
+        const Judgement later = judge(all.subspan(start), false);
+        if (later.kind != Judgement::Kind::frame || start + later.size != all.size()) continue;
+        step_over(start);
+        return true;
+    }
+    return false;
+}
+
+modbus::SerialAdu RtuHearing::take(std::size_t size) {
+    modbus::SerialAdu adu = modbus::serial_adu_of(heard_.view().first(size));
+    trusted_ = sure();
+    aligned_ = true;
+    consume(size);
+    return adu;
+}
+
+void RtuHearing::step_over(std::size_t count) {
+    if (std::exchange(aligned_, false)) ++faults_;
+    if (std::exchange(trusted_, false)) since_lost_ = 0;
+    consume(count);
+}
+
+void RtuHearing::consume(std::size_t count) {
+    heard_.take(count);
+    since_lost_ += count;
+}
+
+void RtuHearing::drop_pending() {
+    silent_ = true;
+    if (step_to_last()) return;
+    step_over(heard_.size());
+    trust();
+}
+
+std::size_t RtuHearing::take_faults() { return std::exchange(faults_, 0); }
 
 }  // namespace panelgate::serial_server

@@ -7,11 +7,9 @@
 
 #include "conversation.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/line/drive.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/line/line.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/rt/log.hpp"
-#include "panelgate/tcp_server/caller.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 
 namespace panelgate::serial_server {

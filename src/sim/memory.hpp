@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::sim {
@@ -22,5 +24,11 @@ class Memory {
     const profile::PanelProfile* profile_;
     std::map<std::string, std::vector<std::uint16_t>> words_;  ///< by area, from readable.first on
 };
+
+/// The reply to a well-formed request that touches no memory: 07 (always 0), 08/00, 0B, 11 and
+/// 2B/0E with the basic objects (AP 6.7 to 6.9, 6.13, 6.21). Exception 01 for everything else.
+/// `events` is what 0B counts: requests answered normally, but for 0B itself.
+Bytes identity_reply(std::string_view profile_name, std::uint8_t station, std::uint16_t events,
+                     ByteView pdu);
 
 }  // namespace panelgate::sim

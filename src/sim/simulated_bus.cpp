@@ -10,9 +10,9 @@
 
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/termios_setup.hpp"
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/sim/collision.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
 
 namespace panelgate::sim {
 

@@ -7,9 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "identity.hpp"
 #include "memory.hpp"
-#include "panelgate/modbus/exception.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/modbus/crc16.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"

@@ -15,12 +15,10 @@
 #include <utility>
 
 #include "datagrams.hpp"
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
-#include "panelgate/rt/access_list.hpp"
-#include "panelgate/rt/keep_alive.hpp"
-#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "diagnostics.hpp"
+#include "own_unit.hpp"
 
 namespace panelgate::tcp_server {
 

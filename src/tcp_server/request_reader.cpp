@@ -1,11 +1,106 @@
 #include "request_reader.hpp"
 
+#include <cstddef>
 #include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
 
-#include "mbap_reader.hpp"
-#include "serial_readers.hpp"
+#include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/framing.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "panelgate/modbus/rtu_request_framer.hpp"
 
 namespace panelgate::tcp_server {
+
+/// Modbus/TCP: what is broken beyond repair closes the connection (MBAP-05 to MBAP-07).
+class MbapReader : public RequestReader {
+  public:
+    explicit MbapReader(const Settings& settings);
+
+    void feed(TimePoint now, ByteView bytes) override;
+    std::optional<ReaderEvent> next(TimePoint now) override;
+    bool partial() const override { return framer_.partial(); }
+    std::optional<TimePoint> due() const override;
+    void on_due(TimePoint now) override;
+    void pause() override { begun_.reset(); }
+
+  private:
+    ReaderEvent on_other_protocol();
+
+    Duration partial_timeout_;
+    int bad_protocol_ids_allowed_;
+    FirstBytes first_{modbus::Framing::tcp};
+    modbus::MbapFramer framer_;
+    int bad_protocol_ids_ = 0;        ///< in a row
+    std::optional<TimePoint> begun_;  ///< the ADU that is not whole
+    bool late_ = false;
+};
+
+/// What RTU and ASCII have in common: what is no frame is stepped over, and only a client that
+/// sends nothing else is closed.
+class SerialReader : public RequestReader {
+  protected:
+    explicit SerialReader(const Settings& settings)
+        : first_(settings.framing), garbage_limit_(settings.garbage_limit) {}
+    void look_at(ByteView bytes) { first_.feed(bytes); }
+    /// Of what the framer has given; it need not be asked for more.
+    bool has_more_to_tell() const { return untold_ > 0 || held_; }
+    /// What is to be told now. `discarded`: bytes since the last good frame; `faults`: new ones.
+    std::optional<ReaderEvent> tell(std::optional<modbus::SerialAdu> adu, std::size_t discarded,
+                                    std::size_t faults);
+
+  private:
+    FirstBytes first_;
+    std::size_t garbage_limit_;
+    std::size_t untold_ = 0;                 ///< faults
+    std::optional<modbus::SerialAdu> held_;  ///< until they are told
+};
+
+/// RTU frames in a stream. A silence ends what nothing else ends, and gives up a start that holds
+/// up a good frame; half a request is given up after partial_adu_timeout.
+class RtuReader : public SerialReader {
+  public:
+    explicit RtuReader(const Settings& settings);
+
+    void feed(TimePoint now, ByteView bytes) override;
+    std::optional<ReaderEvent> next(TimePoint now) override;
+    bool partial() const override { return framer_.partial(); }
+    std::optional<TimePoint> due() const override;
+    void on_due(TimePoint now) override;
+    void on_end() override { framer_.on_silence(); }
+    void pause() override {
+        begun_.reset();
+        unread_ = true;
+    }
+
+  private:
+    Duration silence_;
+    Duration partial_timeout_;
+    modbus::RtuRequestFramer framer_;
+    TimePoint heard_{};        ///< last byte
+    bool was_silent_ = false;  ///< since, and that has been looked at
+    bool unread_ = false;      ///< for a while: whether there was a silence nobody knows
+    std::optional<TimePoint> begun_;
+};
+
+/// ASCII frames in a stream. What is late is only looked at when more comes.
+class AsciiReader : public SerialReader {
+  public:
+    explicit AsciiReader(const Settings& settings);
+
+    void feed(TimePoint now, ByteView bytes) override;
+    std::optional<ReaderEvent> next(TimePoint now) override;
+    bool partial() const override { return framer_.partial(); }
+    std::optional<TimePoint> due() const override { return std::nullopt; }
+    void on_due(TimePoint) override {}
+    void pause() override {}
+
+  private:
+    modbus::AsciiFramer framer_;
+};
 
 std::unique_ptr<RequestReader> make_request_reader(const Settings& settings) {
     switch (settings.framing) {
@@ -17,6 +112,174 @@ std::unique_ptr<RequestReader> make_request_reader(const Settings& settings) {
             return std::make_unique<AsciiReader>(settings);
     }
     std::abort();
+}
+
+namespace {
+
+constexpr std::size_t kKept = modbus::kMaxAsciiAdu;
+
+std::string word(modbus::Framing framing) { return std::string(modbus::label(framing)); }
+
+/// The first line of a request (RFC 9112, 3), whatever its method is.
+bool speaks_http(ByteView first) {
+    const std::string text(first.begin(), first.end());
+    const std::string line = text.substr(0, text.find('\r'));
+    const std::size_t method = line.find(' ');
+    const std::size_t version = line.rfind(" HTTP/1.");
+    return method != line.npos && version != line.npos && method > 0 && method < version &&
+           line.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ") == method;
+}
+
+std::optional<std::string> foreign(modbus::Framing expected, ByteView first) {
+    if (const auto spoken = modbus::other_framing(expected, first))
+        return std::string(name_of(*spoken)) +
+               " and needs a listener with framing: " + word(*spoken);
+    if (speaks_http(first)) return "HTTP and needs the listener of 'http'";
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::string_view name_of(modbus::Framing framing) {
+    switch (framing) {
+        case modbus::Framing::tcp:
+            return "Modbus/TCP";
+        case modbus::Framing::rtu:
+            return "Modbus RTU";
+        case modbus::Framing::ascii:
+            return "Modbus ASCII";
+    }
+    std::abort();
+}
+
+void FirstBytes::feed(ByteView bytes) {
+    if (!watching_) return;
+    append_up_to(kKept, bytes_, bytes);
+    objection_ = foreign(expected_, bytes_);
+    if (objection_ || bytes_.size() == kKept) on_request();
+}
+
+void FirstBytes::on_request() {
+    watching_ = false;
+    bytes_ = Bytes();
+}
+
+std::optional<Unusable> FirstBytes::take_objection() {
+    const auto objection = std::exchange(objection_, std::nullopt);
+    if (!objection) return std::nullopt;
+    return Unusable{"it speaks " + *objection + "; this one has framing: " + word(expected_),
+                    rt::LogLevel::warn};
+}
+
+MbapReader::MbapReader(const Settings& settings)
+    : partial_timeout_(settings.partial_adu_timeout),
+      bad_protocol_ids_allowed_(settings.bad_protocol_ids) {}
+
+void MbapReader::feed(TimePoint, ByteView bytes) {
+    first_.feed(bytes);
+    framer_.feed(bytes);
+}
+
+std::optional<ReaderEvent> MbapReader::next(TimePoint now) {
+    if (auto objection = first_.take_objection()) return std::move(*objection);
+    if (std::exchange(late_, false)) return Unusable{"half-sent ADU"};
+    auto event = framer_.next();
+    if (!event) {
+        if (framer_.partial() && !begun_) begun_ = now;
+        return std::nullopt;
+    }
+    begun_.reset();
+    if (std::holds_alternative<modbus::Broken>(*event)) return Unusable{"length outside 2..254"};
+    if (std::holds_alternative<modbus::SkippedProtocol>(*event)) return on_other_protocol();
+    bad_protocol_ids_ = 0;
+    first_.on_request();
+    return std::get<modbus::Adu>(std::move(*event));
+}
+
+/// MBAP-06.
+ReaderEvent MbapReader::on_other_protocol() {
+    if (++bad_protocol_ids_ >= bad_protocol_ids_allowed_) return Unusable{"protocol id is not 0"};
+    return Discarded{};
+}
+
+/// An ADU has so long from its first byte to its last (MBAP-07): from when another one begins, or
+/// when the rest can be read again after a time without room.
+std::optional<TimePoint> MbapReader::due() const {
+    if (!begun_) return std::nullopt;
+    return *begun_ + partial_timeout_;
+}
+
+void MbapReader::on_due(TimePoint now) {
+    if (begun_ && now >= *begun_ + partial_timeout_) late_ = true;
+}
+
+std::optional<ReaderEvent> SerialReader::tell(std::optional<modbus::SerialAdu> adu,
+                                              std::size_t discarded, std::size_t faults) {
+    if (auto objection = first_.take_objection()) return std::move(*objection);
+    untold_ += faults;
+    if (adu) held_ = std::move(adu);
+    if (untold_ > 0) {
+        --untold_;
+        return Discarded{};
+    }
+    if (held_) {
+        first_.on_request();
+        modbus::SerialAdu given = *std::exchange(held_, std::nullopt);
+        return modbus::Adu{0, given.station, std::move(given.pdu)};
+    }
+    if (discarded <= garbage_limit_) return std::nullopt;
+    return Unusable{"no request in " + std::to_string(discarded) + " bytes"};
+}
+
+RtuReader::RtuReader(const Settings& settings)
+    : SerialReader(settings),
+      silence_(settings.rtu_silence),
+      partial_timeout_(settings.partial_adu_timeout) {}
+
+void RtuReader::feed(TimePoint now, ByteView bytes) {
+    const bool unread = std::exchange(unread_, false);
+    if (now - heard_ >= silence_ && !was_silent_ && !unread) framer_.on_silence();
+    heard_ = now;
+    was_silent_ = false;
+    look_at(bytes);
+    framer_.feed(bytes);
+}
+
+std::optional<ReaderEvent> RtuReader::next(TimePoint now) {
+    std::optional<modbus::SerialAdu> adu;
+    if (!has_more_to_tell()) adu = framer_.next();
+    if (adu) begun_.reset();
+    auto event = tell(std::move(adu), framer_.discarded(), framer_.take_faults());
+    if (!event && framer_.partial() && !begun_) begun_ = now;
+    return event;
+}
+
+std::optional<TimePoint> RtuReader::due() const {
+    if (!framer_.partial()) return std::nullopt;
+    if (!was_silent_) return heard_ + silence_;
+    if (!begun_) return std::nullopt;
+    return *begun_ + partial_timeout_;
+}
+
+void RtuReader::on_due(TimePoint now) {
+    if (now - heard_ >= silence_ && !std::exchange(was_silent_, true)) framer_.on_silence();
+    if (!begun_ || now - *begun_ < partial_timeout_) return;
+    framer_.drop_pending();
+    begun_.reset();
+}
+
+AsciiReader::AsciiReader(const Settings& settings)
+    : SerialReader(settings), framer_(settings.ascii_digits, settings.ascii_pause) {}
+
+void AsciiReader::feed(TimePoint now, ByteView bytes) {
+    look_at(bytes);
+    framer_.feed(now, bytes);
+}
+
+std::optional<ReaderEvent> AsciiReader::next(TimePoint) {
+    std::optional<modbus::SerialAdu> adu;
+    if (!has_more_to_tell()) adu = framer_.next();
+    return tell(std::move(adu), framer_.discarded(), framer_.take_faults());
 }
 
 }  // namespace panelgate::tcp_server

@@ -13,7 +13,7 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/rt/settings.hpp"
-#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "pipeline.hpp"
 #include "request_reader.hpp"
 #include "shared.hpp"

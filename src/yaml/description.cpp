@@ -1,11 +1,22 @@
 #include "panelgate/yaml/description.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "encoding.hpp"
+#include "hints.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/yaml/document.hpp"
+#include "panelgate/yaml/map_reader.hpp"
+#include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
+
 namespace {
 
 std::string joined(const std::string& path, std::string_view key) {
@@ -58,6 +69,193 @@ void Description::tell_below(const Node& map, std::string_view key, const Node& 
     const std::string below = joined(*path, key);
     paths_[&value] = below;
     for (const Node& item : value.items) paths_[&item] = below;
+}
+
+KeyShape* MapReader::shape(std::string_view key) {
+    Description* description = problems_->description();
+    return description == nullptr ? nullptr : description->shape(*node_, key);
+}
+
+void MapReader::looks_like(std::string_view key, std::string_view pattern, bool number) {
+    KeyShape* told = shape(key);
+    if (told == nullptr) return;
+    told->pattern = pattern;
+    told->may_be_number = number;
+}
+
+void MapReader::no_longer(std::string_view key, std::size_t characters) {
+    if (KeyShape* told = shape(key)) told->longest_text = characters;
+}
+
+void MapReader::keyed_by(std::string_view key, std::string_view pattern) {
+    if (KeyShape* told = shape(key)) told->keys = pattern;
+}
+
+void MapReader::holds_integers(std::string_view key) {
+    if (KeyShape* told = shape(key)) told->holds_integers = true;
+}
+
+void MapReader::within(std::string_view key, std::int64_t min, std::int64_t max) {
+    KeyShape* told = shape(key);
+    if (told == nullptr) return;
+    told->min = min;
+    told->max = max;
+}
+
+void MapReader::never(std::string_view key, double number) {
+    if (KeyShape* told = shape(key)) told->never = number;
+}
+
+void MapReader::may_be_null(std::string_view key, bool may) {
+    if (KeyShape* told = shape(key)) told->may_be_null = may;
+}
+
+void MapReader::needed(std::string_view key) {
+    if (KeyShape* told = shape(key)) told->required = true;
+}
+
+void MapReader::entries(std::string_view key, std::size_t fewest, std::size_t most) {
+    KeyShape* told = shape(key);
+    if (told == nullptr) return;
+    told->fewest = fewest;
+    told->most_entries = most;
+}
+
+bool MapReader::lacks(std::string_view key, std::string_view word, std::string_view other) {
+    if (Description* description = problems_->description())
+        description->tell_rule(
+            *node_, {{}, std::string(key), std::string(other), {std::string(word)}, true, false});
+    const Node* node = find(key);
+    return node != nullptr && node->scalar == word && !has(other);
+}
+
+void MapReader::belongs(std::string_view key, std::string_view other,
+                        std::span<const std::string_view> words, bool absent) {
+    if (Description* description = problems_->description())
+        description->tell_rule(*node_, {{},
+                                        std::string(key),
+                                        std::string(other),
+                                        {words.begin(), words.end()},
+                                        false,
+                                        absent});
+}
+
+std::optional<double> MapReader::share(std::string_view key) {
+    const auto value = number(key);
+    if (KeyShape* told = shape(key)) {
+        told->least = 0;
+        told->most = 1;
+    }
+    if (!value || (*value >= 0 && *value <= 1)) return value;
+    problem(key, std::string(key) + " must be a share from 0 to 1, such as 0.1 for 10 %");
+    return std::nullopt;
+}
+
+namespace {
+
+/// {id 5, name: press}
+bool lacks_colon(const Entry& entry, std::string_view key) {
+    return entry.value.kind == Node::Kind::null && entry.key.size() > key.size() + 1 &&
+           entry.key.starts_with(std::string(key) + ' ');
+}
+
+}  // namespace
+
+bool MapReader::is_mistyped(std::string_view key) const {
+    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
+        const Entry& entry = node_->entries[i];
+        if (entry.key == key || std::ranges::find(known_, entry.key) != known_.end()) continue;
+        const Entry* parent = shallow_parent(i);
+        if (nearest(entry.key, std::span(&key, 1)) == key || lacks_colon(entry, key) ||
+            entry.key.starts_with(std::string(key) + ':') ||
+            (parent != nullptr && parent->key == key))
+            return true;
+    }
+    return false;
+}
+
+/// Of a key in the column of one that should have it: `serial:` and `baud: 9600` on the next line.
+const Entry* MapReader::shallow_parent(std::size_t entry) const {
+    const Mark own = node_->entries[entry].mark;
+    constexpr std::size_t kFar = 20;  // keys; a file may be nothing but unknown ones
+    const std::size_t end = entry > kFar ? entry - kFar : 0;
+    while (entry-- > end) {
+        const Entry& above = node_->entries[entry];
+        if (above.mark.line >= own.line || above.mark.column != own.column) return nullptr;
+        if (std::ranges::find(parents_, above.key) != parents_.end())
+            return above.value.kind == Node::Kind::null ? &above : nullptr;
+        if (std::ranges::find(known_, above.key) != known_.end()) return nullptr;
+    }
+    return nullptr;
+}
+
+std::string MapReader::is_unknown(std::string_view key) const {
+    return "unknown key " + quote(key) + " in " + what_;
+}
+
+std::string MapReader::unknown(std::size_t entry) const {
+    const std::string& key = node_->entries[entry].key;
+    const std::vector<std::string_view> known(known_.begin(), known_.end());
+    const std::string message = is_unknown(key);
+    const std::string blank = blank_hint(key);
+    if (!blank.empty()) return message + blank;
+    for (const std::string_view word : known) {
+        if (lacks_colon(node_->entries[entry], word))
+            return message + "; a ':' is missing: write " + std::string(word) + ": " +
+                   key.substr(word.size() + 1);
+    }
+    if (const Entry* parent = shallow_parent(entry))
+        return message + "; below " + quote(parent->key) + " (line " +
+               std::to_string(parent->mark.line) +
+               ") it must stand deeper: type 2 blanks before it";
+    const Entry& typed = node_->entries[entry];
+    if (const std::string place = place_of(typed, true); !place.empty()) return message + place;
+    const std::string near = nearest(key, known);
+    if (!near.empty()) return message + "; did you mean '" + near + "'?";
+    if (const std::string place = place_of(typed, false); !place.empty()) return message + place;
+    std::string list;
+    for (const std::string_view word : known)
+        list += (list.empty() ? "" : ", ") + std::string(word);
+    return message + "; known keys are " + list;
+}
+
+std::string MapReader::place_of(const Entry& entry, bool exactly) const {
+    for (const Elsewhere& place : elsewhere_) {
+        const bool near = !exactly && nearest(entry.key, std::span(&place.key, 1)) == place.key;
+        if (entry.key != place.key && !near) continue;
+        const std::string key(place.key);
+        if (!place.instead.empty()) return "; " + std::string(place.instead);
+        if (place.map.empty())
+            return (near ? "; did you mean '" + key + "', a key of " : "; it is a key of ") +
+                   std::string(place.owner) + (near ? "?" : "");
+        const Node& value = entry.value;
+        std::string shown = nearest(value.scalar, place.words);
+        if (shown.empty())
+            shown = value.kind == Node::Kind::scalar ? std::string(clip(value.scalar, 40)) : "...";
+        return "; write " + std::string(place.map) + ": {" + key + ": " + shown + '}';
+    }
+    return "";
+}
+
+void MapReader::refuse(std::string_view key, const std::string& why) {
+    for (const Entry& entry : node_->entries) {
+        if (entry.key == key) problems_->add(entry.value.mark, std::string(key) + ' ' + why);
+    }
+    refused_.push_back(key);
+}
+
+void MapReader::finish() {
+    std::size_t told = 0;
+    for (std::size_t i = 0; i < node_->entries.size(); ++i) {
+        const Entry& entry = node_->entries[i];
+        if (std::ranges::find(refused_, entry.key) != refused_.end()) continue;
+        if (std::ranges::find(known_, entry.key) != known_.end()) continue;
+        // Nobody reads more of them, and what was meant takes a while to find.
+        problems_->add(entry.mark, ++told > kMaxTold ? is_unknown(entry.key) : unknown(i));
+    }
+    for (const std::string& key : excused_) {
+        if (told == 0) problems_->add(node_->mark, needs(key));  // it was a key of its own
+    }
 }
 
 }  // namespace panelgate::yaml

@@ -6,24 +6,44 @@
 #include <yaml-cpp/exceptions.h>
 #include <yaml-cpp/mark.h>
 #include <yaml-cpp/parser.h>
-
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <map>
 #include <sstream>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "encoding.hpp"
 #include "lint.hpp"
-#include "masking.hpp"
-#include "panelgate/yaml/quote.hpp"
 #include "panelgate/yaml/settings.hpp"
-#include "refusal.hpp"
-#include "size.hpp"
 #include "source.hpp"
 
 namespace panelgate::yaml {
+
+/// What a value takes, with all that is in it.
+struct Size {
+    std::size_t nodes = 1;
+    std::size_t text = 0;   ///< bytes of scalars and keys
+    std::size_t depth = 0;  ///< levels of lists and maps
+};
+
+Size size_of(const Node& node);
+
+/// What a refusal of yaml-cpp means to who wrote the text, for what the lints do not explain.
+std::string in_our_words(std::string_view refusal);
+
+std::string quote(std::string_view text) {
+    constexpr std::size_t kMost = 80;
+    std::string shown(clip(text, kMost));
+    const bool is_cut = shown.size() < text.size();
+    std::ranges::replace_if(shown, [](char c) { return (c >= 0 && c < ' ') || c == 0x7F; }, ' ');
+    const char mark = shown.find('\'') == shown.npos || shown.find('"') != shown.npos ? '\'' : '"';
+    return mark + shown + (is_cut ? "..." : "") + mark;
+}
 
 namespace {
 
@@ -328,6 +348,114 @@ Node parse(std::string_view text, Problems& problems) {
     const Findings causes = find_causes(scanned);
     add(source, causes, problems);
     return causes.empty() ? root : Node();
+}
+
+Size size_of(const Node& node) {
+    Size size;
+    size.text = node.scalar.size();
+    const auto add = [&size](const Node& child) {
+        const Size inner = size_of(child);
+        size.nodes += inner.nodes;
+        size.text += inner.text;
+        size.depth = std::max(size.depth, inner.depth);
+    };
+    for (const Node& item : node.items) add(item);
+    for (const Entry& entry : node.entries) {
+        size.text += entry.key.size();
+        add(entry.value);
+    }
+    if (node.kind == Node::Kind::sequence || node.kind == Node::Kind::map) ++size.depth;
+    return size;
+}
+
+namespace {
+
+struct Words {
+    std::string_view refusal;  ///< how it begins (yaml-cpp/exceptions.h)
+    std::string_view ours;
+};
+
+constexpr std::string_view kIndentation =
+    "the indentation is wrong here or above: keys of one map, and the '-' of one list, stand in "
+    "one column";
+constexpr std::string_view kBracket =
+    "a bracket or a comma is missing before this: write {key: value, key: value} or [a, b]";
+constexpr std::string_view kColon =
+    "a key cannot stand here: write each 'key: value' on a line of its own, in the column of its "
+    "neighbours";
+constexpr std::string_view kName = "a name of letters and digits must follow & or *";
+constexpr std::string_view kTag = "a tag (!...) has no meaning here; leave it out";
+constexpr std::string_view kDirective = "a directive (%...) has no meaning here; leave it out";
+constexpr std::string_view kHex =
+    "what follows this backslash is no character; write \\xNN or \\uNNNN, or \\\\ for a backslash";
+
+constexpr std::array<Words, 30> kWords{{
+    {"end of map flow", kBracket},
+    {"end of sequence flow", kBracket},
+    {"illegal flow end", kBracket},
+    {"end of map", kIndentation},
+    {"end of sequence", kIndentation},
+    {"illegal map", kColon},
+    {"unexpected end", kIndentation},
+    {"illegal block entry",
+     "a '-' cannot stand here: write each item of a list on a line of its own, below a key without "
+     "a value"},
+    {"illegal tab", "a tab in the indentation; type blanks in its place"},
+    {"unknown token", "this character cannot begin a text; put the text in quotes"},
+    {"the referenced anchor", "'*' repeats a name that no '&' gives; put a text in quotes"},
+    {"illegal EOF", "the file ends inside a text in quotes; close the quote"},
+    {"illegal document indicator",
+     "'---' or '...' inside a text in quotes; close the quote before it"},
+    {"unknown escape", "this backslash means nothing in double quotes; write \\\\ for a backslash"},
+    {"bad character found while scanning hex", kHex},
+    {"invalid unicode", kHex},
+    {"alias not found", kName},
+    {"anchor not found", kName},
+    {"illegal character found while scanning alias", kName},
+    {"illegal character found while scanning anchor", kName},
+    {"illegal character found while scanning tag", kTag},
+    {"tag handle", kTag},
+    {"end of verbatim tag", kTag},
+    {"cannot assign multiple", "more than one & or ! before one value; leave one out"},
+    {"aliases can't", "nothing may stand between * and what it repeats; leave it out"},
+    {"cannot set zero", "0 cannot follow | or >; leave it out"},
+    {"unexpected character in block", "only a comment may follow | or > on its line"},
+    {"bad YAML version", kDirective},
+    {"YAML ", kDirective},
+    {"repeated ", kDirective},
+}};
+
+}  // namespace
+
+std::string in_our_words(std::string_view refusal) {
+    for (const Words& words : kWords) {
+        if (refusal.starts_with(words.refusal)) return std::string(words.ours);
+    }
+    return "this is not YAML (" + std::string(refusal) + "); put texts in quotes";
+}
+
+std::string format(const Problem& problem) {
+    return problem.file + ':' + std::to_string(problem.mark.line) + ':' +
+           std::to_string(problem.mark.column) + ": " + problem.message;
+}
+
+std::string Problems::text() const {
+    std::vector<const Problem*> sorted;
+    sorted.reserve(list_.size());
+    for (const Problem& problem : list_) sorted.push_back(&problem);
+    const auto place = [this](const Problem* problem) {
+        return std::tuple(problem->file != file_, std::string_view(problem->file),
+                          problem->mark.line, problem->mark.column, problem);
+    };
+    std::ranges::sort(sorted, {}, place);  // at one place: in the order found
+    const std::size_t shown = sorted.size() > kMaxTold + 1 ? kMaxTold : sorted.size();
+    std::string all;
+    for (std::size_t i = 0; i < shown; ++i) all += format(*sorted[i]) + '\n' + sorted[i]->excerpt;
+    if (shown == sorted.size()) return all;
+    Problem rest = *sorted[shown];
+    rest.message = std::to_string(sorted.size() - shown) +
+                   " more faults from here on; mend those above and check again";
+    return all + format(rest) + '\n';
 }
 
 }  // namespace panelgate::yaml

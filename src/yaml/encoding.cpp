@@ -7,10 +7,11 @@
 #include <optional>
 #include <utility>
 
-#include "panelgate/base/utf8.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/yaml/settings.hpp"
 
 namespace panelgate::yaml {
+
 namespace {
 
 constexpr char32_t kReplacement = 0xFFFD;

@@ -3,10 +3,16 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
-
-#include "finding.hpp"
+#include <vector>
 
 namespace panelgate::yaml {
+
+/// What is wrong at one place of a text.
+struct Finding {
+    std::size_t offset = 0;
+    std::string message;
+};
+using Findings = std::vector<Finding>;
 
 struct Decoded {
     std::string text;  ///< UTF-8 without a byte order mark, each line ended by LF or CR LF

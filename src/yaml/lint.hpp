@@ -5,8 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "finding.hpp"
-#include "masking.hpp"
+#include "encoding.hpp"
 #include "scan.hpp"
 #include "source.hpp"
 

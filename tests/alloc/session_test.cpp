@@ -18,7 +18,7 @@
 #include "answering_line.hpp"
 #include "counting.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 #include "panelgate/tcp_server/listener.hpp"

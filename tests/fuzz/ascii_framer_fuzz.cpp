@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 
 using namespace panelgate;
 using namespace panelgate::modbus;

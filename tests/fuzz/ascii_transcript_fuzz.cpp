@@ -3,8 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/modbus/ascii_frame.hpp"
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 using namespace panelgate;

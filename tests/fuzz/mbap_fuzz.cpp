@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/framing.hpp"
 
 using namespace panelgate;
 using namespace panelgate::modbus;

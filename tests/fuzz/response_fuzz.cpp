@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 
 using namespace panelgate;
 using namespace panelgate::modbus;

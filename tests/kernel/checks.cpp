@@ -15,9 +15,8 @@
 
 #include "conversation.hpp"
 #include "driver.hpp"
-#include "open_error.hpp"
 #include "record.hpp"
-#include "rs485.hpp"
+#include "tty_trouble.hpp"
 
 namespace panelgate::line {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "support/read_span.hpp"
 

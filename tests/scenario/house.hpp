@@ -18,7 +18,7 @@
 #include "house_seam.hpp"
 #include "panel.hpp"
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/write_event.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/points/poller.hpp"
 #include "panelgate/points/relays.hpp"
 #include "random.hpp"

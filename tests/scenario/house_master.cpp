@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 
 namespace panelgate::scenario {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "plan.hpp"
 #include "subject.hpp"

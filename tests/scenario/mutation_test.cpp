@@ -10,7 +10,7 @@
 #include "checker.hpp"
 #include "field.hpp"
 #include "mutant.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "plan.hpp"
 
 namespace panelgate::scenario {

@@ -6,7 +6,7 @@
 
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scenario {
 

@@ -4,9 +4,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
-#include "panelgate/modbus/ascii_transcript.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::scenario {

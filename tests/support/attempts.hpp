@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/group.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/request.hpp"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "panelgate/arbiter/arbiter.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/bus_step.hpp"
 #include "support/request.hpp"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::test {

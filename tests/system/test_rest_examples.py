@@ -213,7 +213,7 @@ class RestExamples(unittest.TestCase):
     def test_the_page_has_the_style_that_its_policy_names(self):
         style = re.search("<style>(.*?)</style>", self.page, re.DOTALL).group(1)
         named = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-        source = (pathlib.Path(harness.ROOT) / "src/web/api/docs_page.cpp").read_text()
+        source = (pathlib.Path(harness.ROOT) / "src/web/api/page.cpp").read_text()
         self.assertIn(f"'sha256-{named}'", source)
         version = harness.run("--version").stdout
         self.assertIn(self.document.all["info"]["version"], version)

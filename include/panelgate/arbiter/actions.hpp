@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -7,17 +8,37 @@
 #include <variant>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/reason.hpp"
-#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
-#include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/base/transaction_end.hpp"
-#include "panelgate/base/transaction_instants.hpp"
-#include "panelgate/modbus/span.hpp"
+#include "panelgate/base/words.hpp"
+#include "panelgate/modbus/function.hpp"
 
 namespace panelgate::arbiter {
+
+/// Why a frame is sent now. It becomes words only when somebody reads them.
+struct Reason {
+    enum class Kind : std::uint8_t {
+        none,         ///< nobody wants to know, or nobody here has sent it
+        learns_echo,  ///< a write is next, and this read finds out about the echo
+        probe,
+        again,  ///< another attempt
+        turn,   ///< it was next
+    };
+    Kind kind = Kind::none;
+    PriorityClass priority = PriorityClass::read;
+    std::uint8_t station = 0;
+    std::uint8_t asked_function = 0;  ///< what it stands for; 0: its own
+    bool passed_over = false;         ///< ahead of a higher class, which had had its turns
+    int attempt = 1;
+    Duration waited{};
+    std::size_t waiting = 0;  ///< behind it, on the whole line
+    std::size_t answers = 0;  ///< requests
+    ClientName client{};      ///< who wants it
+};
+
+/// One line, or "" for none.
+std::string text_of(const Reason& reason);
 
 /// Write these bytes in one piece, now: a frame in the line's mode.
 struct Transmit {

@@ -8,28 +8,59 @@
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/bus_shares.hpp"
-#include "panelgate/arbiter/client_names.hpp"
 #include "panelgate/arbiter/counters.hpp"
 #include "panelgate/arbiter/echo.hpp"
 #include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
 #include "panelgate/arbiter/ledger.hpp"
-#include "panelgate/arbiter/pace.hpp"
 #include "panelgate/arbiter/quiet.hpp"
-#include "panelgate/arbiter/reception.hpp"
-#include "panelgate/arbiter/reply_end.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
+#include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/schedule.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station_health.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/arbiter/strays.hpp"
-#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
 
 namespace panelgate::arbiter {
+
+/// Where jobs come in: they get their ticket and their deadline, or an answer from memory. Pure.
+class Reception {
+  public:
+    explicit Reception(const Settings& settings)
+        : serial_(settings.serial), deadline_(settings.queue.deadline) {}
+
+    /// For jobs from now on.
+    void apply(const Settings& settings) {
+        serial_ = settings.serial;
+        deadline_ = settings.queue.deadline;
+    }
+    /// Its ticket, its deadline, and the last moment at which starting it makes sense: when the
+    /// request, a gap and its normal reply still fit. Counting only the shortest reply, an
+    /// exception, would fill an overloaded line with transactions whose answers come too late for
+    /// everybody.
+    void stamp(TimePoint now, Job& job);
+
+    struct FromMemory {
+        Ticket ticket = 0;
+        ReadCache::Hit hit;
+    };
+    /// A value that was read lately, where the station's max_age allows it. Not for polls, which
+    /// are to bring new ones.
+    std::optional<FromMemory> from_memory(TimePoint now, const Job& job, Duration max_age);
+    /// A read was answered by its station; `max_age`: of that.
+    void on_read(const Group& group, const Bytes& reply, Duration max_age);
+    ReadCache& memory() { return memory_; }
+
+  private:
+    SerialFormat serial_;
+    Duration deadline_;
+    ReadCache memory_;
+    Ticket last_ticket_ = 0;
+};
 
 /// Decides what one line does. Pure: time is an argument, actions come out of poll_action();
 /// calling on_deadline early or twice is harmless.

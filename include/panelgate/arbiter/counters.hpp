@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <map>
 
-#include "panelgate/base/histogram.hpp"
-#include "panelgate/base/priority.hpp"
+#include "panelgate/base/series.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate::arbiter {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/echo_state.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {

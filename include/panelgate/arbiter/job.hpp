@@ -1,15 +1,43 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
 
-#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/base/pool.hpp"
-#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
+
+/// A transaction is one request on the wire. A line counts them, from 1.
+using Transaction = std::uint64_t;
+
+/// The transactions that were made for a job, the oldest first: one for each attempt. Nearly all
+/// have one, and then nothing is taken from any heap.
+class TransactionNumbers {
+  public:
+    void add(Transaction number) {
+        if (last_ != 0) before_.push_back(last_);
+        last_ = number;
+    }
+    /// 0: it was never sent.
+    Transaction last() const { return last_; }
+    template <class Each>
+    void for_each(Each each) const {
+        for (const Transaction number : before_) each(number);
+        if (last_ != 0) each(last_);
+    }
+
+  private:
+    Transaction last_ = 0;
+    PoolVector<Transaction> before_;
+};
 
 /// Names one accepted job; never reused.
 using Ticket = std::uint64_t;
@@ -43,5 +71,63 @@ struct Job {
     TransactionNumbers transactions{};  ///< one for each attempt
 };
 using Jobs = PoolVector<Job>;
+
+/// Nothing: a client without a name.
+using ClientName = std::shared_ptr<const std::string>;
+
+/// What clients are called in words for people: the one place that knows. Bounded; a client that
+/// has gone is forgotten. Pure.
+class ClientNames {
+  public:
+    static constexpr std::size_t kClients = 8192;
+
+    /// The last name counts.
+    void set(Client client, std::string name) {
+        const auto known = names_.find(client);
+        if (known == names_.end() && names_.size() >= kClients) return;
+        names_.insert_or_assign(client, std::make_shared<const std::string>(std::move(name)));
+    }
+    void forget(Client client) { names_.erase(client); }
+    /// For later, when it may have gone.
+    ClientName name(Client client) const {
+        const auto known = names_.find(client);
+        return known == names_.end() ? nullptr : known->second;
+    }
+    std::string of(Client client) const { return words(name(client)); }
+    static std::string words(const ClientName& name) {
+        return name ? *name : "a client without a name";
+    }
+
+  private:
+    std::map<Client, ClientName> names_;
+};
+
+/// How much of the line's time each client has used (P9). A transaction for several is shared out
+/// equally. Bounded; a client that has gone is forgotten. Pure.
+class BusShares {
+  public:
+    static constexpr std::size_t kClients = 1024;
+
+    struct Share {
+        Duration busy{};
+        std::uint64_t transactions = 0;
+    };
+
+    void add(Client client, Duration busy) {
+        if (!shares_.contains(client) && shares_.size() >= kClients) return;
+        shares_[client].busy += busy;
+        ++shares_[client].transactions;
+    }
+    void forget(Client client) { shares_.erase(client); }
+    /// Nothing used yet: all zero.
+    Share of(Client client) const {
+        const auto known = shares_.find(client);
+        return known == shares_.end() ? Share{} : known->second;
+    }
+    const std::map<Client, Share>& all() const { return shares_; }
+
+  private:
+    std::map<Client, Share> shares_;
+};
 
 }  // namespace panelgate::arbiter

@@ -10,8 +10,8 @@
 
 #include "panelgate/arbiter/actions.hpp"
 #include "panelgate/arbiter/attempt.hpp"
-#include "panelgate/arbiter/bus_shares.hpp"
 #include "panelgate/arbiter/counters.hpp"
+#include "panelgate/arbiter/job.hpp"
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 #include "panelgate/base/pool.hpp"

@@ -5,13 +5,31 @@
 #include <map>
 #include <optional>
 
-#include "panelgate/arbiter/shared_read.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
 namespace panelgate::arbiter {
+
+/// What a read of one table (01..04) asks one station for.
+struct ReadSpan {
+    std::uint8_t station = 0;
+    modbus::Span items;
+
+    bool same_table(const ReadSpan& other) const {
+        return station == other.station && items.table == other.items.table;
+    }
+    bool contains(const ReadSpan& other) const {
+        return station == other.station && items.contains(other.items);
+    }
+    friend bool operator==(const ReadSpan&, const ReadSpan&) = default;
+};
+
+/// The part of a reply to `whole` that answers `part`, as its own reply PDU. `whole` contains
+/// `part` and the reply matches it.
+Bytes slice_reply(const modbus::Span& whole, ByteView reply, const modbus::Span& part);
 
 /// What reads of one line have brought, for stations that allow a client an older value (max_age).
 /// Bounded: the oldest value goes first. Pure.

@@ -1,20 +1,94 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <utility>
+#include <vector>
 
-#include "panelgate/arbiter/backlog.hpp"
-#include "panelgate/arbiter/broadcast_replies.hpp"
+#include "panelgate/arbiter/attempt.hpp"
 #include "panelgate/arbiter/echo.hpp"
+#include "panelgate/arbiter/job_queue.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/quiet.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/sharing.hpp"
+#include "panelgate/arbiter/station.hpp"
 #include "panelgate/arbiter/stations.hpp"
-#include "panelgate/arbiter/way.hpp"
+#include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 
 namespace panelgate::arbiter {
+
+/// Which reads go together in one transaction (P6), and what came of it. Pure.
+class Sharing {
+  public:
+    static constexpr std::size_t kRemembered = 64;
+
+    explicit Sharing(bool share) : share_(share) {}
+    void apply(bool share) { share_ = share; }
+
+    /// The leader and what the same transaction can answer: contained reads always; touching ones
+    /// as far as the panel is known to take the length. One request saves a request, a reply header
+    /// and two gaps, so joining reads without a hole is always cheaper on the wire.
+    Group gather(Job leader, const Station& station, JobQueue& queue) const;
+    /// The joined read did not come about: its parts go alone from now on. Gives them in the order
+    /// in which they are to be put back in front of the queue; what asked for the whole, and what
+    /// nobody waits for any more, stays in the group.
+    Jobs split(Group& group);
+    /// What of `reply` answers this job of the group.
+    static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
+
+  private:
+    bool joins(const Group& group, const Job& job, const Station& station) const;
+
+    bool share_;
+    PoolDeque<ReadSpan> refused_;
+};
+
+/// All that has been accepted and is not on the wire: requests that wait for their turn, and those
+/// whose attempt failed and goes again. Pure.
+class Backlog {
+  public:
+    explicit Backlog(const QueueSettings& settings) : queue_(settings) {}
+
+    JobQueue& queue() { return queue_; }
+    const JobQueue& queue() const { return queue_; }
+    bool empty() const { return queue_.empty() && retries_.empty(); }
+    /// Something of this client waits for this station.
+    bool has(Client client, std::uint8_t station) const;
+
+    /// The same request goes again. At most one a station.
+    void retry(Group group) { retries_.push_back(std::move(group)); }
+    bool has_retries() const { return !retries_.empty(); }
+    bool has_retry(std::uint8_t station) const {
+        return std::ranges::any_of(retries_,
+                                   [&](const Group& group) { return group.station == station; });
+    }
+    std::optional<Group> take_retry(const InlineFunction<bool(const Group&), 48>& may_go);
+    void each_retry(const InlineFunction<void(const Group&), 48>& show) const;
+
+    /// Retries that nobody waits for any more, without their jobs: what failed has failed.
+    std::vector<Group> take_dropped() { return std::exchange(dropped_, {}); }
+
+    /// What this client has waiting; it is gone then.
+    Jobs cancel(Client client);
+    /// Those that can no longer be started, or, transmitted before, answered in time.
+    Jobs expire(TimePoint now);
+    std::optional<TimePoint> first_expiry() const;
+    /// Those that match, waiting for their first turn.
+    Jobs remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
+    /// Everything.
+    Jobs clear();
+
+  private:
+    Jobs remove_retries(const JobQueue::Test& match);
+
+    JobQueue queue_;
+    PoolDeque<Group> retries_;
+    std::vector<Group> dropped_;
+};
 
 /// What goes next on a line that is free: a retry, a probe, or a request in turn, together with
 /// what else it answers. Decides; changes only what waits. Pure.

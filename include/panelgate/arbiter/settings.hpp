@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "panelgate/arbiter/station_health.hpp"
-#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/base/words.hpp"
+#include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter {
 

@@ -3,10 +3,10 @@
 #include <map>
 #include <optional>
 
-#include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/arbiter/settings.hpp"
-#include "panelgate/arbiter/slowest.hpp"
 #include "panelgate/arbiter/station.hpp"
+#include "panelgate/arbiter/station_health.hpp"
 
 namespace panelgate::arbiter {
 

@@ -5,12 +5,12 @@
 #include <vector>
 
 #include "panelgate/arbiter/ledger.hpp"
-#include "panelgate/arbiter/questions.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
 #include "panelgate/arbiter/quiet.hpp"
 #include "panelgate/arbiter/stations.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
 namespace panelgate::arbiter {

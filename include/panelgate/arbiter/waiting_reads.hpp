@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/base/inline_function.hpp"
 #include "panelgate/base/pool.hpp"
 

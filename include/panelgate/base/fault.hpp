@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "panelgate/base/outcome.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate {
 

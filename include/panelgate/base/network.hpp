@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace panelgate {
 
@@ -17,5 +18,25 @@ struct Network {
 using AddressBytes = std::array<std::uint8_t, 16>;
 /// The same in their first so many bits, 128 at most.
 bool same_prefix(const AddressBytes& left, const AddressBytes& right, unsigned bits);
+
+/// "127.0.0.1:502"; an IPv6 address stands in brackets: "[::1]:502".
+inline std::string endpoint_text(const std::string& address, std::uint16_t port) {
+    const bool six = address.find(':') != std::string::npos;
+    return (six ? '[' + address + ']' : address) + ':' + std::to_string(port);
+}
+
+/// A client as the log names it, without the port of its connection, which is another one next
+/// time: "modbus_tcp [::1]:50000" -> "modbus_tcp [::1]". An address alone ("http ::1") and a token
+/// ("http ::1 token bob") belong to the client and stay.
+inline std::string without_port(std::string_view client) {
+    constexpr auto kNone = std::string_view::npos;
+    const auto colon = client.rfind(':');
+    if (colon == kNone || client.find(" token ") != kNone) return std::string(client);
+    const std::string_view host = client.substr(client.rfind(' ') + 1, kNone);
+    const bool is_number = client.find_first_not_of("0123456789", colon + 1) == kNone;
+    const bool has_brackets = colon > 0 && client[colon - 1] == ']';
+    const bool is_port = has_brackets || host.find(':') == host.rfind(':');
+    return std::string(is_number && is_port ? client.substr(0, colon) : client);
+}
 
 }  // namespace panelgate

@@ -3,26 +3,48 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "panelgate/arbiter/job.hpp"
-#include "panelgate/arbiter/transaction_numbers.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/fault.hpp"
-#include "panelgate/base/health.hpp"
 #include "panelgate/base/inline_function.hpp"
-#include "panelgate/base/outcome.hpp"
-#include "panelgate/base/priority.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
+#include "panelgate/bus/counters.hpp"
 #include "panelgate/bus/rights.hpp"
 #include "panelgate/bus/trace.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 
+namespace panelgate::line {
+class Line;
+}
+
 namespace panelgate::bus {
+
+class BusClient;
+
+/// Who a station is: what it is called, and where it is asked.
+struct StationRef {
+    std::string name;  ///< unique; "LINE:ID" for a station that the configuration does not list
+    std::string line;
+    std::uint8_t id = 0;
+    BusClient* bus = nullptr;  ///< never null; outlives whoever refers to the station
+};
+
+/// Somebody writes, whoever it is: what is known of these items is old from now on. Told when the
+/// request leaves and when its attempt is over, before it is answered.
+struct WriteEvent {
+    std::uint8_t station = 0;           ///< 0: all of the line
+    std::optional<modbus::Span> items;  ///< nothing: it may change anything
+    bool ended = false;
+    std::uint64_t client = 0;  ///< whose it is (ClientId); 0: nobody waits for it any more
+};
 
 /// Who asks: one number a TCP connection, HTTP session or internal task. 0 is nobody's.
 using ClientId = std::uint64_t;
@@ -195,6 +217,28 @@ class BusClient {
         static_cast<void>(client);
         static_cast<void>(name);
     }
+};
+
+struct Settings;
+
+/// What the program starts, stops and counts: a line that is driven (Bus), or one that is only
+/// listened to (ListeningBus).
+class LineBus : public BusClient {
+  public:
+    virtual void start() = 0;
+    /// Closes the line.
+    virtual void stop() = 0;
+    /// Goes on with these. What is owed, counted, recorded and known stays, but for stations that
+    /// are no longer listed. `line` takes the place of the one before as soon as that waits for no
+    /// reply; meanwhile and until it is open requests wait for their turn. `far_end` is kept until
+    /// the one before is closed. Null, the same line goes on: only where is_same_wire().
+    virtual void apply(Settings settings, std::unique_ptr<line::Line> line,
+                       std::shared_ptr<void> far_end) = 0;
+    /// From when on nothing that was asked on its wire can still be answered there (P1).
+    virtual TimePoint clear_at() const { return {}; }
+    /// Nothing is asked before then.
+    virtual void rest_until(TimePoint until) { static_cast<void>(until); }
+    virtual LineReport report() const = 0;
 };
 
 }  // namespace panelgate::bus

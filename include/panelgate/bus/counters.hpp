@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "panelgate/arbiter/counters.hpp"
-#include "panelgate/base/histogram.hpp"
-#include "panelgate/base/outcome.hpp"
+#include "panelgate/base/series.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/line/counters.hpp"
 
 namespace panelgate::bus {

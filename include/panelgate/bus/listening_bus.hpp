@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
-#include "panelgate/bus/line_bus.hpp"
+#include "panelgate/bus/bus_client.hpp"
 #include "panelgate/line/line.hpp"
 #include "panelgate/rt/clock.hpp"
 

@@ -11,7 +11,7 @@
 #include "panelgate/mqtt/settings.hpp"
 #include "panelgate/points/settings.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/profile/profile_ref.hpp"
+#include "panelgate/profile/panel_profile.hpp"
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/serial_server/settings.hpp"
 #include "panelgate/sim/settings.hpp"

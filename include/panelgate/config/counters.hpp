@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "panelgate/base/reload_outcome.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate::config {
 

@@ -33,4 +33,10 @@ std::string network_of(const Cidr& cidr);
 /// Whether this network has the address, IPv4 as IPv6 too; what is no address is in none.
 bool is_in(const std::string& address, const std::string& network, unsigned prefix);
 
+/// Where a program on this machine reaches a listener: that of all addresses on loopback.
+inline std::string reachable(const std::string& address) {
+    if (!is_any_address(address)) return address;
+    return is_ipv6(address) ? "::1" : "127.0.0.1";
+}
+
 }  // namespace panelgate::config

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <string>
+#include <vector>
+
 #include "panelgate/config/config.hpp"
 
 namespace panelgate::config {
@@ -17,5 +20,11 @@ class RealFiles final : public Files {
     /// line names. A named pipe that nobody writes to within a second is not read (EPIPE).
     static std::optional<std::string> read_any(const std::string& path);
 };
+
+/// Adds the profiles of a directory to a catalogue, or replaces its own by them. What is wrong
+/// inside a file goes to `problems`, with that file's name; returns a text for the directory, or
+/// for each file, that cannot be read.
+std::vector<std::string> add_profiles(const std::string& dir, const Files& files,
+                                      profile::Catalogue& catalogue, yaml::Problems& problems);
 
 }  // namespace panelgate::config

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <string_view>
+
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/base/fault.hpp"
 
 namespace panelgate::modbus {
 
@@ -65,5 +71,59 @@ bool is_broadcastable(std::uint8_t function);
 std::string_view function_name(std::uint8_t function);
 /// Defined by the standard (AP section 6): keeps vendors' own codes out of metric labels.
 bool is_known(std::uint8_t function);
+
+/// Exception codes of AP section 7. Any other byte is a vendor's own and passes through unchanged.
+enum class ExceptionCode : std::uint8_t {
+    illegal_function = 0x01,
+    illegal_data_address = 0x02,
+    illegal_data_value = 0x03,
+    server_device_failure = 0x04,
+    acknowledge = 0x05,
+    server_device_busy = 0x06,
+    memory_parity_error = 0x08,
+    gateway_path_unavailable = 0x0A,
+    gateway_target_failed = 0x0B,
+};
+
+/// "illegal data address"; "exception 9" for codes without a name.
+std::string describe_exception(std::uint8_t code);
+
+/// What a client is told: 01 denied; 03 malformed; 06 busy, expired; 0A not routed, line down,
+/// cancelled (the gateway is stopping); 0B for all that may have happened or a silent station.
+ExceptionCode to_exception(Fault fault);
+
+/// {function | 80h, code}
+Bytes encode_exception(std::uint8_t function, ExceptionCode code);
+/// The code, when `pdu` is an exception reply (two bytes, high bit set).
+std::optional<std::uint8_t> exception_of(ByteView pdu);
+
+inline constexpr std::uint32_t kTableItems = 65536;  ///< of each table (AP 4.3)
+
+/// Items [first, end()) of one table, 0-based as on the wire. Whether they are there, end() within
+/// kTableItems, is asked where it matters.
+struct Span {
+    Table table = Table::holding_registers;
+    std::uint32_t first = 0;
+    std::uint32_t count = 1;
+
+    std::uint32_t end() const { return first + count; }  ///< one past the last item
+    bool contains(const Span& other) const {
+        return table == other.table && first <= other.first && other.end() <= end();
+    }
+    bool overlaps(const Span& other) const {
+        return table == other.table && first < other.end() && other.first < end();
+    }
+    /// They overlap or lie side by side: together they are one span without a hole.
+    bool touches(const Span& other) const {
+        return table == other.table && other.first <= end() && first <= other.end();
+    }
+    friend bool operator==(const Span&, const Span&) = default;
+};
+
+/// The least span that contains both, which are of one table.
+inline Span join(const Span& a, const Span& b) {
+    const std::uint32_t first = std::min(a.first, b.first);
+    return {a.table, first, std::max(a.end(), b.end()) - first};
+}
 
 }  // namespace panelgate::modbus

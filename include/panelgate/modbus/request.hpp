@@ -8,7 +8,6 @@
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/fault.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/span.hpp"
 
 namespace panelgate::modbus {
 
@@ -92,5 +91,11 @@ Bytes encode_write_registers(std::uint16_t address, const std::vector<std::uint1
 
 /// Bits packed least significant first, unused high bits zero (PDU-06).
 Bytes pack_bits(const std::vector<bool>& values);
+
+/// Could writing `written` change what a read of `items` gives? Other tables may show the same
+/// memory (Autonics UB and UW), and a write without addresses (nothing) may change anything.
+inline bool may_change(const std::optional<Span>& written, const Span& items) {
+    return !written || written->table != items.table || written->overlaps(items);
+}
 
 }  // namespace panelgate::modbus

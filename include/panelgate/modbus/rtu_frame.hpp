@@ -1,13 +1,61 @@
 #pragma once
 
+#include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string_view>
+#include <utility>
 
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/modbus/crc_order.hpp"
 
 namespace panelgate::modbus {
+
+/// CRC-16 of the serial line (V1.02, 2.5.1.2): generator 8005h reflected, preset FFFFh, no final
+/// XOR. Sent low byte first; over a whole good frame, its CRC included, it is 0.
+std::uint16_t crc16(ByteView bytes);
+/// ... of bytes that go on where `before` is that of all before them.
+std::uint16_t crc16(std::uint16_t before, ByteView bytes);
+
+/// How the two bytes of the CRC stand at the end of a frame.
+enum class CrcOrder : std::uint8_t {
+    low_first,   ///< the standard's (serial line V1.02, 2.5.1.2)
+    high_first,  ///< Autonics GP of before June 2005 (its manual's revision history)
+};
+/// As the configuration and the profiles write them.
+inline constexpr std::array<std::pair<std::string_view, CrcOrder>, 2> kCrcOrders{
+    {{"low_first", CrcOrder::low_first}, {"high_first", CrcOrder::high_first}}};
+inline std::string_view label(CrcOrder order) {
+    return kCrcOrders[static_cast<std::size_t>(order)].first;
+}
+inline CrcOrder other(CrcOrder order) {
+    return order == CrcOrder::low_first ? CrcOrder::high_first : CrcOrder::low_first;
+}
+
+/// Which order each address of a line sends and expects; the standard's unless set. Address 0 is
+/// the broadcast.
+class CrcOrders {
+  public:
+    void set(std::uint8_t address, CrcOrder order) {
+        high_first_[address] = order == CrcOrder::high_first;
+    }
+    CrcOrder of(std::uint8_t address) const {
+        return high_first_[address] ? CrcOrder::high_first : CrcOrder::low_first;
+    }
+
+    friend bool operator==(const CrcOrders&, const CrcOrders&) = default;
+
+  private:
+    std::bitset<256> high_first_;
+};
+
+/// What a good frame of the serial modes (RTU, ASCII) says.
+struct SerialAdu {
+    std::uint8_t station = 0;  ///< 0..255; 0 is a broadcast
+    Bytes pdu;                 ///< 1 to 253 bytes
+    friend bool operator==(const SerialAdu&, const SerialAdu&) = default;
+};
 
 inline constexpr std::size_t kCrcSize = 2;
 inline constexpr std::size_t kAduOverhead = 1 + kCrcSize;    ///< address and CRC around a PDU

@@ -7,7 +7,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/pool.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::modbus {
 

@@ -3,10 +3,9 @@
 #include <cstddef>
 #include <optional>
 
-#include "panelgate/base/byte_queue.hpp"
 #include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
-#include "panelgate/modbus/serial_adu.hpp"
 
 namespace panelgate::modbus {
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -7,10 +8,75 @@
 #include <string_view>
 #include <vector>
 
+#include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/plan/line.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/points/read_plan.hpp"
+#include "panelgate/points/station_polls.hpp"
+#include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::plan {
+
+/// A point or a poll block, as the configuration has it.
+struct Asked {
+    points::Want want;
+    std::string notation;  ///< as typed
+};
+
+struct Station {
+    std::string name;
+    const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
+    Duration response_timeout = 500ms;
+    Duration think_time = 1ms;
+    /// Of the whole line behind its first timeout (`quarantine: line`); then its request is
+    /// repeated before anybody else's, if it is.
+    Duration line_rest{};
+    bool repeats = true;
+    /// Silence behind its replies, where it is set; nothing: what its rate and its profile ask for.
+    std::optional<Duration> frame_gap;
+    std::vector<Asked> asked;
+    points::SharedMemory memory{};  ///< what is read again behind a write
+};
+
+/// What a relay does on one line. `from` and `to`: its ends that are on this line, one at least.
+struct Relay {
+    struct End {
+        std::size_t station = 0;  ///< index into Line::stations
+        modbus::Span span;
+    };
+    std::string name;
+    Duration every = 1s;  ///< it reads, and writes; above 0
+    /// It writes only what has changed, and all of it once so often; nothing: it always writes.
+    std::optional<Duration> refresh;
+    std::optional<End> from;
+    std::optional<End> to;
+    bool single = false;  ///< it writes by 05 or 06
+
+    /// It writes so often at least, changed or not.
+    Duration writes_every() const { return refresh ? std::max(every, *refresh) : every; }
+    /// On this line it can be told whether `other` goes on where this one ends.
+    bool continues_in(const Relay& other) const;
+};
+
+/// What is known of a line before anything runs.
+struct Line {
+    std::string name;
+    SerialFormat serial;
+    std::vector<Station> stations;
+    std::vector<Relay> relays;
+    Duration deadline = 2s;  ///< of a request, from its arrival to its answer
+    bool listens = false;    ///< nothing is ever sent there
+};
+
+/// Silence behind the replies of one of its stations.
+Duration gap_of(const Line& line, const Station& station);
+/// What bounds a station's reads, and what they cost, on this line.
+points::PlanLimits limits_of(const Line& line, const Station& station);
+/// The same line at another rate. Gaps that are set stay.
+Line at_rate(const Line& line, int baud);
+/// The same line with every interval so many times as long (above 0), up to points::kSlowest;
+/// `refresh` is none.
+Line at_intervals(const Line& line, double times);
 
 // Loads are shares of the wire's time: 0.8 is 80 %; more than 1 is more than there is.
 
@@ -78,5 +144,21 @@ Verdict verdict(const LinePlan& plan);
 bool is_high_by_changes(const LinePlan& plan);
 
 LinePlan make_plan(const Line& line);
+
+struct HighestRate {
+    double times = 1;       ///< as often as now everything could be asked
+    bool changing = false;  ///< beyond, the values that change are too many; else what is certain
+};
+
+/// Up to which all that a line has to carry is fine, found by planning it at other intervals; a
+/// refresh of a relay stays. Nothing of an idle line. `plan` is the line's.
+std::optional<HighestRate> highest_rate(const Line& line, const LinePlan& plan);
+
+/// To whole milliseconds of up to two digits, which people would choose.
+inline Duration rounded_up(Duration duration) {
+    Duration unit = 1ms;
+    while (duration > 20 * unit) unit *= 10;
+    return (duration + unit - Duration(1)) / unit * unit;
+}
 
 }  // namespace panelgate::plan

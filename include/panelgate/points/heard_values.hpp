@@ -7,7 +7,7 @@
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/modbus/span.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/points/read_plan.hpp"
 #include "panelgate/points/station_polls.hpp"
 #include "panelgate/tap/heard.hpp"

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/bus/write_event.hpp"
 #include "panelgate/points/station_polls.hpp"
 #include "panelgate/rt/clock.hpp"
 

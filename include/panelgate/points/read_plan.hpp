@@ -11,7 +11,6 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
-#include "panelgate/modbus/span.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
 namespace panelgate::points {
@@ -91,5 +90,27 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
 /// smallest span that no read may contain then. Nothing when the halves overlap: then only the read
 /// that was bisected is known to be refused.
 std::optional<modbus::Span> seam(const PlannedRead& left, const PlannedRead& right);
+
+/// Keeps the contract of Want.
+bool is_plannable(const Want& want);
+
+/// How far a read of one table may go, from what is readable, what is wanted and what was refused.
+class TableMap {
+  public:
+    TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table);
+
+    /// The furthest end (one past the last item) that a read from `first` may have. `first` itself
+    /// must be wanted or readable. Less than a want's end when the want contains a refused span.
+    std::uint32_t reach(std::uint32_t first) const;
+
+  private:
+    struct Piece {
+        std::uint32_t first = 0;
+        std::uint32_t end = 0;
+    };
+    std::uint32_t max_items_;
+    std::vector<Piece> open_;     ///< disjoint, ascending, never adjacent
+    std::vector<Piece> refused_;  ///< ascending; `end` is the least of it and all that follow
+};
 
 }  // namespace panelgate::points

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <boost/system/result.hpp>
 #include <cstdint>
 #include <string>
 #include <string_view>
-
-#include <boost/system/result.hpp>
 
 #include "panelgate/profile/panel_profile.hpp"
 

@@ -2,15 +2,18 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::profile {
 
@@ -174,5 +177,33 @@ struct PanelProfile {
     unsigned max_count(std::uint8_t function) const;
     friend bool operator==(const PanelProfile&, const PanelProfile&) = default;
 };
+
+/// A profile, and what keeps it: whoever holds this may outlive the configuration that it is of.
+/// Without an owner it is a plain pointer.
+class ProfileRef {
+  public:
+    ProfileRef(const PanelProfile* profile = nullptr, std::shared_ptr<const void> owner = {})
+        : profile_(std::move(owner), profile) {}
+
+    operator const PanelProfile*() const { return profile_.get(); }
+    const PanelProfile& operator*() const { return *profile_; }
+    const PanelProfile* operator->() const { return profile_.get(); }
+    /// The very same; equal ones of two configurations are not.
+    friend bool operator==(const ProfileRef& one, const ProfileRef& other) {
+        return one.profile_.get() == other.profile_.get();
+    }
+    friend bool operator==(const ProfileRef& one, const PanelProfile* other) {
+        return one.profile_.get() == other;
+    }
+
+  private:
+    std::shared_ptr<const PanelProfile> profile_;
+};
+
+/// Silence between frames that the panel's manual asks for at this rate; 0 in ASCII, for manuals
+/// speak of RTU.
+Duration asked_gap(const SerialFormat& serial, const PanelProfile& profile);
+/// That or the standard's (silent_interval()), whichever is longer: what `frame_gap: auto` means.
+Duration automatic_gap(const SerialFormat& serial, const PanelProfile& profile);
 
 }  // namespace panelgate::profile

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 
@@ -23,5 +24,9 @@ std::vector<Translation> translations(const PanelProfile& profile);
 /// an area shows the same memory through both (`also`). Nothing: the request goes as it is.
 std::optional<modbus::Request> translate(const PanelProfile& profile,
                                          const modbus::Request& request);
+
+/// Everything that a write of these items changes, as the panel's tables show it: the items, the
+/// same memory by other tables (`also`), words by their bits and bits by their words (`view_of`).
+std::vector<modbus::Span> shown_as(const PanelProfile& profile, const modbus::Span& written);
 
 }  // namespace panelgate::profile

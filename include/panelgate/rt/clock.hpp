@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/base/wall_time.hpp"
 
 namespace panelgate::rt {
 

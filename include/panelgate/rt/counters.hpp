@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "panelgate/base/histogram.hpp"
+#include "panelgate/base/series.hpp"
 
 namespace panelgate::rt {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "panelgate/rt/log_line.hpp"
+#include "panelgate/rt/log_throttle.hpp"
 #include "panelgate/rt/settings.hpp"
 
 namespace panelgate::rt {

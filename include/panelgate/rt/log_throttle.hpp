@@ -6,13 +6,58 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/rt/log_line.hpp"
 #include "panelgate/rt/settings.hpp"
 
 namespace panelgate::rt {
+
+using LogField = std::pair<std::string_view, std::string>;
+
+/// An event in words, without its time.
+struct LogLine {
+    std::string text;
+    std::string fields{};  ///< the same for the journal (journal.hpp); empty where it is not asked
+};
+
+/// For what must be in the log each time: all of it is told at once, but what is exactly the same
+/// as the last at its place, soon after it, is gathered in one line. Nothing is lost: what a line
+/// gathers differs in nothing but its time. Bounded. Pure.
+class LogRepeats {
+  public:
+    static constexpr Duration kInterval = 1min;  ///< so long one line gathers
+    static constexpr std::size_t kMostPlaces = 1024;
+
+    /// Is this the same as the last at its place? It is to be gathered then, else to be told.
+    bool is_repeat(TimePoint now, std::string_view place, std::string_view what);
+    /// Keeps the repeat of which is_repeat() has just been true.
+    void gather(std::string_view place, LogLine line, WallTime time);
+
+    struct Gathered {
+        LogLine line;  ///< the last one
+        std::uint64_t repeated = 0;
+        WallTime first{};
+        WallTime last{};
+    };
+    /// What is to be told before anything else, as something else has followed.
+    std::vector<Gathered> take_ended();
+    /// What has gathered for kInterval.
+    std::vector<Gathered> take_due(TimePoint now);
+
+  private:
+    struct Last {
+        std::string what;
+        TimePoint told;
+        Gathered gathered{};
+    };
+    void end(Last& last);
+    void make_room();
+
+    std::map<std::string, Last, std::less<>> places_;
+    std::vector<Gathered> ended_;
+};
 
 /// Repeats are quoted now and then: the same event of the same subject passes a few times, and then
 /// once in a while with how often it was left out. As subjects may be chosen by a client

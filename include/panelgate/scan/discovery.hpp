@@ -14,7 +14,6 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/scan/read_request.hpp"
 #include "panelgate/scan/result.hpp"
 
 namespace panelgate::scan {

@@ -10,7 +10,6 @@
 #include "panelgate/base/time.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/scan/progress.hpp"
-#include "panelgate/scan/read_request.hpp"
 #include "panelgate/scan/result.hpp"
 #include "panelgate/scan/settings.hpp"
 

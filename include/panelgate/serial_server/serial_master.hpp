@@ -6,7 +6,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/serial_server/counters.hpp"
 #include "panelgate/serial_server/settings.hpp"
-#include "panelgate/tcp_server/unit_map.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 namespace panelgate::serial_server {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "panelgate/base/echo_state.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/tcp_server/settings.hpp"
 

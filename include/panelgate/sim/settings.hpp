@@ -5,7 +5,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/modbus/crc_order.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::sim {
 

@@ -5,8 +5,8 @@
 #include <variant>
 
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/frame_kind.hpp"
 #include "panelgate/base/time.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate::tap {
 

@@ -7,8 +7,8 @@
 
 #include "panelgate/rt/clock.hpp"
 #include "panelgate/tcp_server/counters.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "panelgate/tcp_server/settings.hpp"
-#include "panelgate/tcp_server/unit_map.hpp"
 
 namespace boost::asio {
 class any_io_executor;

@@ -7,10 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/framing.hpp"
 
 namespace panelgate::tcp_server {

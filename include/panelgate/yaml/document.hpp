@@ -7,6 +7,10 @@
 
 namespace panelgate::yaml {
 
+/// A text of a file in a message of one line: in quotes, cut after 80 bytes, without control
+/// characters.
+std::string quote(std::string_view text);
+
 class Description;
 
 /// A place in a file, 1-based, in characters, as editors count.

@@ -18,4 +18,9 @@ using Environment = std::function<std::optional<std::string>(const std::string& 
 /// nothing is set.
 void expand_variables(Node& tree, const Environment& environment, Problems& problems);
 
+/// Puts what a map takes over from others in the place of its merge key: `<<: *a`, or
+/// `<<: [*a, *b]`. Its own keys win, then those of the map that is named first; nothing is merged
+/// below them. What was taken over keeps its marks. (yaml.org/type/merge.html)
+void resolve_merge_keys(Node& tree, Problems& problems);
+
 }  // namespace panelgate::yaml

@@ -1,15 +1,28 @@
 #include "answer.hpp"
 
+#include <algorithm>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/json/object.hpp>
+#include <charconv>
 #include <chrono>
+#include <cstddef>
 #include <cstdlib>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
-#include "panelgate/modbus/exception.hpp"
+#include "conduct.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/json_text.hpp"
-#include "refusal.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
+
 namespace json = boost::json;
 namespace {
 
@@ -136,6 +149,208 @@ std::string upper_hex(ByteView bytes, std::string_view separator) {
     std::string text = to_hex(bytes, separator);
     for (char& c : text) c = c >= 'a' ? static_cast<char>(c - 'a' + 'A') : c;
     return text;
+}
+
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+    while (text.starts_with(' ')) text.remove_prefix(1);
+    while (text.ends_with(' ')) text.remove_suffix(1);
+    return text;
+}
+
+/// Cuts off what comes before the separator; the rest stays in `text`.
+std::string_view next(std::string_view& text, char separator) {
+    const auto at = std::min(text.find(separator), text.size());
+    const std::string_view part = text.substr(0, at);
+    text.remove_prefix(std::min(at + 1, text.size()));
+    return trimmed(part);
+}
+
+/// The weight among these parameters; 1 when there is none.
+double weight_of(std::string_view parameters) {
+    while (!parameters.empty()) {
+        const std::string_view one = next(parameters, ';');
+        if (!one.starts_with("q=") && !one.starts_with("Q=")) continue;
+        double weight = 0;
+        std::from_chars(one.data() + 2, one.data() + one.size(), weight);
+        return weight;
+    }
+    return 1;
+}
+
+}  // namespace
+
+bool prefers(std::string_view accept, std::string_view type) {
+    double wanted = 0;
+    double other = 0;
+    while (!accept.empty()) {
+        std::string_view item = next(accept, ',');
+        const std::string_view one = next(item, ';');
+        const double weight = weight_of(item);
+        if (one == type) wanted = weight;
+        if (one == "application/json") other = weight;
+    }
+    return wanted > 0 && wanted >= other;
+}
+
+namespace {
+
+std::string quoted(std::string_view field) {
+    if (field.find_first_of(",\"\r\n") == field.npos) return std::string(field);
+    std::string text = "\"";
+    for (const char c : field) text += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return text + '"';
+}
+
+std::string field_of(const json::object& object, std::string_view column) {
+    const json::value* value = object.if_contains(column);
+    if (value == nullptr || value->is_null()) return {};
+    if (value->is_string() && !exact_digits(*value)) return std::string(value->get_string());
+    return json_text(*value);
+}
+
+}  // namespace
+
+bool prefers_csv(std::string_view accept) { return prefers(accept, "text/csv"); }
+
+std::string csv_line(std::span<const std::string_view> fields) {
+    std::string line;
+    for (const std::string_view& field : fields) {
+        if (&field != &fields.front()) line += ',';
+        line += quoted(field);
+    }
+    return line + "\r\n";
+}
+
+std::string csv_line(const json::object& object, std::span<const std::string_view> columns) {
+    std::vector<std::string> texts;
+    for (const std::string_view column : columns) texts.push_back(field_of(object, column));
+    const std::vector<std::string_view> fields(texts.begin(), texts.end());
+    return csv_line(fields);
+}
+
+HttpResponse csv_response(std::string body) {
+    HttpResponse response;
+    response.content_type = "text/csv; charset=utf-8; header=present";
+    response.body = std::move(body);
+    return response;
+}
+
+namespace {
+
+constexpr std::size_t kPackedOfATurn = 16 * 1024;  ///< bytes: some 0.3 ms
+
+}  // namespace
+
+boost::asio::awaitable<std::string> packed(std::string body) {
+    Gzip gzip;
+    for (std::string_view left = body; !left.empty();) {
+        const std::string_view piece = left.substr(0, kPackedOfATurn);
+        gzip.add(piece);
+        left.remove_prefix(piece.size());
+        boost::asio::awaitable<void> turn = others_turn();
+        if (!left.empty()) co_await std::move(turn);
+    }
+    co_return gzip.finish();
+}
+
+/// Some 0.1 ms.
+constexpr std::size_t kEntriesOfATurn = 16;
+
+void LongAnswer::begin_member(std::string_view name) {
+    if (!std::exchange(is_first_, false)) text_ += ',';
+    text_ += json_text(json::value(name)) + ':';
+}
+
+LongAnswer& LongAnswer::begin_list(std::string_view name) {
+    begin_member(name);
+    text_ += '[';
+    is_first_ = true;
+    return *this;
+}
+
+void LongAnswer::add(const json::value& entry) {
+    if (!std::exchange(is_first_, false)) text_ += ',';
+    text_ += json_text(entry);
+    ++entries_;
+}
+
+LongAnswer& LongAnswer::end_list() {
+    text_ += ']';
+    is_first_ = false;
+    return *this;
+}
+
+LongAnswer& LongAnswer::member(std::string_view name, const json::value& value) {
+    begin_member(name);
+    text_ += json_text(value);
+    return *this;
+}
+
+bool LongAnswer::is_turn_over() {
+    if (entries_ < kEntriesOfATurn) return false;
+    entries_ = 0;
+    return true;
+}
+
+HttpResponse LongAnswer::response() {
+    HttpResponse response;
+    response.body = std::move(text_) + "}\n";
+    return response;
+}
+
+boost::asio::awaitable<void> others_turn() {
+    const auto executor = co_await boost::asio::this_coro::executor;
+    co_await boost::asio::post(executor, boost::asio::use_awaitable);
+}
+
+Handling table_answer(HttpRequest request, Table table) {
+    const bool as_csv = prefers_csv(request.headers["accept"]);
+    LongAnswer body;
+    for (const auto& [name, value] : table.members) body.member(name, value);
+    std::string lines = csv_line(table.columns);
+    body.begin_list(table.name);
+    for (std::size_t i = 0; i < table.count; ++i) {
+        const boost::json::object one = table.entry(i);
+        if (as_csv) {
+            lines += csv_line(one, table.columns);
+            body.add(nullptr);  // counts turns
+        } else {
+            body.add(one);
+        }
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
+    }
+    body.end_list();
+    HttpResponse response = as_csv ? csv_response(std::move(lines)) : body.response();
+    response.headers.emplace_back("Vary", "Accept");
+    co_return response;
+}
+
+KeptAnswer::KeptAnswer(std::string text, std::string_view content_type)
+    : text_(std::make_shared<const std::string>(std::move(text))),
+      tag_(tag_of(*text_)),
+      content_type_(content_type) {}
+
+boost::asio::awaitable<HttpResponse> KeptAnswer::give(std::shared_ptr<KeptAnswer> self,
+                                                      HttpRequest request) {
+    HttpResponse response;
+    response.content_type = self->content_type_;
+    const bool known = tell_tag(response, request.headers["if-none-match"], self->tag_);
+    response.headers.emplace_back("Vary", "Accept-Encoding");
+    if (known) co_return response;
+    response.shared_body = self->text_;
+    if (!accepts_gzip(request.headers["accept-encoding"])) co_return response;
+    if (!self->packed_) {
+        boost::asio::awaitable<std::string> packing = packed(*self->text_);
+        self->packed_ = std::make_shared<const std::string>(co_await std::move(packing));
+    }
+    response.shared_body = self->packed_;
+    response.headers.emplace_back("Content-Encoding", "gzip");
+    co_return response;
 }
 
 }  // namespace panelgate::web

@@ -3,8 +3,10 @@
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 #include <boost/json/value.hpp>
+#include <cstddef>
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -14,6 +16,15 @@
 #include "panelgate/web/http/problem.hpp"
 
 namespace panelgate::web {
+
+struct RepeatedMember {
+    std::string name;
+    std::size_t at = 0;  ///< where the second one begins, in the text
+};
+
+/// The first member that an object in this text has twice, at any depth: parsers of values keep the
+/// last one and say nothing. Of a text that is no JSON: what is found before its fault.
+std::optional<RepeatedMember> find_repeated_member(std::string_view json);
 
 /// The names of members that a body may have; they are told apart by case, too.
 using Members = std::initializer_list<std::string_view>;

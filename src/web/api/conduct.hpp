@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "handlers.hpp"
 #include "panelgate/web/http/message.hpp"
+#include "routes.hpp"
 
 namespace panelgate::web {
 

@@ -1,10 +1,156 @@
-#include <utility>
+#include "panelgate/web/api/events.hpp"
 
-#include "event_filter.hpp"
-#include "handlers.hpp"
+#include <algorithm>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/http/event_hub.hpp"
+#include "panelgate/web/http/json_text.hpp"
+#include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
+#include "points.hpp"
+#include "routes.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
+
+/// Which events a request wants: from the queries types, line, station and point, each a list with
+/// commas. 400 for a type that there is not, and where no event of the types could name what is
+/// asked for; 404 for a line, station or point that there is not.
+Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory);
+
+namespace json = boost::json;
+
+std::string point_event(const bus::StationRef& station, const points::Point& point,
+                        const points::PointReading& reading) {
+    json::object object = point_json(point, reading);
+    object["line"] = station.line;
+    object["station"] = station.name;
+    return json_text(object);
+}
+
+std::string line_event(std::string_view line, std::string_view state, std::string_view why) {
+    json::object object{{"line", line}, {"state", state}};
+    if (!why.empty()) object["why"] = why;
+    return json_text(object);
+}
+
+std::string station_event(std::string_view line, std::string_view station, std::string_view what) {
+    return json_text(json::object{{"line", line}, {"station", station}, {"event", what}});
+}
+
+std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
+                            std::size_t of, std::size_t found) {
+    return json_text(json::object{
+        {"line", line}, {"state", state}, {"asked", asked}, {"of", of}, {"found", found}});
+}
+
+std::string transaction_event(std::string_view line, std::string_view station,
+                              std::uint8_t function, std::string_view outcome, Duration took) {
+    json::object object{{"line", line},
+                        {"station", nullptr},
+                        {"function", function},
+                        {"outcome", outcome},
+                        {"duration_ms", to_milliseconds(took)}};
+    if (!station.empty()) object["station"] = station;
+    return json_text(object);
+}
+
+namespace {
+
+struct Kind {
+    std::string_view type;
+    bool names_station;
+    bool names_point;
+};
+constexpr Kind kKinds[] = {{"point", true, true},
+                           {"station", true, false},
+                           {"line", false, false},
+                           {"transaction", true, false},
+                           {"discovery", false, false}};
+
+/// "point, station, line, transaction and discovery"
+std::string known_types() {
+    std::string text;
+    for (const Kind& kind : kKinds) {
+        const bool last = &kind == &kKinds[std::size(kKinds) - 1];
+        text += (text.empty() ? "" : last ? " and " : ", ") + std::string(kind.type);
+    }
+    return text;
+}
+
+/// The parts between commas; none where the query is not given.
+std::vector<std::string> list_of(const HttpRequest& request, const std::string& query) {
+    std::vector<std::string> parts;
+    const auto given = request.query.find(query);
+    if (given == request.query.end()) return parts;
+    std::istringstream in(given->second);
+    for (std::string part; std::getline(in, part, ',');) parts.push_back(part);
+    return parts;
+}
+
+Parsed<void> add_types(EventFilter& filter, const HttpRequest& request) {
+    for (const std::string& type : list_of(request, "types")) {
+        if (std::ranges::find(kKinds, type, &Kind::type) == std::end(kKinds))
+            return problem(400, "there is no event '" + type + "'; types are " + known_types());
+        filter.types.insert(type);
+    }
+    return {};
+}
+
+/// As events name it: one that nobody has listed by its id alone.
+std::string name_in_events(const Directory& directory, const StationEntry& station) {
+    const bool listed = std::ranges::any_of(
+        directory.stations, [&](const StationEntry& one) { return one.name == station.name; });
+    return listed ? station.name : std::to_string(station.id);
+}
+
+Parsed<void> add_places(EventFilter& filter, const HttpRequest& request,
+                        const Directory& directory) {
+    for (const std::string& name : list_of(request, "line")) {
+        const auto line = find_line(directory, name);
+        if (!line) return line.error();
+        filter.lines.insert(name);
+    }
+    for (const std::string& name : list_of(request, "station")) {
+        const auto station = find_station(directory, name);
+        if (!station) return station.error();
+        filter.stations.emplace(station->line, name_in_events(directory, *station));
+    }
+    for (const std::string& name : list_of(request, "point")) {
+        const auto found = find_point(directory, name);
+        if (!found) return found.error();
+        filter.points.emplace(found->station.name, found->point->name);
+    }
+    return {};
+}
+
+/// A listener that could never be told anything has made a mistake.
+Parsed<void> check(const EventFilter& filter) {
+    const auto fits = [&](const Kind& kind) {
+        const bool wanted = filter.types.empty() || filter.types.contains(std::string(kind.type));
+        return wanted && (filter.stations.empty() || kind.names_station) &&
+               (filter.points.empty() || kind.names_point);
+    };
+    if (std::ranges::any_of(kKinds, fits)) return {};
+    return problem(400, filter.points.empty() ? "no event of these types names a station"
+                                              : "only events of the type point name a point");
+}
+
+}  // namespace
+
+Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory) {
+    EventFilter filter;
+    if (const auto types = add_types(filter, request); !types) return types.error();
+    if (const auto places = add_places(filter, request, directory); !places) return places.error();
+    if (const auto checked = check(filter); !checked) return checked.error();
+    return filter;
+}
 
 Handling get_events(HttpRequest request, const Api* api) {
     auto filter = event_filter_of(request, *api->directory);

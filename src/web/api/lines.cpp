@@ -1,13 +1,26 @@
 #include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
 #include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <map>
+#include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "answer.hpp"
-#include "handlers.hpp"
-#include "long_answer.hpp"
+#include "body.hpp"
+#include "panelgate/base/fault.hpp"
+#include "panelgate/bus/bus_client.hpp"
+#include "panelgate/web/api/sources.hpp"
+#include "panelgate/web/http/json_text.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "routes.hpp"
 #include "station_path.hpp"
 
 namespace panelgate::web {
+
 namespace json = boost::json;
 namespace {
 
@@ -98,6 +111,174 @@ Handling get_line(HttpRequest request, const Api* api) {
     body["findings"] = describe(status.findings);
     body["clients"] = describe((*line)->bus->clients());
     co_return json_response(200, body);
+}
+
+std::string_view label(DiscoveryReport::State state) {
+    switch (state) {
+        case DiscoveryReport::State::never:
+            return "never";
+        case DiscoveryReport::State::running:
+            return "running";
+        case DiscoveryReport::State::done:
+            return "done";
+        case DiscoveryReport::State::stopped:
+            return "stopped";
+    }
+    std::abort();
+}
+
+namespace {
+
+constexpr std::int64_t kDefaultShare = 10;  ///< %
+constexpr std::int64_t kMostShare = 50;
+constexpr const char* kAll = "1-247";
+
+json::object describe(const std::string& line, const DiscoveryReport& report) {
+    json::object object;
+    object["line"] = line;
+    object["state"] = label(report.state);
+    object["share_percent"] = report.share_percent;
+    object["asked"] = report.asked;
+    object["refused"] = report.refused;
+    object["of"] = report.of;
+    object["found"] = report.stations.size();
+    object["bus_ms"] = whole_ms(report.bus);
+    object["took_ms"] = whole_ms(report.took);
+    if (report.remaining) object["remaining_ms"] = whole_ms(*report.remaining);
+    if (!report.why.empty()) object["why"] = report.why;
+    json::array stations;
+    for (const DiscoveredStation& station : report.stations) {
+        stations.push_back(json::object{
+            {"id", station.id},
+            {"profiles", json::array(station.profiles.begin(), station.profiles.end())},
+            {"evidence", station.evidence}});
+    }
+    object["stations"] = std::move(stations);
+    object["yaml"] = report.yaml;
+    return object;
+}
+
+struct Wanted {
+    std::string stations = kAll;
+    unsigned share = kDefaultShare;
+};
+
+Parsed<Wanted> wanted_of(std::string_view text) {
+    Wanted wanted;
+    if (text.empty()) return wanted;
+    const auto body = parse_object(text, {"stations", "share_percent"});
+    if (!body) return body.error();
+    if (body->contains("stations")) {
+        const auto stations = string_member(*body, "stations");
+        if (!stations) return stations.error();
+        wanted.stations = *stations;
+    }
+    if (body->contains("share_percent")) {
+        const auto share = number_member(*body, "share_percent", 1, kMostShare);
+        if (!share) return share.error();
+        wanted.share = static_cast<unsigned>(*share);
+    }
+    return wanted;
+}
+
+/// Why nobody can be looked for on this line now.
+std::optional<Problem> barred(const LineEntry& line, const DiscoverySource& source) {
+    const bus::LineStatus status = line.bus->status();
+    // Its refusal of a write says who is master there.
+    if (const auto refusal = line.bus->refusal_of_write(0); status.listens && refusal)
+        return problem_of(*refusal);
+    if (source.report(line.name).state == DiscoveryReport::State::running)
+        return problem(409, "stations are being looked for on line '" + line.name + "' already");
+    if (status.up) return std::nullopt;
+    Problem down = problem_of(Fault::line_down, false);
+    down.detail = "the line is " + status.state;
+    return down;
+}
+
+}  // namespace
+
+Handling get_discovery(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const std::string& name = (*line)->name;
+    co_return json_response(200, describe(name, api->providers.discovery->report(name)));
+}
+
+Handling post_discover(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const auto wanted = wanted_of(request.body);
+    if (!wanted) co_return to_response(wanted.error());
+    DiscoverySource& source = *api->providers.discovery;
+    if (const auto problem = barred(**line, source)) co_return to_response(*problem);
+    const std::string& name = (*line)->name;
+    if (const auto wrong = source.start(name, wanted->stations, wanted->share))
+        co_return to_response(problem(400, "stations " + *wrong));
+    log_client(*request.caller, "discovery started",
+               {{"line", name}, {"stations", wanted->stations}});
+    request.caller->take_effect();
+    co_return json_response(202, describe(name, source.report(name)));
+}
+
+Handling delete_discovery(HttpRequest request, const Api* api) {
+    const auto line = find_line(*api->directory, request.arguments[0]);
+    if (!line) co_return to_response(line.error());
+    const std::string& name = (*line)->name;
+    if (api->providers.discovery->report(name).state == DiscoveryReport::State::running)
+        log_client(*request.caller, "discovery stopped", {{"line", name}});
+    api->providers.discovery->stop(name);
+    co_return json_response(200, describe(name, api->providers.discovery->report(name)));
+}
+
+namespace {
+
+Parsed<StationEntry> find_simulated(const Directory& directory, const std::string& name) {
+    auto station = find_station(directory, name);
+    if (station && !station->simulated)
+        return problem(404, "station '" + name + "' is not simulated");
+    return station;
+}
+
+/// Numbers, and true and false for 1 and 0.
+Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
+    std::map<std::string, double> numbers;
+    for (const auto& [key, value] : body) {
+        if (!value.is_number() && !value.is_bool())
+            return problem(400, std::string(key) + " must be a number, true or false");
+        numbers[key] = value.is_bool() ? (value.get_bool() ? 1 : 0) : value.to_number<double>();
+    }
+    return numbers;
+}
+
+HttpResponse faults_of(const StationEntry& station) {
+    json::object faults;
+    for (const auto& [name, value] : station.simulated->faults()) faults[name] = value;
+    json::object body;
+    body["station"] = station.name;
+    body["faults"] = std::move(faults);
+    return json_response(200, body);
+}
+
+}  // namespace
+
+Handling get_simulated(HttpRequest request, const Api* api) {
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    co_return faults_of(*station);
+}
+
+Handling put_simulated(HttpRequest request, const Api* api) {
+    const auto station = find_simulated(*api->directory, request.arguments[0]);
+    if (!station) co_return to_response(station.error());
+    const auto body = parse_object(request.body);
+    if (!body) co_return to_response(body.error());
+    const auto numbers = numbers_of(*body);
+    if (!numbers) co_return to_response(numbers.error());
+    if (const auto wrong = station->simulated->set_faults(*numbers))
+        co_return to_response(problem(400, *wrong));
+    log_client(*request.caller, "simulator faults set",
+               {{"station", station->name}, {"faults", json_text(*body)}});
+    co_return faults_of(*station);
 }
 
 }  // namespace panelgate::web

@@ -3,9 +3,9 @@
 #include <utility>
 
 #include "answer.hpp"
-#include "ask.hpp"
 #include "panelgate/web/api/value_json.hpp"
-#include "refusal.hpp"
+#include "reading.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;

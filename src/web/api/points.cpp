@@ -1,27 +1,56 @@
+#include "points.hpp"
+
 #include <boost/json/array.hpp>
 #include <cmath>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "answer.hpp"
-#include "ask.hpp"
-#include "csv.hpp"
-#include "handlers.hpp"
-#include "panelgate/base/wall_time.hpp"
+#include "key_book.hpp"
+#include "panelgate/base/decimal.hpp"
+#include "panelgate/base/time.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/web/http/json_text.hpp"
 #include "panelgate/web/http/query.hpp"
-#include "patience.hpp"
-#include "point_json.hpp"
+#include "reading.hpp"
+#include "routes.hpp"
 #include "station_path.hpp"
-#include "table_answer.hpp"
 
 namespace panelgate::web {
+
 namespace json = boost::json;
+
+namespace {
+
+struct Maker {
+    json::value operator()(const auto& value) const { return json::value(value); }
+    json::value operator()(const Decimal& value) const { return exact_number(value.text()); }
+};
+
+}  // namespace
+
+json::value json_of(const points::Value& value) { return std::visit(Maker(), value); }
+
+json::object point_json(const points::Point& point, const points::PointReading& reading) {
+    json::object object;
+    object["name"] = point.name;
+    object["value"] = nullptr;
+    if (reading.value) object["value"] = json_of(*reading.value);
+    if (reading.label) object["label"] = *reading.label;
+    object["unit"] = point.unit;
+    object["quality"] = label(reading.quality);
+    object["age_ms"] = nullptr;
+    if (reading.age) {
+        object["age_ms"] = whole_ms(*reading.age);
+    }
+    return object;
+}
+
 namespace {
 
 using points::Point;

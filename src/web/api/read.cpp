@@ -1,13 +1,20 @@
+#include <boost/json/array.hpp>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "answer.hpp"
-#include "handlers.hpp"
-#include "patience.hpp"
+#include "key_book.hpp"
+#include "lists.hpp"
+#include "panelgate/points/station_points.hpp"
+#include "panelgate/points/value.hpp"
+#include "points.hpp"
 #include "reading.hpp"
+#include "routes.hpp"
 #include "station_path.hpp"
-#include "view.hpp"
 
 namespace panelgate::web {
+
 namespace {
 
 Handling read_items(HttpRequest request, Parsed<Items> items, const Api* api) {
@@ -36,6 +43,132 @@ Handling get_table(HttpRequest request, const Api* api) {
 Handling get_device(HttpRequest request, const Api* api) {
     auto items = items_of_device_path(request, *api->directory);
     return read_items(std::move(request), std::move(items), api);
+}
+
+namespace json = boost::json;
+namespace {
+
+constexpr Members kOfPoints = {"raw"};
+constexpr Members kOfItems = {"count", "type", "order", "length", "raw"};
+
+Parsed<BatchRead> point_read(const json::object& entry, const Directory& directory) {
+    const auto raw = flag_member(entry, "raw");
+    if (!raw) return raw.error();
+    auto found = point_of(entry, directory);
+    if (!found) return found.error();
+    BatchRead read;
+    read.items.station = found->station;
+    const points::Point& point = *found->point;
+    read.items.span = {point.table, point.address, point.count()};
+    read.view = {.value = point, .items = point.count(), .raw = *raw};
+    read.point = std::move(*found);
+    return read;
+}
+
+Parsed<BatchRead> read_of(const json::object& entry, const Api& api) {
+    const auto known = check_members(entry, kOfPoints, kOfItems);
+    if (!known) return known.error();
+    if (names_point(entry)) return point_read(entry, *api.directory);
+    const auto wording = wording_of(entry);
+    if (!wording) return wording.error();
+    auto items = item_of(entry, *api.directory);
+    if (!items) return items.error();
+    BatchRead read;
+    read.items = std::move(*items);
+    auto view = prepare_read(read.items, *wording, api.providers.settings.max_transactions);
+    if (!view) return view.error();
+    read.view = std::move(*view);
+    return read;
+}
+
+/// What is malformed fails all of them; what cannot be read is told in its place.
+Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
+    const auto entries = entries_of(body, api.providers.settings.max_items);
+    if (!entries) return entries.error();
+    std::vector<BatchRead> reads;
+    std::size_t values = 0;
+    const std::size_t most = api.providers.settings.max_values;
+    for (const json::object& entry : *entries) {
+        auto read = read_of(entry, api);
+        if (!read && read.error().status == 400) return in_entry(reads.size(), read.error());
+        if (read) {
+            values += read->items.span.count;
+            if (values > most)
+                return problem(
+                    422, "at most " + std::to_string(most) + " registers and bits in one list",
+                    "too-many");
+            reads.push_back(std::move(*read));
+        } else {
+            reads.emplace_back().problem = read.error();
+        }
+        reads.back().item = entry;
+    }
+    return reads;
+}
+
+json::object point_result(const BatchRead& read) {
+    const points::Point& point = *read.point->point;
+    points::PointReading reading;
+    reading.value = points::decode(point, read.reading.items);
+    reading.label = points::label_of(point, read.reading.items);
+    reading.quality = reading.value ? points::Quality::good : points::Quality::bad;
+    reading.age = read.reading.age;
+    json::object told;
+    told["station"] = read.items.station.name;
+    for (const auto& [name, value] : point_json(point, reading)) told[name] = value;
+    if (read.view.raw)
+        told["raw"] = json::array(read.reading.items.begin(), read.reading.items.end());
+    told["source"] = read.reading.cached ? "cache" : "bus";
+    return told;
+}
+
+json::object told_of(const BatchRead& read) {
+    if (read.problem) return json_of(*read.problem);
+    json::object told;
+    told["status"] = 200;
+    const json::object rest =
+        read.point ? point_result(read) : describe(read.items, read.view, read.reading);
+    for (const auto& [name, value] : rest) told[name] = value;
+    return told;
+}
+
+json::object result_of(const BatchRead& read) {
+    json::object told = told_of(read);
+    told["item"] = read.item;
+    return told;
+}
+
+const std::string* line_of(const BatchRead& read) {
+    return read.problem ? nullptr : &read.items.station.line;
+}
+
+}  // namespace
+
+Handling post_read(HttpRequest request, const Api* api) {
+    auto reads = reads_of(request.body, *api);
+    if (!reads) co_return to_response(reads.error());
+    unsigned transactions = 0;
+    std::vector<boost::asio::awaitable<void>> lines;
+    for (auto& [name, entries] : by_line(*reads, line_of)) {
+        const LineEntry* line = api->directory->find_line(name);
+        const Patience patience(request, line->deadline, api->providers.now);
+        lines.push_back(
+            read_line(request.caller, line, std::move(entries), patience, &transactions));
+    }
+    boost::asio::awaitable<void> all = gather(std::move(lines));
+    co_await std::move(all);
+    if (request.caller->has_left()) co_return HttpResponse{};
+    LongAnswer body;
+    body.begin_list("results");
+    for (const BatchRead& read : *reads) {
+        body.add(result_of(read));
+        if (!body.is_turn_over()) continue;
+        boost::asio::awaitable<void> turn = others_turn();
+        co_await std::move(turn);
+        if (request.caller->has_left()) co_return HttpResponse{};
+    }
+    body.end_list().member("transactions", transactions);
+    co_return body.response();
 }
 
 }  // namespace panelgate::web

@@ -1,20 +1,209 @@
 #include "reading.hpp"
 
 #include <algorithm>
+#include <boost/asio/associated_executor.hpp>
+#include <boost/asio/async_result.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <boost/json/array.hpp>
+#include <boost/system/system_error.hpp>
+#include <cstdint>
+#include <deque>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "answer.hpp"
-#include "ask.hpp"
-#include "panel_limits.hpp"
+#include "body.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
+#include "panelgate/points/read_plan.hpp"
+#include "panelgate/points/value.hpp"
 #include "panelgate/profile/notation.hpp"
+#include "panelgate/web/http/json_text.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "points.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
+
+namespace asio = boost::asio;
+namespace {
+
+/// Starts a transaction and resumes the coroutine by post: a bus must not find itself called again
+/// from inside its own completion.
+struct StartTransact {
+    template <class Handler>
+    void operator()(Handler handler, bus::BusClient* bus, bus::Request request) const {
+        auto shared = std::make_shared<Handler>(std::move(handler));
+        bus->transact(std::move(request), [shared](bus::Answer answer) {
+            const auto executor = asio::get_associated_executor(*shared);
+            asio::post(executor, [shared, answer = std::move(answer)]() mutable {
+                (std::move(*shared))(std::move(answer));
+            });
+        });
+    }
+};
+
+asio::awaitable<bus::Answer> start_transact(bus::BusClient* bus, bus::Request request) {
+    return asio::async_initiate<const asio::use_awaitable_t<>, void(bus::Answer)>(
+        StartTransact{}, asio::use_awaitable, bus, std::move(request));
+}
+
+}  // namespace
+
+Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu) {
+    auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
+    if (!request) return problem_of(request.error(), false);
+    return bus::Request{.station = station, .request = std::move(*request)};
+}
+
+void introduce(Caller& caller, bus::BusClient* bus) {
+    const bus::ClientId client = caller.id();
+    caller.at_leaving(bus, [bus, client] { bus->cancel(client); });
+    bus->name_client(client, caller.name());
+}
+
+asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
+                                 bus::Request request) {
+    if (caller->has_hung_up() && !caller->has_left()) co_return bus::Answer{};  // cancelled
+    if (!caller->has_left()) {
+        const bool changes = !request.request.is_read();
+        introduce(*caller, bus);
+        request.client = caller->id();
+        if (!caller->address().empty()) request.host = bus::host_of(caller->address());
+        asio::awaitable<bus::Answer> pending = start_transact(bus, std::move(request));
+        bus::Answer answer = co_await std::move(pending);
+        answer.transactions.for_each(
+            [&](std::uint64_t number) { caller->add_cost({bus, number}); });
+        if (answer.transmitted && changes) caller->take_effect();
+        if (!caller->has_left()) co_return answer;
+    }
+    throw boost::system::system_error(asio::error::operation_aborted);
+}
+
 namespace json = boost::json;
+namespace {
+
+std::optional<std::string> query(const HttpRequest& request, const char* name) {
+    const auto given = request.query.find(name);
+    if (given == request.query.end()) return std::nullopt;
+    return given->second;
+}
+
+/// The one of all that has this label; otherwise 400 with the labels of all.
+template <class Word, std::size_t N>
+Parsed<Word> word_of(const char* what, const std::string& text, const Word (&all)[N]) {
+    std::string known;
+    for (const Word word : all) {
+        if (text == label(word)) return word;
+        known += (known.empty() ? "" : ", ") + std::string(label(word));
+    }
+    return problem(
+        400, "there is no " + std::string(what) + " '" + excerpt(text) + "'; there are " + known);
+}
+
+Parsed<points::Type> type_of(const Wording& wording, bool bits) {
+    if (!wording.type) return bits ? points::Type::boolean : points::Type::u16;
+    const auto type = word_of("type", *wording.type, points::kTypes);
+    if (type && bits && *type != points::Type::boolean)
+        return problem(400, "the type of a bit is bool, not " + *wording.type);
+    return type;
+}
+
+Parsed<unsigned> count_member(const json::object& entry, std::string_view name, unsigned most) {
+    if (!entry.contains(name)) return 1u;
+    const auto number = number_member(entry, name, 1, most);
+    if (!number) return number.error();
+    return static_cast<unsigned>(*number);
+}
+
+Parsed<std::optional<std::string>> text_member(const json::object& entry, std::string_view name) {
+    if (!entry.contains(name)) return std::optional<std::string>();
+    auto text = string_member(entry, name);
+    if (!text) return text.error();
+    return std::optional<std::string>(std::move(*text));
+}
+
+}  // namespace
+
+Parsed<Wording> wording_of(const HttpRequest& request) {
+    Wording wording;
+    wording.type = query(request, "type");
+    wording.order = query(request, "order");
+    if (query(request, "length")) {
+        const auto length = query_number(request, "length", 1, kMaxText, 1);
+        if (!length) return length.error();
+        wording.length = *length;
+    }
+    const auto raw = query_flag(request, "raw");
+    if (!raw) return raw.error();
+    wording.raw = *raw;
+    return wording;
+}
+
+Parsed<Wording> wording_of(const json::object& entry) {
+    Wording wording;
+    auto type = text_member(entry, "type");
+    if (!type) return type.error();
+    wording.type = std::move(*type);
+    auto order = text_member(entry, "order");
+    if (!order) return order.error();
+    wording.order = std::move(*order);
+    const auto length = count_member(entry, "length", kMaxText);
+    if (!length) return length.error();
+    if (entry.contains("length")) wording.length = *length;
+    const auto count = count_member(entry, "count", modbus::kTableItems);
+    if (!count) return count.error();
+    wording.count = *count;
+    const auto raw = flag_member(entry, "raw");
+    if (!raw) return raw.error();
+    wording.raw = *raw;
+    return wording;
+}
+
+Parsed<View> view_of(const Wording& wording, modbus::Table table) {
+    View view;
+    const bool bits = modbus::is_bit_table(table);
+    view.raw = wording.raw;
+    view.value.table = table;
+    const auto type = type_of(wording, bits);
+    if (!type) return type.error();
+    view.value.type = *type;
+    if (wording.order) {
+        if (bits) return problem(400, "a bit has no order");
+        const auto order = word_of("order", *wording.order, points::kOrders);
+        if (!order) return order.error();
+        view.value.word_order = *order;
+    }
+    const bool text = *type == points::Type::string;
+    if (wording.length && !text) return problem(400, "only a string has a length");
+    if (text && !wording.length) {
+        // One text of all registers.
+        view.value.length = 2 * wording.count;
+        view.items = wording.count;
+        return view;
+    }
+    view.value.length = wording.length.value_or(0);
+    view.items = wording.count * view.value.count();
+    return view;
+}
+
+json::array values_of(const View& view, std::span<const std::uint16_t> items) {
+    json::array values;
+    const std::size_t step = view.value.count();
+    for (std::size_t at = 0; at + step <= items.size(); at += step) {
+        const auto value = points::decode(view.value, items.subspan(at, step));
+        values.push_back(value ? json_of(*value) : json::value(nullptr));
+    }
+    return values;
+}
+
 namespace {
 
 /// What stopped a read after some of its items: its time may just have been too short for all, and
@@ -106,6 +295,109 @@ json::object describe(const Items& items, const View& view, const Reading& readi
     body["source"] = reading.cached ? "cache" : "bus";
     if (reading.transactions > 1) body["transactions"] = reading.transactions;
     return body;
+}
+
+namespace {
+
+/// As large as the panel's own frames are, which REST may use.
+points::PlanLimits limits_of(const StationEntry& station, const SerialFormat& serial) {
+    points::PlanLimits limits =
+        points::make_plan_limits(*station.profile, serial, silent_interval(serial));
+    for (const modbus::Table table : modbus::kTables)
+        limits.of(table).max_items = station.profile->max_count(read_function(table));
+    return limits;
+}
+
+/// Those of one station, as the plan has them: by number.
+struct Plan {
+    std::vector<BatchRead*> entries;
+    std::vector<points::Want> wants;
+    std::deque<points::PlannedRead> reads;
+};
+
+Plan plan_of(std::vector<BatchRead*> entries, const SerialFormat& serial) {
+    Plan plan;
+    plan.entries = std::move(entries);
+    for (BatchRead* entry : plan.entries) {
+        plan.wants.push_back({entry->items.span});
+        entry->reading.items.assign(entry->items.span.count, 0);
+    }
+    const auto limits = limits_of(plan.entries.front()->items.station, serial);
+    for (points::PlannedRead& read : points::plan_reads(plan.wants, limits))
+        plan.reads.push_back(std::move(read));
+    return plan;
+}
+
+/// Of what was read, the part that the entry wants.
+void take(BatchRead& entry, const modbus::Span& span, const Reading& read) {
+    const modbus::Span& wanted = entry.items.span;
+    const std::uint32_t first = std::max(span.first, wanted.first);
+    const std::uint32_t end = std::min(span.end(), wanted.end());
+    std::copy(read.items.begin() + (first - span.first), read.items.begin() + (end - span.first),
+              entry.reading.items.begin() + (first - wanted.first));
+    ++entry.reading.transactions;
+    entry.reading.cached = entry.reading.cached || read.cached;
+    entry.reading.age = std::max(entry.reading.age, read.age);
+}
+
+/// The panel has said that it will not give all of these items.
+bool is_refused(const bus::Answer& answer) {
+    if (answer.refusal || !answer.pdu) return false;
+    const auto code = modbus::exception_of(*answer.pdu);
+    return code && *code <= 4;
+}
+
+/// Its halves are asked for next; false when it has none.
+bool halve(Plan& plan, const points::PlannedRead& read) {
+    auto halves = points::bisect(read, plan.wants);
+    if (!halves) return false;
+    plan.reads.push_front(std::move(halves->second));
+    plan.reads.push_front(std::move(halves->first));
+    return true;
+}
+
+void settle(Plan& plan, const points::PlannedRead& read, const bus::Answer& answer) {
+    const auto failed = problem_of(answer, *plan.entries.front()->items.station.profile);
+    if (failed && is_refused(answer) && halve(plan, read)) return;
+    Reading got;
+    if (!failed) got.take(answer, read.span);
+    for (const std::size_t want : read.wants) {
+        if (failed) {
+            plan.entries[want]->problem = *failed;
+        } else {
+            take(*plan.entries[want], read.span, got);
+        }
+    }
+}
+
+boost::asio::awaitable<void> read_station(std::shared_ptr<Caller> caller,
+                                          std::vector<BatchRead*> entries, SerialFormat serial,
+                                          Patience patience, unsigned* transactions) {
+    Plan plan = plan_of(std::move(entries), serial);
+    const StationEntry& station = plan.entries.front()->items.station;
+    while (!plan.reads.empty()) {
+        const points::PlannedRead read = std::move(plan.reads.front());
+        plan.reads.pop_front();
+        bus::Request made{.station = station.id, .request = modbus::Request::read(read.span)};
+        made.within = patience.left();
+        const bus::Answer answer = co_await ask(caller, station.bus, std::move(made));
+        if (answer.transmitted) ++*transactions;
+        settle(plan, read, answer);
+    }
+}
+
+}  // namespace
+
+boost::asio::awaitable<void> read_line(std::shared_ptr<Caller> caller, const LineEntry* line,
+                                       std::vector<BatchRead*> entries, Patience patience,
+                                       unsigned* transactions) {
+    std::map<std::uint8_t, std::vector<BatchRead*>> stations;
+    for (BatchRead* entry : entries) stations[entry->items.station.id].push_back(entry);
+    for (auto& [id, of_station] : stations) {
+        boost::asio::awaitable<void> reads =
+            read_station(caller, std::move(of_station), line->serial, patience, transactions);
+        co_await std::move(reads);
+    }
 }
 
 }  // namespace panelgate::web

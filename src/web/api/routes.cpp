@@ -8,6 +8,7 @@
 #include "conduct.hpp"
 
 namespace panelgate::web {
+
 namespace {
 
 constexpr Role kFree = Role::none;

@@ -1,13 +1,79 @@
 #pragma once
 
 #include <boost/json/array.hpp>
+#include <map>
 #include <memory>
 #include <vector>
 
-#include "handlers.hpp"
-#include "panelgate/web/http/site.hpp"
+#include "key_book.hpp"
+#include "panelgate/web/api/directory.hpp"
+#include "panelgate/web/api/server.hpp"
+#include "panelgate/web/http/message.hpp"
 
 namespace panelgate::web {
+
+class KeptAnswer;
+
+/// What handlers work on. The directory outlives every caller that has not left.
+struct Api {
+    const Directory* directory = nullptr;
+    std::shared_ptr<const Directory> keeps;  ///< the same, where it may be replaced
+    Providers providers;
+    std::shared_ptr<KeyBook> keys;  ///< never null
+    /// What get_configuration() has made, by the role of who asks. Never null.
+    std::shared_ptr<std::map<Role, std::shared_ptr<KeptAnswer>>> configuration;
+};
+using Handler = Handling (*)(HttpRequest request, const Api* api);
+
+Handling get_index(HttpRequest request, const Api* api);
+Handling get_page(HttpRequest request, const Api* api);
+Handling get_configuration(HttpRequest request, const Api* api);
+Handling get_openapi(HttpRequest request, const Api* api);
+Handling get_docs(HttpRequest request, const Api* api);
+Handling get_version(HttpRequest request, const Api* api);
+Handling get_healthz(HttpRequest request, const Api* api);
+Handling get_readyz(HttpRequest request, const Api* api);
+Handling get_metrics(HttpRequest request, const Api* api);
+
+Handling get_lines(HttpRequest request, const Api* api);
+Handling get_line(HttpRequest request, const Api* api);
+Handling get_trace(HttpRequest request, const Api* api);
+Handling get_line_history(HttpRequest request, const Api* api);
+Handling get_trace_pcapng(HttpRequest request, const Api* api);
+Handling get_incidents(HttpRequest request, const Api* api);
+Handling get_incident(HttpRequest request, const Api* api);
+Handling post_broadcast(HttpRequest request, const Api* api);
+Handling get_discovery(HttpRequest request, const Api* api);
+Handling post_discover(HttpRequest request, const Api* api);
+Handling delete_discovery(HttpRequest request, const Api* api);
+Handling post_raw(HttpRequest request, const Api* api);
+
+Handling post_read(HttpRequest request, const Api* api);
+Handling post_write(HttpRequest request, const Api* api);
+
+Handling get_stations(HttpRequest request, const Api* api);
+Handling get_station(HttpRequest request, const Api* api);
+Handling get_table(HttpRequest request, const Api* api);
+Handling put_table(HttpRequest request, const Api* api);
+Handling get_points(HttpRequest request, const Api* api);
+Handling get_all_points(HttpRequest request, const Api* api);
+Handling get_point(HttpRequest request, const Api* api);
+Handling put_point(HttpRequest request, const Api* api);
+Handling get_point_history(HttpRequest request, const Api* api);
+Handling get_table_plan(HttpRequest request, const Api* api);
+Handling get_device_plan(HttpRequest request, const Api* api);
+Handling get_interpretations(HttpRequest request, const Api* api);
+Handling get_events(HttpRequest request, const Api* api);
+Handling get_relays(HttpRequest request, const Api* api);
+
+Handling get_reload(HttpRequest request, const Api* api);
+Handling post_reload(HttpRequest request, const Api* api);
+
+Handling get_simulated(HttpRequest request, const Api* api);
+Handling put_simulated(HttpRequest request, const Api* api);
+
+Handling get_device(HttpRequest request, const Api* api);
+Handling put_device(HttpRequest request, const Api* api);
 
 /// Every path of the contract's section 5. The handlers share the API.
 std::vector<Route> routes(std::shared_ptr<const Api> api);

@@ -5,7 +5,7 @@
 #include "key_book.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/web/http/listener.hpp"
-#include "panelgate/web/http/site.hpp"
+#include "panelgate/web/http/message.hpp"
 #include "routes.hpp"
 
 namespace panelgate::web {

@@ -3,24 +3,158 @@
 #include <algorithm>
 #include <array>
 #include <boost/json/array.hpp>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include "answer.hpp"
-#include "ask.hpp"
 #include "body.hpp"
+#include "panelgate/base/bytes.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/web/api/point_order.hpp"
 #include "panelgate/web/api/value_json.hpp"
-#include "panelgate/web/http/client_log.hpp"
+#include "panelgate/web/http/message.hpp"
 #include "reading.hpp"
-#include "refusal.hpp"
-#include "view.hpp"
-#include "write_plan.hpp"
+#include "station_path.hpp"
 
 namespace panelgate::web {
+
+namespace {
+
+/// Behind function and address of 0F and 10: quantity and byte count.
+constexpr std::size_t kMultipleHead = 6;
+
+/// The panel's own view of this memory comes first, then the others.
+std::vector<modbus::Table> tables_of(const profile::PanelProfile& panel, const modbus::Span& span) {
+    std::vector<modbus::Table> tables{span.table};
+    const profile::Area* area = panel.find_area(span.table, span.first);
+    if (area == nullptr) return tables;
+    tables.push_back(area->table);
+    tables.insert(tables.end(), area->also.begin(), area->also.end());
+    std::erase_if(tables, [&](modbus::Table table) {
+        return modbus::is_bit_table(table) != modbus::is_bit_table(span.table);
+    });
+    return tables;
+}
+
+}  // namespace
+
+std::optional<Verification> Verification::of(const modbus::Request& write) {
+    const auto span = write.access().write;
+    if (!span) return std::nullopt;
+    const ByteView pdu = write.pdu();
+    Verification made;
+    made.span_ = *span;
+    Reader in(pdu.subspan(3));
+    switch (write.function()) {
+        case modbus::kWriteSingleCoil:
+            made.cells_.push_back({static_cast<std::uint16_t>(in.u16() != 0)});
+            return made;
+        case modbus::kWriteSingleRegister:
+            made.cells_.push_back({in.u16()});
+            return made;
+        case modbus::kMaskWriteRegister: {
+            const std::uint16_t kept = in.u16();
+            const std::uint16_t set = in.u16();
+            const auto mask = static_cast<std::uint16_t>(~kept);
+            made.cells_.push_back({static_cast<std::uint16_t>(set & mask), mask});
+            return made;
+        }
+        case modbus::kWriteMultipleCoils:
+            for (unsigned i = 0; i < span->count; ++i) {
+                const unsigned bit = pdu[kMultipleHead + i / 8] >> (i % 8) & 1u;
+                made.cells_.push_back({static_cast<std::uint16_t>(bit)});
+            }
+            return made;
+        case modbus::kWriteMultipleRegisters: {
+            Reader data(pdu.subspan(kMultipleHead));
+            for (unsigned i = 0; i < span->count; ++i) made.cells_.push_back({data.u16()});
+            return made;
+        }
+        default:
+            return std::nullopt;
+    }
+}
+
+Parsed<modbus::Span> Verification::span_to_read(const profile::PanelProfile& panel) const {
+    for (const modbus::Table table : tables_of(panel, span_)) {
+        const std::uint8_t function = read_function(table);
+        if (panel.has_function(function) && span_.count <= panel.max_count(function))
+            return modbus::Span{table, span_.first, span_.count};
+    }
+    return ruled_out(bus::Rule::function,
+                     "verify is not possible: the panel has no function that "
+                     "reads its " +
+                         std::string(label(span_.table)));
+}
+
+bool Verification::holds(std::span<const std::uint16_t> items) const {
+    return std::ranges::equal(items, cells_, [](std::uint16_t item, const Cell& cell) {
+        return (item & cell.mask) == cell.value;
+    });
+}
+
+namespace {
+
+/// With the items that are really written.
+Parsed<void> check_area(Items items, std::size_t count) {
+    if (items.area == nullptr) return {};
+    items.span.count = static_cast<unsigned>(count);
+    return check_range(items, *items.area->writable, "writable");
+}
+
+}  // namespace
+
+Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& cells) {
+    if (cells.size() > modbus::kTableItems - items.span.first) {
+        return problem(422, "these values go beyond address 65535");
+    }
+    const auto range = check_area(items, cells.size());
+    if (!range) return range.error();
+    const profile::PanelProfile& panel = *items.station.profile;
+    const auto functions = write_functions(items.span.table, cells.size());
+    for (const std::uint8_t function : functions) {
+        if (!panel.has_function(function)) continue;
+        const unsigned limit = panel.max_count(function);
+        if (cells.size() > limit) {
+            return ruled_out(bus::Rule::quantity, "at most " + std::to_string(limit) +
+                                                      " values in one write; writes are not split");
+        }
+        return encode_write(function, items.address(), cells);
+    }
+    return ruled_out(bus::Rule::function, "the panel has no function " +
+                                              upper_hex({&functions.back(), 1}) + " for " +
+                                              std::to_string(cells.size()) + " of its " +
+                                              std::string(label(items.span.table)));
+}
+
+std::vector<std::uint8_t> write_functions(modbus::Table table, std::size_t count) {
+    const bool bits = modbus::is_bit_table(table);
+    std::vector<std::uint8_t> functions;
+    if (count == 1) {
+        functions.push_back(bits ? modbus::kWriteSingleCoil : modbus::kWriteSingleRegister);
+    }
+    functions.push_back(bits ? modbus::kWriteMultipleCoils : modbus::kWriteMultipleRegisters);
+    return functions;
+}
+
+Bytes encode_write(std::uint8_t function, std::uint16_t address,
+                   const std::vector<std::uint16_t>& cells) {
+    if (function == modbus::kWriteSingleCoil) {
+        return modbus::encode_write_coil(address, cells.front() != 0);
+    }
+    if (function == modbus::kWriteSingleRegister) {
+        return modbus::encode_write_register(address, cells.front());
+    }
+    if (function == modbus::kWriteMultipleCoils) {
+        return modbus::encode_write_coils(address, std::vector<bool>(cells.begin(), cells.end()));
+    }
+    return modbus::encode_write_registers(address, cells);
+}
+
 namespace json = boost::json;
 namespace {
 

@@ -2,21 +2,67 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/json/object.hpp>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "key_book.hpp"
+#include "panelgate/base/bytes.hpp"
 #include "panelgate/bus/bus_client.hpp"
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
 #include "panelgate/points/value.hpp"
-#include "panelgate/web/http/caller.hpp"
+#include "panelgate/profile/panel_profile.hpp"
+#include "panelgate/web/http/message.hpp"
 #include "panelgate/web/http/problem.hpp"
-#include "patience.hpp"
 #include "station_path.hpp"
-#include "verification.hpp"
 
 namespace panelgate::web {
+
+/// What a write leaves in its panel, to be held against what is read there afterwards. Pure.
+class Verification {
+  public:
+    /// Nothing for what is not 05, 06, 0F, 10 or 16.
+    static std::optional<Verification> of(const modbus::Request& write);
+
+    /// The items that were written.
+    const modbus::Span& span() const { return span_; }
+    /// The same memory by a table that this panel can read it by; 422 when there is none.
+    Parsed<modbus::Span> span_to_read(const profile::PanelProfile& panel) const;
+    /// Do these items (bits as 0 and 1) hold what was written?
+    bool holds(std::span<const std::uint16_t> items) const;
+
+  private:
+    struct Cell {
+        std::uint16_t value = 0;
+        std::uint16_t mask = 0xFFFF;  ///< the bits that were written
+    };
+
+    modbus::Span span_;
+    std::vector<Cell> cells_;
+};
+
+inline bool is_writable(modbus::Table table) {
+    return table == modbus::Table::coils || table == modbus::Table::holding_registers;
+}
+
+/// The PDU that writes these cells from the first of the items on, by the first of the functions
+/// below that the panel has; or why the panel cannot take them. Writes are never split.
+Parsed<Bytes> plan_write(const Items& items, const std::vector<std::uint16_t>& cells);
+
+/// Functions that can write `count` cells of a table, the preferred one first (one value by 05/06,
+/// several by one 0F/10). The table must be coils or holding registers.
+std::vector<std::uint8_t> write_functions(modbus::Table table, std::size_t count);
+
+/// The PDU that writes these cells, each 16 bits wide (bits: 0 or 1), with this function: 05, 06,
+/// 0F or 10.
+Bytes encode_write(std::uint8_t function, std::uint16_t address,
+                   const std::vector<std::uint16_t>& cells);
 
 /// What was read where a write has been.
 struct ReadBack {

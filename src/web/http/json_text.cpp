@@ -7,7 +7,7 @@
 #include <boost/json/string.hpp>
 #include <cstddef>
 
-#include "panelgate/base/number_text.hpp"
+#include "panelgate/base/text.hpp"
 
 namespace panelgate::web {
 namespace json = boost::json;

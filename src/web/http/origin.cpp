@@ -1,11 +1,105 @@
 #include "origin.hpp"
 
+#include <unistd.h>
+#include <algorithm>
+#include <array>
+#include <boost/system/error_code.hpp>
+#include <cctype>
+#include <cstddef>
 #include <string>
 #include <string_view>
 
-#include "to_lower.hpp"
-
 namespace panelgate::web {
+
+namespace {
+
+namespace ip = boost::asio::ip;
+
+/// IPv4 also where a socket shows it as IPv6, and without a zone: nobody writes it.
+ip::address plain(const ip::address& address) {
+    if (address.is_v4()) return address;
+    const ip::address_v6 v6 = address.to_v6();
+    if (v6.is_v4_mapped()) return ip::make_address_v4(ip::v4_mapped, v6);
+    return ip::address_v6(v6.to_bytes());
+}
+
+bool is_port(std::string_view text) {
+    return text.size() <= 5 &&
+           std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c) != 0; });
+}
+
+bool is_address_v6(const std::string& text) {
+    boost::system::error_code error;
+    ip::make_address_v6(text, error);
+    return !error;
+}
+
+/// What names in use are made of; RFC 3986 allows more.
+bool is_name(std::string_view text) {
+    return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
+        return (std::isalnum(c) != 0 && c < 0x80) || c == '-' || c == '.' || c == '_';
+    });
+}
+
+}  // namespace
+
+std::optional<std::string> host_of_authority(std::string_view authority) {
+    const bool bracketed = authority.starts_with('[');
+    const std::size_t end = bracketed ? authority.find(']') : authority.find(':');
+    if (bracketed && end == authority.npos) return std::nullopt;
+    std::string host = to_lower(authority.substr(0, end));
+    std::string_view rest = end == authority.npos ? std::string_view() : authority.substr(end);
+    if (bracketed) {
+        host.erase(0, 1);
+        rest.remove_prefix(1);
+        if (!is_address_v6(host)) return std::nullopt;
+    } else {
+        if (host.ends_with('.')) host.pop_back();
+        if (!is_name(host)) return std::nullopt;
+    }
+    if (!rest.empty() && (!rest.starts_with(':') || !is_port(rest.substr(1)))) return std::nullopt;
+    return host;
+}
+
+std::string port_of_authority(std::string_view authority) {
+    const std::size_t host = authority.starts_with('[') ? authority.find(']') : 0;
+    const std::size_t colon = authority.find(':', host);
+    return colon == authority.npos ? std::string() : std::string(authority.substr(colon + 1));
+}
+
+std::vector<std::string> machine_names() {
+    std::array<char, 256> buffer{};
+    if (::gethostname(buffer.data(), buffer.size() - 1) != 0) return {};
+    const std::string name(buffer.data());
+    if (name.empty()) return {};
+    const std::string first = name.substr(0, name.find('.'));
+    return {name, first, first + ".local"};
+}
+
+HostNames::HostNames(const Settings& settings, const std::vector<std::string>& machine) {
+    names_.insert("localhost");
+    for (const std::string& host : settings.hosts) configured_.insert(to_lower(host));
+    const auto add = [this](const std::string& host) {
+        boost::system::error_code error;
+        const ip::address address = ip::make_address(host, error);
+        if (error) {
+            names_.insert(to_lower(host));
+        } else {
+            addresses_.insert(plain(address));
+        }
+    };
+    add(settings.address);
+    for (const std::string& host : settings.hosts.empty() ? machine : settings.hosts) add(host);
+}
+
+bool HostNames::knows(const std::string& host, const ip::address& local) const {
+    if (names_.contains(host)) return true;
+    boost::system::error_code error;
+    const ip::address address = plain(ip::make_address(host, error));
+    if (error) return false;
+    return address.is_loopback() || address == plain(local) || addresses_.contains(address);
+}
+
 namespace {
 
 std::string header(const HttpRequest& request, const char* name) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "panelgate/base/suggest.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/web/http/json_text.hpp"
 
 namespace panelgate::web {

@@ -3,12 +3,10 @@
 #include <memory>
 #include <utility>
 
-#include "host_names.hpp"
-#include "logins.hpp"
+#include "admission.hpp"
+#include "origin.hpp"
 #include "panelgate/web/http/counters.hpp"
-#include "panelgate/web/http/site.hpp"
-#include "places.hpp"
-#include "ration.hpp"
+#include "panelgate/web/http/message.hpp"
 
 namespace panelgate::web {
 

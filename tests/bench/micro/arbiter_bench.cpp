@@ -9,7 +9,7 @@
 
 #include "panelgate/arbiter/arbiter.hpp"
 #include "panelgate/arbiter/job_queue.hpp"
-#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 #include "panelgate/base/bytes.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/request.hpp"

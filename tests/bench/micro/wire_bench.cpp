@@ -5,8 +5,7 @@
 #include <cstdint>
 
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/modbus/crc16.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 

@@ -1,4 +1,4 @@
-#include "address_families.hpp"
+#include "prepare.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "connection_limits.hpp"
+#include "prepare.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "line_histories.hpp"
+#include "scene.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "listen_in_text.hpp"
+#include "http_door.hpp"
 
 #include <gtest/gtest.h>
 

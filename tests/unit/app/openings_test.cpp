@@ -1,4 +1,4 @@
-#include "openings.hpp"
+#include "servers.hpp"
 
 #include <gmock/gmock.h>
 

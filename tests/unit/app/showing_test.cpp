@@ -1,4 +1,4 @@
-#include "showing.hpp"
+#include "scene.hpp"
 
 #include <gmock/gmock.h>
 

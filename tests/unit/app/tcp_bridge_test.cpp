@@ -1,4 +1,4 @@
-#include "tcp_bridge.hpp"
+#include "simulated_panels.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -1,4 +1,4 @@
-#include "wiring.hpp"
+#include "running_line.hpp"
 
 #include <gtest/gtest.h>
 

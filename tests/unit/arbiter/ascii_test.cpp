@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "arbiter_fixture.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/backlog.hpp"
+#include "panelgate/arbiter/schedule.hpp"
 
 #include <gtest/gtest.h>
 

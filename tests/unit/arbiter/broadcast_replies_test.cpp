@@ -1,6 +1,6 @@
 // What a panel that answers broadcasts, as none should, may be taken for (P8).
 
-#include "panelgate/arbiter/broadcast_replies.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/client_names.hpp"
+#include "panelgate/arbiter/job.hpp"
 
 #include <gtest/gtest.h>
 

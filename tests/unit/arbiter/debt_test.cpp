@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/debt.hpp"
+#include "panelgate/arbiter/outstanding.hpp"
 
 #include <gtest/gtest.h>
 

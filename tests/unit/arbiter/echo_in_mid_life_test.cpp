@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "echo_fixture.hpp"
-#include "panelgate/arbiter/slowest.hpp"
+#include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::arbiter::echo {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "echo_fixture.hpp"
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"

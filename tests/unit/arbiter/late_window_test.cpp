@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/late_window.hpp"
+#include "panelgate/arbiter/reply_times.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/pace.hpp"
+#include "panelgate/arbiter/quiet.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/probe_budget.hpp"
+#include "panelgate/arbiter/station_health.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/reception.hpp"
+#include "panelgate/arbiter/arbiter.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/arbiter/shared_read.hpp"
+#include "panelgate/arbiter/read_cache.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "panelgate/base/health.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate::arbiter {
 namespace {

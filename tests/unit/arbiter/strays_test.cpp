@@ -5,7 +5,7 @@
 #include <string>
 #include <variant>
 
-#include "panelgate/base/frame_kind.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 

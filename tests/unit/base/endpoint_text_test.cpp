@@ -1,4 +1,4 @@
-#include "panelgate/base/endpoint_text.hpp"
+#include "panelgate/base/network.hpp"
 
 #include <gtest/gtest.h>
 

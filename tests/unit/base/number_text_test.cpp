@@ -1,4 +1,4 @@
-#include "panelgate/base/number_text.hpp"
+#include "panelgate/base/text.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/base/slot_ring.hpp"
+#include "panelgate/base/series.hpp"
 
 #include <gtest/gtest.h>
 

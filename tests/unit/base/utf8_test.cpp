@@ -1,4 +1,4 @@
-#include "panelgate/base/utf8.hpp"
+#include "panelgate/base/text.hpp"
 
 #include <gtest/gtest.h>
 

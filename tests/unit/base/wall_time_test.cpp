@@ -1,4 +1,4 @@
-#include "panelgate/base/wall_time.hpp"
+#include "panelgate/base/time.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,11 +2,7 @@
 
 #include <string>
 
-#include "panelgate/base/echo_state.hpp"
-#include "panelgate/base/frame_kind.hpp"
-#include "panelgate/base/health.hpp"
-#include "panelgate/base/outcome.hpp"
-#include "panelgate/base/priority.hpp"
+#include "panelgate/base/words.hpp"
 
 namespace panelgate {
 namespace {

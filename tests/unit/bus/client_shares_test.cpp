@@ -1,4 +1,4 @@
-#include "client_shares.hpp"
+#include "accounts.hpp"
 
 #include <gtest/gtest.h>
 

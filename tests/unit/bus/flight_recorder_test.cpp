@@ -1,4 +1,4 @@
-#include "panelgate/bus/flight_recorder.hpp"
+#include "panelgate/bus/trace.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::bus {

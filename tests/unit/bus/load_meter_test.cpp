@@ -1,4 +1,4 @@
-#include "panelgate/bus/load_meter.hpp"
+#include "panelgate/bus/line_history.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "request_counters.hpp"
+#include "accounts.hpp"
 
 #include <gtest/gtest.h>
 

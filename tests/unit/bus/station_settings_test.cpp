@@ -1,4 +1,4 @@
-#include "panelgate/bus/station_settings.hpp"
+#include "panelgate/bus/rights.hpp"
 
 #include <gtest/gtest.h>
 

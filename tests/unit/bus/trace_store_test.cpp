@@ -1,4 +1,4 @@
-#include "trace_store.hpp"
+#include "trace_book.hpp"
 
 #include <gtest/gtest.h>
 

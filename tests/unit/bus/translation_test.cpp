@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "panelgate/bus/bus.hpp"
+#include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/modbus/translation.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 #include "support/memory_line.hpp"

@@ -1,4 +1,4 @@
-#include "wall.hpp"
+#include "trace_book.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/config/client_timeout.hpp"
+#include "panelgate/config/deadlines.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/config/reachable.hpp"
+#include "panelgate/config/endpoint.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "panelgate/doctor/sample.hpp"
+#include "panelgate/doctor/doctor.hpp"
 
 namespace panelgate::doctor {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "case.hpp"
-#include "panelgate/doctor/diagnose.hpp"
+#include "panelgate/doctor/doctor.hpp"
 
 namespace panelgate::doctor {
 

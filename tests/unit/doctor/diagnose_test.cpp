@@ -1,5 +1,5 @@
 // Each cause with the figures that show it, and its neighbours that look nearly the same.
-#include "panelgate/doctor/diagnose.hpp"
+#include "panelgate/doctor/doctor.hpp"
 
 #include <gmock/gmock.h>
 

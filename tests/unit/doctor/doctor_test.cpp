@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include "case.hpp"
-#include "panelgate/doctor/diagnose.hpp"
 
 namespace panelgate::doctor {
 namespace {

@@ -1,4 +1,4 @@
-#include "panelgate/doctor/sample.hpp"
+#include "panelgate/doctor/doctor.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/line/drive.hpp"
+#include "panelgate/line/line.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "input_budget.hpp"
+#include "descriptor_line.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "open_error.hpp"
+#include "tty_trouble.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

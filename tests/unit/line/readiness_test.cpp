@@ -1,4 +1,4 @@
-#include "readiness.hpp"
+#include "descriptor_line.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

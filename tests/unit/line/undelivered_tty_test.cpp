@@ -11,13 +11,13 @@
 #include <memory>
 #include <vector>
 
-#include "impatience.hpp"
 #include "line_events.hpp"
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/tty_line.hpp"
 #include "scripted_ops.hpp"
 #include "support/manual_clock.hpp"
+#include "tty_trouble.hpp"
 
 namespace panelgate::line {
 namespace {

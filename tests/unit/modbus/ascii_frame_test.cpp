@@ -1,4 +1,4 @@
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 
 #include <gtest/gtest.h>
 

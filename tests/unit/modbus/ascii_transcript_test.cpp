@@ -1,4 +1,4 @@
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/modbus/crc16.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 
 #include <gtest/gtest.h>
 

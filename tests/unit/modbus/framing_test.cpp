@@ -4,8 +4,7 @@
 
 #include <cstdint>
 
-#include "panelgate/modbus/ascii_frame.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 

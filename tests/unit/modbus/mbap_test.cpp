@@ -1,4 +1,4 @@
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/framing.hpp"
 
 #include <gtest/gtest.h>
 

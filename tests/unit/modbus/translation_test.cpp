@@ -1,10 +1,9 @@
-#include "panelgate/modbus/translation.hpp"
+#include "panelgate/modbus/response.hpp"
 
 #include <gtest/gtest.h>
 
 #include <utility>
 
-#include "panelgate/modbus/response.hpp"
 #include "support/hex.hpp"
 #include "support/request.hpp"
 

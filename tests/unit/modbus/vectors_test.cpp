@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "panelgate/modbus/ascii_transcript.hpp"
-#include "panelgate/modbus/exception.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/ascii.hpp"
+#include "panelgate/modbus/framing.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"

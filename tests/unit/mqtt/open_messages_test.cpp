@@ -1,4 +1,4 @@
-#include "open_messages.hpp"
+#include "connection.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "protobuf.hpp"
+#include "sparkplug_payload.hpp"
 
 #include <gmock/gmock.h>
 

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "mqtt_plant.hpp"
-#include "protobuf.hpp"
+#include "sparkplug_payload.hpp"
 
 namespace panelgate::mqtt {
 namespace {

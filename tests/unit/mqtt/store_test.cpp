@@ -1,4 +1,4 @@
-#include "panelgate/mqtt/store.hpp"
+#include "panelgate/mqtt/subjects.hpp"
 
 #include <gmock/gmock.h>
 

@@ -10,7 +10,7 @@
 #include <regex>
 
 #include "panelgate/plan/advice.hpp"
-#include "panelgate/plan/highest_rate.hpp"
+#include "panelgate/plan/line_plan.hpp"
 #include "plant_line.hpp"
 
 namespace panelgate::plan {

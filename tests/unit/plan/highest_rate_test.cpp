@@ -1,4 +1,4 @@
-#include "panelgate/plan/highest_rate.hpp"
+#include "panelgate/plan/line_plan.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "panelgate/plan/line.hpp"
+#include "panelgate/plan/line_plan.hpp"
 #include "panelgate/profile/load_profile.hpp"
 
 namespace panelgate::plan::test {

@@ -1,4 +1,4 @@
-#include "panelgate/plan/warnings.hpp"
+#include "panelgate/plan/advice.hpp"
 
 #include <gmock/gmock.h>
 

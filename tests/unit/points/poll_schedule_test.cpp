@@ -1,4 +1,4 @@
-#include "panelgate/points/poll_schedule.hpp"
+#include "panelgate/points/station_polls.hpp"
 
 #include <gmock/gmock.h>
 

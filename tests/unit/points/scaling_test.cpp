@@ -1,4 +1,4 @@
-#include "scaling.hpp"
+#include "registers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/points/station_history.hpp"
+#include "panelgate/points/station_points.hpp"
 
 #include <gtest/gtest.h>
 

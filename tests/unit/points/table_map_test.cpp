@@ -1,4 +1,4 @@
-#include "table_map.hpp"
+#include "panelgate/points/read_plan.hpp"
 
 #include <gtest/gtest.h>
 

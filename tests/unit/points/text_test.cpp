@@ -1,4 +1,4 @@
-#include "text.hpp"
+#include "registers.hpp"
 
 #include <gtest/gtest.h>
 

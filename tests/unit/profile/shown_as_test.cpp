@@ -1,4 +1,4 @@
-#include "panelgate/profile/shown_as.hpp"
+#include "panelgate/profile/translate.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/rt/access_list.hpp"
+#include "panelgate/rt/acceptor.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/rt/descriptors.hpp"
+#include "panelgate/rt/process.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

@@ -1,4 +1,4 @@
-#include "panelgate/rt/journal.hpp"
+#include "panelgate/rt/log_output.hpp"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -8,8 +8,6 @@
 #include <cstdlib>
 #include <string>
 #include <vector>
-
-#include "panelgate/rt/log_output.hpp"
 
 namespace panelgate::rt {
 namespace {

@@ -1,4 +1,4 @@
-#include "panelgate/rt/lead_time.hpp"
+#include "panelgate/rt/asio_clock.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/rt/log_repeats.hpp"
+#include "panelgate/rt/log_throttle.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/rt/loop_lag.hpp"
+#include "panelgate/rt/process.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "panelgate/rt/punctual.hpp"
+#include "panelgate/rt/process.hpp"
 
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -7,8 +7,6 @@
 #include <unistd.h>
 
 #include <thread>
-
-#include "sched_attr.hpp"
 
 namespace panelgate::rt {
 namespace {

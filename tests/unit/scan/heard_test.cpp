@@ -1,4 +1,4 @@
-#include "heard.hpp"
+#include "attempt.hpp"
 
 #include <gtest/gtest.h>
 

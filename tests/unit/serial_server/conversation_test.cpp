@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "panelgate/base/serial_format.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "talk.hpp"
 
 namespace panelgate::serial_server::test {

@@ -1,10 +1,10 @@
-#include "rtu_hearing.hpp"
+#include "hearing.hpp"
 
 #include <gmock/gmock.h>
 
 #include <random>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 

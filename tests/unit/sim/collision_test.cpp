@@ -1,11 +1,10 @@
-#include "panelgate/sim/collision.hpp"
+#include "panelgate/sim/misbehaviour.hpp"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "panelgate/modbus/rtu_frame.hpp"
-#include "panelgate/sim/misbehaviour.hpp"
 #include "support/hex.hpp"
 
 namespace panelgate::sim {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "panelgate/modbus/ascii_transcript.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/sim/station.hpp"

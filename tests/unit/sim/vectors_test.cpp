@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/profile/load_profile.hpp"

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "loopback.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
 namespace panelgate::tcp_server {

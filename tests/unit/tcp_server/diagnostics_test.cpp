@@ -1,4 +1,4 @@
-#include "diagnostics.hpp"
+#include "own_unit.hpp"
 
 #include <gtest/gtest.h>
 

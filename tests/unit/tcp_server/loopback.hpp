@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "held_bus.hpp"
-#include "panelgate/modbus/mbap.hpp"
+#include "panelgate/modbus/framing.hpp"
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tcp_server/listener.hpp"
 #include "support/hex.hpp"

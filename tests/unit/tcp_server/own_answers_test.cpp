@@ -1,4 +1,4 @@
-#include "own_answers.hpp"
+#include "shared.hpp"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "held_bus.hpp"
-#include "panelgate/tcp_server/caller.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 #include "shared.hpp"
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"

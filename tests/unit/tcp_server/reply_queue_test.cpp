@@ -1,4 +1,4 @@
-#include "reply_queue.hpp"
+#include "pipeline.hpp"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "loopback.hpp"
-#include "panelgate/modbus/ascii_frame.hpp"
+#include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 

@@ -1,4 +1,4 @@
-#include "panelgate/tcp_server/unit_map.hpp"
+#include "panelgate/tcp_server/dispatch.hpp"
 
 #include <gmock/gmock.h>
 

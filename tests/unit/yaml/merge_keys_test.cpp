@@ -1,4 +1,4 @@
-#include "panelgate/yaml/merge_keys.hpp"
+#include "panelgate/yaml/variables.hpp"
 
 #include <gtest/gtest.h>
 

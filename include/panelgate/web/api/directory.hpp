@@ -12,7 +12,6 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/base/time.hpp"
 #include "panelgate/bus/bus_client.hpp"
-#include "panelgate/bus/station_ref.hpp"
 #include "panelgate/points/station_points.hpp"
 #include "panelgate/profile/panel_profile.hpp"
 

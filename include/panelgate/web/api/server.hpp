@@ -11,11 +11,10 @@
 #include <vector>
 
 #include "panelgate/base/time.hpp"
-#include "panelgate/base/wall_time.hpp"
-#include "panelgate/points/relay_status.hpp"
+#include "panelgate/points/relays.hpp"
 #include "panelgate/web/api/directory.hpp"
-#include "panelgate/web/api/metrics_source.hpp"
 #include "panelgate/web/api/settings.hpp"
+#include "panelgate/web/api/sources.hpp"
 #include "panelgate/web/http/counters.hpp"
 #include "panelgate/web/http/event_hub.hpp"
 #include "panelgate/web/http/message.hpp"

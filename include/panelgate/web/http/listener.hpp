@@ -10,9 +10,8 @@
 
 #include "panelgate/base/time.hpp"
 #include "panelgate/rt/acceptor.hpp"
-#include "panelgate/rt/access_list.hpp"
 #include "panelgate/web/http/counters.hpp"
-#include "panelgate/web/http/site.hpp"
+#include "panelgate/web/http/message.hpp"
 
 namespace panelgate::web {
 

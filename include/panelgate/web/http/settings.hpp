@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "panelgate/base/endpoint_text.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/base/time.hpp"
 

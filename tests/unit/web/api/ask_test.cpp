@@ -1,4 +1,4 @@
-#include "ask.hpp"
+#include "reading.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #include "conduct.hpp"
 
-#include "csv.hpp"
+#include "answer.hpp"
 #include "http_rig.hpp"
 
 namespace panelgate::web {

@@ -5,9 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "docs_page.hpp"
-#include "handlers.hpp"
 #include "http_rig.hpp"
+#include "page.hpp"
 #include "routes.hpp"
 
 namespace panelgate::web {

@@ -1,4 +1,4 @@
-#include "panelgate/web/api/event_text.hpp"
+#include "panelgate/web/api/events.hpp"
 
 #include <gtest/gtest.h>
 

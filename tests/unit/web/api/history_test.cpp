@@ -2,7 +2,7 @@
 
 #include "http_rig.hpp"
 #include "panelgate/bus/line_history.hpp"
-#include "panelgate/points/station_history.hpp"
+#include "panelgate/points/station_points.hpp"
 
 namespace panelgate::web {
 namespace {

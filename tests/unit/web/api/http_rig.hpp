@@ -11,11 +11,11 @@
 #include <optional>
 #include <string>
 
-#include "panelgate/modbus/exception.hpp"
+#include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/request.hpp"
 #include "panelgate/profile/load_profile.hpp"
-#include "panelgate/web/api/discovery_source.hpp"
 #include "panelgate/web/api/server.hpp"
+#include "panelgate/web/api/sources.hpp"
 #include "support/fake_bus.hpp"
 #include "support/http_client.hpp"
 

@@ -1,4 +1,4 @@
-#include "page_file.hpp"
+#include "page.hpp"
 
 #include <algorithm>
 #include <string>

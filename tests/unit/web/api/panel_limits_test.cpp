@@ -1,4 +1,4 @@
-#include "panel_limits.hpp"
+#include "station_path.hpp"
 
 #include <gtest/gtest.h>
 

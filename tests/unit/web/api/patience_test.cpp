@@ -1,4 +1,4 @@
-#include "patience.hpp"
+#include "key_book.hpp"
 
 #include <gtest/gtest.h>
 

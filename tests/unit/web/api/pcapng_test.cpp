@@ -10,12 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "exported_pdu.hpp"
 #include "panelgate/base/bytes.hpp"
-#include "panelgate/base/frame_kind.hpp"
+#include "panelgate/base/words.hpp"
 #include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"
-#include "trace_pcapng.hpp"
 
 namespace panelgate::web {
 namespace {

@@ -1,4 +1,4 @@
-#include "repeated_member.hpp"
+#include "body.hpp"
 
 #include <gtest/gtest.h>
 

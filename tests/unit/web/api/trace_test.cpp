@@ -1,7 +1,7 @@
 // Transactions and incidents of a line, for programs, people and Wireshark.
 #include <string>
 
-#include "accept.hpp"
+#include "answer.hpp"
 #include "http_rig.hpp"
 #include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"

@@ -1,7 +1,7 @@
 #include <map>
 
 #include "http_rig.hpp"
-#include "verification.hpp"
+#include "writing.hpp"
 
 namespace panelgate::web {
 namespace {

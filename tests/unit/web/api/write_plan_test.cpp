@@ -1,4 +1,4 @@
-#include "write_plan.hpp"
+#include "writing.hpp"
 
 #include <gmock/gmock.h>
 

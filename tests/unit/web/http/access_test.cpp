@@ -1,4 +1,4 @@
-#include "access.hpp"
+#include "router.hpp"
 
 #include <gtest/gtest.h>
 

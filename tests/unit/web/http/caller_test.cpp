@@ -1,4 +1,4 @@
-#include "panelgate/web/http/caller.hpp"
+#include "panelgate/web/http/message.hpp"
 
 #include <gtest/gtest.h>
 

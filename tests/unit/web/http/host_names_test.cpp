@@ -1,4 +1,4 @@
-#include "host_names.hpp"
+#include "origin.hpp"
 
 #include <gtest/gtest.h>
 

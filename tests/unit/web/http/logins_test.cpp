@@ -1,4 +1,4 @@
-#include "logins.hpp"
+#include "admission.hpp"
 
 #include <gtest/gtest.h>
 

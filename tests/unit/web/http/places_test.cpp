@@ -1,4 +1,4 @@
-#include "places.hpp"
+#include "admission.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "ration.hpp"
+#include "admission.hpp"
 
 #include <gtest/gtest.h>
 

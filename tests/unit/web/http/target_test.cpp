@@ -1,4 +1,4 @@
-#include "target.hpp"
+#include "beast_message.hpp"
 
 #include <gmock/gmock.h>
 

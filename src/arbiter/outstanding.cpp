@@ -1,0 +1,93 @@
+#include "panelgate/arbiter/outstanding.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "panelgate/modbus/function.hpp"
+#include "panelgate/modbus/request.hpp"
+#include "panelgate/modbus/response.hpp"
+#include "panelgate/modbus/rtu_frame.hpp"
+#include "rules.hpp"
+
+namespace panelgate::arbiter {
+
+namespace {
+
+auto may_be_answered_by(ByteView reply) {
+    return [reply](const Debt::Owed& one) { return modbus::answers(one.pdu, reply); };
+}
+
+}  // namespace
+
+void Debt::add(TimePoint sent, const Bytes& pdu) {
+    owed_.push_back({sent, pdu});
+    if (owed_.size() > kMost) owed_.pop_front();
+}
+
+bool Debt::is_only(const Bytes& pdu) const {
+    return !empty() && std::ranges::all_of(owed_, [&](const Owed& one) { return one.pdu == pdu; });
+}
+
+bool Debt::is_ambiguous(const modbus::Request& request, bool again) const {
+    const Bytes& pdu = request.pdu();
+    const bool is_echoed = modbus::is_broadcastable(pdu[0]);
+    const Bytes reply = is_echoed ? modbus::normal_write_reply(pdu) : Bytes{};
+    const auto length = modbus::reply_length_from_request(pdu);
+    return std::ranges::any_of(owed_, [&](const Owed& one) {
+        if (one.pdu[0] != pdu[0] || (again && one.pdu == pdu)) return false;
+        return is_echoed ? modbus::answers(one.pdu, reply)
+                         : modbus::reply_length_from_request(one.pdu) == length;
+    });
+}
+
+bool Debt::has_other_function(std::uint8_t function) const {
+    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu[0] != function; });
+}
+
+void Debt::close_before(TimePoint sent, TimePoint connected) {
+    std::erase_if(owed_, [&](const Owed& one) { return one.sent < sent && one.sent >= connected; });
+}
+
+bool Debt::fits_other(ByteView reply, const Bytes& pdu) const {
+    const auto fits = may_be_answered_by(reply);
+    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu != pdu && fits(one); });
+}
+
+const Debt::Owed* Debt::oldest(ByteView reply) const {
+    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
+    return found == owed_.end() ? nullptr : &*found;
+}
+
+const Debt::Owed* Debt::oldest(ByteView reply, TimePoint open) const {
+    const Owed* last = nullptr;
+    for (const Owed& one : owed_) {
+        if (!may_be_answered_by(reply)(one)) continue;
+        last = &one;
+        if (one.sent > open) break;
+    }
+    return last;
+}
+
+Bytes Debt::take(ByteView reply) {
+    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
+    if (found == owed_.end()) return {};
+    Bytes pdu = std::move(found->pdu);
+    owed_.erase(found);
+    return pdu;
+}
+
+void Questions::on_heard(TimePoint now, ByteView bytes) {
+    const ByteView adu = bytes.first(modbus::request_adu_length(bytes));
+    if (adu.size() <= modbus::kAduOverhead || adu[0] == kBroadcast) return;
+    if (asked_.size() == kMost) asked_.erase(asked_.begin());
+    asked_.push_back({now, Bytes(adu.begin(), adu.end())});
+}
+
+bool Questions::fit(ByteView adu, TimePoint since) const {
+    return std::ranges::any_of(asked_, [&](const Question& asked) {
+        return asked.at >= since && asked.adu[0] == adu[0] &&
+               modbus::answers(modbus::pdu_of(asked.adu), modbus::pdu_of(adu));
+    });
+}
+
+}  // namespace panelgate::arbiter

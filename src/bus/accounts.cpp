@@ -1,0 +1,271 @@
+#include "accounts.hpp"
+
+#include <algorithm>
+#include <boost/asio/ip/address.hpp>
+#include <boost/system/error_code.hpp>
+#include <iterator>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "panelgate/base/words.hpp"
+#include "panelgate/modbus/function.hpp"
+
+namespace panelgate::bus {
+
+namespace {
+
+/// Without a port, and without the brackets that hold one off.
+std::string_view host_in(std::string_view word) {
+    if (word.starts_with('[')) return word.substr(1, word.find(']') - 1);
+    const auto colon = word.find(':');
+    const bool has_port = colon != word.npos && word.find(':', colon + 1) == word.npos;
+    return has_port ? word.substr(0, colon) : word;
+}
+
+void add(DepartedClients::Row& sum, const DepartedClients::Row& more) {
+    sum.used.busy += more.used.busy;
+    sum.used.transactions += more.used.transactions;
+    sum.asked.requests += more.asked.requests;
+    sum.asked.failed += more.asked.failed;
+    sum.left = std::max(sum.left, more.left);
+    if (!more.asked.last_error || more.asked.failed_at < sum.asked.failed_at) return;
+    sum.asked.last_error = more.asked.last_error;
+    sum.asked.failed_at = more.asked.failed_at;
+}
+
+}  // namespace
+
+std::optional<std::string> address_in(const std::string& name) {
+    const auto blank = name.find(' ');
+    if (blank == name.npos) return std::nullopt;
+    const std::string_view rest = std::string_view(name).substr(blank + 1);
+    const std::string host(host_in(rest.substr(0, rest.find(' '))));
+    boost::system::error_code wrong;
+    boost::asio::ip::make_address(host, wrong);
+    return wrong ? std::nullopt : std::optional(host);
+}
+
+std::string without_port(const std::string& name) {
+    const auto address = address_in(name);
+    if (!address) return name;
+    const auto begin = name.find(' ') + 1;
+    const auto end = std::min(name.find(' ', begin), name.size());
+    return name.substr(0, begin) + *address + name.substr(end);
+}
+
+void DepartedClients::leave(TimePoint now, const std::string& name,
+                            const arbiter::BusShares::Share& used,
+                            const ClientAccounts::Account& asked) {
+    const Row row{used, asked, now};
+    drop_old(now);
+    // The gateway's own tasks end when the configuration changes.
+    if (!address_in(name) || settings_.remembered == 0) return add(forgotten_, row);
+    const std::string key = without_port(name);
+    if (!rows_.contains(key)) make_room();
+    add(rows_[key], row);
+}
+
+const std::map<std::string, DepartedClients::Row>& DepartedClients::rows(TimePoint now) {
+    drop_old(now);
+    return rows_;
+}
+
+void DepartedClients::drop_old(TimePoint now) {
+    for (auto row = rows_.begin(); row != rows_.end();) {
+        const bool old = now - row->second.left > settings_.remembered_for;
+        if (old) add(forgotten_, row->second);
+        row = old ? rows_.erase(row) : std::next(row);
+    }
+}
+
+void DepartedClients::make_room() {
+    while (rows_.size() >= settings_.remembered) {
+        const auto first = std::ranges::min_element(
+            rows_, {}, [](const auto& entry) { return entry.second.left; });
+        add(forgotten_, first->second);
+        rows_.erase(first);
+    }
+}
+
+namespace {
+
+using Rows = std::map<std::string, ClientShare>;
+
+void add(ClientShare& entry, const ClientAccounts::Account& account, TimePoint now) {
+    entry.requests += account.requests;
+    entry.failed += account.failed;
+    if (!account.last_error) return;
+    const Duration ago = now - account.failed_at;
+    if (entry.last_error && entry.last_error_ago < ago) return;
+    entry.last_error = account.last_error;
+    entry.last_error_ago = ago;
+}
+
+void add(ClientShare& entry, const arbiter::BusShares::Share& share) {
+    entry.busy += share.busy;
+    entry.transactions += share.transactions;
+}
+
+Rows rows_of(const ClientUse& use, TimePoint now) {
+    Rows rows;
+    for (const auto& [client, account] : use.accounts.all())
+        add(rows[use.names.of(client)], account, now);
+    for (const auto& [client, share] : use.shares.all()) add(rows[use.names.of(client)], share);
+    for (const auto& [name, row] : use.departed.rows(now)) {
+        const bool is_there = rows.contains(name);
+        ClientShare& entry = rows[name];
+        if (!is_there) entry.gone = now - row.left;
+        add(entry, row.asked, now);
+        add(entry, row.used);
+    }
+    return rows;
+}
+
+Duration busy_of(const std::vector<ClientShare>& list) {
+    Duration sum{};
+    for (const ClientShare& entry : list) sum += entry.busy;
+    return sum;
+}
+
+/// Those who are not shown for themselves; what is still missing is the gateway's own.
+ClientShare others(const ClientUse& use, TimePoint now) {
+    ClientShare rest;
+    rest.name = kOtherClients;
+    add(rest, use.departed.forgotten().asked, now);
+    add(rest, use.departed.forgotten().used);
+    return rest;
+}
+
+/// The last of a long list are no rows of their own.
+void shorten(std::vector<ClientShare>& list, ClientShare& rest) {
+    constexpr std::size_t kShown = 100;
+    for (std::size_t i = kShown; i < list.size(); ++i) {
+        rest.busy += list[i].busy;
+        rest.transactions += list[i].transactions;
+        rest.requests += list[i].requests;
+        rest.failed += list[i].failed;
+    }
+    if (list.size() > kShown) list.resize(kShown);
+}
+
+}  // namespace
+
+std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now) {
+    constexpr Duration kSeen = 1ms;  // below, it is what dividing leaves
+    std::vector<ClientShare> list;
+    for (auto& [name, entry] : rows_of(use, now)) {
+        entry.name = name;
+        entry.address = address_in(name);
+        list.push_back(std::move(entry));
+    }
+    std::ranges::sort(list, std::ranges::greater{}, &ClientShare::busy);
+    ClientShare rest = others(use, now);
+    shorten(list, rest);
+    const Duration shown = busy_of(list);
+    rest.busy = std::max(rest.busy, use.busy - shown);
+    const Duration all = shown + rest.busy;
+    if (rest.busy >= kSeen || rest.requests > 0) list.push_back(std::move(rest));
+    for (ClientShare& entry : list)
+        entry.percent = all > Duration::zero() ? 100 * to_seconds(entry.busy) / to_seconds(all) : 0;
+    return list;
+}
+
+namespace {
+
+std::optional<bool> is_there(Health state) {
+    if (state == Health::unknown) return {};
+    return state == Health::online || state == Health::heard || state == Health::suspect;
+}
+
+}  // namespace
+
+Outcome outcome_of(const Answer& answer) {
+    if (!answer.pdu) return outcome_of(answer.pdu.error());
+    if (modbus::exception_of(*answer.pdu))
+        return answer.transmitted ? Outcome::exception : Outcome::refused;
+    if (answer.source == Source::cache) return Outcome::cached;
+    return answer.shared ? Outcome::shared : Outcome::ok;
+}
+
+RequestCounters::RequestCounters(const Stations& stations) { apply(stations); }
+
+void RequestCounters::apply(const Stations& stations) {
+    std::map<std::uint8_t, StationReport> before = std::exchange(stations_, {});
+    stations_[0] = std::move(before[0]);
+    stations_[0].station = kOtherStations;
+    for (const auto& [id, station] : stations) {
+        stations_[id] = std::move(before[id]);
+        stations_[id].station = station.name;
+        stations_[id].configured = true;
+        for (const std::uint8_t function : station.functions) stations_[id].requests[function];
+        for (const auto& functions : station.translations) stations_[id].translated[functions];
+    }
+}
+
+StationReport& RequestCounters::of(std::uint8_t station) {
+    const auto found = stations_.find(station);
+    return found == stations_.end() ? stations_[0] : found->second;
+}
+
+void RequestCounters::count(std::uint8_t station, std::uint8_t function, Outcome outcome,
+                            Duration took) {
+    StationReport& report = of(station);
+    ++report.requests[modbus::is_known(function) ? function : kOtherFunctions][outcome];
+    report.request_duration.observe(took);
+}
+
+void RequestCounters::succeeded(std::uint8_t station, double wall) {
+    of(station).last_success_unix = wall;
+}
+
+OutcomeCounts RequestCounters::outcomes(std::uint8_t station) const {
+    OutcomeCounts all;
+    const auto found = stations_.find(station);
+    if (found == stations_.end() || !found->second.configured) return all;
+    for (const auto& [function, counts] : found->second.requests) {
+        for (const Outcome outcome : kAllOutcomes) all[outcome] += counts[outcome];
+    }
+    return all;
+}
+
+std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbiter) const {
+    return report(arbiter.station_counters(),
+                  [&](std::uint8_t id) { return arbiter.health(id).state(); });
+}
+
+std::vector<StationReport> RequestCounters::report(
+    const std::map<std::uint8_t, arbiter::StationCounters>& counted_there,
+    const std::function<Health(std::uint8_t)>& health) const {
+    std::vector<StationReport> reports;
+    for (const auto& [id, counted] : stations_) {
+        StationReport report = counted;
+        const auto wire = counted_there.find(id);
+        if (wire != counted_there.end()) report.wire = wire->second;
+        report.up = is_there(health(id));
+        reports.push_back(std::move(report));
+    }
+    return reports;
+}
+
+void observe(const Settings& settings, const BusEvent& event) {
+    if (settings.observe) settings.observe(event);
+}
+
+Account::Account(const Settings& settings) : settings_(settings), counters_(settings.stations) {}
+
+void Account::add(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
+                  Outcome outcome, Duration took) {
+    counters_.count(station, function, outcome, took);
+    if (deed) log_deed(settings_, station, *deed, outcome);
+    observe(settings_, TransactionEvent{station, function, outcome, took});
+}
+
+void Account::add_refused(std::uint8_t station, ByteView pdu, ClientId client,
+                          const arbiter::ClientNames& names) {
+    if (pdu.empty()) return;
+    add(station, pdu[0], deed_of(pdu, client, names), Outcome::refused, Duration::zero());
+}
+
+}  // namespace panelgate::bus

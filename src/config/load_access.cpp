@@ -1,0 +1,159 @@
+#include "load_access.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "hints.hpp"
+#include "panelgate/base/text.hpp"
+#include "panelgate/config/endpoint.hpp"
+#include "panelgate/line/settings.hpp"
+
+namespace panelgate::config {
+
+namespace {
+
+/// A name as a browser would send it, or an address without brackets.
+bool is_host(std::string_view text) {
+    if (text.find('/') == text.npos && parse_cidr(text)) return true;
+    if (line::is_broken_address(text)) return false;
+    return !text.empty() && !text.ends_with('.') && std::ranges::all_of(text, [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+               c == '-' || c == '.' || c == '_';
+    });
+}
+
+/// [fd00::1], as an address stands in a URL.
+std::string without_brackets(const std::string& text) {
+    if (!text.starts_with('[') || !text.ends_with(']')) return text;
+    const std::string inside = text.substr(1, text.size() - 2);
+    return is_ipv6(inside) ? inside : text;
+}
+
+}  // namespace
+
+void load_hosts(Loading& loading, yaml::MapReader& in, web::Settings& settings) {
+    const yaml::Node* list = in.sequence("hosts");
+    in.looks_like("hosts", "^\\[?[A-Za-z0-9._:-]+\\]?$", true);
+    in.entries("hosts", 1, 0);
+    if (list == nullptr) return;
+    for (const yaml::Node& item : list->items) {
+        const std::string host = without_brackets(item.scalar);
+        if (is_host(host)) {
+            settings.hosts.push_back(host);
+        } else {
+            loading.problems.add(
+                item.mark,
+                "hosts lists names such as gateway.plant.example, without http:// "
+                "and without a port, not '" +
+                    item.scalar + '\'' +
+                    (line::is_broken_address(item.scalar) ? "; its numbers are no IP address"
+                                                          : missing_commas(item.scalar)));
+        }
+    }
+    if (list->items.empty())
+        in.problem("hosts",
+                   "hosts must name at least one host; leave it out for the machine's names");
+}
+
+namespace {
+
+using yaml::MapReader;
+using yaml::Node;
+
+/// No header carries them; in text of two bytes a letter every second byte is one.
+bool has_control_character(std::string_view text) {
+    return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+}
+
+/// The path that a variable brought: nobody sees it in the configuration. A text that is none may
+/// be the token itself.
+std::string path_of(const Node* file) {
+    const bool is_path =
+        file != nullptr && !file->variable.empty() && file->scalar.starts_with('/');
+    return is_path ? ' ' + file->scalar : "";
+}
+
+/// A token's secret: the file's text without blanks around it, and without the mark that editors
+/// put before UTF-8. `elsewhere`: it stands where it must not, which is told.
+std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
+    constexpr std::string_view kBlanks = " \t\r\n";
+    const auto file = elsewhere ? in.text("file") : in.required_text("file");
+    if (!file) return "";
+    if (loading.files.is_special(*file)) {
+        in.problem("file", "the token file must be a file, not a pipe, a socket or a device");
+        return "";
+    }
+    auto text = loading.files.read(*file);
+    if (text) text->erase(0, byte_order_mark(*text));
+    if (!text) {
+        // Not the text: whoever took the token for its file has written that.
+        in.problem("file", "cannot read the token file" + path_of(in.child("file")) +
+                               "; give the path of a file that holds the token and "
+                               "that this program may read");
+        return "";
+    }
+    const std::size_t first = text->find_first_not_of(kBlanks);
+    if (first == std::string::npos) {
+        in.problem("file", "the token file is empty");
+        return "";
+    }
+    std::string secret = text->substr(first, text->find_last_not_of(kBlanks) + 1 - first);
+    if (secret.find_first_of(kBlanks) != std::string::npos)
+        in.problem("file", "the token file " + *file + " must hold one token, without blanks");
+    else if (has_control_character(secret))
+        in.problem("file", "the token file " + *file +
+                               " must be plain text (UTF-8); it holds control characters");
+    return secret;
+}
+
+constexpr std::string_view kExample = "{name: ops, role: operator, file: /run/secrets/ops}";
+
+constexpr std::string_view kInFile =
+    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "read, and here file: with its path";
+constexpr std::array<yaml::Elsewhere, 4> kElsewhere{{{"token", {}, {}, kInFile},
+                                                     {"secret", {}, {}, kInFile},
+                                                     {"password", {}, {}, kInFile},
+                                                     {"value", {}, {}, kInFile}}};
+
+web::Token load_token(Loading& loading, const Node& node) {
+    MapReader in(node, loading.problems, "a token", kExample);
+    in.elsewhere(kElsewhere);
+    const bool elsewhere = std::ranges::any_of(node.entries, [](const yaml::Entry& entry) {
+        return std::ranges::find(kElsewhere, entry.key, &yaml::Elsewhere::key) != kElsewhere.end();
+    });
+    web::Token token;
+    token.name = in.required_text("name").value_or("");
+    constexpr std::array<std::pair<std::string_view, web::Role>, 2> kRoles{
+        {{"viewer", web::Role::viewer}, {"operator", web::Role::operator_}}};
+    if (in.required_text("role"))
+        token.role = in.choice<web::Role>("role", kRoles).value_or(web::Role::viewer);
+    token.secret = load_secret(loading, in, elsewhere);
+    in.finish();
+    return token;
+}
+
+}  // namespace
+
+void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& tokens) {
+    const Node* list =
+        in.sequence("tokens", "[{name: ops, role: operator, file: /run/secrets/ops}]");
+    if (list == nullptr) return;
+    for (const Node& node : list->items) {
+        web::Token token = load_token(loading, node);
+        if (!token.name.empty() &&
+            std::ranges::find(tokens, token.name, &web::Token::name) != tokens.end())
+            loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
+        const auto same = std::ranges::find(tokens, token.secret, &web::Token::secret);
+        if (!token.secret.empty() && same != tokens.end() && same->name != token.name)
+            loading.problems.add(node.mark, "the tokens '" + same->name + "' and '" + token.name +
+                                                "' are the same text: nobody could tell them "
+                                                "apart; give each its own");
+        tokens.push_back(std::move(token));
+    }
+}
+
+}  // namespace panelgate::config

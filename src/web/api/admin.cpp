@@ -1,0 +1,271 @@
+#include <boost/asio/associated_executor.hpp>
+#include <boost/asio/async_result.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+#include <boost/json/parse.hpp>
+#include <boost/json/value.hpp>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "answer.hpp"
+#include "body.hpp"
+#include "page.hpp"
+#include "panelgate/web/api/sources.hpp"
+#include "panelgate/web/http/gzip.hpp"
+#include "panelgate/web/http/json_text.hpp"
+#include "panelgate/web/http/message.hpp"
+#include "panelgate/web/http/problem.hpp"
+#include "panelgate/web/http/query.hpp"
+#include "routes.hpp"
+
+namespace panelgate::web {
+
+/// One text of /metrics for this caller; null when there is none. When the caller leaves, nothing
+/// more is made for it.
+boost::asio::awaitable<SharedText> scrape(std::shared_ptr<Caller> caller, MetricsSource* source,
+                                          bool gzip);
+
+namespace asio = boost::asio;
+namespace json = boost::json;
+namespace {
+
+using Verdict = std::shared_ptr<const ReloadVerdict>;
+
+/// Resumes the coroutine by post, never from inside the source.
+struct StartReload {
+    template <class Handler>
+    void operator()(Handler handler, ReloadSource* source, ReloadWish wish,
+                    std::string cause) const {
+        auto shared = std::make_shared<Handler>(std::move(handler));
+        source->reload(wish, std::move(cause), [shared](Verdict verdict) {
+            const auto executor = asio::get_associated_executor(*shared);
+            asio::post(executor, [shared, verdict = std::move(verdict)]() mutable {
+                (std::move(*shared))(std::move(verdict));
+            });
+        });
+    }
+};
+
+asio::awaitable<Verdict> reloaded(ReloadSource* source, ReloadWish wish, std::string cause) {
+    return asio::async_initiate<const asio::use_awaitable_t<>, void(Verdict)>(
+        StartReload{}, asio::use_awaitable, source, wish, std::move(cause));
+}
+
+json::array texts(const std::vector<std::string>& list) {
+    return json::array(list.begin(), list.end());
+}
+
+json::array faults_of(const ReloadVerdict& verdict) {
+    json::array faults;
+    for (const ReloadVerdict::Fault& fault : verdict.faults) {
+        json::object one{{"file", fault.file}, {"detail", fault.text}};
+        if (fault.line > 0) {
+            one["line"] = fault.line;
+            one["column"] = fault.column;
+        }
+        faults.push_back(std::move(one));
+    }
+    return faults;
+}
+
+json::object describe(const ReloadVerdict& verdict) {
+    json::object object{{"outcome", label(verdict.outcome)}, {"at", rfc3339(verdict.at)},
+                        {"rollback", verdict.rollback},      {"cause", verdict.cause},
+                        {"changes", texts(verdict.changes)}, {"warnings", texts(verdict.warnings)}};
+    if (!verdict.weaker.empty()) object["weaker"] = texts(verdict.weaker);
+    if (!verdict.later.empty()) object["restart_needed"] = texts(verdict.later);
+    if (!verdict.faults.empty()) object["errors"] = faults_of(verdict);
+    if (!verdict.why.empty()) object["why"] = verdict.why;
+    return object;
+}
+
+/// By the query, or by a body.
+Parsed<bool> flag_of(const HttpRequest& request, const json::object& body, const char* name) {
+    const auto query = query_flag(request, name);
+    if (!query) return query;
+    const json::value* flag = body.if_contains(name);
+    if (flag == nullptr) return query;
+    if (!flag->is_bool()) return problem(400, std::string(name) + " must be true or false");
+    return *query || flag->as_bool();
+}
+
+Parsed<ReloadWish> wish_of(const HttpRequest& request) {
+    json::object body;
+    if (!request.body.empty()) {
+        auto given = parse_object(request.body, {"rollback", "weaker"});
+        if (!given) return given.error();
+        body = std::move(*given);
+    }
+    const auto rollback = flag_of(request, body, "rollback");
+    if (!rollback) return rollback.error();
+    const auto weaker = flag_of(request, body, "weaker");
+    if (!weaker) return weaker.error();
+    if (*weaker && !*rollback)
+        return problem(400, "weaker goes with rollback: a file is served as it is");
+    return ReloadWish{*rollback, *weaker};
+}
+
+HttpResponse answer_of(const ReloadVerdict& verdict) {
+    switch (verdict.outcome) {
+        case ReloadOutcome::applied:
+        case ReloadOutcome::unchanged:
+            break;
+        case ReloadOutcome::invalid: {
+            Problem made = problem(422, "the configuration has faults; nothing has changed",
+                                   "invalid-configuration");
+            made.extensions = describe(verdict);
+            return to_response(made);
+        }
+        case ReloadOutcome::failed:
+        case ReloadOutcome::refused: {
+            const bool refused = verdict.outcome == ReloadOutcome::refused;
+            Problem made = problem(409, verdict.why + "; nothing has changed",
+                                   refused ? "reload-weaker" : "reload-failed");
+            made.extensions = describe(verdict);
+            return to_response(made);
+        }
+    }
+    return json_response(200, describe(verdict));
+}
+
+}  // namespace
+
+Handling get_reload(HttpRequest, const Api* api) {
+    const Verdict last = api->providers.reload ? api->providers.reload->last() : nullptr;
+    co_return json_response(200, last ? describe(*last) : json::object{{"outcome", "none"}});
+}
+
+Handling post_reload(HttpRequest request, const Api* api) {
+    const auto wish = wish_of(request);
+    if (!wish) co_return to_response(wish.error());
+    ReloadSource* source = api->providers.reload;
+    const std::string why =
+        source ? source->barred(wish->rollback) : "this program serves a built-in configuration";
+    if (!why.empty()) co_return to_response(problem(409, why));
+    request.caller->take_effect();
+    asio::awaitable<Verdict> reloading = reloaded(source, *wish, request.caller->name());
+    const Verdict verdict = co_await std::move(reloading);
+    co_return answer_of(*verdict);
+}
+
+/// What is configured is the same for all of one role, and made once: who asks is told what it may
+/// do.
+Handling get_configuration(HttpRequest request, const Api* api) {
+    if (!api->providers.configuration)
+        co_return to_response(problem(404, "this program shows no configuration"));
+    std::shared_ptr<KeptAnswer>& kept = (*api->configuration)[request.role];
+    if (!kept) {
+        kept = std::make_shared<KeptAnswer>(
+            "{\"version\":" + json_text(boost::json::value(api->providers.version)) +
+                ",\"role\":" + json_text(boost::json::value(label(request.role))) +
+                ",\"configuration\":" + *api->providers.configuration +
+                ",\"rest\":" + json_text(offered()) + "}\n",
+            "application/json");
+    }
+    Handling giving = KeptAnswer::give(kept, std::move(request));
+    HttpResponse response = co_await std::move(giving);
+    co_return response;
+}
+
+namespace {
+
+HttpResponse text_response(unsigned status, std::string body,
+                           std::string_view content_type = "text/plain; charset=utf-8") {
+    HttpResponse response;
+    response.status = status;
+    response.content_type = content_type;
+    response.body = std::move(body);
+    return response;
+}
+
+}  // namespace
+
+Handling get_openapi(HttpRequest request, const Api*) {
+    static const auto kept = std::make_shared<KeptAnswer>(openapi_text(), "application/json");
+    return KeptAnswer::give(kept, std::move(request));
+}
+
+Handling get_docs(HttpRequest request, const Api*) {
+    static const auto kept = std::make_shared<KeptAnswer>(
+        docs_page(boost::json::parse(openapi_text()).as_object()), "text/html; charset=utf-8");
+    Handling giving = KeptAnswer::give(kept, std::move(request));
+    HttpResponse response = co_await std::move(giving);
+    response.headers.emplace_back("Content-Security-Policy", std::string(kDocsPolicy));
+    co_return response;
+}
+
+Handling get_version(HttpRequest, const Api* api) {
+    const Providers& providers = api->providers;
+    boost::json::object libraries;
+    for (const auto& [name, version] : providers.libraries) libraries[name] = version;
+    boost::json::object body;
+    body["version"] = providers.version;
+    body["commit"] = providers.commit;
+    body["compiler"] = providers.compiler;
+    body["libraries"] = std::move(libraries);
+    co_return json_response(200, body);
+}
+
+Handling get_healthz(HttpRequest, const Api*) { co_return text_response(200, "ok\n"); }
+
+Handling get_readyz(HttpRequest, const Api* api) {
+    if (api->providers.ready()) co_return text_response(200, "ready\n");
+    const std::string missing = api->providers.missing();
+    co_return text_response(503, missing.empty() ? "not ready\n" : "not ready: " + missing + '\n');
+}
+
+Handling get_metrics(HttpRequest request, const Api* api) {
+    const bool gzip = accepts_gzip(request.headers["accept-encoding"]);
+    boost::asio::awaitable<SharedText> making =
+        scrape(request.caller, api->providers.metrics, gzip);
+    SharedText text = co_await std::move(making);
+    if (!text)
+        co_return to_response(passing_problem(503, "the metrics cannot be made now; try again", 1));
+    HttpResponse response = text_response(200, {}, api->providers.metrics_type);
+    response.shared_body = std::move(text);
+    response.headers.emplace_back("Vary", "Accept-Encoding");
+    if (gzip) response.headers.emplace_back("Content-Encoding", "gzip");
+    co_return response;
+}
+
+namespace {
+
+/// Resumes the coroutine by post: a source must not find itself called again from inside its own
+/// completion.
+struct StartScrape {
+    template <class Handler>
+    void operator()(Handler handler, MetricsSource* source, std::uint64_t caller, bool gzip) const {
+        auto shared = std::make_shared<Handler>(std::move(handler));
+        source->scrape(caller, gzip, [shared](SharedText text) {
+            const auto executor = asio::get_associated_executor(*shared);
+            asio::post(executor, [shared, text = std::move(text)]() mutable {
+                (std::move(*shared))(std::move(text));
+            });
+        });
+    }
+};
+
+asio::awaitable<SharedText> start_scrape(MetricsSource* source, std::uint64_t caller, bool gzip) {
+    return asio::async_initiate<const asio::use_awaitable_t<>, void(SharedText)>(
+        StartScrape{}, asio::use_awaitable, source, caller, gzip);
+}
+
+}  // namespace
+
+asio::awaitable<SharedText> scrape(std::shared_ptr<Caller> caller, MetricsSource* source,
+                                   bool gzip) {
+    SharedText text;
+    if (caller->has_left()) co_return text;
+    const std::uint64_t id = caller->id();
+    caller->at_leaving(source, [source, id] { source->cancel(id); });
+    asio::awaitable<SharedText> pending = start_scrape(source, id, gzip);
+    text = co_await std::move(pending);
+    co_return text;
+}
+
+}  // namespace panelgate::web
