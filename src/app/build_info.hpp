@@ -9,9 +9,9 @@ namespace panelgate::app {
 const char* build_commit();
 /// "clang 19.1.7"
 const char* build_compiler();
-/// That it was built with, by name: "boost" -> "1.81.0".
+/// Libraries that it was built with, name to version: "boost" -> "1.81.0".
 std::map<std::string, std::string> build_libraries();
-/// For people: what `--version` prints, three lines.
+/// The three lines that `--version` prints.
 std::string build_text();
 
 }  // namespace panelgate::app

@@ -41,7 +41,7 @@ plan::Station station_of(const config::Line& line, const config::Station& statio
     return made;
 }
 
-/// Nothing on another line.
+/// The relay's end on this line; nothing if it is on another one.
 std::optional<plan::Relay::End> end_of(const plan::Line& line, const points::RelayEnd& end,
                                        std::uint32_t count) {
     const auto found = std::ranges::find(line.stations, end.station, &plan::Station::name);
@@ -215,7 +215,7 @@ std::string headroom_of(const Capacity& capacity) {
     return text;
 }
 
-/// What it is judged by first: certain, or while values change.
+/// The load that decides comes first: the certain one, or the one while values change.
 std::string text_of(const plan::Advice& advice, bool changing) {
     std::string text = advice.what + " brings ";
     if (changing) return text + percent_text(advice.most) + kChanging;

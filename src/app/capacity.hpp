@@ -11,24 +11,23 @@
 
 namespace panelgate::app {
 
-/// What a line has to carry, and what would help where that is too much.
+/// The planned load of a line, and advice where it is too high.
 struct Capacity {
     plan::Line line;
     plan::LinePlan plan;
     std::vector<plan::Advice> advice;
-    std::vector<std::string> warnings;  ///< of requests that cannot do at any load
+    std::vector<std::string> warnings;  ///< about requests that cannot work at any load
 };
 
-/// Of each line, in the order of the configuration, which outlives them. A line that is only
-/// listened to carries nothing of ours.
+/// The capacity of each line, in the order of the configuration, which must outlive them. A line
+/// that is only listened to has no load of ours.
 std::vector<Capacity> capacities(const config::Config& config);
 
-/// "line floor1 is planned to be busy for 93 % …; …": what is wrong, and what helps most.
+/// "line floor1 is planned to be busy for 93 % …; …": the overload and the best advice.
 std::string overload_text(const Capacity& capacity);
-/// The plan of one line, in some lines.
+/// The plan of one line as text, several lines long.
 std::string plan_text(const Capacity& capacity);
-/// The members that it adds to a line of inventory_json(); `polls` takes the place of the one
-/// there.
+/// Adds the plan's members to a line of inventory_json(); its `polls` replaces the one there.
 void add_plan(boost::json::object& line, const Capacity& capacity);
 
 }  // namespace panelgate::app

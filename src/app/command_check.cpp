@@ -40,7 +40,7 @@ void print_text(const std::string& file, const config::Config& config,
     for (const Capacity& line : lines) std::cout << plan_text(line);
 }
 
-/// As a person reads them: the file itself first, from top to bottom.
+/// Sorted for reading: the file itself first, from top to bottom.
 json::array errors_json(const std::string& file, std::vector<yaml::Problem> problems) {
     std::ranges::sort(problems, {}, [&](const yaml::Problem& problem) {
         return std::tuple(problem.file != file, problem.file, problem.mark.line,
@@ -49,7 +49,7 @@ json::array errors_json(const std::string& file, std::vector<yaml::Problem> prob
     json::array errors;
     for (const yaml::Problem& problem : problems) {
         json::object error{{"file", problem.file}};
-        if (problem.mark.line > 0) {  // else it is of the whole file
+        if (problem.mark.line > 0) {  // line 0: the fault is of the whole file
             error["line"] = problem.mark.line;
             error["column"] = problem.mark.column;
         }
@@ -59,7 +59,7 @@ json::array errors_json(const std::string& file, std::vector<yaml::Problem> prob
     return errors;
 }
 
-/// What is said of the lines' loads.
+/// The verdict on the lines' loads.
 struct Judged {
     std::vector<Capacity> lines;
     std::vector<std::string> errors;
@@ -78,7 +78,7 @@ Judged judge(const config::Config& config, bool allow_overload) {
     return judged;
 }
 
-/// The file that is compared with; none: nothing is.
+/// The file to compare with; an empty name: no comparison.
 struct Compared {
     std::string file;
     Loaded loaded;
@@ -96,7 +96,7 @@ void print_changes(const std::string& file, const config::Config& config,
     for (const Change& change : changes) std::cout << "  " << to_string(change) << '\n';
 }
 
-/// Of a file with faults `lines` and its like are not there.
+/// For a file with faults `lines` and the like are missing.
 void print_json(const std::string& file, const Loaded& loaded, const Judged& judged,
                 const Compared& compared) {
     const bool valid = loaded.config && judged.errors.empty() && compared.loaded.code == kFine;
@@ -120,7 +120,7 @@ void print_json(const std::string& file, const Loaded& loaded, const Judged& jud
         errors.push_back(json::object{{"file", file}, {"message", error}});
     all["errors"] = std::move(errors);
     all["warnings"] = std::move(warnings);
-    std::cout << as_utf8(web::json_text(all)) << '\n';  // the names of files may be any bytes
+    std::cout << as_utf8(web::json_text(all)) << '\n';  // file names may contain any bytes
 }
 
 }  // namespace
@@ -136,10 +136,10 @@ ExitCode check(const std::string& file, const CheckOptions& options) {
             std::ranges::copy(moved_units(*compared.loaded.config, *loaded.config),
                               std::back_inserter(judged.warnings));
         print_warnings(*loaded.config);
-        for (const std::string& told : judged.warnings)
-            std::cerr << path_of(file) << ": warning: " << told << '\n';
-        for (const std::string& told : judged.errors)
-            std::cerr << path_of(file) << ": " << told << " (--allow-overload takes it)\n";
+        for (const std::string& message : judged.warnings)
+            std::cerr << path_of(file) << ": warning: " << message << '\n';
+        for (const std::string& message : judged.errors)
+            std::cerr << path_of(file) << ": " << message << " (--allow-overload takes it)\n";
     }
     if (options.json) {
         print_json(file, loaded, judged, compared);
@@ -172,11 +172,11 @@ ExitCode import_conf(const std::string& file) {
 
 namespace {
 
-constexpr std::string_view kGateway = "gateway";  // no panel, and yet it is asked like one
+constexpr std::string_view kGateway = "gateway";  // not a panel, but asked for like one
 
 using Listed = std::vector<std::pair<std::string_view, std::string_view>>;
 
-/// Names and what they are, in two columns.
+/// Prints names and descriptions in two columns.
 void print(const Listed& all) {
     std::size_t width = 0;
     for (const auto& [name, description] : all) width = std::max(width, name.size() + 2);
@@ -184,7 +184,7 @@ void print(const Listed& all) {
         std::cout << name << std::string(width - name.size(), ' ') << description << '\n';
 }
 
-/// nullptr, and told, when there is none of this name.
+/// The profile of this name; nullptr with a message on stderr if there is none.
 const profile::PanelProfile* find(const profile::Catalogue& catalogue, const std::string& name) {
     const profile::PanelProfile* found = catalogue.find(name);
     if (found != nullptr) return found;

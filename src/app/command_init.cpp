@@ -19,7 +19,8 @@ ExitCode cannot_write(const OutputFile& output) {
     return kInternal;
 }
 
-/// Before a minute is spent on the scan: whether there will be a file, without making one.
+/// Checks before the scan, which takes a minute, whether the file can be written, without creating
+/// it.
 ExitCode may_write(const OutputFile& output) {
     if (output.file.empty()) return kFine;
     const std::filesystem::path file(output.file);
@@ -40,7 +41,7 @@ ExitCode may_write(const OutputFile& output) {
     return may ? kFine : cannot_write(output);
 }
 
-/// "x": what has come into being meanwhile is not written over either.
+/// "x": a file that was created meanwhile is not overwritten either.
 bool write(const OutputFile& output, const std::string& text) {
     std::FILE* file = std::fopen(output.file.c_str(), output.force ? "w" : "wx");
     const bool written = file != nullptr && std::fputs(text.c_str(), file) >= 0;
@@ -52,41 +53,41 @@ bool write(const OutputFile& output, const std::string& text) {
 
 ExitCode init(const ScanOptions& options, const OutputFile& output) {
     if (const ExitCode refused = may_write(output); refused != kFine) return refused;
-    const Searched searched = search(options);
-    if (!searched.result) return searched.code;
-    tell_advice(options, *searched.result);
-    const bool cut_short = !searched.cut_short.empty();
-    if (!scan::found_any(*searched.result)) {
-        if (cut_short) std::cerr << "panelgate: " << searched.cut_short << '\n';
+    const ScanOutcome outcome = search(options);
+    if (!outcome.result) return outcome.code;
+    print_advice(options, *outcome.result);
+    const bool cut_short = !outcome.cut_short.empty();
+    if (!scan::found_any(*outcome.result)) {
+        if (cut_short) std::cerr << "panelgate: " << outcome.cut_short << '\n';
         std::cerr << "panelgate: there is nothing to write\n";
         return kUnavailable;
     }
-    const std::string text = starter_yaml(
-        {searched.device, searched.profiles_dir, *searched.result, *searched.profiles});
+    const std::string text =
+        starter_yaml({outcome.device, outcome.profiles_dir, *outcome.result, *outcome.profiles});
     if (output.file.empty())
         std::cout << text << std::flush;
     else if (!write(output, text))
         return cannot_write(output);
     else
         std::cerr << "panelgate: wrote " << output.file << " with "
-                  << searched.result->stations.size() << " station(s); run -c " << output.file
+                  << outcome.result->stations.size() << " station(s); run -c " << output.file
                   << " runs it\n";
     if (cut_short)
-        std::cerr << "panelgate: incomplete: " << searched.cut_short << "; what was not reached "
+        std::cerr << "panelgate: incomplete: " << outcome.cut_short << "; what was not reached "
                   << "is missing in it\n";
-    return searched.code;
+    return outcome.code;
 }
 
 ExitCode scan(const ScanOptions& options) {
-    const Searched searched = search(options);
-    if (!searched.result) return searched.code;
+    const ScanOutcome outcome = search(options);
+    if (!outcome.result) return outcome.code;
     if (options.yaml)
-        std::cout << scan::report_yaml(searched.device, *searched.result, searched.profiles_dir);
+        std::cout << scan::report_yaml(outcome.device, *outcome.result, outcome.profiles_dir);
     else
-        std::cout << scan::report_text(options.device, *searched.result, searched.cut_short);
+        std::cout << scan::report_text(options.device, *outcome.result, outcome.cut_short);
     std::cout << std::flush;
-    tell_advice(options, *searched.result);
-    return searched.code;
+    print_advice(options, *outcome.result);
+    return outcome.code;
 }
 
 }  // namespace panelgate::app

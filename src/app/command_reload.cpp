@@ -25,7 +25,7 @@ std::string text_in(const json::object& object, std::string_view name) {
     return found != nullptr && found->is_string() ? std::string(found->as_string()) : "";
 }
 
-/// Each text of a list, a line.
+/// Prints each text of a list on its own line.
 void print_list(std::ostream& out, const json::object& verdict, std::string_view name,
                 std::string_view before) {
     const json::value* list = verdict.if_contains(name);
@@ -47,8 +47,8 @@ void print_faults(const json::object& verdict) {
     }
 }
 
-/// Of a gateway that has understood the question.
-ExitCode tell(const json::object& verdict) {
+/// Prints the verdict of a gateway that understood the request.
+ExitCode print_verdict(const json::object& verdict) {
     const std::string outcome = text_in(verdict, "outcome");
     if (outcome == "applied" || outcome == "unchanged") {
         std::cout << outcome << '\n';
@@ -68,7 +68,7 @@ ExitCode tell(const json::object& verdict) {
     return outcome == "invalid" ? kBadConfig : kUnavailable;
 }
 
-/// "" where none is given; nothing (and told) where it cannot be read.
+/// The token; "" if no file is given; nothing, with a message on stderr, if it cannot be read.
 std::optional<std::string> secret_in(const std::string& file) {
     if (file.empty()) return "";
     std::ifstream in(file);
@@ -81,43 +81,43 @@ std::optional<std::string> secret_in(const std::string& file) {
 }  // namespace
 
 ExitCode reload(const ReloadOptions& options) {
-    const auto door = http_door(options.file, options.http);
-    if (const auto* none = std::get_if<NoDoor>(&door)) {
+    const auto endpoint = http_endpoint(options.file, options.http);
+    if (const auto* none = std::get_if<NoHttpEndpoint>(&endpoint)) {
         std::cerr << "panelgate: not reloaded: " << none->why << "; or kill -HUP its process\n";
         return none->code;
     }
     const auto secret = secret_in(options.token_file);
     if (!secret) return kNoInput;
-    const auto& [address, port] = std::get<config::Endpoint>(door);
+    const auto& [address, port] = std::get<config::Endpoint>(endpoint);
     const std::string place = endpoint_text(address, port);
     const std::string request =
         "POST /api/v1/reload" + std::string(options.rollback ? "?rollback=true" : "") +
         (options.weaker ? "&weaker=true" : "") + " HTTP/1.1\r\nHost: " + place +
         (secret->empty() ? "" : "\r\nAuthorization: Bearer ") + *secret +
         "\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-    const Said said =
-        ask(address, port, request, kPatience, kMost, [](const Said&) { return false; });
+    const HttpReply reply =
+        ask(address, port, request, kPatience, kMost, [](const HttpReply&) { return false; });
     boost::system::error_code wrong;
-    const json::value body = json::parse(said.body(), wrong);
+    const json::value body = json::parse(reply.body(), wrong);
     if (!wrong && body.is_object() && body.as_object().contains("outcome"))
-        return tell(body.as_object());
-    std::string why = said.text.empty() ? said.silence() : said.status();
+        return print_verdict(body.as_object());
+    std::string why = reply.text.empty() ? reply.failure() : reply.status();
     if (!wrong && body.is_object()) why += ": " + text_in(body.as_object(), "detail");
     std::cerr << "panelgate: not reloaded: http://" << place << ": " << why << '\n';
-    if (said.text.empty() && options.http.empty())
+    if (reply.text.empty() && options.http.empty())
         std::cerr << "  (if it runs with another `http: listen` than " << options.file
                   << " has now: --http ADDR:PORT, or kill -HUP its process)\n";
     return kNotReady;
 }
 
 ExitCode health(const std::string& file, const std::string& http) {
-    const auto door = http_door(file, http);
-    if (const auto* none = std::get_if<NoDoor>(&door)) {
+    const auto endpoint = http_endpoint(file, http);
+    if (const auto* none = std::get_if<NoHttpEndpoint>(&endpoint)) {
         std::cerr << "panelgate: " << (none->code == kUsage ? "" : "not ready: ") << none->why
                   << '\n';
         return none->code == kUsage ? kUsage : kNotReady;
     }
-    const auto& [address, port] = std::get<config::Endpoint>(door);
+    const auto& [address, port] = std::get<config::Endpoint>(endpoint);
     const std::string why = ask_whether_ready(address, port, kHealthTimeout);
     if (why.empty()) return kFine;
     std::cerr << "panelgate: not ready: http://" << endpoint_text(address, port)

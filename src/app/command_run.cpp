@@ -31,24 +31,24 @@ const Embedded& shipped_demo();  // config/demo.yaml, compiled in
 
 namespace {
 
-/// What becomes of a configuration.
+/// How a configuration is served.
 struct Service {
     bool simulate = false;
-    std::string file{};  ///< that can be read again
-    bool watch = false;  ///< ... as soon as it has changed
+    std::string file{};  ///< to read again on reload
+    bool watch = false;  ///< reload as soon as the file has changed
 };
 
 void reload(Reloader& reloader, const std::string& cause) {
     const std::string why = reloader.barred(false);
     if (!why.empty()) return rt::log(rt::LogLevel::warn, "no reload", {{"why", why}});
-    reloader.reload({}, cause, [](const auto&) {});  // the log says what came of it
+    reloader.reload({}, cause, [](const auto&) {});  // the log reports the result
 }
 
-/// The process to the configuration, and the other way round.
+/// Adapts the process to the configuration, and the configuration to the process.
 void fit(config::Config& config) {
     rt::set_up_log(config.log);
-    for (const Notice& notice : prepare(config))
-        rt::log(rt::LogLevel::warn, notice.event, {{"warning", notice.text}});
+    for (const StartMessage& message : prepare(config))
+        rt::log(rt::LogLevel::warn, message.event, {{"warning", message.text}});
     for (const std::string& refused : rt::be_punctual(config.realtime))
         rt::log(rt::LogLevel::warn, "not granted", {{"what", refused}});
 }
@@ -57,14 +57,14 @@ std::string url_of(const config::Config& config, const Gateway& gateway) {
     return "http://" + endpoint_text(config::reachable(config.http->address), gateway.http_port());
 }
 
-/// Where a person looks first.
+/// Logs the URL of the dashboard.
 void log_dashboard(const Gateway& gateway) {
     const config::Config& config = *gateway.config();
     if (!config.http) return;
     rt::log(rt::LogLevel::info, "dashboard", {{"url", url_of(config, gateway) + '/'}});
 }
 
-/// `started` is told the gateway once it serves.
+/// Runs the gateway until a signal ends it. `started` is called once it serves.
 ExitCode serve(config::Config config, const Service& service,
                const std::function<void(const Gateway&)>& started) {
     fit(config);
@@ -93,7 +93,7 @@ ExitCode serve(config::Config config, const Service& service,
     Ending ending{.begin = {},
                   .done = [&] { return gateway.drained(); },
                   .finish = [&] { gateway.stop(); },
-                  .open = [&] { return gateway.owing(); },
+                  .open = [&] { return gateway.pending_connections(); },
                   .longest_answer = {},
                   .reload = [&] { reload(reloader, "SIGHUP"); }};
     ending.begin = [&] {
@@ -126,10 +126,11 @@ void print_demo_help(const config::Config& config, const Gateway& gateway) {
               << "Also: " << url << "/metrics and " << url << "/api/v1/lines/floor1/trace?last=20\n"
               << "Ctrl-C ends it.\n"
               << std::flush;
-    std::cout.clear();  // where nobody takes it, it runs all the same
+    std::cout.clear();  // it runs even if stdout takes nothing
 }
 
-/// Replaces the address of `settings` by ADDR:PORT; false (and told) when that is not one.
+/// Replaces the address of `settings` by ADDR:PORT; false, with a message on stderr, if the text is
+/// not one.
 template <class Settings>
 bool listen_on(const std::string& text, Settings& settings) {
     if (text.empty()) return true;
@@ -146,7 +147,7 @@ bool listen_on(const std::string& text, Settings& settings) {
 }  // namespace
 
 ExitCode run(const std::string& file, bool simulate, bool watch) {
-    std::signal(SIGHUP, SIG_IGN);  // what it would be read again for is being read
+    std::signal(SIGHUP, SIG_IGN);  // a reload during start-up is not needed: the file is being read
     if (watch && file == "-") {
         std::cerr << "panelgate: --watch needs a file: standard input is read only once\n";
         return kUsage;

@@ -17,7 +17,8 @@
 namespace panelgate::app {
 namespace {
 
-/// NAME=PTY-LINK and NAME=tcp://ADDR:PORT texts by line name; false (and told) when one is wrong.
+/// Parses NAME=PTY-LINK and NAME=tcp://ADDR:PORT texts by line name; false, with a message on
+/// stderr, if one is wrong.
 bool parse_links(const std::vector<std::string>& texts, const config::Config& config,
                  std::map<std::string, std::string>& links) {
     for (const std::string& text : texts) {
@@ -46,20 +47,20 @@ bool parse_links(const std::vector<std::string>& texts, const config::Config& co
     return true;
 }
 
-/// Where --http listens; nothing without it.
-struct FaultsDoor {
+/// The address of --http; nothing without it.
+struct FaultsEndpoint {
     std::optional<config::Endpoint> endpoint;
-    bool wrong = false;  ///< and told
+    bool wrong = false;  ///< invalid, and reported on stderr
 };
 
-FaultsDoor parse_http(const std::string& text) {
+FaultsEndpoint parse_http(const std::string& text) {
     if (text.empty()) return {};
-    FaultsDoor door{config::parse_endpoint(text)};
-    door.wrong = !door.endpoint;
-    if (door.wrong)
+    FaultsEndpoint faults{config::parse_endpoint(text)};
+    faults.wrong = !faults.endpoint;
+    if (faults.wrong)
         std::cerr << "panelgate: --http '" << text
                   << "' is not ADDR:PORT, such as 127.0.0.1:8081\n";
-    return door;
+    return faults;
 }
 
 }  // namespace
@@ -71,8 +72,8 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     print_warnings(*loaded.config);
     std::map<std::string, std::string> links;
     if (!parse_links(texts, *loaded.config, links)) return kUsage;
-    const FaultsDoor door = parse_http(http);
-    if (door.wrong) return kUsage;
+    const FaultsEndpoint faults = parse_http(http);
+    if (faults.wrong) return kUsage;
 
     rt::set_up_log(loaded.config->log);
     boost::asio::io_context io(1);
@@ -82,13 +83,13 @@ ExitCode simulate(const std::string& file, const std::vector<std::string>& texts
     SimulatedPanels panels(io.get_executor());
     try {
         for (const config::Line& line : loaded.config->lines) panels.add(line, links[line.name]);
-        if (door.endpoint) panels.serve_faults(*door.endpoint);
+        if (faults.endpoint) panels.serve_faults(*faults.endpoint);
     } catch (const std::system_error& error) {
         std::cerr << "panelgate: " << error.what() << '\n';
         return kUnavailable;
     }
     std::cout << panels.text() << "Ctrl-C ends it.\n" << std::flush;
-    std::cout.clear();  // where nobody takes it, they run all the same
+    std::cout.clear();  // they run even if stdout takes nothing
     return loop.run({.begin = [] {},
                      .done = [] { return true; },
                      .finish = [&] { panels.stop(); },

@@ -12,36 +12,36 @@ namespace panelgate::app {
 namespace {
 
 using Kind = Change::Kind;
-using Settings = std::map<std::string, Held>;
+using Settings = std::map<std::string, Setting>;
 
-/// What two differ in at one path; nothing of one is nullptr.
+/// The two settings at one path; nullptr if one side does not have it.
 struct Difference {
-    const Held* before = nullptr;
-    const Held* after = nullptr;
+    const Setting* before = nullptr;
+    const Setting* after = nullptr;
 };
 using Differences = std::map<std::string, Difference>;
 
 Settings by_path(const config::Config& config) {
     Settings settings;
-    for (Held& held : all_held(config)) {
-        std::string path = held.path;
-        settings.emplace(std::move(path), std::move(held));
+    for (Setting& setting : all_settings(config)) {
+        std::string path = setting.path;
+        settings.emplace(std::move(path), std::move(setting));
     }
     return settings;
 }
 
 Differences compare(const Settings& before, const Settings& after) {
     Differences found;
-    for (const auto& [path, held] : before) {
+    for (const auto& [path, setting] : before) {
         const auto other = after.find(path);
         if (other == after.end()) {
-            found[path] = {&held, nullptr};
-        } else if (other->second.value != held.value) {
-            found[path] = {&held, &other->second};
+            found[path] = {&setting, nullptr};
+        } else if (other->second.value != setting.value) {
+            found[path] = {&setting, &other->second};
         }
     }
-    for (const auto& [path, held] : after) {
-        if (!before.contains(path)) found[path] = {nullptr, &held};
+    for (const auto& [path, setting] : after) {
+        if (!before.contains(path)) found[path] = {nullptr, &setting};
     }
     return found;
 }
@@ -50,7 +50,7 @@ bool is_one_sided(const Difference& difference) {
     return difference.before == nullptr || difference.after == nullptr;
 }
 
-/// Something above it was added or removed with all that it has.
+/// True if a map or list entry above it was added or removed as a whole.
 bool is_within(const Differences& all, const std::string& path) {
     for (std::size_t end = path.find('/'); end != path.npos; end = path.find('/', end + 1)) {
         const auto above = all.find(path.substr(0, end));
@@ -59,7 +59,7 @@ bool is_within(const Differences& all, const std::string& path) {
     return false;
 }
 
-/// It only goes along with the setting that it has otherwise.
+/// True if it changes only because the setting that it inherits from changes.
 bool follows(const Differences& all, const Difference& difference) {
     if (is_one_sided(difference) || difference.after->otherwise.empty()) return false;
     const auto owner = all.find(difference.after->otherwise);
@@ -73,8 +73,8 @@ Change change_of(const std::string& path, const Difference& difference) {
     Change change{path, Kind::changed, "", ""};
     if (difference.before == nullptr) change.kind = Kind::added;
     if (difference.after == nullptr) change.kind = Kind::removed;
-    const auto shown = [](const Held* held) {
-        return held == nullptr || held->secret ? "" : held->value;
+    const auto shown = [](const Setting* setting) {
+        return setting == nullptr || setting->secret ? "" : setting->value;
     };
     change.before = shown(difference.before);
     change.after = shown(difference.after);
@@ -83,19 +83,19 @@ Change change_of(const std::string& path, const Difference& difference) {
 
 void add_profiles(const config::Config& before, const config::Config& after,
                   std::vector<Change>& changes) {
-    const auto tell = [&](const std::string& name, Kind kind) {
+    const auto add = [&](const std::string& name, Kind kind) {
         changes.push_back({"profiles/" + name, kind, "", ""});
     };
     for (const auto& [name, profile] : before.profiles->all()) {
         const profile::PanelProfile* other = after.profiles->find(name);
         if (other == nullptr) {
-            tell(name, Kind::removed);
+            add(name, Kind::removed);
         } else if (*other != profile) {
-            tell(name, Kind::changed);
+            add(name, Kind::changed);
         }
     }
     for (const auto& [name, profile] : after.profiles->all()) {
-        if (before.profiles->find(name) == nullptr) tell(name, Kind::added);
+        if (before.profiles->find(name) == nullptr) add(name, Kind::added);
     }
 }
 

@@ -17,13 +17,13 @@ namespace {
 
 constexpr const char* kName = "discovery";
 constexpr int kHundred = 100;
-/// As a scan has at first: most panels think for less. Whoever needs longer speaks into the next
-/// transaction, and may be heard there or not.
+/// The initial timeout of a scan: most panels answer sooner. A slower panel's reply falls into the
+/// next transaction and may or may not be recognized there.
 constexpr Duration kPatience = 100ms;
 
 using Reply = scan::Discovery::Reply;
 
-/// Only what was asked can be silent: a refusal tells nothing about the address.
+/// Only a transmitted request can time out: a refusal says nothing about the address.
 Reply reply_of(const bus::Answer& answer) {
     if (answer.pdu) return Reply::answered;
     switch (answer.pdu.error()) {
@@ -50,13 +50,13 @@ Reply reply_of(const bus::Answer& answer) {
 
 LineDiscovery::LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
                              std::shared_ptr<const profile::Catalogue> profiles,
-                             scan::DiscoverySettings settings, std::function<void()> told)
+                             scan::DiscoverySettings settings, std::function<void()> on_step)
     : clock_(clock),
       bus_(bus),
       profiles_(std::move(profiles)),
       discovery_(*profiles_, settings, clock.now()),
       share_percent_(static_cast<unsigned>(std::lround(settings.share * kHundred))),
-      told_(std::move(told)),
+      on_step_(std::move(on_step)),
       client_(bus::next_client_id()),
       alarm_(clock.make_alarm()),
       began_(clock.now()),
@@ -69,7 +69,7 @@ void LineDiscovery::start() {
 
 void LineDiscovery::step() {
     if (state_ != State::running) return;
-    if (discovery_.done()) ask_the_late();
+    if (discovery_.done()) ask_late_stations();
     if (discovery_.gave_up()) return end(State::stopped, "the line takes no questions");
     if (discovery_.done()) return end(State::done, {});
     const TimePoint now = clock_.now();
@@ -96,20 +96,20 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
 void LineDiscovery::on_answer(const bus::Answer& answer) {
     if (state_ != State::running) return;
     const TimePoint now = clock_.now();
-    scan::Discovery::Answer told;
-    told.reply = reply_of(answer);
-    if (answer.pdu) told.pdu = *answer.pdu;
-    // Where the bus does not say, it may have been all of the time.
+    scan::Discovery::Answer result;
+    result.reply = reply_of(answer);
+    if (answer.pdu) result.pdu = *answer.pdu;
+    // If the bus does not report the cost, assume the whole time.
     const Duration cost = used() - paid_;
     const bool unknown = answer.transmitted && cost <= Duration::zero();
-    told.cost = unknown ? now - asked_ : std::max(cost, Duration::zero());
-    discovery_.on_answer(now, told);
-    told_();
+    result.cost = unknown ? now - asked_ : std::max(cost, Duration::zero());
+    discovery_.on_answer(now, result);
+    on_step_();
     step();
 }
 
-/// A reply that came when nobody waited for it any more.
-void LineDiscovery::ask_the_late() {
+/// Asks again the stations whose reply came after its timeout.
+void LineDiscovery::ask_late_stations() {
     const auto silent = discovery_.silent();
     for (const std::uint8_t station : silent) {
         const auto heard = bus_.station_status(station).last_reply;
@@ -131,7 +131,7 @@ void LineDiscovery::end(State state, std::string why) {
     why_ = std::move(why);
     alarm_->cancel();
     bus_.cancel(client_);
-    told_();
+    on_step_();
 }
 
 web::DiscoveryReport LineDiscovery::report() const {
@@ -173,12 +173,13 @@ std::optional<std::string> Discoveries::start(std::string_view name, std::string
     settings.share = share_percent * kPercent;
     for (const std::uint8_t id : *list)
         if (place.plant.find(name, id) == nullptr) settings.stations.push_back(id);
-    // Of a far end nobody knows how its panels are set.
+    // For a TCP device the serial format of the far end is unknown.
     if (line.configured->kind != config::Line::Kind::tcp)
         settings.format = line.configured->device.serial;
     const std::string key(name);
-    auto search = std::make_shared<LineDiscovery>(clock_, *line.bus, place.profiles,
-                                                  std::move(settings), [this, key] { tell(key); });
+    auto search =
+        std::make_shared<LineDiscovery>(clock_, *line.bus, place.profiles, std::move(settings),
+                                        [this, key] { report_progress(key); });
     by_line_[key] = search;
     rt::log(rt::LogLevel::info, "discovery begins",
             {{"line", key},
@@ -188,7 +189,7 @@ std::optional<std::string> Discoveries::start(std::string_view name, std::string
     return std::nullopt;
 }
 
-void Discoveries::tell(const std::string& line) const {
+void Discoveries::report_progress(const std::string& line) const {
     const LineDiscovery& search = *by_line_.at(line);
     const std::string_view state = label(search.state());
     const scan::Discovery& what = search.discovery();

@@ -20,30 +20,30 @@
 
 namespace panelgate::app {
 
-/// One search on one line: asks the bus what a scan::Discovery wants asked, as a client of the
-/// lowest class, and pays with what the bus says that it has used. One thread.
+/// One discovery on one line: sends the requests of a scan::Discovery to the bus as a client of the
+/// lowest class, and charges it with the line time that the bus reports. One thread.
 class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
   public:
     using State = web::DiscoveryReport::State;
 
-    /// Clock and bus outlive it. `told` is called after each step.
+    /// Clock and bus outlive it. `on_step` is called after each step.
     LineDiscovery(rt::Clock& clock, bus::BusClient& bus,
                   std::shared_ptr<const profile::Catalogue> profiles,
-                  scan::DiscoverySettings settings, std::function<void()> told);
+                  scan::DiscoverySettings settings, std::function<void()> on_step);
 
     void start();
-    /// Nothing more is asked; what waits for the line is taken back.
+    /// Sends nothing more and cancels the queued request.
     void stop(const std::string& why) { end(State::stopped, why); }
     State state() const { return state_; }
     const scan::Discovery& discovery() const { return discovery_; }
-    /// All but the YAML.
+    /// The report without its YAML.
     web::DiscoveryReport report() const;
 
   private:
     void step();
     void ask(const scan::ReadRequest& request);
     void on_answer(const bus::Answer& answer);
-    void ask_the_late();
+    void ask_late_stations();
     Duration used() const;
     void end(State state, std::string why);
 
@@ -52,7 +52,7 @@ class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
     std::shared_ptr<const profile::Catalogue> profiles_;
     scan::Discovery discovery_;
     unsigned share_percent_;
-    std::function<void()> told_;
+    std::function<void()> on_step_;
     bus::ClientId client_;
     std::unique_ptr<rt::Alarm> alarm_;
     State state_ = State::running;
@@ -60,15 +60,15 @@ class LineDiscovery : public std::enable_shared_from_this<LineDiscovery> {
     TimePoint began_;
     TimePoint ended_;
     TimePoint asked_{};
-    Duration bus_total_{};  ///< what it has used of the line, when it has ended
-    Duration paid_{};       ///< what it had used of the line before the question that is open
+    Duration bus_total_{};  ///< line time used in total, once it has ended
+    Duration paid_{};       ///< line time used before the outstanding request
 };
 
-/// The last search for stations of each line. What it is given outlives it, but for the buses'
-/// last answers.
+/// The last discovery of each line. Its constructor arguments outlive it, except for the last
+/// answers of the buses.
 class Discoveries final : public web::DiscoverySource {
   public:
-    /// What is there when somebody asks.
+    /// The current plant and profiles.
     struct Place {
         const Plant& plant;
         std::shared_ptr<const profile::Catalogue> profiles;
@@ -80,11 +80,11 @@ class Discoveries final : public web::DiscoverySource {
                                      unsigned share_percent) override;
     void stop(std::string_view line) override;
     web::DiscoveryReport report(std::string_view line) const override;
-    /// The program ends: all of them.
+    /// Stops all discoveries when the program ends.
     void stop_all();
 
   private:
-    void tell(const std::string& line) const;
+    void report_progress(const std::string& line) const;
 
     rt::Clock& clock_;
     std::function<Place()> place_;

@@ -19,26 +19,26 @@
 
 namespace panelgate::app {
 
-/// What `systemctl status` shows: "2 of 3 lines up, listening on modbus_tcp 127.0.0.1:502, http
-/// 127.0.0.1:8080". `standing` and `missing` are those of Openings.
-std::string service_status(const Plant& plant, const std::string& standing,
+/// The text for `systemctl status`: "2 of 3 lines up, listening on modbus_tcp 127.0.0.1:502, http
+/// 127.0.0.1:8080". `listening` and `missing` are those of Openings.
+std::string service_status(const Plant& plant, const std::string& listening,
                            const std::string& missing);
 
-std::string service_status(const Plant& plant, const std::string& standing,
+std::string service_status(const Plant& plant, const std::string& listening,
                            const std::string& missing) {
     const auto& lines = plant.lines();
     const auto up =
         std::ranges::count_if(lines, [](const Line& line) { return line.bus->status().up; });
     std::string text = std::to_string(up) + " of " + std::to_string(lines.size()) +
                        (lines.size() == 1 ? " line up" : " lines up");
-    if (!standing.empty()) text += ", listening on " + standing;
+    if (!listening.empty()) text += ", listening on " + listening;
     if (!missing.empty()) text += ", waiting to listen on " + missing;
     return text;
 }
 
 namespace {
 
-/// Of the ids of events: another one in each life of the program.
+/// A random prefix of event ids, new in each run of the program.
 std::string new_epoch() {
     constexpr int kHex = 16;
     std::array<char, 8> text{};
@@ -47,7 +47,7 @@ std::string new_epoch() {
     return std::string(text.data(), end);
 }
 
-/// The line of this configuration that runs as `line`; null: none does.
+/// The line of this configuration that `line` continues as; null if there is none.
 const config::Line* find_same(const config::Config& config, const config::Line& line) {
     const auto found = std::ranges::find_if(config.lines, [&](const config::Line& one) {
         return one.name == line.name && one.listens == line.listens;
@@ -55,15 +55,15 @@ const config::Line* find_same(const config::Config& config, const config::Line& 
     return found == config.lines.end() ? nullptr : &*found;
 }
 
-std::vector<points::RelayRoute> routes_of(const Scene& scene) {
+std::vector<points::RelayRoute> routes_of(const Snapshot& snapshot) {
     std::vector<points::RelayRoute> routes;
-    for (const points::Relay& relay : scene.config->relays)
-        routes.push_back(route_of(scene.plant, relay));
+    for (const points::Relay& relay : snapshot.config->relays)
+        routes.push_back(route_of(snapshot.plant, relay));
     return routes;
 }
 
-std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Scene>& scene) {
-    return {scene, &scene->directory};
+std::shared_ptr<const web::Directory> directory_in(const std::shared_ptr<Snapshot>& snapshot) {
+    return {snapshot, &snapshot->directory};
 }
 
 }  // namespace
@@ -80,8 +80,8 @@ Gateway::Gateway(boost::asio::any_io_executor executor,
     Lines lines = lines_of(*config);
     for (std::size_t i = 0; i < lines.size(); ++i)
         known_.lines.emplace(std::pair(config->lines[i].name, lines[i]->listens()), lines[i]);
-    show(make_scene(std::move(config), std::move(lines)));
-    relays_ = std::make_unique<points::Relays>(clock_, routes_of(*scene_));
+    show(make_snapshot(std::move(config), std::move(lines)));
+    relays_ = std::make_unique<points::Relays>(clock_, routes_of(*snapshot_));
     relay_listener_ = relays_->write_listener();
     relays_->on_state([](const points::RelayStatus& relay) {
         const bool ok = relay.state == points::RelayState::ok;
@@ -107,7 +107,7 @@ LineWatch Gateway::watch() {
 }
 
 void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
-    publish(events_, scene_->plant, line, event);
+    publish(events_, snapshot_->plant, line, event);
     northbound_.on_bus_event(line, event);
     const auto* write = std::get_if<bus::WriteEvent>(&event);
     if (write != nullptr && relay_listener_) relay_listener_(line, *write);
@@ -115,14 +115,15 @@ void Gateway::on_event(const std::string& line, const bus::BusEvent& event) {
 
 void Gateway::on_points(const std::string& line, std::uint8_t id,
                         const std::vector<std::size_t>& wants) {
-    if (scene_->plant.find(line, id) == nullptr) return;  // it is about to be shown
-    Station& station = scene_->plant.at(line, id);
+    if (snapshot_->plant.find(line, id) == nullptr)
+        return;  // the new snapshot is about to replace this one
+    Station& station = snapshot_->plant.at(line, id);
     remember(station, wants, clock_.now());
     publish_points(events_, station, wants, clock_.now());
     northbound_.on_points(station, wants);
 }
 
-/// Those that there are already, and new ones.
+/// Existing lines where possible, and new ones.
 Gateway::Lines Gateway::lines_of(const config::Config& config) {
     Lines lines;
     for (const config::Line& line : config.lines) {
@@ -138,7 +139,7 @@ Gateway::Lines Gateway::lines_of(const config::Config& config) {
 void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         const config::Line& now = config.lines[i];
-        const config::Line* before = find_same(*scene_->config, now);
+        const config::Line* before = find_same(*snapshot_->config, now);
         if (known_.lines.emplace(std::pair(now.name, now.listens), lines[i]).second) {
             lines[i]->start();
         } else if (before == nullptr) {
@@ -149,12 +150,12 @@ void Gateway::apply_lines(const config::Config& config, const Lines& lines) {
     }
 }
 
-/// What was asked on a wire under another name is owed to nobody here: until it can no longer come,
-/// the wire rests (P1).
+/// A reply to a request that another line has sent on the same wire belongs to none of this line's
+/// clients: the line stays silent until no such reply can come any more (P1).
 void Gateway::rest_wires(const config::Config& config, const Lines& lines) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
         const std::string wire = wire_of(config.lines[i]);
-        const config::Line* before = find_same(*scene_->config, config.lines[i]);
+        const config::Line* before = find_same(*snapshot_->config, config.lines[i]);
         if (before != nullptr && wire_of(*before) == wire) continue;
         for (const auto& [name, other] : known_.lines) {
             if (other != lines[i] && other->wires().contains(wire))
@@ -164,27 +165,28 @@ void Gateway::rest_wires(const config::Config& config, const Lines& lines) {
 }
 
 void Gateway::retire_lines(const Lines& lines) {
-    for (std::size_t i = 0; i < scene_->lines.size(); ++i) {
-        const auto& line = scene_->lines[i];
+    for (std::size_t i = 0; i < snapshot_->lines.size(); ++i) {
+        const auto& line = snapshot_->lines[i];
         if (std::ranges::find(lines, line) != lines.end()) continue;
-        if (discoveries_) discoveries_->stop(scene_->config->lines[i].name);
+        if (discoveries_) discoveries_->stop(snapshot_->config->lines[i].name);
         line->stop();
     }
 }
 
-/// Who serves nobody keeps nothing.
-void Gateway::show(const std::shared_ptr<Scene>& scene) {
-    if (scene->config->http) {
+/// Makes a snapshot the current one. Histories are kept only while HTTP is configured.
+void Gateway::show(const std::shared_ptr<Snapshot>& snapshot) {
+    if (snapshot->config->http) {
         if (!line_histories_)
             line_histories_ =
                 std::make_unique<LineHistories>(clock_, std::vector<const bus::LineBus*>());
-        keep_histories(*scene, scene_.get(), *line_histories_);
-        scene->directory = directory_of(scene->plant, *scene->config->profiles->find("generic"));
-        for (std::size_t i = 0; i < scene->histories.size(); ++i)
-            scene->directory.lines[i].history = scene->histories[i].get();
+        keep_histories(*snapshot, snapshot_.get(), *line_histories_);
+        snapshot->directory =
+            directory_of(snapshot->plant, *snapshot->config->profiles->find("generic"));
+        for (std::size_t i = 0; i < snapshot->histories.size(); ++i)
+            snapshot->directory.lines[i].history = snapshot->histories[i].get();
     }
-    scene_ = scene;
-    northbound_.show(scene_);
+    snapshot_ = snapshot;
+    northbound_.show(snapshot_);
 }
 
 void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedText shown) {
@@ -192,30 +194,32 @@ void Gateway::apply(std::shared_ptr<const config::Config> config, web::SharedTex
     Plant draft;
     for (std::size_t i = 0; i < lines.size(); ++i)
         draft.add(config->lines[i], lines[i]->bus(), nullptr);
-    const auto directory = [this] { return directory_in(scene_); };
+    const auto directory = [this] { return directory_in(snapshot_); };
     servers_.open(*config, draft, {directory, [this] { return providers(); }});
-    // Nothing below fails.
+    // Nothing below throws.
     const bool kept_nothing = line_histories_ == nullptr;
     rest_wires(*config, lines);
     retire_lines(lines);
     apply_lines(*config, lines);
-    show(make_scene(std::move(config), std::move(lines)));
+    show(make_snapshot(std::move(config), std::move(lines)));
     if (kept_nothing && line_histories_) line_histories_->start();
-    relays_->apply(routes_of(*scene_));
-    servers_.apply(*scene_->config, scene_->plant, directory_in(scene_), shown, longest_answer());
+    relays_->apply(routes_of(*snapshot_));
+    servers_.apply(*snapshot_->config, snapshot_->plant, directory_in(snapshot_), shown,
+                   longest_answer());
 }
 
 web::Providers Gateway::providers() {
     if (!scrapes_) {
         const auto copy = [this] {
-            return [this, points = PointCopy(scene_->plant),
-                    scene = scene_](metrics::Snapshot& into) mutable {
-                return copy_figures(into, points, *scene);
+            return [this, points = PointCopy(snapshot_->plant),
+                    snapshot = snapshot_](metrics::Snapshot& into) mutable {
+                return copy_figures(into, points, *snapshot);
             };
         };
         scrapes_ = std::make_unique<Scrapes>(executor_, copy, Scrapes::Settings{});
         discoveries_ = std::make_unique<Discoveries>(
-            clock_, [this] { return Discoveries::Place{scene_->plant, scene_->config->profiles}; },
+            clock_,
+            [this] { return Discoveries::Place{snapshot_->plant, snapshot_->config->profiles}; },
             events_);
     }
     web::Providers providers;
@@ -238,20 +242,21 @@ web::Providers Gateway::providers() {
 
 void Gateway::start() {
     lag_.start();
-    for (const auto& line : scene_->lines) line->start();
+    for (const auto& line : snapshot_->lines) line->start();
     relays_->start();
     if (line_histories_) line_histories_->start();
-    const auto directory = [this] { return directory_in(scene_); };
-    servers_.open(*scene_->config, scene_->plant, {directory, [this] { return providers(); }});
-    servers_.apply(*scene_->config, scene_->plant, directory(), shown_text(*scene_->config),
-                   longest_answer());
+    const auto directory = [this] { return directory_in(snapshot_); };
+    servers_.open(*snapshot_->config, snapshot_->plant,
+                  {directory, [this] { return providers(); }});
+    servers_.apply(*snapshot_->config, snapshot_->plant, directory(),
+                   shown_text(*snapshot_->config), longest_answer());
     northbound_.start();
     ready_ = true;
 }
 
 Duration Gateway::longest_answer() const {
     Duration longest{};
-    for (const config::Line& line : scene_->config->lines)
+    for (const config::Line& line : snapshot_->config->lines)
         longest = std::max(longest, line.arbiter.queue.deadline);
     return longest;
 }
@@ -270,7 +275,7 @@ bool Gateway::drained() {
 }
 
 std::string Gateway::status() const {
-    return service_status(scene_->plant, servers_.standing(), servers_.missing());
+    return service_status(snapshot_->plant, servers_.listening(), servers_.missing());
 }
 
 void Gateway::stop() {
@@ -279,27 +284,27 @@ void Gateway::stop() {
     northbound_.stop();
     if (line_histories_) line_histories_->stop();
     relays_->stop();
-    for (const auto& line : scene_->lines) line->stop();
+    for (const auto& line : snapshot_->lines) line->stop();
 }
 
-/// One piece: a line, some points, or all the rest, which is small.
-bool Gateway::copy_figures(metrics::Snapshot& snapshot, PointCopy& points,
-                           const Scene& scene) const {
-    const std::size_t lines = snapshot.lines.size();
-    if (lines < scene.lines.size()) {
-        snapshot.lines.push_back(scene.lines[lines]->bus().report());
+/// Copies one piece of the figures: a line, some points, or all the rest, which is small.
+bool Gateway::copy_figures(metrics::Snapshot& figures, PointCopy& points,
+                           const Snapshot& snapshot) const {
+    const std::size_t lines = figures.lines.size();
+    if (lines < snapshot.lines.size()) {
+        figures.lines.push_back(snapshot.lines[lines]->bus().report());
         return true;
     }
-    if (points.next(snapshot.points, clock_.now())) return true;
-    snapshot.relays = relay_samples(relays_->status());
-    servers_.copy_figures(snapshot);
-    snapshot.mqtt = northbound_.counters();
-    if (reloads_->barred(false).empty()) snapshot.reloads = reloads_->counters();
-    snapshot.version = PANELGATE_VERSION;
-    snapshot.commit = build_commit();
-    snapshot.compiler = build_compiler();
-    snapshot.runtime.log_lines_dropped = rt::log_lines_dropped();
-    snapshot.runtime.loop_lag = lag_.seconds();
+    if (points.next(figures.points, clock_.now())) return true;
+    figures.relays = relay_samples(relays_->status());
+    servers_.copy_figures(figures);
+    figures.mqtt = northbound_.counters();
+    if (reloads_->barred(false).empty()) figures.reloads = reloads_->counters();
+    figures.version = PANELGATE_VERSION;
+    figures.commit = build_commit();
+    figures.compiler = build_compiler();
+    figures.runtime.log_lines_dropped = rt::log_lines_dropped();
+    figures.runtime.loop_lag = lag_.seconds();
     return false;
 }
 

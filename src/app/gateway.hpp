@@ -29,34 +29,34 @@ namespace panelgate::app {
 
 class Reloader;
 
-/// The composition root: what is made of a configuration, and what becomes of it when there is
-/// another one. One thread.
+/// The composition root: builds the gateway from a configuration, and changes it when a reload
+/// brings a new one. One thread.
 class Gateway {
   public:
-    /// `reloads`: who is asked by REST to read the file again; null: nobody. It outlives this.
+    /// `reloads` serves the reload requests of REST and outlives this.
     Gateway(boost::asio::any_io_executor executor, std::shared_ptr<const config::Config> config,
             bool simulate, Reloader* reloads);
     Gateway(const Gateway&) = delete;
     Gateway& operator=(const Gateway&) = delete;
 
-    /// Opens lines and listeners. Throws CannotListen when a listener cannot be opened; one whose
-    /// address is not there yet is opened later.
+    /// Opens lines and listeners. Throws CannotListen if a listener cannot be opened; one whose
+    /// address does not exist yet is opened later.
     void start();
-    /// Serves this from now on; lines, listeners, clients and points that are the same do not
-    /// notice. Throws CannotListen, or std::system_error without a pty for a simulated line; then
-    /// nothing has changed. `shown`: its text for REST. Stations that are the same panels share
-    /// their profile with those that run (config::share_profiles()).
+    /// Serves this configuration from now on; unchanged lines, listeners, clients and points are
+    /// not disturbed. Throws CannotListen, or std::system_error without a pty for a simulated line;
+    /// then nothing has changed. `shown`: its text for REST. Unchanged stations share their profile
+    /// with the running ones (config::share_profiles()).
     void apply(std::shared_ptr<const config::Config> config, web::SharedText shown);
-    const std::shared_ptr<const config::Config>& config() const { return scene_->config; }
-    /// Stops accepting; what was accepted is answered within its deadline.
+    const std::shared_ptr<const config::Config>& config() const { return snapshot_->config; }
+    /// Stops accepting; accepted requests are answered within their deadline.
     void stop_accepting();
-    /// Nothing is owed to any client any more, and the broker knows that this is the end.
+    /// True when no client's answer is outstanding and the broker knows of the end.
     bool drained();
-    /// Connections to whom something is owed, once nothing more is accepted.
-    std::size_t owing() const { return servers_.owing(); }
-    /// The longest that a request which was accepted may take to its answer.
+    /// Connections with outstanding answers, once nothing more is accepted.
+    std::size_t pending_connections() const { return servers_.pending_connections(); }
+    /// The longest time that an accepted request may take to its answer.
     Duration longest_answer() const;
-    /// In words, for who has started the program.
+    /// The status text for the service manager.
     std::string status() const;
     /// Closes everything.
     void stop();
@@ -75,30 +75,31 @@ class Gateway {
     void apply_lines(const config::Config& config, const Lines& lines);
     void rest_wires(const config::Config& config, const Lines& lines);
     void retire_lines(const Lines& lines);
-    void show(const std::shared_ptr<Scene>& scene);
+    void show(const std::shared_ptr<Snapshot>& snapshot);
     web::Providers providers();
-    bool copy_figures(metrics::Snapshot& snapshot, PointCopy& points, const Scene& scene) const;
+    bool copy_figures(metrics::Snapshot& figures, PointCopy& points,
+                      const Snapshot& snapshot) const;
 
     boost::asio::any_io_executor executor_;
     rt::AsioClock clock_;
     rt::LoopLag lag_{clock_};
     bool simulate_;
     Reloader* reloads_;
-    web::EventHub events_;  ///< buses publish to it to their end
-    /// Never null; what is there to be looked up, or shown.
-    std::shared_ptr<Scene> scene_;
+    web::EventHub events_;  ///< buses publish to it until they are destroyed
+    /// The current snapshot, never null.
+    std::shared_ptr<Snapshot> snapshot_;
     std::function<void(const std::string&, const bus::WriteEvent&)> relay_listener_;
-    /// Those of earlier configurations too, closed: whoever still knows one gets an answer, and it
-    /// is taken up again under its name. By name and mode.
-    /// Requests that were cut off may keep a scene, and so its lines, for longer than this lives.
+    /// Lines of earlier configurations too, closed: a client that still refers to one gets an
+    /// answer, and a line of the same name and mode reuses it. Requests that were cut off may keep
+    /// a snapshot, and so its lines, alive for longer than this.
     struct KnownLines {
         ~KnownLines();
         std::map<std::pair<std::string, bool>, std::shared_ptr<RunningLine>> lines;
     } known_;
-    std::unique_ptr<Discoveries> discoveries_;       ///< null until there is `http:`
+    std::unique_ptr<Discoveries> discoveries_;       ///< null until `http:` is configured
     std::unique_ptr<LineHistories> line_histories_;  ///< the same
     std::unique_ptr<points::Relays> relays_;
-    std::unique_ptr<Scrapes> scrapes_;  ///< null until there is `http:`
+    std::unique_ptr<Scrapes> scrapes_;  ///< null until `http:` is configured
     Servers servers_;
     Northbound northbound_;
     bool ready_ = false;

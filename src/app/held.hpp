@@ -12,44 +12,45 @@
 
 namespace panelgate::app {
 
-/// One setting of a configuration, or something named that has settings.
-struct Held {
-    /// The keys of the file, lists by the names of what they hold, joined by '/':
+/// One setting of a configuration, or a named entry that has settings.
+struct Setting {
+    /// The keys of the file, list entries by their names, joined by '/':
     /// "lines/floor1/stations/press/guard".
     std::string path;
-    std::string value;    ///< as the file writes it; "" of what only has settings
+    std::string value;    ///< as written in the file; "" for an entry that only has settings
     bool secret = false;  ///< never shown
-    /// The path of the setting that this one has when it says nothing itself, or "".
+    /// The path of the setting that this one inherits from if it is not given itself, or "".
     std::string otherwise = {};
 };
 
-/// All that a configuration holds, with the defaults filled in: whatever may differ between two
-/// files that mean different things is here. What a profile brings is in the profile.
-std::vector<Held> all_held(const config::Config& config);
+/// All settings of a configuration, with the defaults filled in: every difference between two files
+/// that mean different things shows here, except for the contents of profiles.
+std::vector<Setting> all_settings(const config::Config& config);
 
-/// Where settings are told: a path, and the list that they go to. Does not own the list.
-class Holder {
+/// Appends settings below a path to a list, which it does not own.
+class SettingWriter {
   public:
-    Holder(std::vector<Held>& held, std::string path) : held_(&held), path_(std::move(path)) {}
+    SettingWriter(std::vector<Setting>& settings, std::string path)
+        : settings_(&settings), path_(std::move(path)) {}
 
-    void tell(std::string_view key, std::string value) { add(key, std::move(value), ""); }
-    void tell(std::string_view key, std::string_view value) { add(key, std::string(value), ""); }
-    void tell(std::string_view key, const char* value) { add(key, value, ""); }
-    void tell(std::string_view key, bool value) { add(key, value ? "true" : "false", ""); }
-    void tell(std::string_view key, Duration value);
-    void tell(std::string_view key, std::size_t value) { add(key, std::to_string(value), ""); }
-    void tell(std::string_view key, int value) { add(key, std::to_string(value), ""); }
-    /// As what `owner` has under the same key, unless it says so itself.
-    void tell(std::string_view key, std::string value, const Holder& owner) {
+    void put(std::string_view key, std::string value) { add(key, std::move(value), ""); }
+    void put(std::string_view key, std::string_view value) { add(key, std::string(value), ""); }
+    void put(std::string_view key, const char* value) { add(key, value, ""); }
+    void put(std::string_view key, bool value) { add(key, value ? "true" : "false", ""); }
+    void put(std::string_view key, Duration value);
+    void put(std::string_view key, std::size_t value) { add(key, std::to_string(value), ""); }
+    void put(std::string_view key, int value) { add(key, std::to_string(value), ""); }
+    /// Inherited from the same key of `owner` unless given itself.
+    void put(std::string_view key, std::string value, const SettingWriter& owner) {
         add(key, std::move(value), owner.at(key));
     }
-    void tell_secret(std::string_view key, std::string value);
+    void put_secret(std::string_view key, std::string value);
 
-    /// A map of keys: a path, and nothing that could be added or removed.
-    Holder below(std::string_view key) const { return {*held_, at(key)}; }
-    /// Something that may be there or not, such as one of a list: told as there.
-    Holder item(std::string_view key) const;
-    Holder item(std::string_view list, std::string_view name) const {
+    /// A writer for a map of keys; the map itself is no setting.
+    SettingWriter below(std::string_view key) const { return {*settings_, at(key)}; }
+    /// A writer for an entry that may exist or not, such as one of a list; adds the entry itself.
+    SettingWriter item(std::string_view key) const;
+    SettingWriter item(std::string_view list, std::string_view name) const {
         return below(list).item(name);
     }
 
@@ -58,14 +59,14 @@ class Holder {
         return path_.empty() ? std::string(key) : path_ + '/' + std::string(key);
     }
     void add(std::string_view key, std::string value, std::string otherwise) {
-        held_->push_back({at(key), std::move(value), false, std::move(otherwise)});
+        settings_->push_back({at(key), std::move(value), false, std::move(otherwise)});
     }
 
-    std::vector<Held>* held_;
+    std::vector<Setting>* settings_;
     std::string path_;
 };
 
-/// What has no name of its own, by what it is known by: the second of those is "NAME (2)".
+/// Unique names for entries without a name of their own: the second one is "NAME (2)".
 class Distinct {
   public:
     std::string name(const std::string& known_by);
@@ -74,9 +75,9 @@ class Distinct {
     std::map<std::string, int> seen_;
 };
 
-/// The parts of all_held().
-void hold_line(const Holder& top, const config::Line& line);
-void hold_port(Holder& port, const line::Settings& settings);
-void hold_servers(const Holder& top, const config::Config& config);
+/// The parts of all_settings().
+void add_settings_of_line(const SettingWriter& top, const config::Line& line);
+void add_settings_of_port(SettingWriter& port, const line::Settings& settings);
+void add_settings_of_servers(const SettingWriter& top, const config::Config& config);
 
 }  // namespace panelgate::app

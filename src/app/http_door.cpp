@@ -50,7 +50,7 @@ std::vector<std::string_view> lines_of(std::string_view text) {
     return lines;
 }
 
-/// What stands behind a key, without quotes.
+/// The value after a key, without quotes.
 std::string value_in(std::string_view text) {
     text = trimmed(text);
     const bool quoted = text.starts_with('"') || text.starts_with('\'');
@@ -59,7 +59,7 @@ std::string value_in(std::string_view text) {
     return std::string(text.substr(0, text.find_first_of(ends)));
 }
 
-/// `listen:` directly inside the outermost braces of a line.
+/// The value of `listen:` directly inside the outermost braces of a line.
 std::optional<std::string> in_braces(std::string_view line) {
     int depth = 0;
     for (std::size_t at = 0; at < line.size(); ++at) {
@@ -72,7 +72,7 @@ std::optional<std::string> in_braces(std::string_view line) {
     return std::nullopt;
 }
 
-/// `listen:` as far to the right as the first key of the block.
+/// The value of `listen:` with the indentation of the block's first key.
 std::optional<std::string> in_block(const std::vector<std::string_view>& lines, std::size_t first) {
     std::optional<std::size_t> indent;
     for (std::size_t i = first; i < lines.size(); ++i) {
@@ -108,11 +108,12 @@ config::Endpoint usual() {
     return {settings.address, settings.port};
 }
 
-std::variant<config::Endpoint, NoDoor> no_door(const std::string& why, ExitCode code = kNotReady) {
-    return NoDoor{why + "; --http ADDR:PORT says where", code};
+std::variant<config::Endpoint, NoHttpEndpoint> no_http_endpoint(const std::string& why,
+                                                                ExitCode code = kNotReady) {
+    return NoHttpEndpoint{why + "; --http ADDR:PORT says where", code};
 }
 
-/// What is typed behind http's `listen`: nothing where there is no http, "" where it has none.
+/// The value of http's `listen`: nothing if there is no http, "" if http has none.
 std::optional<std::string> listen_in(const std::string& file, const std::string& text) {
     yaml::Problems faults(file);
     const yaml::Node tree = yaml::parse(text, faults);
@@ -126,41 +127,43 @@ std::optional<std::string> listen_in(const std::string& file, const std::string&
     return std::nullopt;
 }
 
-/// Of a file with faults: nobody is asked by a guess, as it may be somebody else.
-std::variant<config::Endpoint, NoDoor> door_beside_faults(const std::string& file) {
+/// The endpoint from a file with faults. No endpoint is guessed: it might be another program's.
+std::variant<config::Endpoint, NoHttpEndpoint> endpoint_despite_faults(const std::string& file) {
     const auto text = config::RealFiles::read_any(path_of(file));
     if (!text && file == kDefaultConfig) return usual();  // `panelgate demo` has none
-    if (!text) return no_door("cannot read " + file, kNoInput);
+    if (!text) return no_http_endpoint("cannot read " + file, kNoInput);
     const std::optional<std::string> listen = listen_in(file, *text);
-    const auto door = config::parse_endpoint(listen.value_or(""));
-    if (door && door->port != 0) return *door;
-    return no_door(
+    const auto found = config::parse_endpoint(listen.value_or(""));
+    if (found && found->port != 0) return *found;
+    return no_http_endpoint(
         file + " has faults (`panelgate check` names them) and does not say where http listens",
         kBadConfig);
 }
 
-std::variant<config::Endpoint, NoDoor> door_of(const std::string& file) {
+std::variant<config::Endpoint, NoHttpEndpoint> endpoint_of(const std::string& file) {
     const std::optional<config::Config> config = read_quietly(file);
-    if (!config) return door_beside_faults(file);
+    if (!config) return endpoint_despite_faults(file);
     if (config->http && config->http->port != 0)
         return config::Endpoint{config->http->address, config->http->port};
-    return no_door(file + (config->http ? " lets http listen on any free port"
-                                        : " has no http, so nobody can be asked"));
+    return no_http_endpoint(file + (config->http ? " lets http listen on any free port"
+                                                 : " has no http, so nobody can be asked"));
 }
 
 }  // namespace
 
-std::variant<config::Endpoint, NoDoor> http_door(const std::string& file, const std::string& http) {
-    auto door = door_of(file);
+std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
+                                                             const std::string& http) {
+    auto found = endpoint_of(file);
     if (!http.empty()) {
         const auto asked = config::parse_endpoint(http);
         if (!asked || asked->port == 0)
-            return NoDoor{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080", kUsage};
-        door = *asked;
+            return NoHttpEndpoint{"--http '" + http + "' is not ADDR:PORT, such as 127.0.0.1:8080",
+                                  kUsage};
+        found = *asked;
     }
-    if (auto* endpoint = std::get_if<config::Endpoint>(&door))
+    if (auto* endpoint = std::get_if<config::Endpoint>(&found))
         endpoint->address = config::reachable(endpoint->address);
-    return door;
+    return found;
 }
 
 namespace {
@@ -168,26 +171,26 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-constexpr std::size_t kShown = 200;  // bytes of a line that is told
+constexpr std::size_t kShown = 200;  // bytes of a line that is shown
 constexpr std::string_view kEndOfHead = "\r\n\r\n";
 
 class Question {
   public:
     Question(const std::string& request, std::size_t most,
-             const std::function<bool(const Said&)>& enough)
+             const std::function<bool(const HttpReply&)>& enough)
         : request_(request), most_(most), enough_(enough) {}
 
-    Said put(const asio::ip::tcp::endpoint& target, Duration patience) {
+    HttpReply put(const asio::ip::tcp::endpoint& target, Duration patience) {
         socket_.async_connect(target, [this](const error_code& error) {
             if (error) return end(error);
-            say();
+            send_request();
         });
         io_.run_for(patience);
-        return said_;
+        return reply_;
     }
 
   private:
-    void say() {
+    void send_request() {
         asio::async_write(socket_, asio::buffer(request_),
                           [this](const error_code& error, std::size_t) {
                               if (error) return end(error);
@@ -197,20 +200,20 @@ class Question {
     void listen() {
         socket_.async_read_some(asio::buffer(buffer_),
                                 [this](const error_code& error, std::size_t size) {
-                                    said_.text.append(buffer_, size);
+                                    reply_.text.append(buffer_, size);
                                     if (error) return end(error);
-                                    if (!enough_(said_) && said_.text.size() < most_) listen();
+                                    if (!enough_(reply_) && reply_.text.size() < most_) listen();
                                 });
     }
-    void end(const error_code& error) { said_.error = error; }
+    void end(const error_code& error) { reply_.error = error; }
 
     const std::string& request_;
     std::size_t most_;
-    const std::function<bool(const Said&)>& enough_;
+    const std::function<bool(const HttpReply&)>& enough_;
     asio::io_context io_{1};
     asio::ip::tcp::socket socket_{io_};
     char buffer_[4096]{};
-    Said said_;
+    HttpReply reply_;
 };
 
 }  // namespace
@@ -223,37 +226,38 @@ std::string first_line(std::string_view text) {
     return shown;
 }
 
-std::string Said::status() const {
+std::string HttpReply::status() const {
     const std::string line = first_line(text);
     return line.substr(std::min(line.find(' ') + 1, line.size()));
 }
 
-std::string_view Said::body() const {
+std::string_view HttpReply::body() const {
     const std::size_t head = text.find(kEndOfHead);
     if (head == std::string::npos) return {};
     return std::string_view(text).substr(head + kEndOfHead.size());
 }
 
-/// Who may not connect is shut out in either way.
-std::string Said::silence() const {
+/// A server refuses a client either by closing or by resetting the connection.
+std::string HttpReply::failure() const {
     if (!error) return "no answer in time";
     const bool shut_out = error == asio::error::eof || error == asio::error::connection_reset;
     if (!shut_out) return error.message();
     return "closed without an answer (does its `allow` let this machine in?)";
 }
 
-Said ask(const std::string& address, std::uint16_t port, const std::string& request,
-         Duration patience, std::size_t most, const std::function<bool(const Said&)>& enough) {
+HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
+              Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough) {
     return Question(request, most, enough).put({asio::ip::make_address(address), port}, patience);
 }
 
 namespace {
 
-constexpr std::size_t kMost = 4096;  // bytes of the answer
+constexpr std::size_t kMost = 4096;  // maximum bytes of the answer
 
-bool is_ready(const Said& said) {
-    const bool whole = said.text.find("\r\n") != std::string::npos;
-    return whole && said.is_http() && (said.status() + ' ').starts_with("200 ");
+bool is_ready(const HttpReply& reply) {
+    const bool whole = reply.text.find("\r\n") != std::string::npos;
+    return whole && reply.is_http() && (reply.status() + ' ').starts_with("200 ");
 }
 
 }  // namespace
@@ -261,12 +265,12 @@ bool is_ready(const Said& said) {
 std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience) {
     const std::string request = "GET /readyz HTTP/1.1\r\nHost: " + endpoint_text(address, port) +
                                 "\r\nConnection: close\r\n\r\n";
-    const Said said = ask(address, port, request, patience, kMost, is_ready);
-    if (is_ready(said)) return {};
-    if (said.text.empty()) return said.silence();
-    if (!said.is_http()) return "an answer that is no HTTP: " + first_line(said.text);
-    const std::string why = first_line(said.body());
-    return said.status() + (why.empty() ? "" : ": " + why);
+    const HttpReply reply = ask(address, port, request, patience, kMost, is_ready);
+    if (is_ready(reply)) return {};
+    if (reply.text.empty()) return reply.failure();
+    if (!reply.is_http()) return "an answer that is no HTTP: " + first_line(reply.text);
+    const std::string why = first_line(reply.body());
+    return reply.status() + (why.empty() ? "" : ": " + why);
 }
 
 }  // namespace panelgate::app

@@ -14,45 +14,46 @@
 
 namespace panelgate::app {
 
-/// What stands behind `listen:` of the top-level `http:` in a text that is no YAML, as somebody is
-/// about to change it; "" where none is found, or more than one. By its lines: braces over several
-/// lines, anchors and the like are not understood. Pure.
+/// The value of `listen:` of the top-level `http:` in a text that is not valid YAML, such as a file
+/// being edited; "" if it is found not once. Works line by line: braces over several lines, anchors
+/// and the like are not understood. Pure.
 std::string http_listen_in(std::string_view text);
 
-/// Why nobody can know where a gateway listens.
-struct NoDoor {
+/// Why the HTTP endpoint of a gateway is unknown.
+struct NoHttpEndpoint {
     std::string why;
-    ExitCode code;  ///< kUsage: of the command line; kNoInput, kBadConfig, kNotReady
+    ExitCode code;  ///< kUsage: wrong command line; else kNoInput, kBadConfig, kNotReady
 };
-/// Where the gateway's HTTP listens, its address one that can be connected to: `http` (ADDR:PORT),
-/// or, when that is "", what the file says, faults or not. Without the usual file the default: what
-/// runs without one listens there.
-std::variant<config::Endpoint, NoDoor> http_door(const std::string& file, const std::string& http);
+/// The HTTP endpoint of the gateway, with an address that can be connected to: `http` (ADDR:PORT),
+/// or, if that is "", the one in the file, even if the file has faults. If the default file does
+/// not exist, the default endpoint, which `panelgate demo` uses.
+std::variant<config::Endpoint, NoHttpEndpoint> http_endpoint(const std::string& file,
+                                                             const std::string& http);
 
-/// What came of a question to a gateway that runs: as it came, HTTP with its head.
-struct Said {
+/// A gateway's reply to an HTTP request: the raw text including its head.
+struct HttpReply {
     std::string text;
-    boost::system::error_code error;  ///< why nothing more came; nothing, too, when time was over
+    boost::system::error_code error;  ///< why reading ended; no error also after a timeout
 
     bool is_http() const { return text.starts_with("HTTP/1."); }
-    /// "200 OK" of the status line (RFC 9112, 4); fit for a terminal.
+    /// "200 OK" of the status line (RFC 9112, 4); safe for a terminal.
     std::string status() const;
-    /// What stands behind the head; nothing before that is whole.
+    /// The body; empty before the head is complete.
     std::string_view body() const;
-    /// Why nothing at all came, in words.
-    std::string silence() const;
+    /// Why there was no reply at all, in words.
+    std::string failure() const;
 };
-/// The first line of `text`, fit for a terminal.
+/// The first line of `text`, safe for a terminal.
 std::string first_line(std::string_view text);
 
-/// Sends a request over a connection of its own and listens until `enough`, `most` bytes, the end
-/// of the connection, or for `patience`. `address`: an IP address, without brackets.
-Said ask(const std::string& address, std::uint16_t port, const std::string& request,
-         Duration patience, std::size_t most, const std::function<bool(const Said&)>& enough);
+/// Sends a request over a new connection and reads until `enough`, `most` bytes, the end of the
+/// connection, or `patience` is over. `address`: an IP address without brackets.
+HttpReply ask(const std::string& address, std::uint16_t port, const std::string& request,
+              Duration patience, std::size_t most,
+              const std::function<bool(const HttpReply&)>& enough);
 
-/// Asks http://ADDR:PORT/readyz and waits for at most `patience`. Empty when the answer is 200;
-/// else what came instead, in one line of printable words. `address`: an IP address, without
-/// brackets.
+/// Requests http://ADDR:PORT/readyz and waits for at most `patience`. Empty if the answer is 200;
+/// else the answer or the error in one printable line. `address`: an IP address without brackets.
 std::string ask_whether_ready(const std::string& address, std::uint16_t port, Duration patience);
 
 }  // namespace panelgate::app

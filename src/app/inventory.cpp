@@ -28,7 +28,7 @@ std::int64_t milliseconds(Duration duration) {
 
 std::string_view access(bool read_only) { return read_only ? "read_only" : "read_write"; }
 
-/// An array of what `make` makes of each.
+/// An array of `make` applied to each element.
 template <class List, class Make>
 json::array each(const List& list, const Make& make) {
     json::array made;
@@ -233,7 +233,7 @@ std::string text_of(const config::Station& station, const arbiter::StationSettin
     return text;
 }
 
-/// What a client's own timeout has to be, and what would suit those that have a short one.
+/// The timeout that clients need, and settings that would suit clients with a short one.
 std::string clients_of(const config::Line& line) {
     const config::ClientTimeout client = config::client_timeout(line);
     const std::string worst = format_duration(client.worst);

@@ -7,10 +7,10 @@
 
 namespace panelgate::app {
 
-/// All that a configuration holds, so that whoever checks it sees what got lost: lines, stations,
-/// their points and polls, relays, unit ids, who may read and write, and where it listens.
+/// Describes all of a configuration, so that a user notices what is missing: lines, stations, their
+/// points and polls, relays, unit ids, access rights and listeners.
 std::string inventory_text(const config::Config& config);
-/// The same as members: lines (with their stations and polls), relays, modbus_tcp, http.
+/// The same as JSON: lines (with their stations and polls), relays, modbus_tcp, http.
 boost::json::object inventory_json(const config::Config& config);
 
 }  // namespace panelgate::app

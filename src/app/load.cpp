@@ -54,7 +54,7 @@ Loaded read_text(std::string_view text, const std::string& name) {
     if (!loaded.config) {
         loaded.code = kBadConfig;
         loaded.problems = problems.list();
-        loaded.told = problems.text();
+        loaded.error_text = problems.text();
     }
     return loaded;
 }
@@ -67,13 +67,13 @@ Loaded load_file(const std::string& typed, const std::string& option) {
                   << loaded.problems.front().message.substr(kCannotRead.size())
                   << " (give another file with " << option << ")\n";
     }
-    std::cerr << loaded.told;
+    std::cerr << loaded.error_text;
     return loaded;
 }
 
 Loaded load_text(std::string_view text, const std::string& name) {
     Loaded loaded = read_text(text, name);
-    std::cerr << loaded.told;
+    std::cerr << loaded.error_text;
     return loaded;
 }
 

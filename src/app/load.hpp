@@ -12,34 +12,34 @@
 
 namespace panelgate::app {
 
-/// The shipped profiles, and those of --profiles DIR when it is not empty; nothing, and told, when
-/// something is wrong there.
+/// The shipped profiles, and those of --profiles DIR if it is not empty; nothing, with a message on
+/// stderr, if they have faults.
 std::optional<profile::Catalogue> load_catalogue(const std::string& dir);
 
-/// A configuration, or the exit code to end with; then stderr has said why.
+/// A configuration, or the exit code and what is wrong.
 struct Loaded {
     std::optional<config::Config> config;
     ExitCode code = kFine;
-    /// What is wrong, when there is no configuration; of a file that cannot be read without a place
-    /// (line 0).
+    /// What is wrong if there is no configuration; a file that cannot be read has no position (line
+    /// 0).
     std::vector<yaml::Problem> problems;
-    std::string told;  ///< the same for stderr; not of a file that cannot be read
+    std::string error_text;  ///< the same as text for stderr; empty for an unreadable file
 };
 
-/// What is read: `-` is standard input.
+/// The path to read; `-` is standard input.
 std::string path_of(const std::string& typed);
-/// Checks a text, and tells nobody but whoever calls.
+/// Parses and checks a text without printing anything.
 Loaded read_text(std::string_view text, const std::string& name);
-/// Reads and checks a file, and tells nobody but whoever calls.
+/// Reads and checks a file without printing anything.
 Loaded read_file(const std::string& path);
-/// Reads and checks a file, `-` for standard input. Its warnings are told by whoever uses it.
-/// `option`: who named it, and may name another one.
+/// Reads and checks a file (`-`: standard input) and prints its faults; the caller prints the
+/// warnings. `option`: the option that named the file, for the message.
 Loaded load_file(const std::string& typed, const std::string& option = "-c");
-/// The same for text; `name` stands in messages.
+/// The same for a text; `name` is used in messages.
 Loaded load_text(std::string_view text, const std::string& name);
-/// What a file holds; nothing, and nothing told, when it cannot be read or has faults.
+/// The configuration in a file; nothing, without a message, if it cannot be read or has faults.
 std::optional<config::Config> read_quietly(const std::string& typed);
-/// To stderr, a line each: of commands that keep no log.
+/// Prints the warnings to stderr, one line each, for commands without a log.
 void print_warnings(const config::Config& config);
 
 }  // namespace panelgate::app

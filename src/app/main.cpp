@@ -18,8 +18,8 @@
 
 namespace panelgate::app {
 
-/// What is wrong with a command line that CLI11 refuses, in our words: "--format must be text or
-/// json, not 'xml'". Without the command's name and without an end.
+/// Rewords a CLI11 error: "--format must be text or json, not 'xml'". Without the command's name
+/// and without a full stop.
 std::string usage_fault(const CLI::ParseError& error);
 
 namespace {
@@ -37,30 +37,30 @@ std::string choices(std::string_view list) {
 }
 
 /// "--format: xml not in {text,json}"
-std::string wrong_choice(const std::string& told, const std::string& option) {
+std::string wrong_choice(const std::string& text, const std::string& option) {
     constexpr std::string_view kBetween = " not in {";
-    const std::size_t between = told.find(kBetween);
+    const std::size_t between = text.find(kBetween);
     const std::size_t value = option.size() + 2;
-    if (between == told.npos || !told.ends_with('}') || value > between) return told;
+    if (between == text.npos || !text.ends_with('}') || value > between) return text;
     const std::size_t list = between + kBetween.size();
     return option + " must be " +
-           choices(std::string_view(told).substr(list, told.size() - list - 1)) + ", not '" +
-           told.substr(value, between - value) + '\'';
+           choices(std::string_view(text).substr(list, text.size() - list - 1)) + ", not '" +
+           text.substr(value, between - value) + '\'';
 }
 
 }  // namespace
 
 std::string usage_fault(const CLI::ParseError& error) {
-    const std::string told = error.what();
+    const std::string text = error.what();
     const std::string kind = error.get_name();
-    const std::string option = told.substr(0, told.find(':'));  // or the whole text
-    if (kind == "RequiredError") return told.substr(0, told.find(" is required")) + " is missing";
+    const std::string option = text.substr(0, text.find(':'));  // or the whole text
+    if (kind == "RequiredError") return text.substr(0, text.find(" is required")) + " is missing";
     if (kind == "ArgumentMismatch")
-        return option + (told.find("At Most") != told.npos ? " may be given once"
+        return option + (text.find("At Most") != text.npos ? " may be given once"
                                                            : " needs a value behind it");
     if (kind == "ConversionError") return "an option that takes no value was given one";
-    if (kind == "RequiresError") return told;  // "--weaker requires --rollback"
-    if (kind == "ValidationError") return wrong_choice(told, option);
+    if (kind == "RequiresError") return text;  // "--weaker requires --rollback"
+    if (kind == "ValidationError") return wrong_choice(text, option);
     const int extras =
         static_cast<int>(CLI::ExitCodes::ExtrasError);  // its kind is the command's name
     if (error.get_exit_code() == extras) return "nothing is to stand behind '--'";
@@ -77,7 +77,7 @@ using namespace panelgate::app;
 constexpr const char* kAbout =
     "panelgate: a Modbus RTU-to-TCP gateway for operator panels on RS-485 lines";
 
-/// The command line; the command that is asked for runs while it is parsed.
+/// The command line; parsing it runs the command.
 class CommandLine {
   public:
     CommandLine() {
@@ -112,7 +112,7 @@ class CommandLine {
             return which_command("a command is missing before '" + words[0] + '\'');
         const std::string command = words[0];
         try {
-            std::ranges::reverse(words);  // as CLI11 takes them
+            std::ranges::reverse(words);  // the order that CLI11 expects
             cli_.parse(std::move(words));
         } catch (const CLI::ParseError& error) {
             if (error.get_exit_code() != static_cast<int>(CLI::ExitCodes::Success))
@@ -150,7 +150,7 @@ class CommandLine {
         return kUsage;
     }
 
-    /// What `command` did not understand, the first of it.
+    /// Reports the first argument that `command` did not understand.
     static ExitCode unexpected(const CLI::App& command) {
         std::vector<std::string> left = command.remaining();
         const auto first = std::ranges::find_if(
@@ -252,7 +252,7 @@ class CommandLine {
         command->callback([this] { code_ = simulate(file_, links_, http_); });
     }
 
-    /// What `scan` and `init` look for.
+    /// The options that `scan` and `init` share.
     void add_search(CLI::App* command) {
         command->add_option("DEVICE", scan_.device, "a serial device, or tcp://HOST:PORT")
             ->required();
@@ -375,12 +375,13 @@ class CommandLine {
     std::string profiles_dir_;
 };
 
-/// Of those three, what was closed is opened again as what can be neither read nor written: else a
-/// socket would get its number, and our texts.
+/// Reopens closed standard descriptors on /dev/null, in the direction that still makes their use
+/// fail: otherwise a socket would get their number, and our output.
 void keep_standard_descriptors() {
     for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
         if (::fcntl(fd, F_GETFD) >= 0) continue;
-        ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);  // the lowest that is free
+        ::open("/dev/null",
+               fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);  // gets the lowest free number
     }
 }
 

@@ -15,9 +15,9 @@ namespace panelgate::app {
 namespace json = boost::json;
 namespace {
 
-constexpr std::size_t kSwept = 500;  ///< subjects a look: well below a millisecond
+constexpr std::size_t kSwept = 500;  ///< subjects per turn: well below a millisecond
 constexpr Duration kSweep = 1s;
-constexpr Duration kRebirth = 1s;  ///< from one to the next: hosts may ask as often as they like
+constexpr Duration kRebirth = 1s;  ///< minimum interval: hosts may ask as often as they like
 constexpr const char* kName = "mqtt";
 
 mqtt::Settings completed(mqtt::Settings settings) {
@@ -44,40 +44,40 @@ mqtt::Subjects subjects_of(const Plant& plant) {
 
 }  // namespace
 
-/// A write that has gone to its bus.
+/// A write that was passed to its bus.
 struct BrokerSession::Order {
     std::string station;
     std::string point;
-    std::string topic;  ///< that it came by
+    std::string topic;  ///< the topic of the command
     std::string id;
     profile::ProfileRef profile;
     web::PointOrder order;
 };
 
 BrokerSession::BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                             std::shared_ptr<const Scene> scene)
+                             std::shared_ptr<const Snapshot> snapshot)
     : clock_(clock),
-      settings_(completed(*scene->config->mqtt)),
-      publisher_(settings_, subjects_of(scene->plant)),
+      settings_(completed(*snapshot->config->mqtt)),
+      publisher_(settings_, subjects_of(snapshot->plant)),
       alarm_(clock.make_alarm()),
       rebirth_alarm_(clock.make_alarm()),
       writes_(std::make_shared<Writes>(Writes{this, bus::next_client_id()})),
       client_(std::move(executor), clock, settings_, publisher_,
               [this](const mqtt::Command& command) { on_command(command); }) {
-    show(std::move(scene));
+    show(std::move(snapshot));
 }
 
-bool BrokerSession::fits(const Scene& scene) const {
-    const auto& mqtt = scene.config->mqtt;
+bool BrokerSession::fits(const Snapshot& snapshot) const {
+    const auto& mqtt = snapshot.config->mqtt;
     return mqtt && completed(*mqtt) == settings_ &&
-           subjects_of(scene.plant) == publisher_.subjects();
+           subjects_of(snapshot.plant) == publisher_.subjects();
 }
 
-void BrokerSession::show(std::shared_ptr<const Scene> scene) {
-    scene_ = std::move(scene);
+void BrokerSession::show(std::shared_ptr<const Snapshot> snapshot) {
+    snapshot_ = std::move(snapshot);
     first_points_.clear();
-    places_.assign(scene_->plant.lines().size(), {});
-    for (const Station& station : scene_->plant.stations()) {
+    places_.assign(snapshot_->plant.lines().size(), {});
+    for (const Station& station : snapshot_->plant.stations()) {
         places_.push_back({&station, nullptr});
         if (!station.points) continue;
         first_points_[&station] = places_.size();
@@ -89,7 +89,8 @@ void BrokerSession::show(std::shared_ptr<const Scene> scene) {
 void BrokerSession::take_over(BrokerSession& before) {
     publisher_.take_over(before.publisher_);
     counters_ = before.counters();
-    if (settings_.broker() != before.settings_.broker()) return;  // who has asked is not here
+    if (settings_.broker() != before.settings_.broker())
+        return;  // the clients of those writes are at the other broker
     writes_ = std::move(before.writes_);
     writes_->session = this;
 }
@@ -130,7 +131,7 @@ mqtt::State BrokerSession::state_of(const Station& station, const points::Point&
     return state;
 }
 
-/// Nothing of lines: they tell of themselves (on_bus_event()).
+/// The current state of a subject; nothing for lines, which report by on_bus_event().
 std::optional<mqtt::State> BrokerSession::seen(std::size_t subject) const {
     const Place& place = places_[subject];
     if (place.station == nullptr) return std::nullopt;
@@ -147,7 +148,7 @@ void BrokerSession::look(std::size_t subject) {
     if (auto state = seen(subject)) offer(subject, std::move(*state));
 }
 
-/// What becomes stale or bad by time alone, a part of the plant at a time.
+/// Publishes what becomes stale or bad by time alone, a part of the plant per turn.
 void BrokerSession::sweep() {
     const std::size_t pieces = (places_.size() + kSwept - 1) / kSwept;
     for (std::size_t i = 0; i < kSwept && i < places_.size(); ++i) {
@@ -230,7 +231,7 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
     const profile::ProfileRef profile = station.configured->profile;
     auto order = web::order_of(*station.bus, station.id, *profile, *place.point, command.value);
     if (!order) {
-        publisher_.repeat(command.point);  // for who has none of our words
+        publisher_.repeat(command.point);  // for clients that ignore our answers
         return refuse(topic, command.id, order.error());
     }
     bus::Request request = order->request;
@@ -249,13 +250,14 @@ void BrokerSession::write(const mqtt::WriteCommand& command) {
 }
 
 void BrokerSession::finish(const Order& order, const bus::Answer& answer) {
-    const auto told = web::told(order.order, answer, *order.profile);
+    const auto result = web::write_result(order.order, answer, *order.profile);
     const auto point = publisher_.subjects().find_point(order.station, order.point);
-    if (!told && point) publisher_.repeat(*point);
-    if (!told && answer.refusal) return refuse(order.topic, order.id, told.error());
-    ++(told ? counters_.writes_ok : counters_.writes_failed);
-    json::object body{{"ok", static_cast<bool>(told)}};
-    for (const auto& [name, value] : told ? *told : web::json_of(told.error())) body[name] = value;
+    if (!result && point) publisher_.repeat(*point);
+    if (!result && answer.refusal) return refuse(order.topic, order.id, result.error());
+    ++(result ? counters_.writes_ok : counters_.writes_failed);
+    json::object body{{"ok", static_cast<bool>(result)}};
+    for (const auto& [name, value] : result ? *result : web::json_of(result.error()))
+        body[name] = value;
     publisher_.answer({order.topic, order.id, web::json_text(body)}, false);
     client_.wake();
 }
@@ -275,10 +277,10 @@ mqtt::Counters BrokerSession::counters() const {
 Northbound::Northbound(boost::asio::any_io_executor executor, rt::Clock& clock)
     : executor_(std::move(executor)), clock_(clock) {}
 
-void Northbound::show(const std::shared_ptr<const Scene>& scene) {
-    if (session_ && session_->fits(*scene)) return session_->show(scene);
+void Northbound::show(const std::shared_ptr<const Snapshot>& snapshot) {
+    if (session_ && session_->fits(*snapshot)) return session_->show(snapshot);
     std::unique_ptr<BrokerSession> next;
-    if (scene->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, scene);
+    if (snapshot->config->mqtt) next = std::make_unique<BrokerSession>(executor_, clock_, snapshot);
     if (session_ && next) next->take_over(*session_);
     leave();
     session_ = std::move(next);

@@ -21,43 +21,44 @@
 
 namespace panelgate::app {
 
-/// A plant at an MQTT broker: its points and the states of its stations and lines, and writes of
-/// points that come back. The clock outlives it. One thread.
+/// A plant's session at an MQTT broker: publishes its points and the states of its stations and
+/// lines, and carries out writes of points. The clock outlives it. One thread.
 class BrokerSession {
   public:
-    /// Of a scene that has `mqtt:`.
+    /// `snapshot` must have `mqtt:`.
     BrokerSession(boost::asio::any_io_executor executor, rt::Clock& clock,
-                  std::shared_ptr<const Scene> scene);
+                  std::shared_ptr<const Snapshot> snapshot);
 
-    /// This one says the same of the same: show() will do.
-    bool fits(const Scene& scene) const;
-    /// What it tells of is looked up in this scene from now on; fits(scene).
-    void show(std::shared_ptr<const Scene> scene);
-    /// Before start(): tells what another one, which is stopped next, has not told any more. At the
-    /// same broker its writes are this one's from now on.
+    /// True if this session can serve the snapshot unchanged: show() is enough.
+    bool fits(const Snapshot& snapshot) const;
+    /// Uses this snapshot from now on; fits(*snapshot) must be true.
+    void show(std::shared_ptr<const Snapshot> snapshot);
+    /// Before start(): takes over what another session, which is stopped next, has not published
+    /// yet. At the same broker this session answers its outstanding writes, too.
     void take_over(BrokerSession& before);
 
     void start();
-    /// What is given keeps the connection until the broker has heard of it; null: there is none.
+    /// Ends the session. The returned object keeps the connection until the broker has got the last
+    /// message; null: there is none.
     std::unique_ptr<mqtt::Leaving> stop();
 
-    /// Of the gateway's lines: what has happened.
+    /// Publishes what has happened on a line.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
-    /// What has become of these wants of a station's polls.
+    /// Publishes the points among these wants of a station's polls.
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
     mqtt::Counters counters() const;
 
   private:
-    /// Where what a subject tells is found.
+    /// The source of a subject's state.
     struct Place {
         const Station* station = nullptr;  ///< null: a line
         const points::Point* point = nullptr;
     };
     struct Order;
-    /// Those under way. Passed on from session to session, for answers that come later.
+    /// The running writes. Passed from session to session, for answers that come later.
     struct Writes {
-        BrokerSession* session;  ///< that is told what becomes of them
+        BrokerSession* session;  ///< that gets their results
         bus::ClientId client;
         std::size_t open = 0;
     };
@@ -74,37 +75,37 @@ class BrokerSession {
     void finish(const Order& order, const bus::Answer& answer);
 
     rt::Clock& clock_;
-    std::shared_ptr<const Scene> scene_;  ///< where the places are
+    std::shared_ptr<const Snapshot> snapshot_;  ///< what the places refer to
     mqtt::Settings settings_;
     std::vector<Place> places_;  ///< by subject
-    /// The first of a station's points; they follow each other.
+    /// The index of a station's first point; its points are consecutive.
     std::map<const Station*, std::size_t> first_points_;
     mqtt::Publisher publisher_;
     std::unique_ptr<rt::Alarm> alarm_;  ///< of the sweep
     std::size_t swept_ = 0;
-    std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the one that others have joined
-    TimePoint next_rebirth_{};                  ///< not before
+    std::unique_ptr<rt::Alarm> rebirth_alarm_;  ///< of the pending rebirth
+    TimePoint next_rebirth_{};                  ///< earliest time of the next rebirth
     bool rebirth_waits_ = false;
-    mqtt::Counters counters_;         ///< of writes, and of sessions before
-    std::shared_ptr<Writes> writes_;  ///< null once they are another's
+    mqtt::Counters counters_;         ///< of writes, and of earlier sessions
+    std::shared_ptr<Writes> writes_;  ///< null once another session has taken them over
     mqtt::Client client_;
 };
 
-/// What is served at the plant's broker, through all reloads. The clock outlives it. One thread.
+/// The plant's MQTT service, across all reloads. The clock outlives it. One thread.
 class Northbound {
   public:
     Northbound(boost::asio::any_io_executor executor, rt::Clock& clock);
 
-    /// From now on this; without `mqtt:` nothing. Where broker, points and stations are the same,
-    /// the connection stays; else it is made anew, and what waited is kept.
-    void show(const std::shared_ptr<const Scene>& scene);
+    /// Serves this snapshot from now on; without `mqtt:` nothing. If broker, points and stations
+    /// are the same, the connection stays; else it is made anew, and queued messages are kept.
+    void show(const std::shared_ptr<const Snapshot>& snapshot);
     void start();
-    /// Says the last word. Harmless when it was said.
+    /// Sends the last message. No effect if it was sent already.
     void stop();
-    /// The broker has heard that last word, or it is not waited for any more.
+    /// True if the broker has got the last message, or it is not waited for any more.
     bool left() const { return !leaving_ || leaving_->done(); }
 
-    /// Of the lines of the scene.
+    /// Reports an event of a line of the snapshot.
     void on_bus_event(const std::string& line, const bus::BusEvent& event);
     void on_points(const Station& station, const std::vector<std::size_t>& wants);
 
@@ -117,7 +118,7 @@ class Northbound {
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     std::unique_ptr<BrokerSession> session_;  ///< null without a broker
-    std::unique_ptr<mqtt::Leaving> leaving_;  ///< of the session before, or of the last
+    std::unique_ptr<mqtt::Leaving> leaving_;  ///< of the previous or the last session
     bool running_ = false;
 };
 

@@ -6,7 +6,7 @@
 namespace panelgate::app {
 namespace {
 
-/// The first station that this is true of, or null.
+/// The first station that satisfies `wanted`, or null.
 template <class Wanted>
 const Station* first(const std::deque<Station>& stations, const Wanted& wanted) {
     const auto found = std::ranges::find_if(stations, wanted);

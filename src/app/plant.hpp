@@ -20,49 +20,49 @@ class BusClient;
 
 namespace panelgate::app {
 
-/// What a simulated line's device is called.
+/// The device name of a simulated line.
 inline constexpr const char* kSimulatedDevice = "sim";
 
 /// A line of the plant. What it refers to outlives the plant.
 struct Line {
     const config::Line* configured = nullptr;  ///< never null
-    std::string device;                        ///< as configured; kSimulatedDevice
+    std::string device;                        ///< as configured, or kSimulatedDevice
     bus::BusClient* bus = nullptr;             ///< never null
 };
 
 /// A station that the configuration lists. What it refers to outlives the plant.
 struct Station : bus::StationRef {
     const config::Station* configured = nullptr;  ///< never null
-    /// Where its panel is played; null: a real one.
+    /// The bus that simulates its panel; null for a real one.
     std::shared_ptr<sim::SimulatedBus> simulated;
-    std::optional<points::StationPoints> points;    ///< what its polls bring, when it has any
-    std::optional<points::StationHistory> history;  ///< ... and have brought; where REST is served
-    /// The id by which Modbus/TCP clients reach it: of the first listener that has one.
+    std::optional<points::StationPoints> points;    ///< the values of its polls, if it has points
+    std::optional<points::StationHistory> history;  ///< their history, if REST is served
+    /// The unit id by which Modbus/TCP clients reach it: that of the first listener that has one.
     std::optional<int> unit;
 };
 
-/// What there is: the lines and their stations. Whoever shows, copies or publishes looks them up
-/// here. Filled at load, then constant; its stations do not move.
+/// The lines and their stations, looked up by REST, /metrics, events and MQTT. Filled at load, then
+/// constant; its stations do not move.
 class Plant {
   public:
-    /// A line with all its stations. `simulated`: null for a real one.
+    /// Adds a line with all its stations. `simulated`: null for a real line.
     void add(const config::Line& line, bus::BusClient& bus,
              const std::shared_ptr<sim::SimulatedBus>& simulated);
-    /// What this listener's clients call the stations that no listener before it has reached.
+    /// Sets the unit ids of this listener for the stations that no earlier listener has reached.
     void add_units(const tcp_server::UnitMap& units);
 
-    /// By the order of the configuration.
+    /// In the order of the configuration.
     const std::deque<Line>& lines() const { return lines_; }
     const std::deque<Station>& stations() const { return stations_; }
 
     const Station* find(std::string_view name) const;
     const Station* find(std::string_view line, std::uint8_t id) const;
-    /// By Station::unit; where listeners differ, several have the same: the first of them.
+    /// Finds a station by Station::unit; if several have the same, the first one.
     const Station* find_unit(int unit) const;
-    /// Of a station that add() has brought.
+    /// The station, which add() must have added; throws std::logic_error otherwise.
     Station& at(std::string_view line, std::uint8_t id);
     std::deque<Station>& stations() { return stations_; }
-    /// Its name, or its id when it is not listed; "" for everybody (station 0).
+    /// The station's name, or its id if it is not listed; "" for a broadcast (station 0).
     std::string name_of(std::string_view line, std::uint8_t id) const;
 
     /// The lines as listeners see them.

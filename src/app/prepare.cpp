@@ -33,14 +33,14 @@ void separate_families(config::Config& config) {
         if (!config::is_ipv6(settings.address)) ports_of_four.insert(settings.port);
     if (config.http && !config::is_ipv6(config.http->address))
         ports_of_four.insert(config.http->port);
-    ports_of_four.erase(0);  // any free one: never the same
+    ports_of_four.erase(0);  // port 0: any free one, never shared
     for (tcp_server::Settings& settings : config.modbus_tcp) separate(settings, ports_of_four);
     if (config.http) separate(*config.http, ports_of_four);
 }
 
 namespace {
 
-/// `max_connections` of every listener, by the order of the configuration; the last is HTTP's.
+/// `max_connections` of every listener, in the order of the configuration; HTTP's is the last.
 std::vector<std::size_t*> maxima(config::Config& config) {
     std::vector<std::size_t*> found;
     for (tcp_server::Settings& settings : config.modbus_tcp)
@@ -67,7 +67,7 @@ std::string fit_connections(config::Config& config, std::size_t limit) {
     const std::size_t wanted =
         kOwnDescriptors +
         kDescriptorsPerLine * (config.lines.size() + config.serial_masters.size());
-    // Of few, clients have a quarter: the gateway seldom needs all that is kept back.
+    // Of few descriptors clients get a quarter: the gateway seldom needs all of its reserve.
     const std::size_t reserve = std::min(wanted, limit - limit / 4);
     std::vector<std::size_t> asked;
     for (const std::size_t* most : maxima(config)) asked.push_back(*most);
@@ -80,7 +80,7 @@ std::string fit_connections(config::Config& config, std::size_t limit) {
 
 namespace {
 
-/// Before the first one is opened.
+/// Must run before the first listener is opened.
 std::string fit_to_descriptors(config::Config& config) {
     const std::size_t limit = rt::raise_descriptor_limit();
     const std::string lowered = fit_connections(config, limit);
@@ -91,20 +91,20 @@ std::string fit_to_descriptors(config::Config& config) {
 
 }  // namespace
 
-std::vector<Notice> prepare(config::Config& config) {
+std::vector<StartMessage> prepare(config::Config& config) {
     separate_families(config);
-    std::vector<Notice> notices;
+    std::vector<StartMessage> messages;
     for (const std::string& warning : config.warnings)
-        notices.push_back({"configuration", warning});
+        messages.push_back({"configuration", warning});
     for (const Capacity& line : capacities(config)) {
         for (const std::string& warning : line.warnings)
-            notices.push_back({"planned requests", warning});
+            messages.push_back({"planned requests", warning});
         if (plan::verdict(line.plan) != plan::Verdict::fine)
-            notices.push_back({"planned load", overload_text(line)});
+            messages.push_back({"planned load", overload_text(line)});
     }
     if (std::string lowered = fit_to_descriptors(config); !lowered.empty())
-        notices.push_back({"max_connections lowered", std::move(lowered)});
-    return notices;
+        messages.push_back({"max_connections lowered", std::move(lowered)});
+    return messages;
 }
 
 web::SharedText shown_text(const config::Config& config) {

@@ -9,33 +9,33 @@
 
 namespace panelgate::app {
 
-/// A listener on "[::]:502" serves IPv4 as well, unless another one has that port on an address of
-/// IPv4: then each has its own kind.
+/// A listener on "[::]:502" serves IPv4 as well, unless another one has that port on an IPv4
+/// address: then it serves IPv6 only.
 void separate_families(config::Config& config);
 
-// What is kept back of the descriptors that this process may have, so that clients cannot take
-// those away that devices, probes and the log need.
+// Descriptors that are reserved, so that clients cannot take those that devices, probes and the log
+// need.
 
-/// The loop, the log, listeners, signals, files that are read, and connections that are told that
-/// there is no room, or that ask only whether all is well.
+/// The loop, the log, listeners, signals, files being read, connections that are refused for lack
+/// of room, and health probes.
 inline constexpr std::size_t kOwnDescriptors = 64;
-/// A device and its watch, or a connection and the one that follows it; the two ends of a simulated
-/// wire; what the look-up of a name opens.
+/// Per line: a device and its watch, or a connection and its successor; the two ends of a simulated
+/// wire; what a name look-up opens.
 inline constexpr std::size_t kDescriptorsPerLine = 8;
 
-/// Lowers `max_connections` of all listeners to what `limit` descriptors allow. What was lowered,
-/// in words; empty when nothing had to be.
+/// Lowers `max_connections` of all listeners to what `limit` descriptors allow. Returns the new
+/// limits in words; empty if nothing was lowered.
 std::string fit_connections(config::Config& config, std::size_t limit);
 
-/// Something legal that is worth a word in the log.
-struct Notice {
+/// A warning about a valid configuration, for the log.
+struct StartMessage {
     std::string event;
     std::string text;
 };
-/// Fits what was read to this machine and this process (address families, descriptors), and says
-/// what is worth a word: its own warnings, lines that are planned too full, what had to be lowered.
-std::vector<Notice> prepare(config::Config& config);
-/// As REST shows it.
+/// Adapts a configuration to this machine and this process (address families, descriptors). Returns
+/// its warnings, planned overloads and lowered limits.
+std::vector<StartMessage> prepare(config::Config& config);
+/// The configuration as shown by REST.
 web::SharedText shown_text(const config::Config& config);
 
 }  // namespace panelgate::app

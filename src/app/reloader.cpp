@@ -63,8 +63,8 @@ namespace {
 using rt::LogLevel;
 
 constexpr const char* kStopping = "the gateway is stopping";
-constexpr std::size_t kLogged = 100;   ///< changes; the verdict has all
-constexpr std::size_t kWaiting = 256;  ///< who may wait for a reload
+constexpr std::size_t kLogged = 100;   ///< changes logged; the verdict has all of them
+constexpr std::size_t kWaiting = 256;  ///< requests that may wait for a reload
 
 double unix_now() {
     return std::chrono::duration<double>(rt::wall_now().time_since_epoch()).count();
@@ -74,7 +74,7 @@ web::ReloadVerdict::Fault fault_of(const yaml::Problem& problem) {
     return {problem.file, problem.mark.line, problem.mark.column, problem.message};
 }
 
-void tell(const web::ReloadVerdict& verdict) {
+void log_verdict(const web::ReloadVerdict& verdict) {
     const std::string outcome(label(verdict.outcome));
     for (const web::ReloadVerdict::Fault& fault : verdict.faults) {
         rt::log(LogLevel::error, "configuration",
@@ -98,8 +98,8 @@ void tell(const web::ReloadVerdict& verdict) {
              {"why", verdict.why}});
 }
 
-/// Without the lines that the other one has, too: of a large plant most are the same, and to list
-/// all that they hold takes more memory than they do.
+/// The configuration without the lines that are equal in the other one: in a large plant most are,
+/// and listing all their settings takes more memory than they do.
 config::Config but_equal_lines(const config::Config& config, const config::Config& other) {
     config::Config made;
     made.profiles = config.profiles;
@@ -118,12 +118,12 @@ config::Config but_equal_lines(const config::Config& config, const config::Confi
 
 }  // namespace
 
-/// One reload. The loop fills it, then it is the worker's, then the loop's again.
+/// One reload. Owned by the loop, then by the worker, then by the loop again.
 struct Reloader::Job {
     std::string file;
     std::shared_ptr<const config::Config> running;
-    std::shared_ptr<const config::Config> rollback;  ///< null: the file is read
-    bool may_be_weaker = false;                      ///< of a rollback
+    std::shared_ptr<const config::Config> rollback;  ///< null: read the file
+    bool may_be_weaker = false;                      ///< for a rollback
     std::shared_ptr<const config::Config> next;      ///< null: there is none
     web::SharedText shown;
     web::ReloadVerdict verdict;
@@ -132,7 +132,7 @@ struct Reloader::Job {
     void compare();
 };
 
-/// The way back leads to no token that is no longer one.
+/// A rollback must not bring back tokens that were removed.
 std::shared_ptr<const config::Config> with_tokens_of(const config::Config& config,
                                                      const config::Config& running) {
     config::Config made = config;
@@ -143,7 +143,7 @@ std::shared_ptr<const config::Config> with_tokens_of(const config::Config& confi
     return std::make_shared<const config::Config>(std::move(made));
 }
 
-/// In the worker: all that takes long.
+/// Runs in the worker: all that takes long.
 void Reloader::Job::read() try {
     if (rollback) {
         next = with_tokens_of(*rollback, *running);
@@ -165,9 +165,10 @@ void Reloader::Job::read() try {
             return;
         }
         config::share_profiles(*loaded.config, *running);
-        for (const Notice& notice : prepare(*loaded.config))
-            verdict.warnings.push_back(
-                notice.event == "configuration" ? notice.text : notice.event + ": " + notice.text);
+        for (const StartMessage& message : prepare(*loaded.config))
+            verdict.warnings.push_back(message.event == "configuration"
+                                           ? message.text
+                                           : message.event + ": " + message.text);
         next = std::make_shared<const config::Config>(std::move(*loaded.config));
     }
     compare();
@@ -209,7 +210,7 @@ void Reloader::reload(web::ReloadWish wish, std::string cause, Handler handler) 
     if (served_.empty()) begin();
 }
 
-/// The wishes that have come together are one, as far as they are the same.
+/// Serves all waiting requests of the same kind with one reload.
 void Reloader::begin() {
     const web::ReloadWish wish = waiting_.front().wish;
     std::vector<Waiting> others;
@@ -227,7 +228,7 @@ void Reloader::begin() {
     worker_.run([job] { job->read(); }, [this, job] { apply(job); });
 }
 
-/// In one turn of the loop.
+/// Runs in one turn of the loop.
 void Reloader::apply(const std::shared_ptr<Job>& job) {
     if (stopping_) {
         job->verdict.outcome = ReloadOutcome::failed;
@@ -237,7 +238,7 @@ void Reloader::apply(const std::shared_ptr<Job>& job) {
             gateway_->apply(job->next, job->shown);
             before_ = job->running;
             if (job->next->log != job->running->log) rt::set_up_log(job->next->log);
-        } catch (const std::runtime_error& error) {  // a door, a pty
+        } catch (const std::runtime_error& error) {  // a listener, a pty
             job->verdict.outcome = ReloadOutcome::failed;
             job->verdict.why = error.what();
         }
@@ -253,11 +254,11 @@ void Reloader::end(const std::shared_ptr<Job>& job) {
     if (verdict.outcome != ReloadOutcome::refused) counters_.last_succeeded = good;
     ++counters_.reloads[static_cast<std::size_t>(verdict.outcome)];
     if (good) counters_.last_success_unix = unix_now();
-    tell(verdict);
+    log_verdict(verdict);
     last_ = std::make_shared<const web::ReloadVerdict>(std::move(verdict));
     if (step_) step_(false);
     for (Waiting& one : std::exchange(served_, {})) one.handler(last_);
-    // Reading takes many times what is kept, and nobody else would give it back.
+    // Reading takes far more memory than is kept, and malloc would not return it to the system.
     worker_.run([] { ::malloc_trim(0); }, [] {});
     if (!waiting_.empty()) begin();
 }

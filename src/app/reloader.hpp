@@ -18,11 +18,10 @@
 
 namespace panelgate::app {
 
-/// Tells that a file is another one, or has another content, through all links: editors put a new
-/// one in its place, Kubernetes turns a link of a folder above. It is looked at now and then beside
-/// the loop, because not every file system tells; and told when two looks agree, so that whoever
-/// writes it has ended. A file that has gone is no news before there is one again. One thread; the
-/// clock outlives it.
+/// Reports that a file was replaced or changed, through all links: editors replace the file,
+/// Kubernetes redirects a link of a folder above. Polls it in a worker, because not every file
+/// system notifies; reports when two polls agree, so that the writer has finished. A file that has
+/// vanished is reported only when it is back. One thread; the clock outlives it.
 class FileWatch {
   public:
     static constexpr Duration kEvery = 1s;
@@ -31,7 +30,7 @@ class FileWatch {
               std::function<void()> changed);
 
   private:
-    /// Device, inode, size, and when it changed last; nanoseconds.
+    /// Device, inode, size and time of the last change in ns.
     using Stamp =
         std::optional<std::tuple<std::uint64_t, std::uint64_t, std::int64_t, std::int64_t>>;
     static Stamp stamp_of(const std::string& path);
@@ -43,27 +42,27 @@ class FileWatch {
     std::function<void()> changed_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> alarm_;
-    Stamp known_;  ///< that was told, or there from the first
-    Stamp seen_;   ///< by the last look
+    Stamp known_;  ///< last reported, or found at the start
+    Stamp seen_;   ///< of the last poll
     rt::Worker worker_;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
 
 class Gateway;
 
-/// Reads the file again and has the gateway serve it: read, checked and compared beside the loop,
-/// applied in one turn of it. What cannot be applied changes nothing. One reload at a time; those
-/// who come meanwhile are told of the next one. One thread.
+/// Reloads the file: reads, checks and compares it in a worker, applies it in one turn of the loop.
+/// A configuration that cannot be applied changes nothing. One reload at a time; requests that come
+/// meanwhile get the result of the next one. One thread.
 class Reloader final : public web::ReloadSource {
   public:
-    /// `file`: what was read at the start; empty or `-`: nothing that could be read again.
+    /// `file`: the file read at the start; empty or `-`: it cannot be read again.
     Reloader(boost::asio::any_io_executor executor, std::string file);
-    /// Before anything is asked of it. The gateway lives as long as the loop runs.
+    /// Call before any other function. The gateway lives as long as the loop runs.
     void serve(Gateway& gateway);
-    /// Told at the beginning of each reload, and at its end.
+    /// `step` is called at the beginning of each reload, and at its end.
     void on_step(std::function<void(bool begins)> step) { step_ = std::move(step); }
 
-    /// The program ends: what is under way is not applied, and nothing more is read.
+    /// The program ends: a running reload is not applied, and no other one starts.
     void stop() { stopping_ = true; }
 
     std::string barred(bool rollback) const override;
@@ -86,9 +85,9 @@ class Reloader final : public web::ReloadSource {
 
     std::string file_;
     Gateway* gateway_ = nullptr;
-    std::shared_ptr<const config::Config> before_;  ///< what ran before; null: nothing else has
+    std::shared_ptr<const config::Config> before_;  ///< the previous one; null: none
     std::vector<Waiting> waiting_;
-    std::vector<Waiting> served_;  ///< by the one under way
+    std::vector<Waiting> served_;  ///< by the running reload
     std::function<void(bool)> step_;
     bool stopping_ = false;
     std::shared_ptr<const web::ReloadVerdict> last_;

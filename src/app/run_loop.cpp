@@ -17,7 +17,7 @@ using boost::system::error_code;
 
 constexpr auto kLook = 5ms;
 
-/// Lives on run()'s stack for as long as the loop runs.
+/// Lives on run()'s stack while the loop runs.
 class Loop {
   public:
     Loop(asio::io_context& io, const Ending& ending, asio::signal_set& ends,
@@ -50,7 +50,7 @@ class Loop {
         });
     }
 
-    /// Somebody does not want to wait for what is owed.
+    /// The user does not want to wait for the outstanding answers.
     void cut() {
         if (!finished_ && !ending_.done()) {
             code_ = kCut;
@@ -103,8 +103,8 @@ class Loop {
     ExitCode code_ = kFine;
 };
 
-/// A signal that comes behind the last turn of the loop must not end by its default, with another
-/// exit code, what has ended. Never destroyed: whoever is destroyed last gives the default back.
+/// A signal after the last turn of the loop must not end the process by its default action, with
+/// another exit code. Never destroyed: destroying the last signal_set restores the default.
 void keep_until_the_process_goes() {
     struct Kept {
         asio::io_context nobody_runs{1};
@@ -119,8 +119,8 @@ void keep_until_the_process_goes() {
 SignalLoop::SignalLoop(asio::io_context& io)
     : io_(io), ends_(io, SIGTERM, SIGINT), reloads_(io, SIGHUP) {
     keep_until_the_process_goes();
-    std::signal(SIGPIPE, SIG_IGN);  // a reader of our output may go away
-    std::signal(SIGUSR1, SIG_IGN);  // a habit of those who rotate logs; it would end the gateway
+    std::signal(SIGPIPE, SIG_IGN);  // the reader of our output may close it
+    std::signal(SIGUSR1, SIG_IGN);  // sent by some log rotation scripts; it would end the gateway
     std::signal(SIGUSR2, SIG_IGN);
 }
 

@@ -11,25 +11,25 @@
 
 namespace panelgate::app {
 
-/// What a program does when it is told to end, or to read its file again.
+/// What a program does on a signal to end, or to reload.
 struct Ending {
     std::function<void()> begin;   ///< first SIGTERM or SIGINT: stop accepting
-    std::function<bool()> done;    ///< asked again and again until true
-    std::function<void()> finish;  ///< then, or when patience() is over, or at the second signal
-    std::function<std::size_t()> open{};  ///< connections that are still owed an answer
-    Duration longest_answer{};            ///< of what is in flight
-    std::function<void()> reload{};       ///< at SIGHUP; empty: nothing can be read again
+    std::function<bool()> done;    ///< polled until true
+    std::function<void()> finish;  ///< called then, after patience(), or at the second signal
+    std::function<std::size_t()> open{};  ///< connections with outstanding answers
+    Duration longest_answer{};            ///< longest time to an outstanding answer
+    std::function<void()> reload{};       ///< on SIGHUP; empty: no reload
 
-    /// What has been accepted is answered within its time, and the answer needs a moment to leave.
+    /// Accepted requests are answered within their time, and the answer needs a moment to be sent.
     Duration patience() const { return std::max<Duration>(10s, longest_answer + 2s); }
 };
 
-/// Keeps signals from its construction on, so that none ends the program while it starts.
+/// Catches signals from its construction on, so that none ends the program while it starts.
 class SignalLoop {
   public:
     explicit SignalLoop(boost::asio::io_context& io);
-    /// Runs the loop until a signal, also an earlier one, has ended it: kFine, or kCut when a
-    /// second one came before it was done.
+    /// Runs the loop until a signal, perhaps an earlier one, has ended it. kFine, or kCut if a
+    /// second signal came before it was done.
     ExitCode run(const Ending& ending);
 
   private:

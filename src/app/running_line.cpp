@@ -42,7 +42,7 @@ std::optional<bus::Rule> rule_of(profile::Judgement judgement) {
     std::abort();
 }
 
-/// Refuses what the panel's manual rules out.
+/// A guard that refuses what the panel's manual rules out.
 bus::Guard guard_of(const profile::ProfileRef& panel) {
     return [panel](const modbus::Request& request) -> std::optional<bus::Objection> {
         const auto rule = rule_of(profile::judge(*panel, request));
@@ -62,7 +62,7 @@ void add_translation(bus::StationSettings& station, const profile::ProfileRef& p
     };
 }
 
-/// Of the functions that read and write values, those that the panel has.
+/// The functions of the panel that read and write values.
 std::vector<std::uint8_t> functions_of(const profile::PanelProfile& profile) {
     std::vector<std::uint8_t> functions{1, 2, 3, 4, 5, 6, 15, 16};
     std::erase_if(functions, [&](std::uint8_t code) { return !profile.has_function(code); });
@@ -116,7 +116,7 @@ points::SharedMemory memory_of(const profile::ProfileRef& panel) {
     memory.shown_as = [panel](const modbus::Span& written) {
         return profile::shown_as(*panel, written);
     };
-    memory.known = panel->name != "generic";  // which says what anybody could
+    memory.known = panel->name != "generic";  // which describes no particular panel
     return memory;
 }
 
@@ -143,7 +143,7 @@ points::RelayRoute route_of(const Plant& plant, const points::Relay& relay) {
 namespace {
 
 struct Played {
-    std::vector<profile::ProfileRef> panels;  ///< what the bus's stations refer to
+    std::vector<profile::ProfileRef> panels;  ///< referenced by the bus's stations
     std::unique_ptr<sim::SimulatedBus> bus;
 };
 
@@ -194,7 +194,7 @@ bool is_remote(const config::Line& line, bool simulate) {
     return line.kind == config::Line::Kind::tcp && !simulate;
 }
 
-/// The panels that are played.
+/// True if both lines simulate the same panels.
 bool plays_alike(const config::Line& before, const config::Line& now) {
     return before.simulated_echo == now.simulated_echo &&
            std::ranges::equal(before.stations, now.stations,
@@ -249,10 +249,11 @@ bus::Settings RunningLine::settings_of(const config::Line& line) {
     return settings;
 }
 
-/// And the panels at its other end, where they are simulated.
+/// Opens the line, and its simulated panels if it has any.
 std::unique_ptr<line::Line> RunningLine::make_wire(const config::Line& line) {
     line::Settings device = line.device;
-    if (wires_.size() >= kWires) wires_.clear();  // those before are long clear
+    if (wires_.size() >= kWires)
+        wires_.clear();  // no reply is outstanding on the earlier ones any more
     if (!is_simulated(line, simulate_)) wires_.insert(wire_of(line));
     simulated_.reset();
     if (is_simulated(line, simulate_)) {
@@ -285,7 +286,7 @@ void RunningLine::dispose() {
     simulated_.reset();
 }
 
-/// What is polled changes behind the bus: nothing is asked for in the old way then.
+/// The polls change after the bus, so that nothing is sent with the old settings.
 void RunningLine::apply(const config::Line& before, const config::Line& now) {
     if (running_ && is_same_wire(before, now, simulate_)) {
         bus_->apply(settings_of(now), nullptr, nullptr);
@@ -300,13 +301,13 @@ void RunningLine::apply(const config::Line& before, const config::Line& now) {
     if (!std::exchange(running_, true) && poller_) poller_->start();
 }
 
-/// They were those of other panels.
+/// Drops all values: they were those of other panels.
 void RunningLine::forget_points() {
     if (poller_) poller_->apply({});
     heard_.clear();
 }
 
-/// One poller a line. What it reads answers clients too, where a station's max_age allows it.
+/// One poller per line. What it reads also answers clients where a station's max_age allows it.
 void RunningLine::apply_points(const config::Line& line) {
     std::vector<points::PolledStation> wanted = polled_stations(line);
     if (listens_) {
@@ -349,7 +350,7 @@ void RunningLine::on_event(const std::string& line, const bus::BusEvent& event) 
     watch_.event(line, event);
 }
 
-/// A broadcast is to all of them.
+/// Passes a heard transaction to its station, a broadcast to all stations.
 void RunningLine::hear(const std::string& line, const tap::Transaction& heard) {
     for (const auto& [station, values] : heard_) {
         if (heard.station != 0 && heard.station != station) continue;

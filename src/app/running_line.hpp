@@ -26,47 +26,48 @@
 
 namespace panelgate::app {
 
-// What the configuration means to each module.
+// The configuration translated for each module.
 
 bus::Settings bus_settings(const config::Line& line);
 /// The stations that have points or poll blocks.
 std::vector<points::PolledStation> polled_stations(const config::Line& line);
-/// Which items are shown elsewhere as well.
+/// Describes which items of the panel share memory.
 points::SharedMemory memory_of(const profile::ProfileRef& panel);
-/// The panel has function 15 or 16 for this table.
+/// True if the panel has function 15 or 16 for this table.
 bool takes_multiple(const profile::PanelProfile& panel, modbus::Table table);
-/// A relay whose ends the plant has: the configuration was checked.
+/// The route of a relay whose stations the plant has; the configuration was checked.
 points::RelayRoute route_of(const Plant& plant, const points::Relay& relay);
 
 /// A simulated bus with the configured stations of a line.
 std::shared_ptr<sim::SimulatedBus> simulate_line(boost::asio::any_io_executor executor,
                                                  rt::Clock& clock, const config::Line& line);
 
-/// How REST reaches the faults of a simulated panel; null for a real one (no bus).
+/// REST's access to the faults of a simulated panel; null for a real one (no bus).
 std::shared_ptr<const web::SimulatedPanel> simulated_panel(
     const std::shared_ptr<sim::SimulatedBus>& bus, std::uint8_t station);
 
-/// Whoever is told what happens on a line, by its name.
+/// Callbacks for what happens on a line, named by the line.
 struct LineWatch {
     std::function<void(const std::string& line, const bus::BusEvent& event)> event;
-    /// These wants of a station's points are others now: of StationPoints, by wants_of().
+    /// These wants of a station's points have new values: indices of wants_of() in StationPoints.
     std::function<void(const std::string& line, std::uint8_t station,
                        const std::vector<std::size_t>& wants)>
         points;
 };
 
-/// What it is on, whatever the line is called: its device through links, or the far end.
+/// The wire of a line, whatever its name: its device with links resolved, or the far end.
 std::string wire_of(const config::Line& line);
-/// The line goes on as it is: nothing that has to be right before the first byte is another.
+/// True if the line can continue without reopening: nothing has changed that must be right before
+/// the first byte.
 bool is_same_wire(const config::Line& before, const config::Line& now, bool simulate);
 
-/// One line as it runs: its bus, the panels that are simulated for it, and what is polled or heard
-/// on it. Its bus is the same object through all reloads, so that whoever knows it may go on
-/// asking; of a line that is configured no more it is closed and stays. One thread.
+/// A running line: its bus, its simulated panels, and what is polled or heard on it. Its bus stays
+/// the same object through all reloads, so that its clients may keep a reference; the bus of a
+/// removed line is closed and stays. One thread.
 class RunningLine {
   public:
-    /// `simulate`: whatever its device. The clock outlives it. Throws std::system_error when there
-    /// is no pty left.
+    /// `simulate`: simulate it whatever its device is. The clock outlives it. Throws
+    /// std::system_error if no pty is available.
     RunningLine(boost::asio::any_io_executor executor, rt::Clock& clock, const config::Line& line,
                 bool simulate, LineWatch watch);
     RunningLine(const RunningLine&) = delete;
@@ -74,18 +75,19 @@ class RunningLine {
 
     void start();
     void stop();
-    /// The end: nothing of it is there any more. Whoever still holds it may only let it go.
+    /// Destroys its bus, poller and panels. Nothing else may be called after that.
     void dispose();
-    /// Goes on as this; `before` is what it was. Opens it again after stop().
+    /// Applies a new configuration; `before` is the running one. Opens the line again after stop().
     void apply(const config::Line& before, const config::Line& now);
 
     bus::LineBus& bus() { return *bus_; }
     const bus::LineBus& bus() const { return *bus_; }
     const std::shared_ptr<sim::SimulatedBus>& simulated() const { return simulated_; }
     bool listens() const { return listens_; }
-    /// Its device, and those that it may still be waited for on; through links.
+    /// Its device, and former ones on which replies may still be outstanding; links resolved.
     const std::set<std::string>& wires() const { return wires_; }
-    /// What is known of its points; nothing without any. The configuration outlives it, not this.
+    /// The values of a station's points; nothing without any. The configuration outlives them, this
+    /// object need not.
     std::optional<points::StationPoints> points_of(const config::Station& station) const;
 
   private:
@@ -101,12 +103,12 @@ class RunningLine {
     bool simulate_;
     bool listens_;
     LineWatch watch_;
-    /// Of a line that is only listened to, by station.
+    /// For a line that is only listened to, by station.
     std::map<std::uint8_t, std::shared_ptr<points::HeardValues>> heard_;
     std::function<void(const bus::WriteEvent&)> write_listener_;  ///< the poller's
     std::shared_ptr<sim::SimulatedBus> simulated_;                ///< null for a real device
-    std::unique_ptr<bus::LineBus> bus_;                           ///< tells those above to its end
-    std::unique_ptr<points::Poller> poller_;  ///< null where nothing was ever polled
+    std::unique_ptr<bus::LineBus> bus_;       ///< calls the members above until it is destroyed
+    std::unique_ptr<points::Poller> poller_;  ///< null if nothing was ever polled
     std::set<std::string> wires_;
     bool running_ = false;
 };

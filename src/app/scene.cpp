@@ -53,8 +53,8 @@ void LineHistories::start() {
     look();
 }
 
-/// The looks are spread over a slot; one that comes late moves none that follows, and counts for
-/// when it was due, so that each falls into a slot of its own.
+/// The samples are spread over a slot. A late one does not delay the next and is recorded for its
+/// due time, so that each falls into its own slot.
 void LineHistories::look() {
     const auto count = static_cast<std::int64_t>(lines_.size());
     const Duration pause = histories_.front()->width() / count;
@@ -87,7 +87,7 @@ points::PointSample sample_of(const Station& station, const points::Point& point
     return sample;
 }
 
-/// Puts what a bus tells into the words of /api/v1/events.
+/// Converts bus events to those of /api/v1/events.
 struct Publisher {
     web::EventHub& hub;
     const Plant& plant;
@@ -111,8 +111,8 @@ struct Publisher {
                     web::transaction_event(line, station, event.function, label(event.outcome),
                                            event.took));
     }
-    void operator()(const bus::WriteEvent&) const {}   // the points it touches are told
-    void operator()(const tap::Transaction&) const {}  // as are these
+    void operator()(const bus::WriteEvent&) const {}   // published as changes of points
+    void operator()(const tap::Transaction&) const {}  // likewise
 };
 
 }  // namespace
@@ -178,29 +178,29 @@ void publish_points(web::EventHub& hub, const Station& station,
     }
 }
 
-std::shared_ptr<Scene> make_scene(std::shared_ptr<const config::Config> config,
-                                  std::vector<std::shared_ptr<RunningLine>> lines) {
-    auto scene = std::make_shared<Scene>();
-    scene->config = std::move(config);
-    scene->lines = std::move(lines);
-    for (std::size_t i = 0; i < scene->lines.size(); ++i) {
-        const config::Line& line = scene->config->lines[i];
-        RunningLine& runs = *scene->lines[i];
-        scene->plant.add(line, runs.bus(), runs.simulated());
+std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> config,
+                                        std::vector<std::shared_ptr<RunningLine>> lines) {
+    auto snapshot = std::make_shared<Snapshot>();
+    snapshot->config = std::move(config);
+    snapshot->lines = std::move(lines);
+    for (std::size_t i = 0; i < snapshot->lines.size(); ++i) {
+        const config::Line& line = snapshot->config->lines[i];
+        RunningLine& runs = *snapshot->lines[i];
+        snapshot->plant.add(line, runs.bus(), runs.simulated());
     }
-    std::size_t at = 0;  // the plant has the stations in this order
-    for (std::size_t i = 0; i < scene->lines.size(); ++i) {
-        for (const config::Station& station : scene->config->lines[i].stations)
-            scene->plant.stations()[at++].points = scene->lines[i]->points_of(station);
+    std::size_t at = 0;  // the plant's stations are in this order
+    for (std::size_t i = 0; i < snapshot->lines.size(); ++i) {
+        for (const config::Station& station : snapshot->config->lines[i].stations)
+            snapshot->plant.stations()[at++].points = snapshot->lines[i]->points_of(station);
     }
-    for (const tcp_server::Settings& settings : scene->config->modbus_tcp)
-        scene->plant.add_units(tcp_server::UnitMap(settings, scene->plant.listener_lines()));
-    return scene;
+    for (const tcp_server::Settings& settings : snapshot->config->modbus_tcp)
+        snapshot->plant.add_units(tcp_server::UnitMap(settings, snapshot->plant.listener_lines()));
+    return snapshot;
 }
 
-void keep_histories(Scene& scene, const Scene* before, LineHistories& lines) {
+void keep_histories(Snapshot& snapshot, const Snapshot* before, LineHistories& lines) {
     std::size_t points = 0;
-    for (const Station& station : scene.plant.stations())
+    for (const Station& station : snapshot.plant.stations())
         points += station.points ? station.points->points().size() : 0;
     const Duration width = points::StationHistory::width_for(points);
     using Key = std::pair<std::string_view, std::uint8_t>;
@@ -209,16 +209,17 @@ void keep_histories(Scene& scene, const Scene* before, LineHistories& lines) {
         for (const Station& station : std::as_const(before->plant).stations())
             if (station.history) known.emplace(Key(station.line, station.id), &station);
     }
-    for (Station& station : scene.plant.stations()) {
+    for (Station& station : snapshot.plant.stations()) {
         if (!station.points) continue;
         station.history.emplace(station.points->points(), width);
         const auto was = known.find(Key(station.line, station.id));
         if (was != known.end()) station.history->adopt(*was->second->history);
     }
     std::vector<const bus::LineBus*> buses;
-    for (const auto& line : scene.lines) buses.push_back(&line->bus());
+    for (const auto& line : snapshot.lines) buses.push_back(&line->bus());
     lines.apply(std::move(buses));
-    for (std::size_t i = 0; i < scene.lines.size(); ++i) scene.histories.push_back(lines.at(i));
+    for (std::size_t i = 0; i < snapshot.lines.size(); ++i)
+        snapshot.histories.push_back(lines.at(i));
 }
 
 }  // namespace panelgate::app

@@ -23,21 +23,21 @@
 
 namespace panelgate::app {
 
-/// Looks at each line once a slot of its history, at one line at a time. One thread.
+/// Samples each line once per slot of its history, one line at a time. One thread.
 class LineHistories {
   public:
-    static constexpr std::size_t kBytes = 4 * 1024 * 1024;  ///< of all lines
+    static constexpr std::size_t kBytes = 4 * 1024 * 1024;  ///< for all lines together
 
     /// The clock and the lines outlive it.
     LineHistories(rt::Clock& clock, std::vector<const bus::LineBus*> lines);
 
-    /// From now on these. The past of those that are among them stays, unless slots have another
-    /// width.
+    /// Samples these lines from now on. The history of lines that stay is kept unless the slot
+    /// width changes.
     void apply(std::vector<const bus::LineBus*> lines);
 
     void start();
     void stop();
-    /// By the order of the lines. May outlive this.
+    /// The history of a line, by its index. May outlive this.
     const std::shared_ptr<bus::LineHistory>& at(std::size_t line) const { return histories_[line]; }
 
   private:
@@ -52,19 +52,18 @@ class LineHistories {
     bool running_ = false;
 };
 
-// What others are shown of the plant. Nothing here touches a bus (P10).
+// Views of the plant for REST, /metrics and events. Nothing here touches a bus (P10).
 
-/// REST's view. `generic` is the profile of stations that the configuration does not list; it and
-/// the plant outlive the view.
+/// REST's view. `generic` is the profile of unlisted stations; it and the plant outlive the view.
 web::Directory directory_of(const Plant& plant, const profile::PanelProfile& generic);
 
-/// The points of the plant at a scrape, some at a time. The plant outlives it.
+/// Copies the points of the plant for a scrape, a piece at a time. The plant outlives it.
 class PointCopy {
   public:
     static constexpr std::size_t kPiece = 250;  ///< points: well below a millisecond
 
     explicit PointCopy(const Plant& plant) : plant_(&plant) {}
-    /// Adds the next ones as they are now; false: all have been.
+    /// Adds the next points with their current values; false: there are no more.
     bool next(std::deque<points::PointSample>& samples, TimePoint now);
 
   private:
@@ -74,36 +73,36 @@ class PointCopy {
 };
 std::vector<points::RelaySample> relay_samples(const std::vector<points::RelayStatus>& relays);
 
-/// Tells those who listen, if anybody does, what has happened on a line.
+/// Publishes what has happened on a line, if any client listens.
 void publish(web::EventHub& hub, const Plant& plant, const std::string& line,
              const bus::BusEvent& event);
-/// The same: what has become of the points that are among these wants of the station's polls.
+/// The same for the points among these wants of the station's polls.
 void publish_points(web::EventHub& hub, const Station& station,
                     const std::vector<std::size_t>& wants, TimePoint now);
 
-/// Keeps what has become of the points among them, where the station has a history.
+/// Records the points among these wants in the station's history, if it has one.
 void remember(Station& station, const std::vector<std::size_t>& wants, TimePoint now);
 
-/// What is served: one configuration and the plant made of it, as lines run. A reload makes
-/// another; whoever works on this one keeps it to the end of what it does. Does not move.
-struct Scene {
+/// One configuration and the plant made of it, with the running lines. A reload makes a new one;
+/// users of this one keep it until they have finished. Does not move.
+struct Snapshot {
     std::shared_ptr<const config::Config> config;
-    std::vector<std::shared_ptr<RunningLine>> lines;  ///< by the order of config->lines
+    std::vector<std::shared_ptr<RunningLine>> lines;  ///< in the order of config->lines
     Plant plant;
-    /// By the same order; empty where nothing is kept.
+    /// In the same order; empty if no history is kept.
     std::vector<std::shared_ptr<bus::LineHistory>> histories;
-    web::Directory directory;  ///< REST's view of it all
+    web::Directory directory;  ///< REST's view
 
-    Scene() = default;
-    Scene(const Scene&) = delete;
-    Scene& operator=(const Scene&) = delete;
+    Snapshot() = default;
+    Snapshot(const Snapshot&) = delete;
+    Snapshot& operator=(const Snapshot&) = delete;
 };
 
-/// Of lines that run as the configuration says, in its order.
-std::shared_ptr<Scene> make_scene(std::shared_ptr<const config::Config> config,
-                                  std::vector<std::shared_ptr<RunningLine>> lines);
-/// The past of its points is kept from now on, and of what is the same in `before` (may be null)
-/// it goes on; `lines` keeps that of its lines.
-void keep_histories(Scene& scene, const Scene* before, LineHistories& lines);
+/// Makes the snapshot of lines that run with this configuration, in its order.
+std::shared_ptr<Snapshot> make_snapshot(std::shared_ptr<const config::Config> config,
+                                        std::vector<std::shared_ptr<RunningLine>> lines);
+/// Starts the histories of its points and continues those of unchanged stations in `before` (may be
+/// null); `lines` does so for its lines.
+void keep_histories(Snapshot& snapshot, const Snapshot* before, LineHistories& lines);
 
 }  // namespace panelgate::app

@@ -17,9 +17,9 @@
 
 namespace panelgate::app {
 
-/// A JSON Schema (2020-12) of the configuration, made of what the loader asks for
-/// (config::describe()). Whatever the loader takes is valid; of what it refuses, unknown keys and
-/// values of the wrong kind are not.
+/// A JSON Schema (2020-12) of the configuration, made from the loader's description
+/// (config::describe()). Whatever the loader accepts is valid; of what it rejects, unknown keys and
+/// values of the wrong kind are invalid.
 boost::json::object schema_json();
 
 namespace {
@@ -29,7 +29,7 @@ using yaml::KeyRule;
 using yaml::KeyShape;
 using Kind = KeyShape::Kind;
 
-/// Scalars are taken as they are written, so a text may look like a number.
+/// Scalars are read as written, so a text may look like a number.
 constexpr std::string_view kDefinitions = R"({
     "variable": {"type": "string", "pattern": "\\$\\{"},
     "text": {"type": ["string", "number", "boolean"], "minLength": 1}
@@ -60,7 +60,7 @@ std::string duration_name(const KeyShape& shape) {
            yaml::format_duration(shape.longest);
 }
 
-/// Of the key, or of what stands in its list or map.
+/// The text schema of the key, or of the entries of its list or map.
 json::object text_of(const KeyShape& shape) {
     if (shape.holds_integers) return {{"type", "integer"}};
     if (shape.pattern.empty() && shape.longest_text == 0) return reference("text");
@@ -71,7 +71,7 @@ json::object text_of(const KeyShape& shape) {
     return made;
 }
 
-/// What a scalar may be, besides a variable.
+/// The schema of a scalar, without the variable alternative.
 json::object scalar_of(const KeyShape& shape) {
     switch (shape.kind) {
         case Kind::integer:
@@ -105,7 +105,7 @@ json::object any_of(const KeyShape& shape) {
     return {{"anyOf", std::move(choices)}};
 }
 
-/// Of a map or a list.
+/// The type of a map or a list.
 json::value type_of(const KeyShape& shape, std::string_view type) {
     if (!shape.may_be_null.value_or(true)) return json::value(std::string(type));
     return json::array{json::value(std::string(type)), "null"};
@@ -115,14 +115,14 @@ json::object required(std::string_view key) {
     return {{"required", json::array{json::value(std::string(key))}}};
 }
 
-/// `key` has one of the words.
+/// Matches if `key` has one of the words.
 json::object has_word(std::string_view key, json::array words) {
     json::object made = required(key);
     made["properties"] = json::object{{key, json::object{{"enum", std::move(words)}}}};
     return made;
 }
 
-/// What is missing may come from a merge.
+/// A missing key may come from a merge.
 json::array or_merge(json::object one) { return {std::move(one), required("<<")}; }
 
 json::value as_json(const KeyShape& shape, std::string_view written) {
@@ -132,8 +132,8 @@ json::value as_json(const KeyShape& shape, std::string_view written) {
                  : json::value(std::string(written));
 }
 
-std::string description_of(const KeyShape& shape, const config::KeyText& told) {
-    std::string text(told.text);
+std::string description_of(const KeyShape& shape, const config::KeyText& key_text) {
+    std::string text(key_text.text);
     if (shape.kind == Kind::duration)
         text += (text.empty() ? "" : " ") + yaml::format_duration(shape.shortest) + " to " +
                 yaml::format_duration(shape.longest) + '.';
@@ -200,7 +200,7 @@ class Schema {
                 {"then", json::object{{"anyOf", or_merge(std::move(right))}}}};
     }
 
-    /// The keys right below; "" is the top.
+    /// The keys directly below a path; "" is the top.
     std::vector<const KeyShape*> below(std::string_view path) const {
         std::vector<const KeyShape*> found;
         const std::string start = path.empty() ? "" : std::string(path) + '/';
@@ -211,7 +211,7 @@ class Schema {
         return found;
     }
 
-    /// `part`: of a map whose keys may stand elsewhere, too, so that none of them is needed.
+    /// `part`: some keys of the map may be given elsewhere, so none of them is required.
     enum class Part : std::uint8_t { whole, some };
     json::object map_at(std::string_view path, Part part = Part::whole) const {
         json::object keys{{"<<", true}};
@@ -258,11 +258,11 @@ class Schema {
         json::object made = shape.kind == Kind::map    ? map_of(shape)
                             : shape.kind == Kind::list ? list_of(shape)
                                                        : any_of(shape);
-        const auto told = texts_.find(shape.path);
-        if (told == texts_.end()) return made;
-        const std::string text = description_of(shape, told->second);
+        const auto key_text = texts_.find(shape.path);
+        if (key_text == texts_.end()) return made;
+        const std::string text = description_of(shape, key_text->second);
         if (!text.empty()) made["description"] = text;
-        const std::string_view otherwise = told->second.otherwise;
+        const std::string_view otherwise = key_text->second.otherwise;
         if (!otherwise.empty()) made["default"] = as_json(shape, otherwise);
         return made;
     }

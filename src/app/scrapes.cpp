@@ -14,20 +14,20 @@
 
 namespace panelgate::app {
 
-/// One text. The loop fills it, then it is the worker's, but for `given_up`, and then the loop's.
+/// One text. Owned by the loop, then by the worker, then by the loop again, except for `given_up`.
 struct Scrapes::Job {
     metrics::Snapshot snapshot;
-    bool plain = false;  ///< somebody wants it so
+    bool plain = false;  ///< wanted uncompressed
     bool gzip = false;
     std::size_t expected_size = 0;
-    std::atomic<bool> given_up = false;  ///< nobody wants it any more
+    std::atomic<bool> given_up = false;  ///< no caller waits any more
     web::SharedText text;
     web::SharedText packed;
 
     void write();
 };
 
-/// In the worker. The figures end here, too. Without memory for it there is no text.
+/// Runs in the worker and frees the figures. Without memory there is no text.
 void Scrapes::Job::write() try {
     snapshot.process = metrics::read_process_facts();
     std::string made;
@@ -60,7 +60,7 @@ Scrapes::~Scrapes() {
 }
 
 void Scrapes::scrape(std::uint64_t caller, bool gzip, Handler handler) {
-    if (waiting_.size() >= settings_.waiting || held_bytes() > settings_.held_bytes)
+    if (waiting_.size() >= settings_.waiting || sending_bytes() > settings_.sending_bytes)
         return hand_over(std::move(handler), nullptr);
     waiting_.push_back({caller, gzip, std::move(handler)});
     if (!job_) begin();
@@ -89,7 +89,7 @@ void Scrapes::begin() {
     step();
 }
 
-/// One piece of the figures, then everybody else's turn.
+/// Copies one piece of the figures per turn of the loop.
 void Scrapes::step() {
     boost::asio::post(executor_, [self = std::weak_ptr(self_)] {
         const auto alive = self.lock();
@@ -126,8 +126,8 @@ void Scrapes::hand_over(Handler handler, web::SharedText text) {
     });
 }
 
-/// Of all texts that somebody is still being sent.
-std::size_t Scrapes::held_bytes() {
+/// The bytes of all texts that are still being sent.
+std::size_t Scrapes::sending_bytes() {
     std::erase_if(sent_, [](const auto& text) { return text.expired(); });
     std::size_t bytes = 0;
     for (const auto& weak : sent_) {

@@ -13,19 +13,19 @@
 
 namespace panelgate::app {
 
-/// What /metrics answers. The loop only copies the figures, in pieces between which it serves
-/// others; a worker makes the text and packs it. Whoever asks while figures are copied or written
-/// gets the next text, whose figures are all copied after that, together with the others who wait.
+/// Answers /metrics. The loop only copies the figures, in pieces between which it serves other
+/// work; a worker renders and packs the text. A scrape that arrives meanwhile gets the next text,
+/// whose figures are all copied later, together with the other waiting scrapes.
 class Scrapes final : public web::MetricsSource {
   public:
     /// Copies one piece; false: it was the last.
     using Copy = std::function<bool(metrics::Snapshot&)>;
     struct Settings {
-        std::size_t waiting = 256;                  ///< who may wait for a text
-        std::size_t held_bytes = 64 * 1024 * 1024;  ///< of texts that are being sent
+        std::size_t waiting = 256;                     ///< scrapes that may wait for a text
+        std::size_t sending_bytes = 64 * 1024 * 1024;  ///< of texts that are being sent
     };
 
-    /// `begin` starts a copy; what that refers to outlives the scrapes.
+    /// `begin` starts a copy; what the copy refers to outlives this.
     Scrapes(boost::asio::any_io_executor executor, std::function<Copy()> begin, Settings settings);
     ~Scrapes() override;
     Scrapes(const Scrapes&) = delete;
@@ -48,18 +48,18 @@ class Scrapes final : public web::MetricsSource {
     void end();
     void drop(std::vector<Waiter>& waiters, std::uint64_t caller);
     void hand_over(Handler handler, web::SharedText text);
-    std::size_t held_bytes();
+    std::size_t sending_bytes();
 
     boost::asio::any_io_executor executor_;
     std::function<Copy()> begin_;
     Settings settings_;
     std::vector<Waiter> waiting_;  ///< for the next text
-    std::vector<Waiter> served_;   ///< by the one under way
+    std::vector<Waiter> served_;   ///< by the running job
     Copy copy_;                    ///< while figures are copied
-    std::shared_ptr<Job> job_;     ///< the one under way
+    std::shared_ptr<Job> job_;     ///< the running job
     std::vector<std::weak_ptr<const std::string>> sent_;
     std::size_t last_size_ = 0;
-    std::shared_ptr<Scrapes*> self_ = std::make_shared<Scrapes*>(this);  ///< for what is posted
+    std::shared_ptr<Scrapes*> self_ = std::make_shared<Scrapes*>(this);  ///< for posted handlers
     rt::Worker worker_;
 };
 

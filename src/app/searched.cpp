@@ -28,8 +28,8 @@
 
 namespace panelgate::app {
 
-/// Drives a Scanner over a line until it is done, the line fails or a signal comes. Says meanwhile
-/// on stderr how far it is, when that is a terminal.
+/// Drives a Scanner over a line until it is done, the line fails or a signal comes. Shows the
+/// progress on stderr if that is a terminal.
 class ScanRun final : public line::Line::Events {
   public:
     /// `settings` and `profiles` outlive it.
@@ -71,9 +71,9 @@ class ScanRun final : public line::Line::Events {
 
 namespace {
 
-constexpr const char* kClear = "\x1b[K";  // to the end of the line
+constexpr const char* kClear = "\x1b[K";  // erases to the end of the line
 
-/// A line that is drawn again and again is for a terminal.
+/// The progress line is redrawn, which needs a terminal.
 bool shows_progress() {
     static const bool shown = ::isatty(STDERR_FILENO) == 1;
     return shown;
@@ -144,7 +144,7 @@ void ScanRun::redraw() {
 
 namespace {
 
-/// Settings of the command line; nothing (and told) when something is wrong with it.
+/// The settings from the command line; nothing, with a message on stderr, if they are wrong.
 std::optional<scan::Settings> parse_options(const ScanOptions& options) {
     scan::Settings settings;
     settings.remote = options.device.starts_with("tcp://");
@@ -171,16 +171,16 @@ std::string absolute(const std::string& path) {
     return path.empty() ? path : std::filesystem::absolute(path).string();
 }
 
-/// False, and told, when the line could not be had.
-bool run_scan(const ScanOptions& options, const scan::Settings& settings, Searched& searched) {
+/// False, with a message on stderr, if the line could not be opened.
+bool run_scan(const ScanOptions& options, const scan::Settings& settings, ScanOutcome& outcome) {
     line::Settings device;
     device.device = options.device;
     boost::asio::io_context io(1);
-    ScanRun run(io, settings, *searched.profiles, device);
+    ScanRun run(io, settings, *outcome.profiles, device);
     run.run();
-    searched.cut_short = run.cut_short();
+    outcome.cut_short = run.cut_short();
     if (run.has_begun()) {
-        searched.result = run.result();
+        outcome.result = run.result();
         return true;
     }
     std::cerr << "panelgate: " << run.cut_short() << '\n';
@@ -189,27 +189,27 @@ bool run_scan(const ScanOptions& options, const scan::Settings& settings, Search
 
 }  // namespace
 
-Searched search(const ScanOptions& options) {
-    Searched searched;
-    searched.code = kUsage;
+ScanOutcome search(const ScanOptions& options) {
+    ScanOutcome outcome;
+    outcome.code = kUsage;
     const auto settings = parse_options(options);
-    if (!settings) return searched;
-    searched.code = kBadConfig;
-    searched.profiles = load_catalogue(options.profiles);
-    if (!searched.profiles) return searched;
+    if (!settings) return outcome;
+    outcome.code = kBadConfig;
+    outcome.profiles = load_catalogue(options.profiles);
+    if (!outcome.profiles) return outcome;
     rt::LogSettings quiet;
-    quiet.level = rt::LogLevel::error;  // the result is what there is to say
+    quiet.level = rt::LogLevel::error;  // the result is the output
     rt::set_up_log(quiet);
-    searched.device = settings->remote ? options.device : absolute(options.device);
-    searched.profiles_dir = absolute(options.profiles);
-    searched.code = kUnavailable;
-    if (!run_scan(options, *settings, searched)) return searched;
-    const bool complete = searched.cut_short.empty() && scan::found_any(*searched.result);
-    if (complete) searched.code = kFine;
-    return searched;
+    outcome.device = settings->remote ? options.device : absolute(options.device);
+    outcome.profiles_dir = absolute(options.profiles);
+    outcome.code = kUnavailable;
+    if (!run_scan(options, *settings, outcome)) return outcome;
+    const bool complete = outcome.cut_short.empty() && scan::found_any(*outcome.result);
+    if (complete) outcome.code = kFine;
+    return outcome;
 }
 
-void tell_advice(const ScanOptions& options, const scan::Result& result) {
+void print_advice(const ScanOptions& options, const scan::Result& result) {
     for (const std::string& sentence : scan::advice(options.device, result))
         std::cerr << "panelgate: " << sentence << '\n';
 }

@@ -9,20 +9,20 @@
 
 namespace panelgate::app {
 
-/// What came of a scan; no result: stderr has said why.
-struct Searched {
+/// The outcome of a scan; without a result, stderr has the reason.
+struct ScanOutcome {
     ExitCode code = kFine;
     std::optional<profile::Catalogue> profiles;
     std::optional<scan::Result> result;
     std::string cut_short;     ///< why it ended early; empty when it did not
-    std::string device;        ///< as a configuration names it
-    std::string profiles_dir;  ///< the same; empty: none was given
+    std::string device;        ///< as in a configuration
+    std::string profiles_dir;  ///< likewise; empty: none was given
 };
 
-/// Scans as the command line says. kUnavailable with a result: it is not complete, or nothing was
+/// Scans with these options. kUnavailable with a result: the result is incomplete, or nothing was
 /// found.
-Searched search(const ScanOptions& options);
-/// On stderr, what a person should know or do besides.
-void tell_advice(const ScanOptions& options, const scan::Result& result);
+ScanOutcome search(const ScanOptions& options);
+/// Prints further advice for the user on stderr.
+void print_advice(const ScanOptions& options, const scan::Result& result);
 
 }  // namespace panelgate::app

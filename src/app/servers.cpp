@@ -22,68 +22,71 @@ namespace errc = boost::system::errc;
 
 constexpr std::uint16_t kFirstFreePort = 1024;  // below, a right is needed
 
-std::string where(const Door& door) { return endpoint_text(door.address, door.port); }
+std::string where(const ListenerHandle& handle) {
+    return endpoint_text(handle.address, handle.port);
+}
 
 std::string words(const error_code& why) {
     if (why == errc::address_not_available) return "this machine does not have the address yet";
     return why.message();
 }
 
-void tell_wait(const Door& door, const error_code& why) {
-    rt::log(rt::LogLevel::warn, "listener waits", {{door.kind, where(door)}, {"why", words(why)}});
+void log_wait(const ListenerHandle& handle, const error_code& why) {
+    rt::log(rt::LogLevel::warn, "listener waits",
+            {{handle.kind, where(handle)}, {"why", words(why)}});
 }
 
 }  // namespace
 
 Openings::Openings(rt::Clock& clock) : clock_(clock), again_(clock.make_alarm()) {}
 
-void Openings::open(const std::vector<Door>& doors) {
+void Openings::open(const std::vector<ListenerHandle>& handles) {
     std::vector<Waiting> late;
-    for (const Door& door : doors) {
-        const error_code why = opened(door);
+    for (const ListenerHandle& handle : handles) {
+        const error_code why = opened(handle);
         if (!why) continue;
         if (why != errc::address_not_available) {
-            const std::string advice = listening_advice(why, door.port);
-            throw CannotListen("cannot listen on " + where(door) + ": " + why.message() +
+            const std::string advice = listening_advice(why, handle.port);
+            throw CannotListen("cannot listen on " + where(handle) + ": " + why.message() +
                                (advice.empty() ? "" : "; " + advice));
         }
-        tell_wait(door, why);
-        late.push_back({door, why});
+        log_wait(handle, why);
+        late.push_back({handle, why});
     }
     waiting_.insert(waiting_.end(), late.begin(), late.end());
     later();
 }
 
-void Openings::take_over(const std::vector<Door>& doors) {
-    for (const Door& door : doors) waiting_.push_back({door, {}});
+void Openings::take_over(const std::vector<ListenerHandle>& handles) {
+    for (const ListenerHandle& handle : handles) waiting_.push_back({handle, {}});
     try_again();
 }
 
-void Openings::forget(const void* whose) {
-    std::erase_if(waiting_, [&](const Waiting& waiting) { return waiting.door.whose == whose; });
-    std::erase_if(standing_, [&](const auto& standing) { return standing.first == whose; });
+void Openings::forget(const void* owner) {
+    std::erase_if(waiting_, [&](const Waiting& waiting) { return waiting.handle.owner == owner; });
+    std::erase_if(listening_, [&](const auto& listening) { return listening.first == owner; });
 }
 
-error_code Openings::opened(const Door& door) {
-    const error_code error = door.open();
+error_code Openings::opened(const ListenerHandle& handle) {
+    const error_code error = handle.open();
     if (error) return error;
-    const std::string place = endpoint_text(door.address, door.opened_port());
-    rt::log(rt::LogLevel::info, "listening", {{door.kind, place}});
-    standing_.emplace_back(door.whose, door.kind + ' ' + place);
+    const std::string place = endpoint_text(handle.address, handle.opened_port());
+    rt::log(rt::LogLevel::info, "listening", {{handle.kind, place}});
+    listening_.emplace_back(handle.owner, handle.kind + ' ' + place);
     return error;
 }
 
-std::string Openings::standing() const {
+std::string Openings::listening() const {
     std::string text;
-    for (const auto& [whose, place] : standing_) text += (text.empty() ? "" : ", ") + place;
+    for (const auto& [owner, place] : listening_) text += (text.empty() ? "" : ", ") + place;
     return text;
 }
 
-/// The gateway serves meanwhile: nothing that happens here ends it any more.
+/// The gateway is serving already: no error here ends it any more.
 void Openings::try_again() {
     for (Waiting& waiting : waiting_) {
-        const error_code why = opened(waiting.door);
-        if (why && why != waiting.why) tell_wait(waiting.door, why);
+        const error_code why = opened(waiting.handle);
+        if (why && why != waiting.why) log_wait(waiting.handle, why);
         waiting.why = why;
     }
     later();
@@ -97,14 +100,14 @@ void Openings::later() {
 void Openings::stop() {
     again_->cancel();
     waiting_.clear();
-    standing_.clear();
+    listening_.clear();
 }
 
 std::string Openings::missing() const {
     std::string text;
-    for (const auto& [door, why] : waiting_) {
+    for (const auto& [handle, why] : waiting_) {
         if (!text.empty()) text += ", ";
-        text += door.kind + ' ' + where(door) + " (" + words(why) + ')';
+        text += handle.kind + ' ' + where(handle) + " (" + words(why) + ')';
     }
     return text;
 }
@@ -134,7 +137,7 @@ boost::system::error_code error_of(tcp_server::Listener& listener) {
     return {};
 }
 
-Door door_of(const tcp_server::Settings& settings, tcp_server::Listener* listener) {
+ListenerHandle handle_of(const tcp_server::Settings& settings, tcp_server::Listener* listener) {
     return {"modbus_tcp",
             settings.address,
             settings.port,
@@ -143,7 +146,7 @@ Door door_of(const tcp_server::Settings& settings, tcp_server::Listener* listene
             listener};
 }
 
-Door door_of(const web::Settings& settings, web::Server* server) {
+ListenerHandle handle_of(const web::Settings& settings, web::Server* server) {
     return {"http",
             settings.address,
             settings.port,
@@ -152,7 +155,7 @@ Door door_of(const web::Settings& settings, web::Server* server) {
             server};
 }
 
-/// Who else answers on the master's line is not ours to speak for: only what is listed is served.
+/// Other stations may answer on the master's line: only listed stations are served.
 std::vector<tcp_server::LineInfo> lines_of_master(const Plant& plant) {
     auto lines = plant.listener_lines();
     for (tcp_server::LineInfo& line : lines) line.pass_unlisted = false;
@@ -185,13 +188,13 @@ Servers::Modbus* Servers::find(const tcp_server::Settings& settings) {
     return found == listeners_.end() ? nullptr : &*found;
 }
 
-/// By somebody who will leave: the same port, of an address that has to do with this one.
-bool Servers::is_left_to(const Door& door, const config::Config& config) const {
+/// True if a listener that is about to close uses the port, on the same or an overlapping address.
+bool Servers::is_left_to(const ListenerHandle& handle, const config::Config& config) const {
     const auto meets = [&](const auto& settings) {
-        const bool overlap = settings.address == door.address ||
+        const bool overlap = settings.address == handle.address ||
                              config::is_any_address(settings.address) ||
-                             config::is_any_address(door.address);
-        return door.port != 0 && settings.port == door.port && overlap;
+                             config::is_any_address(handle.address);
+        return handle.port != 0 && settings.port == handle.port && overlap;
     };
     const auto leaves = [&](const Modbus& one) {
         return std::ranges::none_of(config.modbus_tcp, [&](const tcp_server::Settings& wanted) {
@@ -213,9 +216,9 @@ void Servers::open(const config::Config& config, const Plant& plant, const Web& 
 
 void Servers::open_new(const config::Config& config, const Plant& plant, const Web& web) {
     fresh_ = {};
-    std::vector<Door> now;
-    const auto add = [&](Door door) {
-        (is_left_to(door, config) ? fresh_.late : now).push_back(std::move(door));
+    std::vector<ListenerHandle> now;
+    const auto add = [&](ListenerHandle handle) {
+        (is_left_to(handle, config) ? fresh_.late : now).push_back(std::move(handle));
     };
     for (const tcp_server::Settings& configured : config.modbus_tcp) {
         const tcp_server::Settings settings = completed(configured, config);
@@ -224,13 +227,13 @@ void Servers::open_new(const config::Config& config, const Plant& plant, const W
             continue;
         }
         fresh_.listeners.push_back(make(settings, plant));
-        add(door_of(settings, fresh_.listeners.back().listener.get()));
+        add(handle_of(settings, fresh_.listeners.back().listener.get()));
     }
     if (config.http && !(http_ && http_->settings.is_same_door(*config.http))) {
         auto server = std::make_unique<web::Server>(executor_, *config.http, web.directory(),
                                                     web.providers());
         fresh_.http = Http{*config.http, std::move(server)};
-        add(door_of(*config.http, fresh_.http->server.get()));
+        add(handle_of(*config.http, fresh_.http->server.get()));
     }
     openings_.open(now);
 }
@@ -258,7 +261,7 @@ void Servers::apply(const config::Config& config, const Plant& plant,
     openings_.take_over(fresh.late);
 }
 
-/// It stands in the list until its last client has gone.
+/// Keeps the listener until its last client has gone.
 void Servers::leave(Modbus modbus) {
     openings_.forget(modbus.listener.get());
     leaving_->push_back(std::move(modbus));
@@ -289,7 +292,7 @@ void Servers::apply_masters(const config::Config& config, const Plant& plant) {
         masters_.push_back(std::move(*same));
         before.erase(same);
     }
-    before.clear();  // the device of one may be that of another
+    before.clear();  // a removed master's device may be a new one's
     for (Master& one : masters_) {
         if (one.master) continue;
         one.master = std::make_unique<serial_server::SerialMaster>(
@@ -314,7 +317,7 @@ bool Servers::drained() {
            (!http_ || silent(*http_)) && std::ranges::all_of(leaving_http_, silent);
 }
 
-std::size_t Servers::owing() const {
+std::size_t Servers::pending_connections() const {
     std::size_t count = http_ ? http_->server->connections() : 0;
     for (const Http& old : leaving_http_) count += old.server->connections();
     for (const Modbus& one : listeners_) count += one.listener->counters().connections;
@@ -331,10 +334,10 @@ void Servers::close() {
     leaving_http_.clear();
 }
 
-void Servers::copy_figures(metrics::Snapshot& snapshot) const {
-    for (const Modbus& one : listeners_) snapshot.listeners.push_back(one.listener->counters());
-    for (const Master& one : masters_) snapshot.serial_masters.push_back(one.master->counters());
-    if (http_) snapshot.http = http_->server->counters();
+void Servers::copy_figures(metrics::Snapshot& figures) const {
+    for (const Modbus& one : listeners_) figures.listeners.push_back(one.listener->counters());
+    for (const Master& one : masters_) figures.serial_masters.push_back(one.master->counters());
+    if (http_) figures.http = http_->server->counters();
 }
 
 }  // namespace panelgate::app

@@ -48,14 +48,14 @@ struct TcpBridge::State : std::enable_shared_from_this<TcpBridge::State> {
 
     explicit State(const asio::any_io_executor& executor) : client(executor), device(executor) {}
 
-    /// Takes the place of the one before.
+    /// Replaces the former client.
     void serve(tcp::socket socket);
     void from_client(std::uint64_t connection);
     void from_device();
 
     tcp::socket client;
     asio::posix::stream_descriptor device;
-    std::uint64_t connections = 0;  ///< a completion of an earlier one is stale
+    std::uint64_t connections = 0;  ///< completions of an earlier one are stale
     Buffer up{};
     Buffer down{};
 };
@@ -76,7 +76,7 @@ void TcpBridge::State::from_client(std::uint64_t connection) {
                 self->client.close(error);
                 return;
             }
-            // A pty takes a frame at once; what it does not take is lost, as on a wire.
+            // A pty takes a frame at once; the rest is lost, as on a wire.
             asio::write(self->device, asio::buffer(self->up, n), error);
             self->from_client(connection);
         });
@@ -105,7 +105,7 @@ TcpBridge::TcpBridge(const asio::any_io_executor& executor, const config::Endpoi
     const int fd = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) throw std::system_error(errno, std::generic_category(), device);
     state_->device.assign(fd);
-    state_->device.non_blocking(true);  // else a write waits for those who read on this very loop
+    state_->device.non_blocking(true);  // else a write would wait for readers on this very loop
     if (const error_code error = acceptor_.open(endpoint.address, endpoint.port)) {
         throw std::system_error(
             error, "cannot listen on " + endpoint_text(endpoint.address, endpoint.port));

@@ -33,8 +33,8 @@ class PtyLink {
     std::string target_;
 };
 
-/// Offers a pty as a serial device server would: RTU frames over TCP, one client at a time; a new
-/// one takes the place of the old. One thread.
+/// Serves a pty like a serial device server: RTU frames over TCP, one client at a time; a new
+/// client replaces the old one. One thread.
 class TcpBridge {
   public:
     /// Listens. Throws std::system_error.
@@ -52,21 +52,21 @@ class TcpBridge {
     rt::Acceptor acceptor_;
 };
 
-/// What a link begins with that is no path.
+/// The prefix of a link that is not a path.
 inline constexpr std::string_view kTcpLink = "tcp://";
 
-/// The panels of all lines, the ways to them, and to their faults. One thread.
+/// The simulated panels of all lines, their links, and REST access to their faults. One thread.
 class SimulatedPanels {
   public:
     explicit SimulatedPanels(boost::asio::any_io_executor executor);
 
-    /// `link`: a path that is to lead to the line's pty, tcp://ADDR:PORT, or empty. Throws
+    /// `link`: a path to become a link to the line's pty, tcp://ADDR:PORT, or empty. Throws
     /// std::system_error.
     void add(const config::Line& line, const std::string& link);
-    /// GET and PUT /api/v1/simulator/{station} there, for everybody; after all lines. Throws
-    /// std::system_error.
+    /// Serves GET and PUT /api/v1/simulator/{station} at the endpoint, for all clients; call after
+    /// all lines are added. Throws std::system_error.
     void serve_faults(const config::Endpoint& endpoint);
-    /// Where each line is reached and who is on it, for a person to read.
+    /// Where each line is reached and its stations, for the user.
     const std::string& text() const { return text_; }
     void stop();
 
@@ -81,7 +81,7 @@ class SimulatedPanels {
     std::vector<std::unique_ptr<PtyLink>> links_;
     std::vector<std::unique_ptr<TcpBridge>> bridges_;
     web::EventHub nothing_happens_;
-    web::Directory directory_;  ///< of stations that have faults, and no bus
+    web::Directory directory_;  ///< stations with faults, without a bus
     std::unique_ptr<web::Server> http_;
     std::string text_;
 };

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostExamples = 4;
 
-/// In double quotes, and a dollar as itself.
+/// In double quotes, with '$' escaped.
 std::string quoted(const std::string& text) {
     std::string made = "\"";
     for (const char c : text) {
@@ -36,7 +36,7 @@ std::string serial_of(const scan::Result& result) {
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
 }
 
-/// "gdt-0", of GDT0: a name of a point.
+/// A point name made from a notation: "at-gdt0" for GDT0.
 std::string name_of(std::string_view notation) {
     std::string name = "at-";
     for (const char c : notation) {
@@ -47,7 +47,7 @@ std::string name_of(std::string_view notation) {
     return name;
 }
 
-/// One line, "" where the panel lets nothing be read.
+/// One example line; "" if nothing in the area is readable.
 std::string example_of(const profile::Area& area) {
     const bool bits = modbus::is_bit_table(area.table);
     const auto first = static_cast<std::uint16_t>(

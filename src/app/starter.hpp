@@ -7,7 +7,7 @@
 
 namespace panelgate::app {
 
-/// What the first configuration of a line is made of.
+/// The input of a line's first configuration.
 struct Found {
     std::string device;        ///< an absolute path, or tcp://HOST:PORT
     std::string profiles_dir;  ///< an absolute path, or ""
@@ -15,8 +15,8 @@ struct Found {
     const profile::Catalogue& profiles;
 };
 
-/// A configuration of what a scan has found, with comments that explain it and examples of points
-/// that only have to be uncommented. Complete and valid when a station was found (found_any()).
+/// A configuration from a scan's result, with comments that explain it and examples of points that
+/// only have to be uncommented. Complete and valid if a station was found (found_any()).
 std::string starter_yaml(const Found& found);
 
 }  // namespace panelgate::app

@@ -12,7 +12,7 @@
 
 namespace panelgate::arbiter {
 
-void Reception::stamp(TimePoint now, Job& job) {
+void Admission::stamp(TimePoint now, Job& job) {
     const std::size_t request = job.request.pdu().size() + modbus::kAduOverhead;
     const std::size_t reply =
         std::max(job.request.reply_length().value_or(0), modbus::kExceptionAdu);
@@ -25,7 +25,7 @@ void Reception::stamp(TimePoint now, Job& job) {
     job.start_by = job.deadline - needed;
 }
 
-std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const Job& job,
+std::optional<Admission::FromMemory> Admission::from_memory(TimePoint now, const Job& job,
                                                             Duration max_age) {
     if (max_age <= Duration::zero() || job.priority == PriorityClass::poll) return std::nullopt;
     const auto& span = job.request.span();
@@ -35,17 +35,17 @@ std::optional<Reception::FromMemory> Reception::from_memory(TimePoint now, const
     return FromMemory{++last_ticket_, std::move(*hit)};
 }
 
-void Reception::on_read(const Group& group, const Bytes& reply, Duration max_age) {
+void Admission::on_read(const Group& group, const Bytes& reply, Duration max_age) {
     if (group.span && max_age > Duration::zero())
         memory_.store({group.station, *group.span}, reply, group.started);
 }
 
 namespace {
 
-/// What follows from others is put in.
+/// Derives the dependent settings.
 Settings completed(Settings settings) {
     settings.end_of_frame = std::max(settings.end_of_frame, silent_interval(settings.serial));
-    // Of ASCII each other character tells something.
+    // In ASCII only every other character completes a byte.
     if (settings.serial.mode == SerialMode::ascii)
         settings.end_of_frame += byte_time(settings.serial);
     settings.reply_hole = std::max(settings.reply_hole, settings.end_of_frame);
@@ -64,10 +64,10 @@ Arbiter::Arbiter(Settings settings)
       stations_(settings_),
       schedule_(settings_),
       quiet_(quiet_of(settings_)),
-      strays_(settings_.serial, orders_),
-      reception_(settings_),
+      unsolicited_(settings_.serial, orders_),
+      admission_(settings_),
       echo_memory_(settings_.echo),
-      ledger_(settings_) {
+      outbox_(settings_) {
     if (settings_.serial.mode == SerialMode::ascii)
         ascii_.emplace(settings_.ascii_digits, settings_.reply_hole);
 }
@@ -78,12 +78,12 @@ void Arbiter::apply(Settings settings) {
     settings_ = std::move(settings);
     stations_.apply(settings_);
     schedule_.apply(settings_);
-    reception_.apply(settings_);
-    ledger_.apply(settings_);
+    admission_.apply(settings_);
+    outbox_.apply(settings_);
     if (same_wire) return;
     orders_ = crc_orders(settings_);
     quiet_ = quiet_of(settings_);
-    strays_ = Strays(settings_.serial, orders_);
+    unsolicited_ = UnsolicitedFrames(settings_.serial, orders_);
     echo_memory_ = EchoMemory(settings_.echo);
     ascii_.reset();
     if (settings_.serial.mode == SerialMode::ascii)
@@ -91,38 +91,39 @@ void Arbiter::apply(Settings settings) {
 }
 
 Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
-    if ((!up_ && !held_) || resetting_) return Fault::line_down;
-    // Not while the client has something open there: it must not read older than its own write.
+    if ((!up_ && !suspended_) || resetting_) return Fault::line_down;
+    // Not while the client has a request open there: it must not read values older than its own
+    // write.
     const bool waits = schedule_.backlog().has(job.client, job.station);
     const bool open = waits || (active_ && active_->group().has(job.client, job.station));
     const Duration max_age = open ? Duration::zero() : stations_.settings(job.station).max_age;
-    if (auto known = reception_.from_memory(now, job, max_age)) {
-        ledger_.finish_from_memory(known->ticket, std::move(known->hit.pdu), known->hit.age);
+    if (auto known = admission_.from_memory(now, job, max_age)) {
+        outbox_.finish_from_memory(known->ticket, std::move(known->hit.pdu), known->hit.age);
         return known->ticket;
     }
     if (stations_.refuses(now, job)) {
-        ledger_.decide(now,
+        outbox_.decide(now,
                        [&] { return explain::offline(now, job, health(job.station), names_); });
         return Fault::offline;
     }
-    reception_.stamp(now, job);
+    admission_.stamp(now, job);
     job.alone = job.alone || !settings_.share_reads;
     const Ticket ticket = job.ticket;
-    if (active_ && !waits && active_->takes_along(now, job)) {
+    if (active_ && !waits && active_->can_join(now, job)) {
         job.attempts = 1;
         job.transactions.add(active_->group().transaction);
-        ledger_.on_started(now, job);
+        outbox_.on_started(now, job);
         active_->group().jobs.push_back(std::move(job));
         return ticket;
     }
-    const JobQueue::Admission admission = schedule_.backlog().queue().push(job);
-    for (const Job& shed : admission.shed) {
-        ledger_.decide(now, [&] { return explain::shed(shed, names_); });
-        const bool sent = shed.attempts > 0;  // in a joined read that did not come about
-        ledger_.finish(shed, sent ? Fault::timeout : Fault::busy);
+    const JobQueue::PushResult pushed = schedule_.backlog().queue().push(job);
+    for (const Job& shed : pushed.shed) {
+        outbox_.decide(now, [&] { return explain::shed(shed, names_); });
+        const bool sent = shed.attempts > 0;  // in a joined read that failed
+        outbox_.finish(shed, sent ? Fault::timeout : Fault::busy);
     }
-    if (!admission.taken) {
-        ledger_.decide(now,
+    if (!pushed.taken) {
+        outbox_.decide(now,
                        [&] { return explain::full(job, settings_.queue, queue_depth(), names_); });
         return Fault::busy;
     }
@@ -131,15 +132,15 @@ Result<Ticket> Arbiter::submit(TimePoint now, Job job) {
 }
 
 void Arbiter::deny(TimePoint now, const JobQueue::Test& match) {
-    for (const Job& job : schedule_.backlog().remove_if(match)) ledger_.finish(job, Fault::denied);
+    for (const Job& job : schedule_.backlog().remove_if(match)) outbox_.finish(job, Fault::denied);
     step(now);
 }
 
 void Arbiter::cancel(TimePoint now, Client client) {
-    ledger_.on_client_gone(client);
+    outbox_.on_client_gone(client);
     names_.forget(client);
-    for (const Job& job : schedule_.backlog().cancel(client)) ledger_.finish(job, Fault::cancelled);
-    if (active_) active_->group().on_gone(client);
+    for (const Job& job : schedule_.backlog().cancel(client)) outbox_.finish(job, Fault::cancelled);
+    if (active_) active_->group().on_client_gone(client);
     step(now);
 }
 
@@ -159,51 +160,52 @@ void Arbiter::rest_until(TimePoint until) {
 
 void Arbiter::on_line_left() {
     rest_ = std::max(rest_, quiet_.free_at(Duration::zero()));
-    held_ = true;
+    suspended_ = true;
     up_ = false;
     resetting_ = false;
-    strays_.forget();
-    reception_.memory().clear();
+    unsolicited_.forget();
+    admission_.memory().clear();
 }
 
 void Arbiter::on_line_up(TimePoint now) {
     up_ = true;
-    held_ = false;
+    suspended_ = false;
     resetting_ = false;
-    schedule_.on_way_opened(now);
+    schedule_.on_transport_opened(now);
     if (settings_.may_stall) stations_.on_opened(now);
     if (ascii_) ascii_->cut();
     quiet_.on_open(now);
     quiet_.rest_until(rest_);
-    stations_.on_back();
+    stations_.on_recovery();
     pace_ = {};
     echo_memory_.forget();
     step(now);
 }
 
-/// What was sent is owed all the same: a device server may hand it to the next connection.
+/// A sent request stays outstanding: a device server may hand its reply to the next connection.
 void Arbiter::on_line_down(TimePoint now) {
     up_ = false;
-    held_ = false;
+    suspended_ = false;
     resetting_ = false;
     stations_.on_line_down();
-    strays_.forget();
-    reception_.memory().clear();
+    unsolicited_.forget();
+    admission_.memory().clear();
     if (active_) {
-        note(now, active_->take_strays());
+        note(now, active_->take_unsolicited());
         const Attempt attempt = take_active(now);
         const Group& group = attempt.group();
         if (attempt.is_broadcast()) {
             schedule_.on_broadcast(attempt.timing().sent, group.request.pdu());
             rest_ = std::max(rest_, attempt.timing().sent + settings_.broadcast_turnaround);
         } else {
-            stations_.of(group.station).owe(now, group.request.pdu(), attempt.timing().sent);
+            stations_.of(group.station)
+                .add_outstanding(now, group.request.pdu(), attempt.timing().sent);
         }
-        ledger_.tell(attempt, TransactionEnd::line_down);
-        for (const Job& job : group.jobs) ledger_.finish(job, Fault::line_lost);
+        outbox_.report(attempt, TransactionEnd::line_down);
+        for (const Job& job : group.jobs) outbox_.finish(job, Fault::line_lost);
     }
     for (const Job& job : schedule_.backlog().clear())
-        ledger_.finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
+        outbox_.finish(job, job.attempts > 0 ? Fault::line_lost : Fault::line_down);
 }
 
 void Arbiter::on_rx(TimePoint now, ByteView bytes) {
@@ -227,7 +229,7 @@ void Arbiter::hear(TimePoint now, ByteView bytes) {
         const Verdict verdict = active_->on_rx(now, bytes, ends_attempt(now));
         quiet_.on_heard(std::max(active_->timing().sent, now));
         if (active_->echo().mismatch() && !was_wrong) {
-            ledger_.on_echo_mismatch(now, active_->group().station);
+            outbox_.on_echo_mismatch(now, active_->group().station);
             echo_memory_.on_mismatch();
         }
         if (const Bytes stale = active_->take_stale(); !stale.empty()) hear_idle(now, stale);
@@ -235,7 +237,7 @@ void Arbiter::hear(TimePoint now, ByteView bytes) {
     }
 }
 
-/// Whose is what has ended: of the attempt, of nobody, or a part of both.
+/// The piece that has ended may belong to the attempt, to no request, or partly to both.
 void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& piece) {
     using End = modbus::AsciiTranscript::Piece::End;
     if (!piece.bytes.empty()) hear(now, piece.bytes);
@@ -243,7 +245,7 @@ void Arbiter::hear_piece(TimePoint now, const modbus::AsciiTranscript::Piece& pi
     const bool good = piece.end == End::frame;
     if (active_ && !active_->is_broadcast())
         conclude(now, active_->on_frame_end(good, ends_attempt(now)));
-    if (strays_.pending()) note(now, strays_.take_told(quiet_.station(), good));
+    if (unsolicited_.pending()) note(now, unsolicited_.take_delimited(quiet_.station(), good));
 }
 
 void Arbiter::on_end(TimePoint now, Duration left) {
@@ -255,15 +257,15 @@ void Arbiter::on_end(TimePoint now, Duration left) {
 void Arbiter::step(TimePoint now) {
     check_active(now);
     expire(now);
-    if (!active_ && strays_.pending() && now >= quiet_.since() + settings_.end_of_frame)
+    if (!active_ && unsolicited_.pending() && now >= quiet_.since() + settings_.end_of_frame)
         judge_idle(now);
-    while (up_ && !held_ && !resetting_ && !active_ && start_next(now)) check_active(now);
+    while (up_ && !suspended_ && !resetting_ && !active_ && start_next(now)) check_active(now);
 }
 
 void Arbiter::check_active(TimePoint now) {
     if (!active_ || now < active_->deadline()) return;
     if (active_->is_broadcast()) return end_broadcast(now);
-    expire_active(now);  // a reply that was held back may be too late for some
+    expire_active(now);  // the candidate may be too late for some
     conclude(now, active_->on_deadline(now, ends_attempt(now)));
     if (ascii_ && ascii_->has_given()) ascii_->cut();
 }
@@ -272,8 +274,8 @@ void Arbiter::expire(TimePoint now) {
     expire_active(now);
     for (const Job& job : schedule_.backlog().expire(now)) {
         const bool sent = job.attempts > 0;
-        ledger_.decide(now, [&] { return explain::expired(now, job, sent, names_); });
-        ledger_.finish(job, sent ? Fault::timeout : Fault::expired);
+        outbox_.decide(now, [&] { return explain::expired(now, job, sent, names_); });
+        outbox_.finish(job, sent ? Fault::timeout : Fault::expired);
     }
     for (const Group& group : schedule_.backlog().take_dropped()) {
         const bool silent = group.silent_after > Duration::zero();
@@ -281,40 +283,40 @@ void Arbiter::expire(TimePoint now) {
     }
 }
 
-/// Those of the transaction whose own deadline has come; the others go on waiting for its reply. A
-/// broadcast that is leaving is answered when it has left.
+/// Fails the jobs of the transaction whose own deadline has passed; the others keep waiting for its
+/// reply. A broadcast that is leaving is answered when it has left.
 void Arbiter::expire_active(TimePoint now) {
     if (!active_ || active_->is_broadcast()) return;
-    for (const Job& job : active_->group().expire(now)) ledger_.finish(job, Fault::timeout);
+    for (const Job& job : active_->group().expire(now)) outbox_.finish(job, Fault::timeout);
 }
 
 Attempt::Ends Arbiter::ends_attempt(TimePoint now) const {
-    return [this, now](ByteView adu) { return strays_.is_wrong_reply(now, adu, stations_); };
+    return [this, now](ByteView adu) { return unsolicited_.is_wrong_reply(now, adu, stations_); };
 }
 
 void Arbiter::hear_idle(TimePoint now, ByteView bytes) {
     quiet_.on_noise(now);
-    strays_.hear(bytes);
-    if (strays_.full()) judge_idle(now);
+    unsolicited_.hear(bytes);
+    if (unsolicited_.full()) judge_idle(now);
 }
 
 void Arbiter::judge_idle(TimePoint now) {
     if (ascii_) ascii_->cut();
-    note(now, strays_.take(quiet_.station()));
+    note(now, unsolicited_.take(quiet_.station()));
 }
 
 void Arbiter::note(TimePoint now, const std::vector<modbus::Unused>& parts) {
     const bool idle = !active_;
-    strays_.note(now, parts, idle, stations_, quiet_, ledger_);
+    unsolicited_.note(now, parts, idle, stations_, quiet_, outbox_);
 }
 
 bool Arbiter::start_next(TimePoint now) {
     if (now < quiet_.free_at(stations_.gap(quiet_.station()))) return false;
-    if (strays_.pending()) judge_idle(now);  // it may tell that the line is not free
+    if (unsolicited_.pending()) judge_idle(now);  // it may show that the line is not free
     Schedule::Next next = schedule_.next(now, stations_, quiet_, echo_memory_);
-    if (next.new_way) {
+    if (next.reopen) {
         resetting_ = true;
-        ledger_.reset("nothing was answered since a request: it may still be on its way");
+        outbox_.reset("nothing was answered since a request: it may still be on its way");
     }
     if (!next.group) return false;
     start(now, std::move(*next.group));
@@ -323,12 +325,12 @@ bool Arbiter::start_next(TimePoint now) {
 
 void Arbiter::start(TimePoint now, Group group) {
     Bytes adu = modbus::encode_adu(group.station, group.request.pdu(), orders_.of(group.station));
-    ledger_.on_rested(quiet_.take_rested(now));
+    outbox_.on_rested(quiet_.take_rested(now));
     if (++group.attempts == 1) group.started = now;
     group.transaction = ++transactions_;
     for (Job& job : group.jobs) {
         job.transactions.add(group.transaction);
-        if (job.attempts++ == 0) ledger_.on_started(now, job);
+        if (job.attempts++ == 0) outbox_.on_started(now, job);
     }
     Bytes wire = ascii_ ? modbus::to_ascii(adu) : adu;
     if (ascii_) ascii_->cut();
@@ -339,26 +341,26 @@ void Arbiter::start(TimePoint now, Group group) {
     if (group.station != kBroadcast) {
         Station& station = stations_.of(group.station);
         if (group.attempts == 1) group.repeatable = station.settings().retry_writes;
-        station.on_asked(now, group, schedule_.held_back(station));
+        station.on_asked(now, group, schedule_.in_transit(station));
         if (group.attempts == 1)
-            group.first_silence =
-                !station.suspect() && !station.health().offline() && !stations_.spent(now, station);
+            group.first_silence = !station.missed_last() && !station.health().offline() &&
+                                  !stations_.flaky_beside_others(now, station);
         timing.patience = stations_.patience(now, group) + latency_;
         timing.usual = std::min(station.usual(stations_.slowest()) + latency_, timing.patience);
-        timing.notice = notice_.early();
+        timing.wake_latency = wake_latency_.early();
         timing.drift = station.clock_drift();
         timing.echoes = echo_memory_.expects_one();
-        timing.as_asked = surprised_ == 0 && station.answers_as_asked() && echo_memory_.known();
+        timing.as_asked = unusual_ == 0 && station.answers_as_asked() && echo_memory_.known();
     }
-    if (!group.request.is_read()) reception_.memory().on_write(now, group.station, group.request);
-    ledger_.written(group, false);
+    if (!group.request.is_read()) admission_.memory().on_write(now, group.station, group.request);
+    outbox_.written(group, false);
     Reason why;
-    if (ledger_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
+    if (outbox_.explains()) why = explain::start(now, group, schedule_.backlog().queue(), names_);
     quiet_.on_sent(timing.sent, group.station);
-    strays_.on_sent(adu);
+    unsolicited_.on_sent(adu);
     EchoFilter echo(adu, echo_memory_.expect(group.request));
     active_.emplace(std::move(group), timing, std::move(echo), orders_);
-    ledger_.transmit(now, *active_, std::move(adu), std::move(wire), std::move(why));
+    outbox_.transmit(now, *active_, std::move(adu), std::move(wire), std::move(why));
 }
 
 std::optional<TimePoint> Arbiter::next_deadline() const {
@@ -371,13 +373,13 @@ std::optional<TimePoint> Arbiter::next_deadline() const {
         }
         return next;
     }
-    if (strays_.pending()) earlier(quiet_.since() + settings_.end_of_frame);
-    if (!up_ || held_ || resetting_) return next;
+    if (unsolicited_.pending()) earlier(quiet_.since() + settings_.end_of_frame);
+    if (!up_ || suspended_ || resetting_) return next;
     if (const auto start = schedule_.next_start(stations_, quiet_)) earlier(*start);
     return next;
 }
 
-// What must always hold, whatever has been heard or asked. Tests call it after every verb.
+// Invariants. Tests check them after every call.
 
 namespace {
 

@@ -24,9 +24,9 @@ Attempt::Timing Attempt::timing_of(const Settings& line, TimePoint now, std::siz
     timing.hole = line.reply_hole;
     timing.longest_reply = 2 * frame_time(line.serial, modbus::kMaxLongRtuAdu) + line.reply_hole;
     timing.serial = line.serial;
-    // ASCII has longer pauses than frames, and a character tells less than its time.
+    // ASCII pauses can be longer than frames, and a character carries less than its time.
     timing.steady = !line.may_stall && line.serial.mode == SerialMode::rtu;
-    // Rates may differ by 2 %, and both ends in the same direction.
+    // Rates may differ by 2 %, at both ends in the same direction.
     if (line.paced) timing.tolerance = leaving * 3 / 100 + character_time(line.serial);
     return timing;
 }
@@ -37,23 +37,23 @@ Attempt::Attempt(Group group, const Timing& timing, EchoFilter echo,
       timing_(timing),
       orders_(orders),
       echo_(std::move(echo)),
-      framer_(
-          group_.station, group_.request.pdu(), orders_,
-          ends_are_told() ? modbus::ReplyFramer::Ends::told : modbus::ReplyFramer::Ends::by_length),
+      framer_(group_.station, group_.request.pdu(), orders_,
+              has_delimiters() ? modbus::ReplyFramer::Ends::told
+                               : modbus::ReplyFramer::Ends::by_length),
       computed_end_(timing.sent),
       first_byte_(timing.sent),
       last_byte_(timing.sent),
       echo_possible_(echo_.expected()),
       end_confirmed_(!timing.confirm_end) {}
 
-bool Attempt::takes_along(TimePoint now, const Job& job) const {
+bool Attempt::can_join(TimePoint now, const Job& job) const {
     const bool leaving = timing_.tolerance && now < earliest_end();
     return leaving && !group_.probe && group_.attempts == 1 && job.station == group_.station &&
            contained_in(group_.span, job) && group_.jobs.size() < JobQueue::kMost;
 }
 
 Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
-    // Who looks late, or is told late, is no slower line.
+    // Late reading or late notification does not make the line slower.
     const Duration slack = std::max<Duration>(2 * byte(), 1ms);
     const auto planned = next_look();
     since_ += bytes.size();
@@ -64,10 +64,10 @@ Verdict Attempt::on_rx(TimePoint now, ByteView bytes, const Ends& ends) {
     const Verdict verdict = hear(now, bytes, ends);
     if (planned && planned->end && now >= planned->at && !end_look_) {
         const bool whole = since_ * byte() >= planned->reply;
-        overslept_ = verdict == Verdict::replied && !whole;
-        if (!overslept_) end_look_ = {planned->reply, whole};
+        unexpected_exception_ = verdict == Verdict::replied && !whole;
+        if (!unexpected_exception_) end_look_ = {planned->reply, whole};
     }
-    // More should have come by now: a hole, or a slower clock, as the next byte will tell.
+    // More should have come by now: a hole, or a slower clock; the next byte decides.
     const auto busy = busy_until();
     if (began_ && (latest > *began_ + slack || (busy && *busy <= now))) began_.reset();
     return verdict;
@@ -81,12 +81,12 @@ std::optional<Attempt::NextLook> Attempt::next_look() const {
     next.reply = (since_ + rest) * byte();
     next.end = since_ + rest > modbus::kMinAdu && rest != echo_.missing();
     next.at = *began_ + next.reply;
-    const Duration early = timing_.notice + timing_.drift.early(next.reply);
-    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one tells nothing
+    const Duration early = timing_.wake_latency + timing_.drift.early(next.reply);
+    if (next.end) next.at -= std::min(early, next.reply / 4);  // or a short one could not be judged
     return next;
 }
 
-/// A reply that was cut short is noticed before twice the time that it has taken.
+/// A reply that was cut short is noticed before twice its time so far.
 std::optional<TimePoint> Attempt::busy_until() const {
     constexpr Duration kLongest = 30ms;
     const auto next = next_look();
@@ -98,7 +98,8 @@ std::size_t Attempt::missing() const {
     const std::size_t echo = echo_.missing();
     if (!timing_.as_asked) return echo > 0 ? echo : framer_.missing();
     if (!echo_.pending()) return echo > 0 ? echo : framer_.missing_as_asked();
-    return std::max(group_.request.reply_length().value_or(0), echo_.held() + echo) - echo_.held();
+    return std::max(group_.request.reply_length().value_or(0), echo_.pending_size() + echo) -
+           echo_.pending_size();
 }
 
 Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
@@ -110,14 +111,14 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
         if (since_ > 0) began_ = now - since_ * byte();
     }
     if (echo_.pending() || rest.size() < bytes.size()) last_byte_ = std::max(last_byte_, now);
-    const bool may_lend = !ends_are_told() && echo_.complete() && !was_complete;
+    const bool may_lend = !has_delimiters() && echo_.complete() && !was_complete;
     if (may_lend && echo_.frame().back() == group_.station) {
         lender_.emplace(group_.station, group_.request.pdu(), orders_);
         const std::uint8_t lent = group_.station;
         lender_->feed(ByteView(&lent, 1));
     }
     if (rest.empty()) {
-        if (echo_.pending() && !held_since_) held_since_ = now;
+        if (echo_.pending() && !echo_since_) echo_since_ = now;
         return Verdict::open;
     }
     if (now < timing_.sent) early_ = now;
@@ -128,17 +129,18 @@ Verdict Attempt::hear(TimePoint now, ByteView bytes, const Ends& ends) {
     }
     drop_what_ended(now, rest.size());
     if (!heard_) first_byte_ = now;
-    // What was held back as an echo was the beginning, where nothing but us delays the rest.
-    if (!heard_ && timing_.steady && held_since_ && !echo_.complete())
-        first_byte_ = std::min(now, std::max(*held_since_, timing_.sent));
+    // The bytes buffered as an echo were the beginning, where only we delay the rest.
+    if (!heard_ && timing_.steady && echo_since_ && !echo_.complete())
+        first_byte_ = std::min(now, std::max(*echo_since_, timing_.sent));
     heard_ = true;
     last_byte_ = now;
     return feed(rest, ends);
 }
 
-/// The silence behind bytes that are no part of the reply was longer than any inside a frame.
+/// Drops bytes that are no part of the reply once the silence after them was longer than any inside
+/// a frame.
 void Attempt::drop_what_ended(TimePoint now, std::size_t size) {
-    if (ends_are_told()) return;
+    if (has_delimiters()) return;
     const TimePoint first = now - wire_time(timing_.serial, size);
     const bool over = first >= last_byte_ + 3 * character_time(timing_.serial) / 2;
     if (heard_ && over && framer_.has_pending() && !framer_.has_candidate()) framer_.drop_pending();
@@ -162,49 +164,50 @@ Verdict Attempt::accept(std::optional<Bytes> reply) {
         own_frame_seen_ = true;
         return Verdict::open;
     }
-    // Of two that are equal nobody knows which one it is.
-    if (const auto copy = std::exchange(held_, std::nullopt); copy && copy != reply) {
-        stray_frame(*copy);
-    } else if (copy) {
-        said_twice_ = held_at_;
+    // Two equal replies cannot be distinguished.
+    if (const auto candidate = std::exchange(candidate_, std::nullopt);
+        candidate && candidate != reply) {
+        add_unsolicited(*candidate);
+    } else if (candidate) {
+        first_reply_at_ = candidate_at_;
     }
     reply_ = std::move(reply);
     return Verdict::replied;
 }
 
-/// P8: bytes of somebody else may stand in front of the echo, and the filter does not know it then.
-/// The first frame that is our own confirms nothing, unless a part of the echo has come before it.
+/// P8: foreign bytes may precede the echo, which the filter then does not recognise. The first
+/// frame that equals our own confirms nothing, unless a part of the echo came before it.
 bool Attempt::may_be_echo(ByteView reply) const {
     const bool accounted = !echo_possible_ || echo_.complete() || fragment_ || own_frame_seen_;
     return !accounted && std::ranges::equal(adu_of(reply), echo_.frame());
 }
 
-/// What is pending becomes strays. Was it what the station said instead of the reply?
+/// Turns pending bytes into unsolicited parts. Did the station send them instead of the reply?
 Verdict Attempt::judge_pending(const Ends& ends) {
-    const std::size_t before = strays_.size();
+    const std::size_t before = unsolicited_.size();
     framer_.drop_pending();
     collect();
-    judge_strays(before, ends);
+    judge_unsolicited(before, ends);
     return wrong_ ? Verdict::wrong : Verdict::open;
 }
 
-void Attempt::judge_strays(std::size_t from, const Ends& ends) {
-    for (; from < strays_.size(); ++from) {
-        const Unused& part = strays_[from];
+void Attempt::judge_unsolicited(std::size_t from, const Ends& ends) {
+    for (; from < unsolicited_.size(); ++from) {
+        const Unused& part = unsolicited_[from];
         if (part.kind != Unused::Kind::own) continue;
         const bool exception = (part.bytes[1] & modbus::kExceptionBit) != 0;
         const std::uint8_t function = modbus::plain_function(part.bytes[1]);
         const bool refuses_other = exception && function != group_.request.function();
         if (!ends(part.bytes)) {
-            // It may be the refusal of this request, with another function's number.
+            // It may be the exception to this request, with another function's number.
             disturbed_ = disturbed_ || refuses_other;
             continue;
         }
-        // What has nothing to do with the request may be babble: the reply has its usual time.
+        // An unrelated frame may be babble: the reply still has its usual time.
         const bool other = !exception && function != group_.request.function();
         refused_other_ = refused_other_ || refuses_other;
         (other ? disturbed_ : wrong_) = true;
-        strange_ = strange_ || other;
+        unrelated_ = unrelated_ || other;
     }
 }
 
@@ -213,7 +216,8 @@ void Attempt::collect() {
     std::vector<Unused> parts = framer_.take_unused();
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const bool foreign = begins_with_request(parts[i].bytes, echo_.frame(), orders_);
-        if (foreign && parts[i].bytes[0] == group_.station) others_.on_heard({}, parts[i].bytes);
+        if (foreign && parts[i].bytes[0] == group_.station)
+            foreign_requests_.on_heard({}, parts[i].bytes);
         if (std::ranges::equal(parts[i].bytes, echo_.frame())) on_echo_behind();
         const bool in_front = i + behind < parts.size();
         const bool damaged = parts[i].kind == Unused::Kind::damaged;
@@ -224,29 +228,29 @@ void Attempt::collect() {
             append_up_to(modbus::ReplyFramer::kMaxHeard, damaged_bytes_, parts[i].bytes);
             disturbed_ = true;
         }
-        strays_.push_back(std::move(parts[i]));
+        unsolicited_.push_back(std::move(parts[i]));
     }
 }
 
-/// What was taken for the reply came before what was asked.
+/// The candidate came before our own request.
 void Attempt::on_echo_behind() {
     if (!timing_.echoes) return;
     echo_behind_ = true;
-    if (held_) stray_frame(*std::exchange(held_, std::nullopt));
+    if (candidate_) add_unsolicited(*std::exchange(candidate_, std::nullopt));
 }
 
-std::vector<Unused> Attempt::take_strays() { return std::exchange(strays_, {}); }
+std::vector<Unused> Attempt::take_unsolicited() { return std::exchange(unsolicited_, {}); }
 
 TimePoint Attempt::deadline() const {
     if (is_broadcast()) return timing_.sent;
     const TimePoint over = give_up();
     if (!is_hearing()) return in_doubt() ? std::min(over, timing_.sent + timing_.usual) : over;
-    // What the echo filter holds back begins like the reply, too.
+    // The bytes that the echo filter buffers begin like the reply, too.
     const bool hole = echo_.pending() || (framer_.has_candidate() && framer_.knows_length());
     Duration silence = hole ? timing_.hole : timing_.end_of_frame;
     if (framer_.is_inside()) silence = silent_interval(timing_.serial);
     const TimePoint silent = std::max(timing_.sent, last_byte_) + silence;
-    // What may be the reply is heard to its end, also after its time, but not for ever.
+    // A possible reply is heard to its end, also after the timeout, but not without limit.
     const bool may_be_reply = framer_.has_candidate() || echo_.pending();
     return std::min(silent, may_be_reply ? over + timing_.longest_reply : over);
 }
@@ -254,15 +258,15 @@ TimePoint Attempt::deadline() const {
 Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     if (now < deadline()) return Verdict::open;
     if (is_hearing()) {
-        if (take_held(ends) == Verdict::replied) return Verdict::replied;
-        const std::size_t before = strays_.size();
+        if (take_from_echo(ends) == Verdict::replied) return Verdict::replied;
+        const std::size_t before = unsolicited_.size();
         if (accept(framer_.on_silence()) == Verdict::replied) return Verdict::replied;
-        judge_strays(before, ends);
+        judge_unsolicited(before, ends);
     }
     const bool usual_is_over = now >= timing_.sent + timing_.usual;
-    if (held_ && usual_is_over && doubted_) return Verdict::doubtful;
-    if (held_ && usual_is_over) {
-        reply_ = std::exchange(held_, std::nullopt);
+    if (candidate_ && usual_is_over && doubted_) return Verdict::doubtful;
+    if (candidate_ && usual_is_over) {
+        reply_ = std::exchange(candidate_, std::nullopt);
         return Verdict::replied;
     }
     if (wrong_) return Verdict::wrong;
@@ -270,22 +274,22 @@ Verdict Attempt::on_deadline(TimePoint now, const Ends& ends) {
     if (framer_.was_damaged_whole()) return Verdict::damaged;
     const Duration wait = in_doubt() ? timing_.usual : timing_.patience;
     if (now < timing_.sent + wait) return Verdict::open;
-    if (strange_) return Verdict::wrong;
+    if (unrelated_) return Verdict::wrong;
     return damaged ? Verdict::damaged : Verdict::silent;
 }
 
-Verdict Attempt::take_held(const Ends& ends) {
-    const Bytes held = echo_.release();
-    if (held.empty()) return Verdict::open;
+Verdict Attempt::take_from_echo(const Ends& ends) {
+    const Bytes released = echo_.release();
+    if (released.empty()) return Verdict::open;
     heard_ = true;
-    return feed(held, ends);
+    return feed(released, ends);
 }
 
 Verdict Attempt::on_frame_end(bool good, const Ends& ends) {
-    take_held(ends);
-    const std::size_t before = strays_.size();
+    take_from_echo(ends);
+    const std::size_t before = unsolicited_.size();
     if (accept(framer_.on_end(good)) == Verdict::replied) return Verdict::replied;
-    judge_strays(before, ends);
+    judge_unsolicited(before, ends);
     if (wrong_) return Verdict::wrong;
     return framer_.was_damaged_whole() ? Verdict::damaged : Verdict::open;
 }
@@ -301,8 +305,8 @@ void Attempt::on_end(TimePoint now, Duration left) {
     timing_.sent = end;
 }
 
-/// Nothing, when what stands in front of the reply may have been an echo that was damaged, or tells
-/// that the way was held up, and what had come before may be lost.
+/// Learns nothing if the bytes in front of the reply may be a damaged echo, or show that the
+/// transport was delayed and earlier bytes may be lost.
 void Attempt::teach(EchoMemory& memory) const {
     const bool noisy = noise_in_front_ * 2 >= echo_.frame().size();
     const bool clean = !echo_.mismatch() && !noisy && !frames_in_front_;
@@ -310,7 +314,7 @@ void Attempt::teach(EchoMemory& memory) const {
 }
 
 Duration Attempt::waited(TimePoint now) const {
-    if (overslept_) return std::max(first_byte_ - timing_.sent, Duration::zero());
+    if (unexpected_exception_) return std::max(first_byte_ - timing_.sent, Duration::zero());
     const Duration reply = frame_time(timing_.serial, reply_->size() + modbus::kAduOverhead);
     return std::max(now - timing_.sent - reply, Duration::zero());
 }
@@ -320,37 +324,37 @@ TimePoint Attempt::first_byte() const {
     return std::min(first_byte_, timing_.sent + waited(last_byte_));
 }
 
-bool Attempt::said_damaged_before() const {
+bool Attempt::came_damaged_before() const {
     if (noise_in_front_ < reply_->size() + modbus::kAduOverhead) return false;
     const std::array head{group_.station, reply_->front()};
     const auto behind = std::ranges::search(damaged_bytes_, head).end();
-    // A part of our own request's echo begins like the reply, but goes on as we did.
+    // A part of our own request's echo begins like the reply, but continues as the request.
     return behind != damaged_bytes_.end() && *behind != group_.request.pdu()[1];
 }
 
-void Attempt::stray_frame(const Bytes& pdu) {
+void Attempt::add_unsolicited(const Bytes& pdu) {
     Unused part;
     part.kind = Unused::Kind::own;
     part.station = group_.station;
     part.bytes = adu_of(pdu);
-    strays_.push_back(std::move(part));
+    unsolicited_.push_back(std::move(part));
 }
 
 void Attempt::reject_reply() {
     refusal_rejected_ = refusal_rejected_ || (reply_->front() & modbus::kExceptionBit) != 0;
-    stray_frame(*std::exchange(reply_, std::nullopt));
+    add_unsolicited(*std::exchange(reply_, std::nullopt));
     heard_ = false;
     disturbed_ = true;
 }
 
-void Attempt::hold_reply(Duration needed, bool doubted) {
+void Attempt::keep_candidate(Duration needed, bool doubted) {
     doubted_ = doubted;
     timing_.usual = std::min(timing_.usual, needed);
-    // The reply that a copy has kept its station from saying comes behind it.
+    // The reply that the duplicate has delayed comes after it.
     if (doubted) timing_.usual = std::min(last_byte_ - timing_.sent + needed, timing_.patience);
-    held_ = std::exchange(reply_, std::nullopt);
-    held_back_ = true;
-    held_at_ = last_byte_;
+    candidate_ = std::exchange(reply_, std::nullopt);
+    had_candidate_ = true;
+    candidate_at_ = last_byte_;
     disturbed_ = true;
 }
 

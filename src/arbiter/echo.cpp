@@ -83,7 +83,8 @@ void EchoMemory::begin() {
 
 EchoFilter::Expect EchoMemory::expect(const modbus::Request& request) const {
     if (state_ == EchoState::present) return EchoFilter::Expect::certainly;
-    // Reads go on watching: an adapter that is said or was found to have no echo may have one.
+    // Reads keep looking for an echo: an adapter without one, as configured or learned, may have
+    // one.
     if (state_ == EchoState::absent && !teaches_echo(request)) return EchoFilter::Expect::nothing;
     return EchoFilter::Expect::perhaps;
 }

@@ -11,20 +11,20 @@ std::string ms(Duration duration) {
     return std::to_string(tenths / 10) + '.' + std::to_string(tenths % 10) + " ms";
 }
 
-/// "read of modbus_tcp 10.0.0.5:50012 to station 17"; who polls is called after what it polls.
-std::string who(PriorityClass priority, const std::string& name, std::uint8_t station) {
+/// "read of modbus_tcp 10.0.0.5:50012 to station 17"; a poller's name already says what it polls.
+std::string describe(PriorityClass priority, const std::string& name, std::uint8_t station) {
     const std::string own = std::string(label(priority)) + " of ";
     if (name.starts_with(own)) return name;
     return own + name + " to station " + std::to_string(station);
 }
-std::string who(const Job& job, const ClientNames& names) {
-    return who(job.priority, names.of(job.client), job.station);
+std::string describe(const Job& job, const ClientNames& names) {
+    return describe(job.priority, names.of(job.client), job.station);
 }
 
-/// Of a request that is sent.
+/// Explains a request that is sent.
 std::string turn(const Reason& reason) {
     const std::string text =
-        who(reason.priority, ClientNames::words(reason.client), reason.station) + ": ";
+        describe(reason.priority, ClientNames::words(reason.client), reason.station) + ": ";
     const std::string instead =
         reason.asked_function == 0
             ? ""
@@ -64,24 +64,24 @@ Reason start(TimePoint now, const Group& group, const JobQueue& queue, const Cli
 
 std::string offline(TimePoint now, const Job& job, const StationHealth& health,
                     const ClientNames& names) {
-    return who(job, names) + " refused: offline after " + std::to_string(health.silent_in_a_row()) +
-           " silent transactions, next probe in " +
+    return describe(job, names) + " refused: offline after " +
+           std::to_string(health.silent_in_a_row()) + " silent transactions, next probe in " +
            ms(std::max(health.next_probe() - now, Duration::zero()));
 }
 
 std::string full(const Job& job, const QueueSettings& settings, std::size_t waiting,
                  const ClientNames& names) {
-    return who(job, names) + " refused: " + std::to_string(waiting) + " of " +
+    return describe(job, names) + " refused: " + std::to_string(waiting) + " of " +
            std::to_string(settings.limit) + " wait on this line, at most " +
            std::to_string(settings.per_client) + " of one client";
 }
 
 std::string shed(const Job& job, const ClientNames& names) {
-    return who(job, names) + " given up: the queue is full, and its host has the most waiting";
+    return describe(job, names) + " given up: the queue is full, and its host has the most waiting";
 }
 
 std::string doubted(const Job& job, const ClientNames& names) {
-    return who(job, names) +
+    return describe(job, names) +
            " asked once more: its answer repeats an earlier one and may be a copy of that";
 }
 
@@ -91,7 +91,7 @@ std::string line_rests(Duration rest, const Group& group) {
 }
 
 std::string expired(TimePoint now, const Job& job, bool transmitted, const ClientNames& names) {
-    return who(job, names) + " given up after " + ms(now - job.arrived) +
+    return describe(job, names) + " given up after " + ms(now - job.arrived) +
            (transmitted ? ": no answer before its deadline"
                         : ": it could not end before its deadline");
 }

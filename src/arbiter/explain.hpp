@@ -9,8 +9,7 @@
 #include "panelgate/arbiter/settings.hpp"
 #include "panelgate/arbiter/station.hpp"
 
-/// Why the schedule decides as it does, in one line a decision. Called only where somebody wants to
-/// read it.
+/// Explains the decisions of the schedule, one line each. Called only with Settings::explain.
 namespace panelgate::arbiter::explain {
 
 Reason start(TimePoint now, const Group& group, const JobQueue& queue, const ClientNames& names);

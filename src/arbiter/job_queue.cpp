@@ -25,7 +25,7 @@ const JobQueue::Lane& JobQueue::lane_at(const Place& place) const {
     return hosts_.at(place.host).sources.at(place.client).lanes.at(place.station);
 }
 
-/// Lanes are in order of tickets, so the first ones tell; broadcasts are the first lane.
+/// Lanes are in order of tickets, so their first jobs decide; broadcasts are the first lane.
 bool JobQueue::in_order(const Source& source, std::uint8_t station) {
     const auto& [first_station, first_lane] = *source.lanes.begin();
     if (first_station != kBroadcast) return true;
@@ -50,7 +50,7 @@ std::optional<JobQueue::Place> JobQueue::first_of(std::size_t rank, const Test& 
     return std::nullopt;
 }
 
-/// A lower class is never let ahead twice in a row, so that a write waits for one of them only.
+/// A lower class never goes ahead twice in a row, so that a write waits for only one.
 JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     Choice choice;
     for (std::size_t rank = kRanks; rank-- > 0;) {
@@ -68,9 +68,9 @@ JobQueue::Choice JobQueue::choose(const Test& may_run) const {
     return choice;
 }
 
-/// Its last chance is the tenth turn. Where a read could then be in the way (it is due itself, or
-/// would be in the turn that follows, which is a write's again), the poll goes up to three turns
-/// earlier; with these, one of four turns in a row is always free for it.
+/// Its last chance is the tenth turn. Where a read could then be in the way (because it is due
+/// itself, or would be in the following turn, which is a write's again), the poll goes up to three
+/// turns earlier; one of these four turns is always free for it.
 bool JobQueue::is_polls_turn(const Choice& choice, std::size_t top) const {
     const bool read = choice.first[kRead].has_value();
     const int reads_wait = passed_[kRead];
@@ -100,11 +100,11 @@ std::optional<Job> JobQueue::pop(const Test& may_run) {
     if (choice.rank == kRanks) return std::nullopt;
     count_turn(choice);
     const Place place = *choice.first[choice.rank];
-    to_the_end(place, choice.rank);
+    move_to_back(place, choice.rank);
     return take(place, 0);
 }
 
-void JobQueue::to_the_end(const Place& place, std::size_t rank) {
+void JobQueue::move_to_back(const Place& place, std::size_t rank) {
     ++turns_;
     const auto move = [&](auto& rounds, Turns& turns) {
         auto node = rounds[rank].extract(turns[rank]);
@@ -142,7 +142,7 @@ Jobs JobQueue::take_all(std::uint8_t station, const Test& wanted) {
     return taken;
 }
 
-/// There is such a lane, and order allows its first job to run.
+/// True if the lane exists and order allows its first job to run.
 bool JobQueue::has_first(const Place& place) const {
     const auto origin = hosts_.find(place.host);
     if (origin == hosts_.end()) return false;
@@ -193,7 +193,7 @@ std::optional<TimePoint> JobQueue::first_expiry() const {
     return *expiries_.begin();
 }
 
-// The lanes of the queue and its accounts: who waits where, who is in which round, what counts.
+// Lanes and accounting: waiting jobs, rounds and counts.
 
 JobQueue::Entry JobQueue::entry_of(Job job) {
     std::optional<ReadSpan> span;
@@ -202,14 +202,14 @@ JobQueue::Entry JobQueue::entry_of(Job job) {
     return {std::move(job), span};
 }
 
-/// A client stays where it is as long as something of it waits.
+/// A client keeps its host while a job of it waits.
 JobQueue::HostKey JobQueue::host_of(const Job& job) const {
     const auto home = home_.find(job.client);
     if (home != home_.end()) return home->second;
     return job.host == 0 ? HostKey{true, job.client} : HostKey{false, job.host};
 }
 
-/// Who is new comes in at the end of all rounds.
+/// New entries join at the end of all rounds.
 JobQueue::Lane& JobQueue::open_lane(const Place& place) {
     const auto open = [this](auto& map, const auto& key) -> auto& {
         const auto [it, added] = map.try_emplace(key);
@@ -224,7 +224,7 @@ JobQueue::Lane& JobQueue::open_lane(const Place& place) {
 
 void JobQueue::put_back(Job job) { insert(entry_of(std::move(job))); }
 
-/// Where its ticket belongs: at the end when it is new, ahead when it was taken before.
+/// Inserts by ticket: at the end if it is new, further ahead if it was taken before.
 void JobQueue::insert(Entry entry) {
     const Place place{host_of(entry.job), entry.job.client, entry.job.station};
     Lane& lane = open_lane(place);
@@ -271,7 +271,7 @@ void JobQueue::forget(const Entry& entry) {
 
 void JobQueue::count(Client client, int by) {
     Origin& origin = hosts_.at(home_.at(client));
-    const auto change = static_cast<std::size_t>(by);  // wraps, and back
+    const auto change = static_cast<std::size_t>(by);  // unsigned wrap-around is intended
     origin.sources.at(client).counting += change;
     origin.counting += change;
     size_ += change;
@@ -359,23 +359,23 @@ bool JobQueue::consistent() const {
            reads_.consistent();
 }
 
-// Who is let into the queue, and who has to leave it for that.
+// Admission to the queue, and dropping jobs for it.
 
-JobQueue::Admission JobQueue::push(Job job) {
-    Admission admission;
-    if (waiting() >= kMost) return admission;
+JobQueue::PushResult JobQueue::push(Job job) {
+    PushResult result;
+    if (waiting() >= kMost) return result;
     Entry entry = entry_of(std::move(job));
     if (!entry.span || !reads_.carries(*entry.span)) {
-        if (counting_of(entry.job.client) >= settings_.per_client) return admission;
-        if (size_ >= settings_.limit && !make_room(entry.job, admission.shed)) return {};
+        if (counting_of(entry.job.client) >= settings_.per_client) return result;
+        if (size_ >= settings_.limit && !make_room(entry.job, result.shed)) return {};
     }
-    admission.taken = true;
+    result.taken = true;
     insert(std::move(entry));
-    return admission;
+    return result;
 }
 
-/// When the victim carried others, these count in its place and may have to go as well. Tried on a
-/// copy: either there is room in the end, or nothing changes.
+/// If the victim carried other reads, these count in its place and may have to go as well. Tried on
+/// a copy of the queue: either there is room in the end, or nothing changes.
 bool JobQueue::make_room(const Job& newcomer, Jobs& shed) {
     const auto first = find_victim(newcomer);
     if (!first) return false;
@@ -415,7 +415,7 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
             return holder.host == own && holder.source.counting > of_client + 1;
         },
         writes_too);
-    // Writes come first, but the places of reads that every fifth turn needs are not theirs.
+    // Writes come first, but not at the expense of the places of reads that every fifth turn needs.
     if (victim || !write || kReadTurn * reads_.counting() <= settings_.limit) return victim;
     return greediest(
         [&](const Holder& holder) {
@@ -425,8 +425,8 @@ std::optional<JobQueue::Victim> JobQueue::find_victim(const Job& newcomer) const
         [](const Holder&) { return false; });
 }
 
-/// The victim of the greediest client that has one. Among equals the newest request loses: if it
-/// were always the same client's, nothing of that client would ever be served.
+/// The victim of the client with the most requests that has one. Among equals the newest request is
+/// dropped, so that not always the same client loses.
 std::optional<JobQueue::Victim> JobQueue::greediest(const Ask& may_lose,
                                                     const Ask& writes_too) const {
     std::optional<Victim> best;
@@ -455,9 +455,9 @@ std::optional<JobQueue::Victim> JobQueue::victim_of(const Holder& holder, bool w
     return best;
 }
 
-/// The newest of a lane whose removal makes room; if none does, because others would count in its
-/// place, the newest that counts. Only reads stay behind it, so order is not broken by its loss;
-/// for the same reason nothing younger may wait on the other side of a broadcast.
+/// The newest of a lane whose removal frees a place; if there is none, because carried reads would
+/// count instead, the newest that counts. Only reads remain behind it, so its removal breaks no
+/// order; likewise nothing younger may wait across a broadcast.
 std::optional<JobQueue::Victim> JobQueue::victim_in(const Holder& holder,
                                                     std::uint8_t station) const {
     const auto& lanes = holder.source.lanes;

@@ -15,21 +15,21 @@ namespace panelgate::arbiter {
 
 namespace {
 
-FrameKind kind_of(Ledger::Part what) {
+FrameKind kind_of(Outbox::Part what) {
     switch (what) {
-        case Ledger::Part::damaged:
+        case Outbox::Part::damaged:
             return FrameKind::damaged;
-        case Ledger::Part::echo:
+        case Outbox::Part::echo:
             return FrameKind::echo;
-        case Ledger::Part::request:
+        case Outbox::Part::request:
             return FrameKind::foreign_request;
-        case Ledger::Part::late:
+        case Outbox::Part::late:
             return FrameKind::late;
-        case Ledger::Part::copy:
+        case Outbox::Part::duplicate:
             return FrameKind::copy;
-        case Ledger::Part::broadcast_reply:
-        case Ledger::Part::unasked:
-        case Ledger::Part::unknown:
+        case Outbox::Part::broadcast_reply:
+        case Outbox::Part::unasked:
+        case Outbox::Part::unknown:
             return FrameKind::foreign;
     }
     std::abort();
@@ -44,9 +44,9 @@ FrameKind kind_of(const Group& group) {
 
 }  // namespace
 
-Ledger::Ledger(const Settings& settings) { apply(settings); }
+Outbox::Outbox(const Settings& settings) { apply(settings); }
 
-void Ledger::apply(const Settings& settings) {
+void Outbox::apply(const Settings& settings) {
     explain_ = settings.explain;
     orders_ = crc_orders(settings);
     std::map<std::uint8_t, StationCounters> before = std::exchange(stations_, {});
@@ -55,19 +55,19 @@ void Ledger::apply(const Settings& settings) {
         stations_[station.id] = std::move(before[station.id]);
 }
 
-std::optional<Action> Ledger::poll() {
+std::optional<Action> Outbox::poll() {
     if (actions_.empty()) return std::nullopt;
     Action action = std::move(actions_.front());
     actions_.pop_front();
     return action;
 }
 
-StationCounters& Ledger::of(std::uint8_t station) {
+StationCounters& Outbox::of(std::uint8_t station) {
     const auto found = stations_.find(station);
     return found == stations_.end() ? stations_[kUnlisted] : found->second;
 }
 
-void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
+void Outbox::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why) {
     const Group& group = attempt.group();
     if (group.attempts > 1) ++of(group.station).retries;
     if (group.station == kBroadcast) ++line_.broadcasts;
@@ -76,12 +76,12 @@ void Ledger::transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wi
     actions_.push_back(Transmit{std::move(wire)});
 }
 
-void Ledger::finish(const Job& job, Result<Bytes> pdu, bool shared) {
+void Outbox::finish(const Job& job, Result<Bytes> pdu, bool shared) {
     actions_.push_back(
         Finish{job.ticket, std::move(pdu), job.attempts > 0, shared, {}, job.transactions});
 }
 
-void Ledger::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
+void Outbox::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
     Finish answer;
     answer.ticket = ticket;
     answer.pdu = std::move(pdu);
@@ -89,40 +89,40 @@ void Ledger::finish_from_memory(Ticket ticket, Bytes pdu, Duration age) {
     actions_.push_back(std::move(answer));
 }
 
-void Ledger::tell(const Attempt& attempt, TransactionEnd end) {
+void Outbox::report(const Attempt& attempt, TransactionEnd end) {
     if (!explain_) return;
     const Group& group = attempt.group();
     const Attempt::Timing& timing = attempt.timing();
-    Exchange told;
-    told.transaction = group.transaction;
-    told.end = end;
-    told.station = group.station;
-    if (!group.jobs.empty()) told.arrived = group.jobs.front().arrived;
-    told.granted = timing.started;
-    told.first_bit_out = timing.sent - timing.leaving;
-    told.last_bit_out = timing.sent;
+    Exchange exchange;
+    exchange.transaction = group.transaction;
+    exchange.end = end;
+    exchange.station = group.station;
+    if (!group.jobs.empty()) exchange.arrived = group.jobs.front().arrived;
+    exchange.granted = timing.started;
+    exchange.first_bit_out = timing.sent - timing.leaving;
+    exchange.last_bit_out = timing.sent;
     if (attempt.heard()) {
-        told.first_byte_in = attempt.first_byte();
-        told.last_byte_in = attempt.last_byte();
+        exchange.first_byte_in = attempt.first_byte();
+        exchange.last_byte_in = attempt.last_byte();
     }
-    actions_.push_back(told);
+    actions_.push_back(exchange);
 }
 
-void Ledger::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
+void Outbox::event(StationEvent::Kind kind, std::uint8_t station, Duration by) {
     actions_.push_back(StationEvent{kind, station, by});
 }
 
-void Ledger::written(const Group& group, bool ended) {
+void Outbox::written(const Group& group, bool ended) {
     if (group.request.is_read()) return;
     const Client client = group.jobs.empty() ? 0 : group.jobs.front().client;
     actions_.push_back(Written{group.station, group.request.access().write, ended, client});
 }
 
-void Ledger::on_started(TimePoint now, const Job& job) {
+void Outbox::on_started(TimePoint now, const Job& job) {
     line_.queue_wait[static_cast<std::size_t>(job.priority)].observe(now - job.arrived);
 }
 
-void Ledger::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
+void Outbox::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
     const Attempt::Timing& timing = attempt.timing();
     const TimePoint longest = attempt.give_up() + timing.longest_reply;
     const TimePoint end = std::max({timing.sent, attempt.last_byte(), std::min(now, longest)});
@@ -134,27 +134,27 @@ void Ledger::on_ended(TimePoint now, const Attempt& attempt, Duration gap) {
     }
 }
 
-void Ledger::on_echo_mismatch(TimePoint now, std::uint8_t station) {
+void Outbox::on_echo_mismatch(TimePoint now, std::uint8_t station) {
     constexpr Duration kPause = 10s;
     ++of(station).echo_mismatches;
-    if (told_collision_ && now < *told_collision_ + kPause) return;
-    told_collision_ = now;
+    if (reported_collision_ && now < *reported_collision_ + kPause) return;
+    reported_collision_ = now;
     event(StationEvent::Kind::collision, station);
 }
 
-void Ledger::on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
-                      Duration lateness) {
-    const bool known = what == Part::late || what == Part::copy || what == Part::unasked;
-    const bool nobodys = what == Part::unasked || what == Part::unknown || what == Part::request ||
-                         what == Part::broadcast_reply;
+void Outbox::on_unsolicited(TimePoint now, const modbus::Unused& part, Part what,
+                            std::uint8_t asked, Duration lateness) {
+    const bool known = what == Part::late || what == Part::duplicate || what == Part::unasked;
+    const bool is_foreign = what == Part::unasked || what == Part::unknown ||
+                            what == Part::request || what == Part::broadcast_reply;
     of(known ? part.station : asked).discarded_bytes += part.bytes.size();
     if (what == Part::late) ++of(part.station).late_frames;
-    if (nobodys) ++of(asked).foreign_frames;
-    count_stray(part, what, asked, lateness);
+    if (is_foreign) ++of(asked).foreign_frames;
+    count_unsolicited(part, what, asked, lateness);
     actions_.push_back(Note{now, kind_of(what), part.bytes, {}});
 }
 
-// What tells a line's troubles apart. Everything here is counted and nothing depends on it.
+// Symptoms, for diagnosis only: nothing depends on them.
 
 namespace {
 
@@ -165,14 +165,14 @@ std::size_t pause_class(Duration pause) {
     return i;
 }
 
-/// Of addresses that a search asks nobody knows whether anybody is there.
+/// A scan may ask addresses without a panel.
 bool is_search(const Group& group) {
     return !group.jobs.empty() && std::ranges::all_of(group.jobs, &Job::search);
 }
 
 }  // namespace
 
-void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
+void Outbox::on_answered(TimePoint now, const Attempt& attempt, Duration think,
                          const Station::Replied& replied) {
     const std::uint8_t station = attempt.group().station;
     actions_.push_back(Note{now,
@@ -191,14 +191,14 @@ void Ledger::on_answered(TimePoint now, const Attempt& attempt, Duration think,
     if (attempt.echoed()) ++symptoms.echoes;
     if (!attempt.damaged_bytes().empty()) ++symptoms.strays;
     if (replied.trailed) ++symptoms.trailed;
-    credit_unheard(attempt.group());
+    credit_unanswered(attempt.group());
     if (replied.back) event(StationEvent::Kind::online, station);
     if (replied.drift) event(StationEvent::Kind::drift, station, *replied.drift);
     if (replied.trail) event(StationEvent::Kind::trail, station, *replied.trail);
     symptoms.mute_in_a_row = 0;
 }
 
-void Ledger::on_failed(const Attempt& attempt, Verdict verdict) {
+void Outbox::on_failed(const Attempt& attempt, Verdict verdict) {
     Symptoms& symptoms = symptoms_of(attempt.group().station);
     if (attempt.echoed()) ++symptoms.echoes;
     if (verdict == Verdict::damaged) ++of(attempt.group().station).damaged_frames;
@@ -215,38 +215,38 @@ void Ledger::on_failed(const Attempt& attempt, Verdict verdict) {
     } else {
         const bool silent = !attempt.heard() && !attempt.disturbed();
         ++(silent ? symptoms.silent : symptoms.disturbed);
-        if (silent) remember_unheard(attempt, symptoms.mute_in_a_row);
+        if (silent) remember_unanswered(attempt, symptoms.mute_in_a_row);
         if (!is_search(attempt.group())) ++symptoms.mute_in_a_row;
     }
 }
 
-/// A read that stays without reply now, and is answered when it is asked again, tells about the
-/// pause before it. A station that is off tells nothing, nor does a register that it ignores.
-void Ledger::remember_unheard(const Attempt& attempt, std::uint64_t mute_before) {
+/// An unanswered read that is answered when asked again gives evidence about the pause before it.
+/// An offline station gives none, nor does a register that the panel ignores.
+void Outbox::remember_unanswered(const Attempt& attempt, std::uint64_t mute_before) {
     const Group& group = attempt.group();
     constexpr std::uint64_t kMost = 2;  // in a row: a retry may follow another frame closely, too
     if (!group.request.is_read()) return;
     if (mute_before >= kMost) {
-        unheard_.erase(group.station);
+        unanswered_.erase(group.station);
         return;
     }
-    Unheard& unheard = unheard_[group.station];
-    if (unheard.pdu != group.request.pdu()) unheard = {group.request.pdu(), {}, 0};
-    if (unheard.count < unheard.pauses.size())
-        unheard.pauses[unheard.count++] = pause_class(attempt.timing().pause);
+    Unanswered& unanswered = unanswered_[group.station];
+    if (unanswered.pdu != group.request.pdu()) unanswered = {group.request.pdu(), {}, 0};
+    if (unanswered.count < unanswered.pauses.size())
+        unanswered.pauses[unanswered.count++] = pause_class(attempt.timing().pause);
 }
 
-void Ledger::credit_unheard(const Group& group) {
-    const auto found = unheard_.find(group.station);
-    if (found == unheard_.end() || found->second.pdu != group.request.pdu()) return;
-    const Unheard& unheard = found->second;
-    for (std::size_t i = 0; i < unheard.count; ++i)
-        ++symptoms_of(group.station).silent_after[unheard.pauses[i]];
-    unheard_.erase(found);
+void Outbox::credit_unanswered(const Group& group) {
+    const auto found = unanswered_.find(group.station);
+    if (found == unanswered_.end() || found->second.pdu != group.request.pdu()) return;
+    const Unanswered& unanswered = found->second;
+    for (std::size_t i = 0; i < unanswered.count; ++i)
+        ++symptoms_of(group.station).silent_after[unanswered.pauses[i]];
+    unanswered_.erase(found);
 }
 
-/// Its own line in the account of an attempt: what came instead of the reply.
-void Ledger::count_damaged(const Attempt& attempt) {
+/// Counts an attempt with damage instead of the reply.
+void Outbox::count_damaged(const Attempt& attempt) {
     const Group& group = attempt.group();
     const ByteView bytes = attempt.damaged_bytes();
     Symptoms& symptoms = symptoms_of(group.station);
@@ -260,7 +260,7 @@ void Ledger::count_damaged(const Attempt& attempt) {
     } else {
         ++symptoms.damaged_long;
     }
-    // A good frame, but for the order of the CRC's bytes.
+    // A good frame except for the order of the CRC's bytes.
     if (modbus::crc_ok(bytes, other(orders_.of(group.station)))) ++symptoms.crc_swapped;
     if (modbus::ends_in_lower_case(bytes)) ++symptoms.lower_case;
     if (head) ++symptoms.damaged_heads;
@@ -271,8 +271,8 @@ void Ledger::count_damaged(const Attempt& attempt) {
     symptoms.damaged_zeros += static_cast<std::uint64_t>(std::ranges::count(bytes, 0));
 }
 
-void Ledger::count_stray(const modbus::Unused& part, Part what, std::uint8_t asked,
-                         Duration lateness) {
+void Outbox::count_unsolicited(const modbus::Unused& part, Part what, std::uint8_t asked,
+                               Duration lateness) {
     const bool known = what != Part::damaged && what != Part::unknown && what != Part::request;
     Symptoms& symptoms = symptoms_of(known ? part.station : asked);
     switch (what) {
@@ -287,11 +287,11 @@ void Ledger::count_stray(const modbus::Unused& part, Part what, std::uint8_t ask
             return;
         case Part::late:
             symptoms.mute_in_a_row = 0;
-            if (lateness <= Duration::zero()) return;  // behind a wait that was cut short
+            if (lateness <= Duration::zero()) return;  // after a shortened wait
             ++symptoms.late;
             symptoms.worst_lateness = std::max(symptoms.worst_lateness, lateness);
             return;
-        case Part::copy:
+        case Part::duplicate:
             ++symptoms.doubled;
             return;
         case Part::broadcast_reply:

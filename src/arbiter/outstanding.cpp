@@ -14,53 +14,57 @@ namespace panelgate::arbiter {
 namespace {
 
 auto may_be_answered_by(ByteView reply) {
-    return [reply](const Debt::Owed& one) { return modbus::answers(one.pdu, reply); };
+    return
+        [reply](const OutstandingReplies::Entry& one) { return modbus::answers(one.pdu, reply); };
 }
 
 }  // namespace
 
-void Debt::add(TimePoint sent, const Bytes& pdu) {
-    owed_.push_back({sent, pdu});
-    if (owed_.size() > kMost) owed_.pop_front();
+void OutstandingReplies::add(TimePoint sent, const Bytes& pdu) {
+    entries_.push_back({sent, pdu});
+    if (entries_.size() > kMost) entries_.pop_front();
 }
 
-bool Debt::is_only(const Bytes& pdu) const {
-    return !empty() && std::ranges::all_of(owed_, [&](const Owed& one) { return one.pdu == pdu; });
+bool OutstandingReplies::is_only(const Bytes& pdu) const {
+    return !empty() &&
+           std::ranges::all_of(entries_, [&](const Entry& one) { return one.pdu == pdu; });
 }
 
-bool Debt::is_ambiguous(const modbus::Request& request, bool again) const {
+bool OutstandingReplies::is_ambiguous(const modbus::Request& request, bool again) const {
     const Bytes& pdu = request.pdu();
     const bool is_echoed = modbus::is_broadcastable(pdu[0]);
     const Bytes reply = is_echoed ? modbus::normal_write_reply(pdu) : Bytes{};
     const auto length = modbus::reply_length_from_request(pdu);
-    return std::ranges::any_of(owed_, [&](const Owed& one) {
+    return std::ranges::any_of(entries_, [&](const Entry& one) {
         if (one.pdu[0] != pdu[0] || (again && one.pdu == pdu)) return false;
         return is_echoed ? modbus::answers(one.pdu, reply)
                          : modbus::reply_length_from_request(one.pdu) == length;
     });
 }
 
-bool Debt::has_other_function(std::uint8_t function) const {
-    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu[0] != function; });
+bool OutstandingReplies::has_other_function(std::uint8_t function) const {
+    return std::ranges::any_of(entries_, [&](const Entry& one) { return one.pdu[0] != function; });
 }
 
-void Debt::close_before(TimePoint sent, TimePoint connected) {
-    std::erase_if(owed_, [&](const Owed& one) { return one.sent < sent && one.sent >= connected; });
+void OutstandingReplies::close_before(TimePoint sent, TimePoint connected) {
+    std::erase_if(entries_,
+                  [&](const Entry& one) { return one.sent < sent && one.sent >= connected; });
 }
 
-bool Debt::fits_other(ByteView reply, const Bytes& pdu) const {
+bool OutstandingReplies::fits_other(ByteView reply, const Bytes& pdu) const {
     const auto fits = may_be_answered_by(reply);
-    return std::ranges::any_of(owed_, [&](const Owed& one) { return one.pdu != pdu && fits(one); });
+    return std::ranges::any_of(entries_,
+                               [&](const Entry& one) { return one.pdu != pdu && fits(one); });
 }
 
-const Debt::Owed* Debt::oldest(ByteView reply) const {
-    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
-    return found == owed_.end() ? nullptr : &*found;
+const OutstandingReplies::Entry* OutstandingReplies::oldest(ByteView reply) const {
+    const auto found = std::ranges::find_if(entries_, may_be_answered_by(reply));
+    return found == entries_.end() ? nullptr : &*found;
 }
 
-const Debt::Owed* Debt::oldest(ByteView reply, TimePoint open) const {
-    const Owed* last = nullptr;
-    for (const Owed& one : owed_) {
+const OutstandingReplies::Entry* OutstandingReplies::oldest(ByteView reply, TimePoint open) const {
+    const Entry* last = nullptr;
+    for (const Entry& one : entries_) {
         if (!may_be_answered_by(reply)(one)) continue;
         last = &one;
         if (one.sent > open) break;
@@ -68,23 +72,23 @@ const Debt::Owed* Debt::oldest(ByteView reply, TimePoint open) const {
     return last;
 }
 
-Bytes Debt::take(ByteView reply) {
-    const auto found = std::ranges::find_if(owed_, may_be_answered_by(reply));
-    if (found == owed_.end()) return {};
+Bytes OutstandingReplies::take(ByteView reply) {
+    const auto found = std::ranges::find_if(entries_, may_be_answered_by(reply));
+    if (found == entries_.end()) return {};
     Bytes pdu = std::move(found->pdu);
-    owed_.erase(found);
+    entries_.erase(found);
     return pdu;
 }
 
-void Questions::on_heard(TimePoint now, ByteView bytes) {
+void ForeignRequests::on_heard(TimePoint now, ByteView bytes) {
     const ByteView adu = bytes.first(modbus::request_adu_length(bytes));
     if (adu.size() <= modbus::kAduOverhead || adu[0] == kBroadcast) return;
-    if (asked_.size() == kMost) asked_.erase(asked_.begin());
-    asked_.push_back({now, Bytes(adu.begin(), adu.end())});
+    if (requests_.size() == kMost) requests_.erase(requests_.begin());
+    requests_.push_back({now, Bytes(adu.begin(), adu.end())});
 }
 
-bool Questions::fit(ByteView adu, TimePoint since) const {
-    return std::ranges::any_of(asked_, [&](const Question& asked) {
+bool ForeignRequests::fit(ByteView adu, TimePoint since) const {
+    return std::ranges::any_of(requests_, [&](const Entry& asked) {
         return asked.at >= since && asked.adu[0] == adu[0] &&
                modbus::answers(modbus::pdu_of(asked.adu), modbus::pdu_of(adu));
     });

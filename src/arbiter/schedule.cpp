@@ -47,8 +47,9 @@ bool Sharing::joins(const Group& group, const Job& job, const Station& station) 
     if (!span || !group.span->touches(*span)) return false;
     if (group.span->contains(*span)) return true;
     const modbus::Span both = join(*group.span, *span);
-    if (station.owes() && station.is_ambiguous(modbus::Request::read(both))) return false;
-    // The whole of one that contains all the others has been asked for by a client.
+    if (station.has_outstanding() && station.is_ambiguous(modbus::Request::read(both)))
+        return false;
+    // A span that contains all the others was asked for by a client itself.
     if (both != *span && both.count > known_length(station, both)) return false;
     return std::none_of(refused_.begin(), refused_.end(), [&](const ReadSpan& refused) {
         return ReadSpan{job.station, both}.contains(refused);
@@ -114,7 +115,8 @@ Jobs Backlog::remove_retries(const JobQueue::Test& match) {
             ++group;
             continue;
         }
-        append(removed, std::exchange(group->jobs, {}));  // of those who left while it was sent
+        append(removed,
+               std::exchange(group->jobs, {}));  // of clients that left while it was on the wire
         dropped_.push_back(std::move(*group));
         group = retries_.erase(group);
     }
@@ -156,7 +158,7 @@ Jobs Backlog::clear() {
 
 namespace {
 
-/// The longer of the silences that the last station and this one ask for.
+/// The longer of the gaps that the last station and this one require.
 bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, Quiet& quiet) {
     const Duration gap = std::max(stations.gap(quiet.station()), stations.gap(station));
     const TimePoint allowed = quiet.free_at(gap);
@@ -165,19 +167,19 @@ bool gap_is_over(TimePoint now, std::uint8_t station, const Stations& stations, 
     return false;
 }
 
-/// A read that no client asked for.
-Group read_for_nobody(std::uint8_t station, modbus::Request request) {
+/// Makes a read that no client asked for.
+Group internal_read(std::uint8_t station, modbus::Request request) {
     const std::optional<modbus::Span> span = request.span();
     return {.station = station, .request = std::move(request), .span = span};
 }
 
-/// P8: nobody knows yet whether this line hears itself, and this job could be confirmed by its own
-/// echo. A read of the same station tells.
+/// P8: it is unknown whether this line has an echo, and this job could be confirmed by its own
+/// echo. A read of the same station decides.
 Group learning_for(const Job& job, const Station& station) {
     modbus::Request probe = station.probe();
     if (!teaches_echo(probe))
         probe = modbus::Request::read({modbus::Table::holding_registers, 0, 1});
-    Group group = read_for_nobody(job.station, std::move(probe));
+    Group group = internal_read(job.station, std::move(probe));
     group.learns_for = job.ticket;
     return group;
 }
@@ -197,31 +199,31 @@ void Schedule::apply(const Settings& settings) {
     sharing_.apply(settings.share_reads);
 }
 
-/// From then on a job may have its turn: it is sent, or, where that is sooner, a read whose answer
-/// shows that nothing else is outstanding (P1). Nothing that answers a broadcast can be taken for
-/// its reply either (P8). No reply is that to a broadcast.
+/// Time from which a job may have its turn: it is sent, or, where that is sooner, a read whose
+/// answer proves that nothing else is outstanding (P1). No answer to a broadcast can then be taken
+/// for its reply either (P8). A broadcast itself has no reply.
 TimePoint Schedule::ready_at(const Stations& stations, const Job& job) const {
     if (job.station == kBroadcast) return {};
     const Station* station = stations.find(job.station);
     if (station == nullptr)
         return broadcasts_.over(job.request, stations.settings(job.station).response_timeout);
-    // Before a write that its echo could confirm a read goes that may be any one.
+    // A write that its echo could confirm is preceded by a read, which may be any.
     const bool is_learned = echo_known_ || job.request.is_read();
     TimePoint clear = is_learned ? station->clear_at(job.request) : station->rested();
     if (can_prove(*station)) clear = std::min(clear, station->clear_at(station->proof()));
     return std::max({clear, broadcasts_.over(job.request, station->broadcast_window()),
-                     stations.held_until(job.station)});
+                     stations.throttled_until(job.station)});
 }
 
-/// At once when the reply that its station owes is to this very request, else behind that (P1).
+/// At once if the outstanding reply is to this very request, else after it (P1).
 TimePoint Schedule::repeat_from(const Group& group, const Stations& stations) const {
     const Station& station = *stations.find(group.station);
     return std::max(station.clear_at(group.request, true),
                     broadcasts_.over(group.request, station.broadcast_window()));
 }
 
-/// On the connection where the way may hold back what is outstanding, more is sent only while the
-/// station is seen to answer.
+/// On a connection that may delay outstanding requests, more is sent only while the station is seen
+/// to answer.
 bool Schedule::can_prove(const Station& station) const {
     return station.may_prove() && (!may_stall_ || station.is_answering());
 }
@@ -237,13 +239,13 @@ Schedule::Next Schedule::next(TimePoint now, Stations& stations, Quiet& quiet,
         if (alone) return {};
     }
     const auto due = stations.next_probe();
-    // A probe is of the lowest class, but a busy line must not keep a station dead: its budget
-    // bounds what it takes.
+    // Probes have the lowest class, but a busy line must not keep a station offline: its budget
+    // limits them.
     constexpr Duration kPatience = 20ms;
     if (due && now >= *due + kPatience) {
         if (auto group = next_probe(now, stations, quiet)) return {std::move(group), false};
     }
-    if (Next job = next_job(now, stations, quiet, echo); job.group || job.new_way) return job;
+    if (Next job = next_job(now, stations, quiet, echo); job.group || job.reopen) return job;
     if (auto group = next_retry(now, stations, quiet)) return {std::move(group), false};
     if (due && now >= *due) return {next_probe(now, stations, quiet), false};
     return {};
@@ -258,7 +260,7 @@ std::optional<Group> Schedule::next_retry(TimePoint now, const Stations& station
     return group;
 }
 
-/// Before the next retry.
+/// Reserves turns for other stations before the next retry.
 void Schedule::let_others_go_first(TimePoint now) {
     others_.clear();
     turns_ = 0;
@@ -285,7 +287,7 @@ std::optional<Group> Schedule::next_probe(TimePoint now, Stations& stations, Qui
     if (now < quiet.quarantined_until()) return std::nullopt;
     const auto station = stations.next_to_probe(now);
     if (!station || !gap_is_over(now, *station, stations, quiet)) return std::nullopt;
-    Group group = read_for_nobody(*station, stations.find(*station)->probe());
+    Group group = internal_read(*station, stations.find(*station)->probe());
     group.probe = true;
     return group;
 }
@@ -299,22 +301,23 @@ JobQueue::Test Schedule::runnable(TimePoint now, const Stations& stations,
     };
 }
 
-/// P1: what is outstanding at its station could be taken for the answer to this job. Stations serve
-/// in turn: the answer to a read of another length shows that nothing is. Where the way may hold
-/// things back and the station does not answer, nothing shows that on the connection which the
-/// request was sent on: a new one is needed.
+/// P1: an outstanding reply of its station could be taken for the answer to this job. Stations
+/// serve in order: the answer to a read of another length proves that none can come. If the
+/// transport may delay frames and the station does not answer, the connection that the request was
+/// sent on proves nothing: a new one is needed.
 std::optional<Schedule::Next> Schedule::proof_before(TimePoint now, const Job& job,
                                                      const Stations& stations) const {
     const Station* station = stations.find(job.station);
     if (job.station == kBroadcast || station == nullptr || !station->is_ambiguous(job.request))
         return std::nullopt;
-    const bool held = held_back(*station);
-    if (!held && now >= station->clear_at(job.request)) return std::nullopt;
-    if (held && !can_prove(*station) && station->owes_since(way_.opened()))
+    const bool is_in_transit = in_transit(*station);
+    if (!is_in_transit && now >= station->clear_at(job.request)) return std::nullopt;
+    if (is_in_transit && !can_prove(*station) &&
+        station->has_outstanding_since(transport_.opened()))
         return Next{std::nullopt, true};
-    Group proof = read_for_nobody(job.station, station->proof());
+    Group proof = internal_read(job.station, station->proof());
     proof.probe = true;
-    proof.told_apart = proof.request != station->probe();
+    proof.distinct_length = proof.request != station->probe();
     return Next{std::move(proof), false};
 }
 
@@ -323,7 +326,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     // While a retry lets others go first, each of them has one turn.
     const bool others = others_go_first(now, stations, quiet);
     const JobQueue::Test may_run = runnable(now, stations, quiet);
-    PoolSet<std::uint8_t> reads;  // that go before their station's writes
+    PoolSet<std::uint8_t> reads;  // stations whose reads go before their writes
     backlog_.queue().any_first([&](const Job& job) {
         if (job.request.is_read() && stations.has_read_turn(job.station) && may_run(job))
             reads.insert(job.station);
@@ -336,7 +339,7 @@ Schedule::Next Schedule::next_job(TimePoint now, Stations& stations, Quiet& quie
     const JobQueue::Test in_budget = [&](const Job& job) {
         return may(job) && stations.may_spend(now, job);
     };
-    // Who fails again and again waits for its share only while others want the line.
+    // A failing station waits for its share only while others want the line.
     const Job* next = backlog_.queue().peek(in_budget);
     const JobQueue::Test& test = next != nullptr ? in_budget : may;
     if (next == nullptr) next = backlog_.queue().peek(may);
@@ -366,7 +369,7 @@ std::optional<TimePoint> Schedule::next_start(const Stations& stations, const Qu
         next = next ? std::min(*next, std::max(free, t)) : std::max(free, t);
     };
     backlog_.each_retry([&](const Group& group) { earlier(repeat_from(group, stations)); });
-    // As a rule the first of them may start at once: however many wait, nothing starts sooner.
+    // Usually the first may start at once: then nothing can start sooner.
     const bool at_once = backlog_.queue().any_first([&](const Job& job) {
         if (backlog_.has_retry(job.station)) return false;
         earlier(std::max(quiet.quarantined_until(), ready_at(stations, job)));
@@ -385,7 +388,7 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
     if (quarantine_ == Quarantine::line && !failed.probe) {
         return own.adaptive_timeout ? std::min(rested, now + station.response_timeout()) : rested;
     }
-    // A rest longer than another timeout is not worth it: that is what a collision costs.
+    // A rest longer than another timeout is not worth it: a collision costs that much.
     const Duration worst = station.worst_lateness();
     const bool is_late =
         failed.first_silence && worst > Duration::zero() && worst <= own.response_timeout;
@@ -396,7 +399,7 @@ std::optional<TimePoint> Schedule::line_rests_until(TimePoint now, const Group& 
 void Schedule::retry(TimePoint now, Group group, Duration patience) {
     const bool first = !backlog_.has_retries();
     const bool at_once = !group.confirms.empty();
-    // A write that goes again has had its turn among the writes.
+    // A retried write has had its turn among the writes.
     if (group.request.is_read()) patience_ = std::max(patience_, patience);
     backlog_.retry(std::move(group));
     if (first) let_others_go_first(now);

@@ -25,7 +25,7 @@ void StationHealth::on_damaged() {
     returns_ += silent_ > 0 ? 1u : 0u;
     silent_ = 0;
     state_ = Health::suspect;
-    // Of a station that was never heard it may be anybody's noise.
+    // A station that was never heard: the damage may come from any sender.
     known_ = last_heard_.has_value();
 }
 

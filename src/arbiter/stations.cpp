@@ -47,57 +47,57 @@ Duration Stations::gap(std::uint8_t id) const {
 
 Duration Stations::patience(TimePoint now, const Group& group) {
     const Station& station = of(group.station);
-    const bool poor = station.in_debt(now) && has_company(now, station);
-    const bool hurry = now < hurry_until_ || poor;
-    Duration wait = station.patience(group, slowest(), hurry, spent(now, station));
+    const bool is_over_budget = station.over_budget(now) && others_active(now, station);
+    const bool urgent = now < urgent_until_ || is_over_budget;
+    Duration wait = station.patience(group, slowest(), urgent, flaky_beside_others(now, station));
     const Duration whole = settings(group.station).response_timeout;
     for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));
     return wait;
 }
 
-TimePoint Stations::company_until(const Station& station) const {
+TimePoint Stations::others_active_until(const Station& station) const {
     TimePoint until{};
     for (const auto& [id, other] : stations_) {
         const auto answered = other.health().last_heard();
         if (&other != &station && answered && *answered > station.failed())
-            until = std::max(until, *answered + kCompany);
+            until = std::max(until, *answered + kOthersActive);
     }
     return until;
 }
 
-TimePoint Stations::held_until(std::uint8_t id) const {
+TimePoint Stations::throttled_until(std::uint8_t id) const {
     const Station* station = find(id);
     if (station == nullptr || !station->failing()) return {};
-    return std::min(station->affordable_at(), company_until(*station));
+    return std::min(station->affordable_at(), others_active_until(*station));
 }
 
-bool Stations::is_stranger(std::uint8_t id) const {
+bool Stations::is_unheard_id(std::uint8_t id) const {
     const Station* station = find(id);
     return id != kBroadcast &&
-           (station == nullptr ? !configured_.contains(id) : station->stranger());
+           (station == nullptr ? !configured_.contains(id) : station->unheard());
 }
 
 bool Stations::may_spend(TimePoint now, const Job& job) const {
-    if (is_stranger(job.station)) return strangers_.allows(now, surprise());
+    if (is_unheard_id(job.station)) return unheard_.allows(now, timeout_cost());
     const Station* station = find(job.station);
     if (station == nullptr) return true;
-    // A write that is ignored says nothing of reads while these are answered.
+    // An ignored write says nothing about reads while these are answered.
     const bool is_read = job.request.is_read();
-    const bool is_suspect = station->suspect() && !(is_read && station->answers_reads());
-    return (!is_suspect || suspects_.allows(now)) &&
+    const bool is_missed = station->missed_last() && !(is_read && station->answers_reads());
+    return (!is_missed || newly_silent_.allows(now)) &&
            station->may_spend(now, is_read ? nullptr : &job.request);
 }
 
-/// A client's request may be the probe once an interval, as far as the budget goes.
+/// A client's request may be the probe once an interval, within the budget.
 bool Stations::refuses(TimePoint now, const Job& job) {
     if (job.station == kBroadcast) return false;
-    forget_strangers(now);
+    forget_unheard(now);
     Station& station = of(job.station);
-    if (station.stranger()) station.on_wanted(now);
+    if (station.unheard()) station.on_wanted(now);
     if (!station.health().offline()) return false;
-    if (station.stranger() && job.search) return false;
-    const bool may_wake = station.stranger() || !job.request.is_read();
-    const ProbeBudget& budget = station.stranger() ? known_strangers_ : probes();
+    if (station.unheard() && job.search) return false;
+    const bool may_wake = station.unheard() || !job.request.is_read();
+    const ProbeBudget& budget = station.unheard() ? asked_unheard_ : probes();
     if (may_wake && budget.allows(now) && station.take_half_open(now, job.request.is_read()))
         return false;
     station.on_refused(job.request);
@@ -107,7 +107,7 @@ bool Stations::refuses(TimePoint now, const Job& job) {
 TimePoint Stations::clear_at(TimePoint now, bool may_stall) const {
     TimePoint clear{};
     for (const auto& [id, station] : stations_) {
-        if (!station.owes()) continue;
+        if (!station.has_outstanding()) continue;
         clear = std::max(clear, station.rested());
         if (may_stall) clear = std::max(clear, now + station.latest_reply());
     }
@@ -132,26 +132,26 @@ Duration Stations::response_timeout(std::uint8_t id) const {
 void Stations::on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost) {
     Station& station = of(group.station);
     station.on_failed(now, verdict, cost, group.request.is_read() ? nullptr : &group.request);
-    if (station.stranger()) {
-        strangers_.spend(now, cost, 2 * surprise());
-        if (station.health().offline()) known_strangers_.spend(now, cost, kCompany);
+    if (station.unheard()) {
+        unheard_.spend(now, cost, 2 * timeout_cost());
+        if (station.health().offline()) asked_unheard_.spend(now, cost, kOthersActive);
     } else if (station.health().offline()) {
         probes_.spend(now, cost);
         alone_.spend(now, cost);
-    } else if (station.suspect()) {
-        suspects_.spend(now, cost);
+    } else if (station.missed_last()) {
+        newly_silent_.spend(now, cost);
     } else if (verdict == Verdict::silent) {
-        // It may be one of several that have died together: the others are not waited for longer
-        // than they have ever needed, for as long as this one has taken a fifth of.
-        hurry_until_ =
-            now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost, kHurry);
+        // Several stations may have failed together: for five times what this one took, the others
+        // are not waited for longer than they have ever needed.
+        urgent_until_ =
+            now + std::min<Duration>(static_cast<int>(1 / ProbeBudget::kFailing) * cost, kUrgent);
     }
 }
 
-/// What is offline has to pay for it.
+/// Probes of offline stations must be within their budget.
 std::optional<TimePoint> Stations::probe_at(const Station& station) const {
     if (station.wants_check()) return station.probe_due();
-    if (!station.health().offline() || station.stranger()) return std::nullopt;
+    if (!station.health().offline() || station.unheard()) return std::nullopt;
     return std::max(station.probe_due(), probes().next());
 }
 
@@ -176,14 +176,14 @@ std::optional<TimePoint> Stations::next_probe() const {
     return next;
 }
 
-bool Stations::anyone_online() const {
+bool Stations::any_online() const {
     return std::ranges::any_of(stations_, [](const auto& entry) {
         const StationHealth& health = entry.second.health();
         return !health.offline() && health.last_heard();
     });
 }
 
-void Stations::forget_strangers(TimePoint now) {
+void Stations::forget_unheard(TimePoint now) {
     std::erase_if(stations_, [&](const auto& entry) { return entry.second.forgettable(now); });
 }
 

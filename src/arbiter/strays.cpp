@@ -13,11 +13,11 @@ namespace panelgate::arbiter {
 
 using modbus::Unused;
 using Kind = StationEvent::Kind;
-using Part = Ledger::Part;
+using Part = Outbox::Part;
 
 namespace {
 
-/// A good frame that can only be a request, another master's.
+/// True for a good frame that can only be another master's request.
 bool is_request(ByteView adu) {
     const modbus::ReplyLength as_reply = modbus::reply_length(adu);
     const bool fits_reply =
@@ -25,14 +25,14 @@ bool is_request(ByteView adu) {
     return !fits_reply && modbus::request_adu_length(adu) == adu.size();
 }
 
-Part part_of(Stray stray) {
-    switch (stray) {
-        case Stray::late:
+Part part_of(Unsolicited kind) {
+    switch (kind) {
+        case Unsolicited::late:
             return Part::late;
-        case Stray::copy:
-        case Stray::second:
-            return Part::copy;
-        case Stray::unasked:
+        case Unsolicited::duplicate:
+        case Unsolicited::second:
+            return Part::duplicate;
+        case Unsolicited::unasked:
             return Part::unasked;
     }
     std::abort();
@@ -40,79 +40,81 @@ Part part_of(Stray stray) {
 
 }  // namespace
 
-void Strays::hear(ByteView bytes) { idle_.insert(idle_.end(), bytes.begin(), bytes.end()); }
+void UnsolicitedFrames::hear(ByteView bytes) {
+    idle_.insert(idle_.end(), bytes.begin(), bytes.end());
+}
 
-std::vector<Unused> Strays::take(std::uint8_t asked) {
-    if (serial_.mode == SerialMode::ascii) return take_told(asked, false);
+std::vector<Unused> UnsolicitedFrames::take(std::uint8_t asked) {
+    if (serial_.mode == SerialMode::ascii) return take_delimited(asked, false);
     return modbus::classify_heard(std::exchange(idle_, {}), asked, orders_);
 }
 
-std::vector<Unused> Strays::take_told(std::uint8_t asked, bool good) {
+std::vector<Unused> UnsolicitedFrames::take_delimited(std::uint8_t asked, bool good) {
     const Bytes bytes = std::exchange(idle_, {});
     if (bytes.empty()) return {};
     return {modbus::told_part(bytes, asked, good && modbus::crc_ok(bytes, orders_))};
 }
 
-/// A reply to the broadcast of a moment ago: a panel that does not know that it should be silent.
-bool Strays::answers_broadcast(ByteView adu) const {
+/// A reply to a recent broadcast, from a panel that should be silent.
+bool UnsolicitedFrames::answers_broadcast(ByteView adu) const {
     constexpr unsigned kRecent = 4;  // requests sent since
     return !broadcast_.empty() && sent_since_ <= kRecent &&
            modbus::answers(modbus::pdu_of(broadcast_), modbus::pdu_of(adu));
 }
 
-Part Strays::judge(TimePoint now, const Unused& part, const Stations& stations) const {
+Part UnsolicitedFrames::judge(TimePoint now, const Unused& part, const Stations& stations) const {
     if (std::ranges::equal(part.bytes, last_frame_)) return Part::echo;
     if (begins_with_request(part.bytes, last_frame_, orders_) &&
         (part.kind == Unused::Kind::damaged || is_request(part.bytes)))
         return Part::request;
     if (part.kind == Unused::Kind::damaged) return Part::damaged;
-    // Whatever else it might be, it is not to be believed to be that.
+    // It must not be taken for anything else it might be.
     if (answers_other_master(now, part.bytes)) return Part::unknown;
     const Station* station = stations.find(part.station);
-    const bool owed =
-        station != nullptr && station->judge(now, modbus::pdu_of(part.bytes)) != Stray::unasked;
-    if (!owed && answers_broadcast(part.bytes)) return Part::broadcast_reply;
+    const bool explained = station != nullptr &&
+                           station->judge(now, modbus::pdu_of(part.bytes)) != Unsolicited::unasked;
+    if (!explained && answers_broadcast(part.bytes)) return Part::broadcast_reply;
     return station == nullptr ? Part::unknown : Part::unasked;
 }
 
-void Strays::note(TimePoint now, const std::vector<Unused>& parts, bool idle, Stations& stations,
-                  Quiet& quiet, Ledger& ledger) {
+void UnsolicitedFrames::note(TimePoint now, const std::vector<Unused>& parts, bool idle,
+                             Stations& stations, Quiet& quiet, Outbox& outbox) {
     const TimePoint heard_at = std::min(now, quiet.since());
     for (const Unused& part : parts) {
         const Part what = judge(heard_at, part, stations);
         if (what != Part::unasked) {
-            ledger.on_stray(now, part, what, quiet.station());
+            outbox.on_unsolicited(now, part, what, quiet.station());
             if (what == Part::damaged) stations.on_damaged(heard_at, part.bytes);
             if (what == Part::broadcast_reply) stations.on_broadcast_answered(part.station);
             if (what == Part::damaged && idle) stations.on_trail(heard_at, replied_);
-            if (what == Part::request) others_.on_heard(heard_at, part.bytes);
+            if (what == Part::request) foreign_requests_.on_heard(heard_at, part.bytes);
             if (what == Part::request) let_reply_pass(now, part.bytes, stations, quiet);
             continue;
         }
         const Station::Heard heard =
-            stations.of(part.station).on_stray_frame(heard_at, modbus::pdu_of(part.bytes));
-        ledger.on_stray(now, part, part_of(heard.stray), quiet.station(), heard.lateness);
-        if (heard.stray == Stray::late) ledger.event(Kind::late, part.station, heard.lateness);
+            stations.of(part.station).on_unsolicited_frame(heard_at, modbus::pdu_of(part.bytes));
+        outbox.on_unsolicited(now, part, part_of(heard.kind), quiet.station(), heard.lateness);
+        if (heard.kind == Unsolicited::late) outbox.event(Kind::late, part.station, heard.lateness);
         if (heard.back) {
-            stations.on_back();
-            ledger.event(Kind::online, part.station);
+            stations.on_recovery();
+            outbox.event(Kind::online, part.station);
         }
         if (heard.settled) quiet.lift(now, part.station);
     }
 }
 
-bool Strays::answers_other_master(TimePoint now, ByteView adu) const {
+bool UnsolicitedFrames::answers_other_master(TimePoint now, ByteView adu) const {
     constexpr Duration kLongest = 500ms;  // for a reply; its master would have asked again
-    return others_.fit(adu, now - kLongest);
+    return foreign_requests_.fit(adu, now - kLongest);
 }
 
-/// Another master asks: whoever speaks now damages the reply to it. Its panel has as long as ours
-/// need at the most, or as many are used to.
-void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
-                            Quiet& quiet) const {
+/// Another master asks: sending now would damage the reply to it. Wait as long as our slowest panel
+/// has needed, or a usual time.
+void UnsolicitedFrames::let_reply_pass(TimePoint now, ByteView request, const Stations& stations,
+                                       Quiet& quiet) const {
     const std::size_t size = modbus::request_adu_length(request);
     const ByteView pdu = modbus::pdu_of(request.first(size));
-    if (request.size() > size || request[0] == kBroadcast) return;  // its reply is heard as well
+    if (request.size() > size || request[0] == kBroadcast) return;  // its reply was heard as well
     constexpr std::size_t kShort = modbus::kReadRequestAdu;
     const Duration reply =
         frame_time(serial_, modbus::reply_length_from_request(pdu).value_or(kShort));
@@ -120,17 +122,18 @@ void Strays::let_reply_pass(TimePoint now, ByteView request, const Stations& sta
     quiet.rest_until(now + silent_interval(serial_) + think + reply);
 }
 
-bool Strays::is_wrong_reply(TimePoint now, ByteView adu, const Stations& stations) const {
+bool UnsolicitedFrames::is_wrong_reply(TimePoint now, ByteView adu,
+                                       const Stations& stations) const {
     if (std::ranges::equal(adu, last_frame_) || is_request(adu) || answers_broadcast(adu) ||
         answers_other_master(now, adu))
         return false;
     const Station* station = stations.find(adu[0]);
     if (station == nullptr) return false;
-    // A refusal with the number of another function that is outstanding may be that of this
-    // request: asking once more tells sooner than waiting.
-    const Stray stray = station->judge(now, modbus::pdu_of(adu));
-    return stray == Stray::unasked ||
-           (stray == Stray::late && modbus::exception_of(modbus::pdu_of(adu)));
+    // An exception for another outstanding function may be meant for this request: asking again
+    // decides sooner than waiting.
+    const Unsolicited kind = station->judge(now, modbus::pdu_of(adu));
+    return kind == Unsolicited::unasked ||
+           (kind == Unsolicited::late && modbus::exception_of(modbus::pdu_of(adu)));
 }
 
 }  // namespace panelgate::arbiter

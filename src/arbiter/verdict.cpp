@@ -1,4 +1,4 @@
-// What comes of an attempt: its jobs are answered, or it goes again, and its station is judged.
+// Handles an attempt's outcome: its jobs are answered or it is retried, and its station is judged.
 
 #include <algorithm>
 #include <cstdlib>
@@ -33,7 +33,7 @@ TransactionEnd end_of(Verdict verdict) {
     std::abort();
 }
 
-/// Somebody could still be answered by another attempt.
+/// True if another attempt could still answer one of the jobs in time.
 bool in_time(TimePoint now, const Group& group) {
     return std::ranges::any_of(group.jobs, [&](const Job& job) { return now < job.start_by; });
 }
@@ -41,78 +41,79 @@ bool in_time(TimePoint now, const Group& group) {
 }  // namespace
 
 void Arbiter::conclude(TimePoint now, Verdict verdict) {
-    const std::vector<modbus::Unused> strays = active_->take_strays();
-    ledger_.inside_attempt(true);
+    const std::vector<modbus::Unused> unsolicited = active_->take_unsolicited();
+    outbox_.inside_attempt(true);
     if (verdict == Verdict::replied) settle(now);
-    note(now, strays);
+    note(now, unsolicited);
     if (verdict == Verdict::doubtful) {
         ask_again(now);
     } else if (verdict != Verdict::open && verdict != Verdict::replied) {
         fail(now, verdict);
     }
-    ledger_.inside_attempt(false);
+    outbox_.inside_attempt(false);
 }
 
-/// The last bit of a broadcast has left: nobody answers, the line rests for the turnaround.
+/// The last bit of a broadcast has left: no reply comes, the line rests for the turnaround.
 void Arbiter::end_broadcast(TimePoint now) {
     const Attempt attempt = take_active(now);
     quiet_.rest_until(attempt.timing().sent + settings_.broadcast_turnaround + latency_);
     schedule_.on_broadcast(attempt.timing().sent, attempt.group().request.pdu());
-    ledger_.tell(attempt, TransactionEnd::ok);
+    outbox_.report(attempt, TransactionEnd::ok);
     for (const Job& job : attempt.group().jobs) {
-        if (job.deadline <= now) {  // nobody looked at the clock in between
-            ledger_.finish(job, Fault::timeout);
+        if (job.deadline <= now) {  // the deadline passed unnoticed while it was leaving
+            outbox_.finish(job, Fault::timeout);
         } else {
-            ledger_.finish(job, modbus::normal_write_reply(job.request.pdu()));
+            outbox_.finish(job, modbus::normal_write_reply(job.request.pdu()));
         }
     }
 }
 
-/// What answers by its form may be somebody else's, or of another time: then it is put aside, or
-/// waits for what comes behind it.
+/// A reply of the right form may be another sender's, or belong to an earlier request: then it is
+/// rejected or kept as a candidate until more is heard.
 bool Arbiter::takes_reply(TimePoint now, const Station& station, bool early) {
     Attempt& attempt = *active_;
     const Group& group = attempt.group();
     const bool refusal = modbus::exception_of(attempt.reply()).has_value();
-    const bool may_be_owed = refusal && !group.probe &&
-                             (attempt.refusal_was_rejected() ||
-                              station.refuses_other(attempt.reply(), group.request.pdu()));
+    const bool may_be_outstanding = refusal && !group.probe &&
+                                    (attempt.refusal_was_rejected() ||
+                                     station.refuses_other(attempt.reply(), group.request.pdu()));
     const bool is_early = early && !settings_.paced && pace_.believed();
     const bool is_too_early = is_early && attempt.replied_too_early();
     if (attempt.is_contested()) {
         attempt.reject_contested();
         return false;
     }
-    if (may_be_owed || station.is_copy(now, attempt, is_too_early)) {
+    if (may_be_outstanding || station.is_duplicate(now, attempt, is_too_early)) {
         attempt.reject_reply();
         return false;
     }
-    const bool waits = attempt.precedes_echo() && !attempt.was_held();
+    const bool waits = attempt.precedes_echo() && !attempt.had_candidate();
     const bool may_be_others =
-        refusal && group.may_doubt_refusal() && !attempt.was_held() &&
+        refusal && group.may_doubt_refusal() && !attempt.had_candidate() &&
         station.may_refuse_other(now, attempt.reply(), group.request.function());
-    const bool may_be_copy = station.may_be_copy(now, attempt, is_early);
+    const bool may_be_duplicate = station.may_be_duplicate(now, attempt, is_early);
     const bool may_be_echo =
-        attempt.may_be_its_echo() && !attempt.was_held() &&
+        attempt.may_be_its_echo() && !attempt.had_candidate() &&
         (is_early || station.is_far_too_quick(attempt.first_sign(now), stations_.quickest()));
-    if (may_be_copy || may_be_echo || may_be_others || waits) {
+    if (may_be_duplicate || may_be_echo || may_be_others || waits) {
         const bool doubted =
-            may_be_echo || may_be_others || (may_be_copy && group.may_doubt(attempt.reply()));
-        attempt.hold_reply(station.needed(), doubted);
+            may_be_echo || may_be_others || (may_be_duplicate && group.may_doubt(attempt.reply()));
+        attempt.keep_candidate(station.needed(), doubted);
         if (may_be_echo) attempt.suspect_echo();
     }
-    return !may_be_copy && !may_be_echo && !may_be_others && !waits;
+    return !may_be_duplicate && !may_be_echo && !may_be_others && !waits;
 }
 
-/// The reply is there.
+/// The reply has come.
 void Arbiter::settle(TimePoint now) {
     Station& station = stations_.of(active_->group().station);
     const bool early = active_->replied_early();
     if (!takes_reply(now, station, early)) return;
     pace_.on_reply(early);
     pace_.on_rate(active_->hasty());
-    surprised_ = active_->overslept() ? Station::kOdd : std::max(surprised_ - 1, 0);
-    if (const auto& look = active_->end_look()) notice_.on_look(look->whole);
+    unusual_ =
+        active_->unexpected_exception() ? Station::kUnusualReplies : std::max(unusual_ - 1, 0);
+    if (const auto& look = active_->end_look()) wake_latency_.on_look(look->whole);
     Attempt attempt = take_active(now);
     Group& group = attempt.group();
     const Bytes& reply = attempt.reply();
@@ -121,60 +122,61 @@ void Arbiter::settle(TimePoint now) {
     const Duration needed = attempt.first_sign(now);
     const TimePoint proved = station.surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
-    stations_.on_reply(now, group.tells_pace() ? std::optional(needed) : std::nullopt);
-    if (replied.back) stations_.on_back();
+    stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
+    if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
-    schedule_.on_way_proved(proved);
+    schedule_.on_transport_proved(proved);
     if (!settings_.paced && pace_.unbound() && now < attempt.timing().sent)
         quiet_.on_answered_early(now);
-    strays_.on_replied(group.station);
+    unsolicited_.on_replied(group.station);
     quiet_.rest_until(station.trail_until());
-    ledger_.on_answered(now, attempt, think, replied);
+    outbox_.on_answered(now, attempt, think, replied);
     attempt.teach(echo_memory_);
     if (attempt.echo_is_suspected()) echo_memory_.on_suspected();
     const bool refused = modbus::exception_of(reply).has_value();
-    ledger_.tell(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
+    outbox_.report(attempt, refused ? TransactionEnd::exception : TransactionEnd::ok);
     if (!group.confirms.empty()) return confirm(group, !attempt.echoed());
     if (refused) {
         give_back(group);
     } else {
-        reception_.on_read(group, reply, station.settings().max_age);
+        admission_.on_read(group, reply, station.settings().max_age);
     }
     for (const Job& job : group.jobs)
-        ledger_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
+        outbox_.finish(job, Sharing::part_for(group, reply, job), &job != &group.jobs.front());
 }
 
-/// P8: what equals a write came back sooner than the station has ever answered, and a read has told
-/// whether the line hears itself.
+/// P8: a reply that equals the write came sooner than the station has ever answered, and a read has
+/// now shown whether the line has an echo.
 void Arbiter::confirm(const Group& group, bool is_answer) {
     for (const Job& job : group.jobs) {
         if (is_answer) {
-            ledger_.finish(job, group.confirms);
+            outbox_.finish(job, group.confirms);
         } else {
-            ledger_.finish(job, Fault::timeout);
+            outbox_.finish(job, Fault::timeout);
         }
     }
 }
 
-/// What came may be a copy of an earlier reply, and its own may still come. Nobody is to blame.
+/// The reply may be a duplicate of an earlier one, and the real one may still come. The station's
+/// health is not affected.
 void Arbiter::ask_again(TimePoint now) {
     active_->remember_doubt();
     Attempt attempt = take_active(now);
-    ledger_.tell(attempt, end_of(Verdict::doubtful));
+    outbox_.report(attempt, end_of(Verdict::doubtful));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
-    station.owe(now, group.request.pdu(), attempt.timing().sent);
+    station.add_outstanding(now, group.request.pdu(), attempt.timing().sent);
     group.silent_after = group.cut_after = {};
     if (in_time(now, group) && !group.abandoned()) {
         if (!group.request.is_read()) return schedule_.retry(now, confirming(group, station), {});
-        ledger_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
+        outbox_.decide(now, [&] { return explain::doubted(group.jobs.front(), names_); });
         return schedule_.retry(now, std::move(group), station.usual());
     }
     for (const Job& job : group.jobs)
-        ledger_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
+        outbox_.finish(job, job.gone ? Fault::cancelled : Fault::timeout);
 }
 
-/// A read for the jobs of this write, whose confirmation may be its echo.
+/// Makes a read for the jobs of this write, whose confirmation may be its echo.
 Group Arbiter::confirming(Group& write, const Station& station) {
     Group read{.jobs = std::move(write.jobs), .station = write.station, .request = station.probe()};
     if (!teaches_echo(read.request))
@@ -187,8 +189,8 @@ Group Arbiter::confirming(Group& write, const Station& station) {
 
 void Arbiter::fail(TimePoint now, Verdict verdict) {
     Attempt attempt = take_active(now);
-    ledger_.on_failed(attempt, verdict);
-    ledger_.tell(attempt, end_of(verdict));
+    outbox_.on_failed(attempt, verdict);
+    outbox_.report(attempt, end_of(verdict));
     Group& group = attempt.group();
     Station& station = stations_.of(group.station);
     const TimePoint sent = attempt.timing().sent;
@@ -196,7 +198,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     if (attempt.came_damaged()) {
         station.on_damaged_reply(now, group.request, sent);
     } else {
-        station.owe(now, group.request.pdu(), sent);
+        station.add_outstanding(now, group.request.pdu(), sent);
     }
     if (verdict == Verdict::silent && attempt.echoed()) echo_memory_.on_unanswered(group.request);
     const bool affordable = stations_.affords_retry(now, station);
@@ -204,7 +206,7 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
     if (const auto until = schedule_.line_rests_until(now, group, sent, station)) {
         quiet_.quarantine(now, group.station, *until);
         station.on_line_rests(now, *until - now);
-        ledger_.decide(now, [&] { return explain::line_rests(*until - now, group); });
+        outbox_.decide(now, [&] { return explain::line_rests(*until - now, group); });
     }
     group.silent_after = verdict == Verdict::silent
                              ? std::min(now - sent, attempt.timing().patience) - latency_
@@ -218,52 +220,52 @@ void Arbiter::fail(TimePoint now, Verdict verdict) {
         schedule_.retry(now, std::move(group), stations_.patience(now, group));
     } else if (group.joined()) {
         station.on_retry(verdict == Verdict::silent);
-        give_back(group);  // nobody's health: the panel may only not take the length
+        give_back(group);  // health unaffected: the panel may only not answer this length
     } else {
         give_up(now, group, verdict == Verdict::silent ? Fault::timeout : Fault::damaged);
     }
 }
 
-/// The parts of a joined read go again, but those of clients who have left.
+/// The parts of a joined read are sent again, except for clients that have left.
 void Arbiter::give_back(Group& group) {
-    for (const Job& job : schedule_.give_back(group)) ledger_.finish(job, Fault::cancelled);
+    for (const Job& job : schedule_.give_back(group)) outbox_.finish(job, Fault::cancelled);
 }
 
-/// No further attempt: everybody is answered, and the station judged.
+/// No further attempt: all jobs are answered, and the station is judged.
 void Arbiter::give_up(TimePoint now, const Group& group, Fault fault) {
-    for (const Job& job : group.jobs) ledger_.finish(job, fault);
+    for (const Job& job : group.jobs) outbox_.finish(job, fault);
     Backlog& backlog = schedule_.backlog();
     if (group.learns_for != 0 && fault == Fault::damaged) echo_memory_.on_unclear();
     if (group.learns_for != 0 && fault != Fault::damaged) {
         // P8: the write never left, and its station is silent.
         const auto asked = [&](const Job& job) { return job.ticket == group.learns_for; };
-        for (const Job& job : backlog.remove_if(asked)) ledger_.finish(job, fault);
+        for (const Job& job : backlog.remove_if(asked)) outbox_.finish(job, fault);
     }
     Station& station = stations_.of(group.station);
-    if (group.probe) station.on_in_vain(group.told_apart);
-    if (group.told_apart) return;
+    if (group.probe) station.on_probe_unanswered(group.distinct_length);
+    if (group.distinct_length) return;
     if (!station.on_given_up(now, fault, group.request.is_read())) return;
-    if (!station.stranger()) ledger_.event(Kind::offline, group.station);
+    if (!station.unheard()) outbox_.event(Kind::offline, group.station);
     const auto theirs = [&](const Job& job) { return job.station == group.station; };
-    for (const Job& job : backlog.remove_if(theirs)) ledger_.finish(job, Fault::offline);
+    for (const Job& job : backlog.remove_if(theirs)) outbox_.finish(job, Fault::offline);
 }
 
-/// The attempt is over: its time is accounted for, and what the echo filter held back is heard.
+/// Ends the attempt: accounts for its time, and passes on what the echo filter buffered.
 Attempt Arbiter::take_active(TimePoint now) {
     Attempt attempt = std::move(*active_);
     active_.reset();
     const Duration behind = attempt.is_broadcast() ? settings_.broadcast_turnaround
                                                    : stations_.gap(attempt.group().station);
-    ledger_.on_ended(now, attempt, behind);
+    outbox_.on_ended(now, attempt, behind);
     quiet_.take_rested(now);  // the attempt's own time
-    ledger_.written(attempt.group(), true);
+    outbox_.written(attempt.group(), true);
     if (attempt.echoed() && echo_memory_.on_echo(attempt.group().request))
-        ledger_.event(Kind::echo, attempt.group().station);
-    // Where a reply may come before the request has left, early bytes tell nothing.
+        outbox_.event(Kind::echo, attempt.group().station);
+    // Where a reply may come before the request has left, early bytes prove nothing.
     const bool keeps_pace = settings_.paced || pace_.believed();
     if (const auto noise = attempt.early_noise(); noise && keeps_pace)
-        stations_.on_trail(*noise, strays_.replied_before());
-    strays_.hear(attempt.release_echo());
+        stations_.on_trail(*noise, unsolicited_.replied_before());
+    unsolicited_.hear(attempt.release_echo());
     return attempt;
 }
 

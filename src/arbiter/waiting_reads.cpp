@@ -58,8 +58,8 @@ void WaitingReads::remove(const Job& job, const ReadSpan& span, const Count& cou
     }
 }
 
-/// Spans that only this one contained become widest. Where two begin together the wider
-/// comes first, so that none of them is contained in a later one.
+/// Spans that only this one contained become widest. Of two that begin together the wider comes
+/// first, so that none is contained in a later one.
 void WaitingReads::drop_span(Spans::iterator it, const Count& count) {
     const ReadSpan gone = it->first;
     auto next = spans_.erase(it);

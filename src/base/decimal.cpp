@@ -16,7 +16,7 @@ using boost::multiprecision::cpp_int;
 constexpr std::size_t kMostDigits = 60;
 constexpr int kMostMagnitude = 400;
 
-/// cpp_int takes no empty text, and one with a 0 in front as octal.
+/// cpp_int rejects an empty text and reads a leading 0 as octal.
 cpp_int number_of(const std::string& digits) { return cpp_int(digits.empty() ? "0" : digits); }
 
 cpp_int tens(int count) {
@@ -113,10 +113,10 @@ std::string Decimal::whole_text() const {
 
 std::string Decimal::text() const {
     constexpr int kPlain = 16;
-    constexpr int kPlainOfMany = 21;
+    constexpr int kPlainManyDigits = 21;
     constexpr std::size_t kMany = 15;
     const int size = magnitude();
-    const bool many = digits_.size() > kMany && size < kPlainOfMany;
+    const bool many = digits_.size() > kMany && size < kPlainManyDigits;
     if (is_whole() && (size < kPlain || many)) return whole_text();
     std::string text = digits_;
     if (size < -4 || (size >= kPlain && !many)) {
@@ -190,7 +190,7 @@ Decimal::Around Decimal::divided_by(const Decimal& divisor) const {
     (shift > 0 ? number : by) *= tens(std::abs(shift));
     const cpp_int least = number / by;
     const cpp_int rest = number % by;
-    // Of the sizes first: below and above change places for a negative quotient.
+    // Computed on magnitudes: below and above swap for a negative quotient.
     const bool negative = negative_ != divisor.negative_;
     const Decimal inner = made(negative, least.str(), 0);
     const Decimal outer = rest == 0 ? inner : made(negative, cpp_int(least + 1).str(), 0);

@@ -21,7 +21,7 @@ namespace {
 
 constexpr bool kPlainHeap = PANELGATE_PLAIN_HEAP == 1;
 
-// Sizes rise by kStep to kFine, and double from there on.
+// Size classes grow by kStep up to kFine, then double.
 constexpr std::size_t kStep = 16;
 constexpr std::size_t kFine = 1024;
 constexpr std::size_t kFineSizes = kFine / kStep;
@@ -38,36 +38,36 @@ std::size_t size_of(std::size_t index) {
 struct Free {
     Free* next;
 };
-struct Shelf {
+struct FreeList {
     Free* first = nullptr;
     std::size_t kept = 0;  ///< bytes
 };
 
-/// Without a destructor of its own: blocks come back until the thread's very end.
-struct Shelves {
-    std::array<Shelf, kSizes> of;
-    bool open = false;  ///< the thread has a Closing, and it has not come yet
+/// No destructor: blocks may be freed until the very end of the thread.
+struct FreeLists {
+    std::array<FreeList, kSizes> of;
+    bool open = false;  ///< the thread has a ThreadExit that has not run yet
 };
-constinit thread_local Shelves shelves{};
+constinit thread_local FreeLists free_lists{};
 
-/// At the end of a thread what is kept goes back to the heap, and nothing is kept any more.
-struct Closing {
-    Closing() { shelves.open = true; }
-    ~Closing() {
-        shelves.open = false;
-        for (Shelf& shelf : shelves.of) {
-            while (shelf.first != nullptr) {
-                Free* const block = shelf.first;
-                shelf.first = block->next;
+/// At thread exit, returns the kept blocks to the heap; nothing is kept afterwards.
+struct ThreadExit {
+    ThreadExit() { free_lists.open = true; }
+    ~ThreadExit() {
+        free_lists.open = false;
+        for (FreeList& free_list : free_lists.of) {
+            while (free_list.first != nullptr) {
+                Free* const block = free_list.first;
+                free_list.first = block->next;
                 ::operator delete(block);
             }
-            shelf.kept = 0;
+            free_list.kept = 0;
         }
     }
 };
 
 void* take_new(std::size_t index) {
-    thread_local const Closing closing;
+    thread_local const ThreadExit closing;
     static_cast<void>(&closing);
     return ::operator new(size_of(index));
 }
@@ -77,21 +77,21 @@ void* take_new(std::size_t index) {
 void* take(std::size_t size) {
     if (kPlainHeap || size > kLargest) return ::operator new(size);
     const std::size_t index = index_of(size);
-    Shelf& shelf = shelves.of[index];
-    if (shelf.first == nullptr) return take_new(index);
-    Free* const block = shelf.first;
-    shelf.first = block->next;
-    shelf.kept -= size_of(index);
+    FreeList& free_list = free_lists.of[index];
+    if (free_list.first == nullptr) return take_new(index);
+    Free* const block = free_list.first;
+    free_list.first = block->next;
+    free_list.kept -= size_of(index);
     return block;
 }
 
 void give_back(void* block, std::size_t size) noexcept {
     if (kPlainHeap || size > kLargest) return ::operator delete(block);
     const std::size_t index = index_of(size);
-    Shelf& shelf = shelves.of[index];
-    if (!shelves.open || shelf.kept >= kKept) return ::operator delete(block);
-    shelf.first = ::new (block) Free{shelf.first};
-    shelf.kept += size_of(index);
+    FreeList& free_list = free_lists.of[index];
+    if (!free_lists.open || free_list.kept >= kKept) return ::operator delete(block);
+    free_list.first = ::new (block) Free{free_list.first};
+    free_list.kept += size_of(index);
 }
 
 bool keeps_blocks() noexcept { return !kPlainHeap; }

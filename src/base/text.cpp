@@ -84,7 +84,7 @@ std::string as_utf8(std::string_view bytes) {
 
 namespace {
 
-/// Edits (insert, delete, replace, swap of neighbours) that turn a into b.
+/// Number of edits (insert, delete, replace, swap of neighbours) that turn a into b.
 std::size_t distance(std::string_view a, std::string_view b) {
     std::vector<std::size_t> before(b.size() + 1);
     std::vector<std::size_t> above(b.size() + 1);
@@ -104,7 +104,7 @@ std::size_t distance(std::string_view a, std::string_view b) {
     return above[b.size()];
 }
 
-/// Letters and digits, lower case: "Panasonic GT" is panasonic-gt.
+/// Keeps letters and digits, in lower case: "Panasonic GT" is panasonicgt.
 std::string plain(std::string_view text) {
     std::string all;
     for (const char c : text) {
@@ -121,7 +121,7 @@ struct Synonym {
     std::string_view word;
     std::string_view meant;
 };
-/// What other programs and other trades call it.
+/// Synonyms of other programs and industries.
 constexpr std::array<Synonym, 107> kSynonyms{{{"baudrate", "baud"},
                                               {"speed", "baud"},
                                               {"bitrate", "baud"},
@@ -230,7 +230,7 @@ constexpr std::array<Synonym, 107> kSynonyms{{{"baudrate", "baud"},
                                               {"0", "none"},
                                               {"writable", "access"}}};
 
-/// float32be, uint16le: types with the order of their bytes.
+/// Strips a byte order suffix: float32be, uint16le.
 std::string_view without_order(std::string_view typed) {
     const bool ordered = typed.ends_with("be") || typed.ends_with("le");
     return typed.substr(0, typed.size() - (ordered ? 2 : 0));

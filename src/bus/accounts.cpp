@@ -16,7 +16,7 @@ namespace panelgate::bus {
 
 namespace {
 
-/// Without a port, and without the brackets that hold one off.
+/// Returns the host without port and brackets.
 std::string_view host_in(std::string_view word) {
     if (word.starts_with('[')) return word.substr(1, word.find(']') - 1);
     const auto colon = word.find(':');
@@ -27,12 +27,12 @@ std::string_view host_in(std::string_view word) {
 void add(DepartedClients::Row& sum, const DepartedClients::Row& more) {
     sum.used.busy += more.used.busy;
     sum.used.transactions += more.used.transactions;
-    sum.asked.requests += more.asked.requests;
-    sum.asked.failed += more.asked.failed;
+    sum.totals.requests += more.totals.requests;
+    sum.totals.failed += more.totals.failed;
     sum.left = std::max(sum.left, more.left);
-    if (!more.asked.last_error || more.asked.failed_at < sum.asked.failed_at) return;
-    sum.asked.last_error = more.asked.last_error;
-    sum.asked.failed_at = more.asked.failed_at;
+    if (!more.totals.last_error || more.totals.failed_at < sum.totals.failed_at) return;
+    sum.totals.last_error = more.totals.last_error;
+    sum.totals.failed_at = more.totals.failed_at;
 }
 
 }  // namespace
@@ -57,10 +57,10 @@ std::string without_port(const std::string& name) {
 
 void DepartedClients::leave(TimePoint now, const std::string& name,
                             const arbiter::BusShares::Share& used,
-                            const ClientAccounts::Account& asked) {
-    const Row row{used, asked, now};
+                            const ClientAccounts::Totals& totals) {
+    const Row row{used, totals, now};
     drop_old(now);
-    // The gateway's own tasks end when the configuration changes.
+    // Internal tasks end when the configuration changes: they are not remembered.
     if (!address_in(name) || settings_.remembered == 0) return add(forgotten_, row);
     const std::string key = without_port(name);
     if (!rows_.contains(key)) make_room();
@@ -93,13 +93,13 @@ namespace {
 
 using Rows = std::map<std::string, ClientShare>;
 
-void add(ClientShare& entry, const ClientAccounts::Account& account, TimePoint now) {
-    entry.requests += account.requests;
-    entry.failed += account.failed;
-    if (!account.last_error) return;
-    const Duration ago = now - account.failed_at;
+void add(ClientShare& entry, const ClientAccounts::Totals& totals, TimePoint now) {
+    entry.requests += totals.requests;
+    entry.failed += totals.failed;
+    if (!totals.last_error) return;
+    const Duration ago = now - totals.failed_at;
     if (entry.last_error && entry.last_error_ago < ago) return;
-    entry.last_error = account.last_error;
+    entry.last_error = totals.last_error;
     entry.last_error_ago = ago;
 }
 
@@ -110,14 +110,14 @@ void add(ClientShare& entry, const arbiter::BusShares::Share& share) {
 
 Rows rows_of(const ClientUse& use, TimePoint now) {
     Rows rows;
-    for (const auto& [client, account] : use.accounts.all())
-        add(rows[use.names.of(client)], account, now);
+    for (const auto& [client, totals] : use.accounts.all())
+        add(rows[use.names.of(client)], totals, now);
     for (const auto& [client, share] : use.shares.all()) add(rows[use.names.of(client)], share);
     for (const auto& [name, row] : use.departed.rows(now)) {
-        const bool is_there = rows.contains(name);
+        const bool is_connected = rows.contains(name);
         ClientShare& entry = rows[name];
-        if (!is_there) entry.gone = now - row.left;
-        add(entry, row.asked, now);
+        if (!is_connected) entry.gone = now - row.left;
+        add(entry, row.totals, now);
         add(entry, row.used);
     }
     return rows;
@@ -129,17 +129,17 @@ Duration busy_of(const std::vector<ClientShare>& list) {
     return sum;
 }
 
-/// Those who are not shown for themselves; what is still missing is the gateway's own.
-ClientShare others(const ClientUse& use, TimePoint now) {
+/// Clients without a row of their own. The gateway's own time is added by client_shares().
+ClientShare other_clients(const ClientUse& use, TimePoint now) {
     ClientShare rest;
     rest.name = kOtherClients;
-    add(rest, use.departed.forgotten().asked, now);
+    add(rest, use.departed.forgotten().totals, now);
     add(rest, use.departed.forgotten().used);
     return rest;
 }
 
-/// The last of a long list are no rows of their own.
-void shorten(std::vector<ClientShare>& list, ClientShare& rest) {
+/// Adds the rows beyond the limit to `rest` and drops them.
+void fold_tail(std::vector<ClientShare>& list, ClientShare& rest) {
     constexpr std::size_t kShown = 100;
     for (std::size_t i = kShown; i < list.size(); ++i) {
         rest.busy += list[i].busy;
@@ -153,7 +153,7 @@ void shorten(std::vector<ClientShare>& list, ClientShare& rest) {
 }  // namespace
 
 std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now) {
-    constexpr Duration kSeen = 1ms;  // below, it is what dividing leaves
+    constexpr Duration kRoundingLimit = 1ms;  // less is a rounding error of divided shares
     std::vector<ClientShare> list;
     for (auto& [name, entry] : rows_of(use, now)) {
         entry.name = name;
@@ -161,12 +161,12 @@ std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now) {
         list.push_back(std::move(entry));
     }
     std::ranges::sort(list, std::ranges::greater{}, &ClientShare::busy);
-    ClientShare rest = others(use, now);
-    shorten(list, rest);
+    ClientShare rest = other_clients(use, now);
+    fold_tail(list, rest);
     const Duration shown = busy_of(list);
     rest.busy = std::max(rest.busy, use.busy - shown);
     const Duration all = shown + rest.busy;
-    if (rest.busy >= kSeen || rest.requests > 0) list.push_back(std::move(rest));
+    if (rest.busy >= kRoundingLimit || rest.requests > 0) list.push_back(std::move(rest));
     for (ClientShare& entry : list)
         entry.percent = all > Duration::zero() ? 100 * to_seconds(entry.busy) / to_seconds(all) : 0;
     return list;
@@ -174,7 +174,7 @@ std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now) {
 
 namespace {
 
-std::optional<bool> is_there(Health state) {
+std::optional<bool> is_up(Health state) {
     if (state == Health::unknown) return {};
     return state == Health::online || state == Health::heard || state == Health::suspect;
 }
@@ -236,14 +236,14 @@ std::vector<StationReport> RequestCounters::report(const arbiter::Arbiter& arbit
 }
 
 std::vector<StationReport> RequestCounters::report(
-    const std::map<std::uint8_t, arbiter::StationCounters>& counted_there,
+    const std::map<std::uint8_t, arbiter::StationCounters>& wire_counters,
     const std::function<Health(std::uint8_t)>& health) const {
     std::vector<StationReport> reports;
     for (const auto& [id, counted] : stations_) {
         StationReport report = counted;
-        const auto wire = counted_there.find(id);
-        if (wire != counted_there.end()) report.wire = wire->second;
-        report.up = is_there(health(id));
+        const auto wire = wire_counters.find(id);
+        if (wire != wire_counters.end()) report.wire = wire->second;
+        report.up = is_up(health(id));
         reports.push_back(std::move(report));
     }
     return reports;
@@ -255,17 +255,17 @@ void observe(const Settings& settings, const BusEvent& event) {
 
 Account::Account(const Settings& settings) : settings_(settings), counters_(settings.stations) {}
 
-void Account::add(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
-                  Outcome outcome, Duration took) {
+void Account::add(std::uint8_t station, std::uint8_t function,
+                  const std::optional<WriteRecord>& write, Outcome outcome, Duration took) {
     counters_.count(station, function, outcome, took);
-    if (deed) log_deed(settings_, station, *deed, outcome);
+    if (write) log_write(settings_, station, *write, outcome);
     observe(settings_, TransactionEvent{station, function, outcome, took});
 }
 
 void Account::add_refused(std::uint8_t station, ByteView pdu, ClientId client,
                           const arbiter::ClientNames& names) {
     if (pdu.empty()) return;
-    add(station, pdu[0], deed_of(pdu, client, names), Outcome::refused, Duration::zero());
+    add(station, pdu[0], write_record_of(pdu, client, names), Outcome::refused, Duration::zero());
 }
 
 }  // namespace panelgate::bus

@@ -22,25 +22,25 @@
 
 namespace panelgate::bus {
 
-/// How many requests each client has made, and how they ended. Bounded; a client that has gone is
-/// forgotten, and what is then still answered counts for nobody. Pure.
+/// Counts each client's requests and their outcomes. Bounded; later answers to a forgotten client
+/// are not counted. Pure.
 class ClientAccounts {
   public:
     static constexpr std::size_t kClients = 1024;
 
-    struct Account {
+    struct Totals {
         std::uint64_t requests = 0;
         std::uint64_t failed = 0;
         std::optional<Outcome> last_error{};
         TimePoint failed_at{};
     };
 
-    void asked(ClientId client) {
-        if (client == 0) return;  // nobody's
+    void count_request(ClientId client) {
+        if (client == 0) return;  // no client
         if (!accounts_.contains(client) && accounts_.size() >= kClients) return;
         ++accounts_[client].requests;
     }
-    void answered(ClientId client, Outcome outcome, TimePoint now) {
+    void count_outcome(ClientId client, Outcome outcome, TimePoint now) {
         const auto known = accounts_.find(client);
         const bool is_good =
             outcome == Outcome::ok || outcome == Outcome::cached || outcome == Outcome::shared;
@@ -50,37 +50,36 @@ class ClientAccounts {
         known->second.failed_at = now;
     }
     void forget(ClientId client) { accounts_.erase(client); }
-    /// Nothing asked yet: all zero.
-    Account of(ClientId client) const {
+    /// Returns zeros for an unknown client.
+    Totals of(ClientId client) const {
         const auto known = accounts_.find(client);
-        return known == accounts_.end() ? Account{} : known->second;
+        return known == accounts_.end() ? Totals{} : known->second;
     }
-    const std::map<ClientId, Account>& all() const { return accounts_; }
+    const std::map<ClientId, Totals>& all() const { return accounts_; }
 
   private:
-    std::map<ClientId, Account> accounts_;
+    std::map<ClientId, Totals> accounts_;
 };
 
-/// What those have used who have hung up: a script has a connection a request, and is one client
-/// all the same. Only servers' clients are remembered, by their names without ports, for the time
-/// and in the number that the settings allow. Pure.
+/// Line use by disconnected clients. A script that connects once per request counts as one client.
+/// Keeps only servers' clients, by name without port, within the settings' time and number. Pure.
 class DepartedClients {
   public:
     struct Row {
         arbiter::BusShares::Share used;
-        ClientAccounts::Account asked;
+        ClientAccounts::Totals totals;
         TimePoint left;
     };
 
     explicit DepartedClients(ClientSettings settings = {}) : settings_(settings) {}
     void apply(ClientSettings settings) { settings_ = settings; }
 
-    /// `name` as it was while it was there.
+    /// `name`: the client's full name while connected.
     void leave(TimePoint now, const std::string& name, const arbiter::BusShares::Share& used,
-               const ClientAccounts::Account& asked);
-    /// Those who are remembered, by name.
+               const ClientAccounts::Totals& totals);
+    /// Returns the remembered clients by name.
     const std::map<std::string, Row>& rows(TimePoint now);
-    /// All others together.
+    /// Returns the sum of all others.
     const Row& forgotten() const { return forgotten_; }
 
   private:
@@ -92,69 +91,70 @@ class DepartedClients {
     Row forgotten_{};
 };
 
-/// Of a client's name: a server's clients are called by its word and where they come from
-/// ("modbus_tcp 10.0.0.7:51234", "http ::1 token ops"). Nothing for others.
+/// Returns the address in a server client's name ("modbus_tcp 10.0.0.7:51234", "http ::1 token
+/// ops"); nullopt for other names.
 std::optional<std::string> address_in(const std::string& name);
 
-/// "modbus_tcp 10.0.0.7" of the first of them; what is no name of a server's client stays.
+/// Returns "modbus_tcp 10.0.0.7" for the first of these; other names unchanged.
 std::string without_port(const std::string& name);
 
-/// Where it stands what clients have used of a line.
+/// The sources of client_shares().
 struct ClientUse {
     const arbiter::BusShares& shares;
     const arbiter::ClientNames& names;
     const ClientAccounts& accounts;
     DepartedClients& departed;
-    Duration busy{};  ///< of the line, whoever has used it
+    Duration busy{};  ///< the line's total
 };
 
-/// The greediest clients with their names, a name once, and what is not theirs as the last.
+/// Returns the clients with the largest shares by name, merged per name, and last a row for the
+/// rest.
 std::vector<ClientShare> client_shares(const ClientUse& use, TimePoint now);
 
 Outcome outcome_of(const Answer& answer);
 
-/// Counts requests by station, function and outcome. Stations the configuration does not list share
-/// one entry, functions that nobody knows one label: no client can add a series (P10).
+/// Counts requests by station, function and outcome. Unlisted stations share one entry, unknown
+/// functions one label: no client can add a series (P10).
 class RequestCounters {
   public:
     explicit RequestCounters(const Stations& stations);
-    /// What was counted of stations that are no longer listed is forgotten.
+    /// Drops the counters of stations no longer listed.
     void apply(const Stations& stations);
 
     void count(std::uint8_t station, std::uint8_t function, Outcome outcome, Duration took);
-    /// One that was counted went out as function `sent`.
+    /// Counts a request that was sent as function `sent`.
     void translated(std::uint8_t station, std::uint8_t function, std::uint8_t sent) {
         ++of(station).translated[{function, sent}];
     }
     void succeeded(std::uint8_t station, double wall);
-    /// Of all functions; none of a station that is not configured.
+    /// Returns the sum over all functions; zeros for an unlisted station.
     OutcomeCounts outcomes(std::uint8_t station) const;
-    /// Joined with what the arbiter counted on the wire.
+    /// Returns the reports, joined with the arbiter's counters.
     std::vector<StationReport> report(const arbiter::Arbiter& arbiter) const;
-    /// ... or with what was heard there.
+    /// The same with counters and health from listening.
     std::vector<StationReport> report(const std::map<std::uint8_t, arbiter::StationCounters>& wire,
                                       const std::function<Health(std::uint8_t)>& health) const;
 
   private:
     StationReport& of(std::uint8_t station);
 
-    std::map<std::uint8_t, StationReport> stations_;  ///< 0: the others, and broadcasts
+    std::map<std::uint8_t, StationReport> stations_;  ///< 0: unlisted stations and broadcasts
 };
 
-/// Whoever watches is told.
+/// Calls the observer, if there is one.
 void observe(const Settings& settings, const BusEvent& event);
 
-/// Where a request's end goes, on lines that ask and on lines that listen: the metrics, the log of
-/// writes, whoever watches. `settings` outlives it.
+/// Records the end of each request, on driven and on listening lines: in the metrics, in the write
+/// log, and for the observer. `settings` outlives it.
 class Account {
   public:
     explicit Account(const Settings& settings);
-    /// Those are others now.
+    /// Call after the settings changed.
     void apply() { counters_.apply(settings_.stations); }
 
-    void add(std::uint8_t station, std::uint8_t function, const std::optional<Deed>& deed,
+    void add(std::uint8_t station, std::uint8_t function, const std::optional<WriteRecord>& write,
              Outcome outcome, Duration took);
-    /// A face has refused it before it was a request. An empty PDU is nothing.
+    /// Counts a request that a server refused before submitting it. An empty PDU is ignored.
     void add_refused(std::uint8_t station, ByteView pdu, ClientId client,
                      const arbiter::ClientNames& names);
 

@@ -9,52 +9,52 @@
 
 namespace panelgate::bus {
 
-/// An answer on its way to whom it is for.
-struct Handed {
+/// An answer with the handler that receives it.
+struct Delivery {
     AnswerHandler handler;
     Answer answer;
 };
 
-/// Hands answers over in their order, all that there are at a time, and never from inside the call
-/// of somebody who asks.
+/// Delivers answers in order and in batches, never from inside a client's call.
 class Answers {
   public:
-    /// What has not been handed over when it ends is handed over all the same.
+    /// Undelivered answers are still delivered after destruction.
     explicit Answers(boost::asio::any_io_executor executor);
 
-    /// `soon`: whoever adds it is called by the loop, and hand_over() follows. Else it is posted.
-    void add(Handed handed, bool soon);
-    void hand_over();
+    /// `soon`: the caller runs from the loop and calls deliver() next. Otherwise deliver() is
+    /// posted.
+    void add(Delivery delivery, bool soon);
+    void deliver();
 
   private:
     struct Waiting {
-        std::vector<Handed> next;
-        std::vector<Handed> leaving;  ///< empty but while it is handed over
+        std::vector<Delivery> next;
+        std::vector<Delivery> delivering;  ///< empty except during delivery
         bool posted = false;
-        void hand_over();
+        void deliver();
     };
 
     boost::asio::any_io_executor executor_;
-    std::shared_ptr<Waiting> waiting_;  ///< whoever hands over holds it as well
+    std::shared_ptr<Waiting> waiting_;  ///< shared with a delivery in progress
 };
 
-/// Refusals go out together, a millisecond apart: who asks again at once cannot keep the loop from
-/// the wire (P4, P9). At most one waits a request that clients may have open.
+/// Delivers refusals in batches, a millisecond apart: a client that retries at once cannot keep the
+/// loop from the wire (P4, P9). Bounded by the number of requests that clients may have open.
 class Refusals {
   public:
     Refusals(boost::asio::any_io_executor executor, rt::Clock& clock);
-    /// Who still waits is told from the loop.
+    /// Waiting refusals are delivered from the loop.
     ~Refusals();
     Refusals(const Refusals&) = delete;
     Refusals& operator=(const Refusals&) = delete;
 
-    void add(Handed refused);
+    void add(Delivery refused);
 
   private:
     boost::asio::any_io_executor executor_;
     rt::Clock& clock_;
     std::unique_ptr<rt::Alarm> alarm_;
-    std::vector<Handed> waiting_;
+    std::vector<Delivery> waiting_;
 };
 
 }  // namespace panelgate::bus

@@ -31,9 +31,9 @@ struct Bus::State final : public line::Line::Events {
         std::uint8_t station = 0;
         std::uint8_t function = 0;
         TimePoint arrived;
-        std::optional<Deed> deed{};
-        Bytes asked{};             ///< of a request that is translated: what its client wants
-        std::uint8_t sent_as = 0;  ///< ... and its function on the wire; 0: the one asked
+        std::optional<WriteRecord> write{};
+        Bytes original_pdu{};      ///< if translated: the client's PDU
+        std::uint8_t sent_as = 0;  ///< ... and the function sent; 0: not translated
         ClientId client = 0;
     };
 
@@ -59,13 +59,13 @@ struct Bus::State final : public line::Line::Events {
     void on_bytes(ByteView bytes) override;
 
     void apply(Settings next, std::unique_ptr<line::Line> other, std::shared_ptr<void> far_end);
-    void take(Settings next);
-    /// What has waited since before a change and may not be written any more is refused (P2).
-    void deny_what_is_forbidden(TimePoint now);
-    void change_soon();
+    void adopt(Settings next);
+    /// Refuses waiting writes that the changed settings forbid (P2).
+    void deny_forbidden_writes(TimePoint now);
+    void schedule_line_change();
     void change_line();
     void transact(Request request, AnswerHandler handler);
-    void part(ClientId client);
+    void record_departure(ClientId client);
     void refuse(Pending pending, Result<Bytes> pdu, std::optional<Refusal> refusal = {});
     void act(arbiter::Transmit& transmit) {
         line->write(transmit.adu);
@@ -89,10 +89,10 @@ struct Bus::State final : public line::Line::Events {
     void settled(TimePoint now) {
         load.record(now, arbiter.counters().busy);
         if (up) doctor.look(now, counts());
-        if (calls == 0) answers.hand_over();
-        change_soon();
+        if (calls == 0) answers.deliver();
+        schedule_line_change();
     }
-    /// Somebody calls: whatever it leads to, nobody is answered before it ends.
+    /// Runs a client's call: no answer is delivered before it returns.
     template <class Verb>
     void call(Verb verb) {
         ++calls;
@@ -121,18 +121,18 @@ struct Bus::State final : public line::Line::Events {
     Answers answers;
     line::Drive<arbiter::Arbiter, State> drive;
     PoolMap<arbiter::Ticket, Pending> pending;
-    /// Another line, to which this one changes as soon as it waits for no reply.
+    /// A new line that replaces this one as soon as no reply is outstanding.
     struct Change {
         Settings settings;
         std::unique_ptr<line::Line> line;
-        std::vector<std::shared_ptr<void>> far_ends;  ///< of the lines before
-        bool due = false;                             ///< it is posted
+        std::vector<std::shared_ptr<void>> far_ends;  ///< of the lines replaced so far
+        bool posted = false;                          ///< change_line() is posted
     };
     std::optional<Change> change;
     std::shared_ptr<bool> alive = std::make_shared<bool>(true);
-    int calls = 0;  ///< of those who ask, under way
+    int calls = 0;  ///< clients' calls in progress
     bool up = false;
-    std::uint64_t ups = 0;  ///< how often the line came up
+    std::uint64_t up_count = 0;  ///< how often the line came up
     std::string why_down = "not opened yet";
 };
 
@@ -149,7 +149,7 @@ PriorityClass priority_of(const Request& request) {
 
 void Bus::State::on_up() {
     up = true;
-    ++ups;
+    ++up_count;
     rt::log(rt::LogLevel::info, "line up", {{"line", settings.name}, {"device", settings.device}});
     observe(settings, LineEvent{true, {}});
     arbiter.set_lead(line->lead());
@@ -179,9 +179,9 @@ void Bus::State::on_bytes(ByteView bytes) {
 void Bus::State::transact(Request request, AnswerHandler handler) {
     const modbus::Request& what = request.request;
     Pending entry{std::move(handler), request.station, what.function(), clock.now()};
-    entry.deed = deed_of(request, arbiter.client_names());
+    entry.write = write_record_of(request, arbiter.client_names());
     entry.client = request.client;
-    clients.asked(request.client);
+    clients.count_request(request.client);
     const bool broadcast = request.station == 0;
     if (broadcast ? !what.is_broadcastable() : what.is_never_answered()) {
         return refuse(std::move(entry), Fault::denied);
@@ -192,7 +192,7 @@ void Bus::State::transact(Request request, AnswerHandler handler) {
     }
     const PriorityClass priority = priority_of(request);
     if (auto other = translated(settings.stations, request.station, what)) {
-        entry.asked = what.pdu();
+        entry.original_pdu = what.pdu();
         entry.sent_as = other->function();
         request.request = std::move(*other);
     }
@@ -231,7 +231,7 @@ void Bus::State::act(arbiter::Finish& finish) {
     if (entry.sent_as != 0) {
         if (finish.transmitted)
             account.counters().translated(entry.station, entry.function, entry.sent_as);
-        if (result.pdu) result.pdu = modbus::translated_back(entry.asked, *result.pdu);
+        if (result.pdu) result.pdu = modbus::translated_back(entry.original_pdu, *result.pdu);
     }
     result.transmitted = finish.transmitted;
     result.shared = finish.shared;
@@ -255,37 +255,37 @@ void Bus::State::on_deadline(TimePoint now) {
     arbiter.on_deadline(now);
 }
 
-/// A request that the far end has not even taken when its time is over must not be executed
-/// whenever the way is free again (P2), and its late reply must not answer another one (P1).
+/// A request that the far end has not accepted when its time is over must not be executed when the
+/// transport recovers (P2), and its late reply must not answer another request (P1).
 void Bus::State::check_delivery(TimePoint now) {
     if (up && arbiter.is_unheard(now) && line->undelivered())
         line->reset("what was sent is not taken: the way to the wire is blocked");
 }
 
-/// The one place that answers: counted, then handed over from the loop, never from inside a call.
+/// Counts every answer, then delivers it from the loop, never from inside a client's call.
 void Bus::State::answer(Pending entry, Answer result) {
     const TimePoint now = clock.now();
     const Duration took = now - entry.arrived;
     const Outcome outcome = outcome_of(result);
-    if (entry.deed) entry.deed->transaction = result.transactions.last();
-    account.add(entry.station, entry.function, entry.deed, outcome, took);
-    clients.answered(entry.client, outcome, now);
+    if (entry.write) entry.write->transaction = result.transactions.last();
+    account.add(entry.station, entry.function, entry.write, outcome, took);
+    clients.count_outcome(entry.client, outcome, now);
     const bool success = result.pdu.has_value() && !modbus::exception_of(*result.pdu);
     if (success) account.counters().succeeded(entry.station, wall_seconds_of(wall.at(now)));
     if (!result.pdu && result.pdu.error() == Fault::line_down)
         result.why = up ? "its device is being closed" : why_down;
     const bool refused = !result.transmitted && result.source == Source::bus;
-    Handed handed{std::move(entry.handler), std::move(result)};
+    Delivery delivery{std::move(entry.handler), std::move(result)};
     if (refused) {
-        refusals.add(std::move(handed));
+        refusals.add(std::move(delivery));
     } else {
-        answers.add(std::move(handed), calls == 0);
+        answers.add(std::move(delivery), calls == 0);
     }
 }
 
 namespace {
 
-Settings explained(Settings settings) {
+Settings with_explanations(Settings settings) {
     settings.arbiter.explain = true;
     return settings;
 }
@@ -294,8 +294,8 @@ Settings explained(Settings settings) {
 
 Bus::Bus(asio::any_io_executor executor, rt::Clock& clock, Settings settings,
          std::unique_ptr<line::Line> line)
-    : state_(std::make_unique<State>(std::move(executor), clock, explained(std::move(settings)),
-                                     std::move(line))) {}
+    : state_(std::make_unique<State>(std::move(executor), clock,
+                                     with_explanations(std::move(settings)), std::move(line))) {}
 
 Bus::~Bus() { stop(); }
 
@@ -317,7 +317,7 @@ void Bus::stop() {
 void Bus::apply(Settings settings, std::unique_ptr<line::Line> line,
                 std::shared_ptr<void> far_end) {
     state_->call([&] {
-        state_->apply(explained(std::move(settings)), std::move(line), std::move(far_end));
+        state_->apply(with_explanations(std::move(settings)), std::move(line), std::move(far_end));
     });
 }
 
@@ -329,16 +329,16 @@ void Bus::tell_refused(std::uint8_t station, ByteView pdu, ClientId client) {
     state_->account.add_refused(station, pdu, client, state_->arbiter.client_names());
 }
 
-/// What it has asked stays in the list of clients, although its number is nobody's any more.
-void Bus::State::part(ClientId client) {
+/// Keeps a disconnecting client's use of the line in the list of clients.
+void Bus::State::record_departure(ClientId client) {
     const auto used = arbiter.shares().of(client);
-    const auto asked = clients.of(client);
-    if (used.transactions == 0 && asked.requests == 0) return;
-    departed.leave(clock.now(), arbiter.client_names().of(client), used, asked);
+    const auto totals = clients.of(client);
+    if (used.transactions == 0 && totals.requests == 0) return;
+    departed.leave(clock.now(), arbiter.client_names().of(client), used, totals);
 }
 
 void Bus::cancel(ClientId client) {
-    state_->part(client);
+    state_->record_departure(client);
     state_->call(
         [&] { state_->drive.tell([&](TimePoint now) { state_->arbiter.cancel(now, client); }); });
     state_->clients.forget(client);
@@ -357,7 +357,7 @@ LineStatus Bus::status() const {
     status.queue_depth = state_->arbiter.queue_depth();
     status.load_percent = state_->load.percent(state_->clock.now());
     status.echo = state_->arbiter.echo();
-    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->counts());
+    if (state_->up) state_->doctor.look_on_demand(state_->clock.now(), state_->counts());
     status.findings = state_->doctor.findings();
     return status;
 }
@@ -373,7 +373,7 @@ StationStatus Bus::station_status(std::uint8_t station) const {
     const arbiter::StationHealth health = state_->arbiter.health(station);
     StationStatus status;
     status.state = health.state();
-    status.returns = health.returns() + state_->ups;
+    status.returns = health.returns() + state_->up_count;
     const TimePoint now = state_->clock.now();
     if (const auto last = health.last_success()) status.last_success = now - *last;
     if (const auto last = health.last_heard()) status.last_reply = now - *last;
@@ -424,26 +424,26 @@ void Bus::State::apply(Settings next, std::unique_ptr<line::Line> other,
         if (!change) change.emplace(Change{{}, nullptr, {}, false});
         change->line = std::move(other);
         change->far_ends.push_back(std::move(far_end));
-        arbiter.hold();
+        arbiter.suspend();
     }
     if (change) {
         change->settings = std::move(next);
-        return change_soon();
+        return schedule_line_change();
     }
-    take(std::move(next));
+    adopt(std::move(next));
     drive.tell([this](TimePoint now) {
         arbiter.apply(settings.arbiter);
-        deny_what_is_forbidden(now);
+        deny_forbidden_writes(now);
     });
 }
 
-void Bus::State::deny_what_is_forbidden(TimePoint now) {
+void Bus::State::deny_forbidden_writes(TimePoint now) {
     arbiter.deny(now, [this](const arbiter::Job& job) {
         return !job.request.is_read() && rights.judge_write(job.station);
     });
 }
 
-void Bus::State::take(Settings next) {
+void Bus::State::adopt(Settings next) {
     settings = std::move(next);
     rights = Rights(settings.stations);
     account.apply();
@@ -451,10 +451,10 @@ void Bus::State::take(Settings next) {
     doctor.apply();
 }
 
-/// Not from inside the line that is to go.
-void Bus::State::change_soon() {
-    if (!change || change->due || arbiter.is_waiting()) return;
-    change->due = true;
+/// Posted: the line may be the caller, and must not be replaced during its own call.
+void Bus::State::schedule_line_change() {
+    if (!change || change->posted || arbiter.is_waiting()) return;
+    change->posted = true;
     asio::post(executor, [this, life = std::weak_ptr(alive)] {
         if (!life.expired()) change_line();
     });
@@ -462,7 +462,7 @@ void Bus::State::change_soon() {
 
 void Bus::State::change_line() {
     if (!change) return;
-    change->due = false;
+    change->posted = false;
     if (arbiter.is_waiting()) return;
     Change made = std::move(*change);
     change.reset();
@@ -470,13 +470,13 @@ void Bus::State::change_line() {
         line->stop();
         if (std::exchange(up, false)) book.on_line_down(clock.now());
         why_down = "its settings have changed, and it is being opened";
-        take(std::move(made.settings));
+        adopt(std::move(made.settings));
         line = std::move(made.line);
         drive.use(*line);
         drive.hear([this](TimePoint now) {
             arbiter.on_line_left();
             arbiter.apply(settings.arbiter);
-            deny_what_is_forbidden(now);
+            deny_forbidden_writes(now);
         });
         line->start(*this);
     });

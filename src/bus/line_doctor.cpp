@@ -50,17 +50,17 @@ void LineDoctor::look(TimePoint now, const LineCounts& counts) {
     if (doctor_.due(now)) judge(now, counts);
 }
 
-void LineDoctor::glance(TimePoint now, const LineCounts& counts) {
+void LineDoctor::look_on_demand(TimePoint now, const LineCounts& counts) {
     if (doctor_.rested(now)) judge(now, counts);
 }
 
 void LineDoctor::judge(TimePoint now, const LineCounts& counts) {
     const doctor::Doctor::Change change = doctor_.look(now, sample_of(counts));
-    for (const doctor::Finding& finding : change.gone) say(finding, false);
-    for (const doctor::Finding& finding : change.appeared) say(finding, true);
+    for (const doctor::Finding& finding : change.gone) report_change(finding, false);
+    for (const doctor::Finding& finding : change.appeared) report_change(finding, true);
 }
 
-void LineDoctor::say(const doctor::Finding& finding, bool is_new) const {
+void LineDoctor::report_change(const doctor::Finding& finding, bool is_new) const {
     const std::string cause(code(finding.cause));
     const std::string station =
         finding.station ? name_of(settings_.stations, *finding.station) : std::string(kAllStations);

@@ -10,35 +10,35 @@
 
 namespace panelgate::bus {
 
-/// What a line has counted so far. The wire is asked for what its driver has.
+/// A line's counters so far. UART counters are read from `line`.
 struct LineCounts {
     const std::map<std::uint8_t, arbiter::StationCounters>& stations;
     std::uint64_t broadcasts = 0;
     line::Line& line;
 };
 
-/// Joins what the arbiter and the device have counted, has it judged, and says each change once: in
-/// the log and to the observer. Wakes nobody: it looks when something happens, or somebody asks.
+/// Passes the counters of arbiter and device to the doctor and reports each change of its findings
+/// once, to the log and to the observer. Has no timer: it runs on line activity or on request.
 class LineDoctor {
   public:
     /// The settings outlive it.
     explicit LineDoctor(const Settings& settings);
 
-    /// Those are others now.
+    /// Call after the settings changed.
     void apply();
 
     void begin(TimePoint now, const LineCounts& counts);
-    /// Something happened: looks once a step.
+    /// Call on line activity: judges at most once per step.
     void look(TimePoint now, const LineCounts& counts);
-    /// Somebody wants to know: looks unless it has just done so.
-    void glance(TimePoint now, const LineCounts& counts);
+    /// Call before reading findings: judges unless it has just done so.
+    void look_on_demand(TimePoint now, const LineCounts& counts);
 
     std::vector<LineFinding> findings() const;
     std::vector<FindingReport> report() const;
 
   private:
     void judge(TimePoint now, const LineCounts& counts);
-    void say(const doctor::Finding& finding, bool is_new) const;
+    void report_change(const doctor::Finding& finding, bool is_new) const;
 
     const Settings& settings_;
     doctor::Doctor doctor_;

@@ -6,7 +6,7 @@
 
 namespace panelgate::bus {
 
-/// What lies before the ring is as idle as what was never busy.
+/// Seconds before the ring's range count as idle.
 void LoadMeter::advance_to(std::int64_t second) {
     const std::int64_t first = std::max(newest_ + 1, second - kSeconds);
     for (std::int64_t next = first; next <= second; ++next) of(next) = {};
@@ -55,7 +55,7 @@ std::uint64_t count_of(const Histogram& all) {
     return std::accumulate(all.counts.begin(), all.counts.end(), std::uint64_t{0});
 }
 
-/// In milliseconds; nothing when nothing was observed in between.
+/// Returns milliseconds; nullopt if nothing was observed in between.
 std::optional<double> mean(const Histogram& before, const Histogram& now) {
     const std::uint64_t count = count_of(now) - count_of(before);
     if (count == 0) return std::nullopt;

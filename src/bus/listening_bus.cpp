@@ -27,17 +27,17 @@
 
 namespace panelgate::bus {
 
-/// How a request ended that was heard, not one of ours.
+/// Outcome of a request between another master and a station.
 Outcome outcome_of(const tap::Transaction& heard);
 
-/// What was heard of the stations of a line whose master is somebody else. Pure.
+/// Counters of the stations on a line with another master. Pure.
 class HeardStations {
   public:
     using Wire = std::map<std::uint8_t, arbiter::StationCounters>;
 
-    /// `offline_after`: silences in a row.
+    /// `offline_after`: timeouts in a row.
     HeardStations(const Stations& listed, int offline_after);
-    /// What was counted on the wire of stations that are no longer listed is forgotten.
+    /// Drops the wire counters of stations no longer listed.
     void apply(const Stations& listed, int offline_after);
 
     void count(const tap::Transaction& heard);
@@ -45,14 +45,14 @@ class HeardStations {
 
     Health health(std::uint8_t station) const;
     StationStatus status(std::uint8_t station, TimePoint now) const;
-    /// 0: all that are not listed.
+    /// Key 0: all unlisted stations.
     const Wire& wire() const { return wire_; }
     const arbiter::LineCounters& line() const { return line_; }
 
   private:
     struct One {
         HeardCounts counts;
-        int silences = 0;  ///< in a row, up to now
+        int timeouts_in_a_row = 0;  ///< until now
         bool failed = false;
         std::optional<TimePoint> last_success;
     };
@@ -119,7 +119,7 @@ void HeardStations::count_answer(One& one, const tap::Transaction& heard) {
     } else {
         ++one.counts.replies;
     }
-    one.silences = 0;
+    one.timeouts_in_a_row = 0;
     one.failed = false;
     wire.symptoms.mute_in_a_row = 0;
     one.last_success = heard.ended;
@@ -138,12 +138,12 @@ void HeardStations::count_failure(One& one, const tap::Transaction& heard) {
     if (heard.end == tap::End::damaged) {
         ++one.counts.damaged;
         ++wire.symptoms.damaged_long;
-        one.silences = 0;
+        one.timeouts_in_a_row = 0;
         wire.symptoms.mute_in_a_row = 0;
         return;
     }
     ++one.counts.timeouts;
-    ++one.silences;
+    ++one.timeouts_in_a_row;
     ++wire.symptoms.silent;
     ++wire.symptoms.mute_in_a_row;
 }
@@ -179,7 +179,7 @@ Health HeardStations::health(std::uint8_t station) const {
     const auto found = stations_.find(station);
     if (found == stations_.end() || found->second.counts.requests == 0) return Health::unknown;
     const One& one = found->second;
-    if (one.silences >= offline_after_) return Health::offline;
+    if (one.timeouts_in_a_row >= offline_after_) return Health::offline;
     return one.failed ? Health::suspect : Health::heard;
 }
 
@@ -204,7 +204,7 @@ tap::Settings tap_settings(const arbiter::Settings& line) {
     return settings;
 }
 
-std::string words_of_doubt(const tap::Transaction& made) {
+std::string doubt_text(const tap::Transaction& made) {
     const std::string function = std::to_string(made.request.front());
     const std::string station = std::to_string(made.station);
     if (made.end == tap::End::answered)
@@ -230,18 +230,18 @@ TransactionEnd end_of(const tap::Transaction& made) {
     std::abort();
 }
 
-/// Of the request that was heard last.
+/// For the request heard last.
 arbiter::Exchange exchange_of(const tap::Transaction& made) {
-    arbiter::Exchange told;
-    told.end = end_of(made);
-    told.station = made.station;
-    told.granted = told.first_bit_out = made.asked;
-    told.last_bit_out = made.sent;
+    arbiter::Exchange exchange;
+    exchange.end = end_of(made);
+    exchange.station = made.station;
+    exchange.granted = exchange.first_bit_out = made.asked;
+    exchange.last_bit_out = made.sent;
     if (made.end == tap::End::answered) {
-        told.first_byte_in = made.replied;
-        told.last_byte_in = made.ended;
+        exchange.first_byte_in = made.replied;
+        exchange.last_byte_in = made.ended;
     }
-    return told;
+    return exchange;
 }
 
 }  // namespace
@@ -290,7 +290,7 @@ struct ListeningBus::State final : public line::Line::Events {
     LoadMeter load;
     Refusals refusals;
     Wall wall;
-    TraceBook book;  ///< whose frames are whose is a decision here
+    TraceBook book;  ///< the matcher assigns frames to requests
     line::Drive<tap::Matcher, State> drive;
     bool up = false;
     std::string why_down = "not opened yet";
@@ -318,11 +318,11 @@ void ListeningBus::State::act(tap::Frame& frame) {
     book.note({frame.at, frame.kind, std::move(frame.bytes)});
 }
 
-/// What is perhaps no request at all is no request of the line's.
+/// A doubtful request is not counted as a request.
 void ListeningBus::State::act(const tap::Transaction& made) {
     heard.count(made);
     book.end(exchange_of(made));
-    if (made.doubtful) book.decide(made.ended, words_of_doubt(made));
+    if (made.doubtful) book.decide(made.ended, doubt_text(made));
     if (made.end == tap::End::answered || !made.doubtful) {
         const Outcome outcome = outcome_of(made);
         const Duration took = made.ended - made.asked;
@@ -341,7 +341,7 @@ Refusal ListeningBus::State::refusal(std::uint8_t station) const {
 
 void ListeningBus::State::refuse(Request request, AnswerHandler handler) {
     const std::uint8_t function = request.request.function();
-    account.add(request.station, function, deed_of(request, names), Outcome::refused,
+    account.add(request.station, function, write_record_of(request, names), Outcome::refused,
                 Duration::zero());
     Answer answer;
     answer.refusal = refusal(request.station);
@@ -362,7 +362,7 @@ void ListeningBus::stop() {
     state_->drive.rest();
 }
 
-/// Nobody waits here, so the other line is there at once.
+/// No request waits here, so the line is replaced at once.
 void ListeningBus::apply(Settings settings, std::unique_ptr<line::Line> line,
                          std::shared_ptr<void>) {
     State& state = *state_;
@@ -404,7 +404,7 @@ LineStatus ListeningBus::status() const {
     status.listens = true;
     status.state = state_->up ? "up" : "down: " + state_->why_down;
     status.load_percent = state_->load.percent(state_->clock.now());
-    if (state_->up) state_->doctor.glance(state_->clock.now(), state_->counts());
+    if (state_->up) state_->doctor.look_on_demand(state_->clock.now(), state_->counts());
     status.findings = state_->doctor.findings();
     return status;
 }

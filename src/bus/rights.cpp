@@ -85,7 +85,7 @@ std::optional<Refusal> Rights::judge_write(std::uint8_t station) const {
     return refusal_by(Rule::read_only, listed->second.name);
 }
 
-/// It reaches every station: one that must not be written forbids it.
+/// A broadcast reaches every station: one read-only station forbids it.
 std::optional<Refusal> Rights::judge_broadcast() const {
     for (const auto& [id, station] : stations_) {
         if (station.access != Access::read_only) continue;

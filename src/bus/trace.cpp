@@ -2,7 +2,7 @@
 
 namespace panelgate::bus {
 
-/// What is not written is never read: no page of it is touched before.
+/// Uninitialised: pages are touched only when written, and only written bytes are read.
 ByteRing::ByteRing(std::size_t size)
     : size_(size), bytes_(std::make_unique_for_overwrite<std::uint8_t[]>(size)) {}
 

@@ -17,7 +17,7 @@ ByteView bytes_of(std::string_view text) {
     return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-/// What it was sent for, in a word.
+/// Why it was sent, in one word.
 std::string reason_of(const RecordedFrame& request) {
     if (request.kind != FrameKind::request) return std::string(label(request.kind));
     return std::string(label(request.why.priority));
@@ -44,7 +44,7 @@ void TraceStore::add(RecordedFrame frame, ByteView bytes) {
         std::min<std::size_t>({bytes.size(), bytes_.size(), std::size_t{UINT16_MAX}}));
     frame.place = bytes_.add(bytes.first(frame.size));
     frames_.add(std::move(frame));
-    forget_torn();
+    drop_incomplete();
 }
 
 void TraceStore::add(RecordedDecision decision, std::string_view text) {
@@ -56,8 +56,8 @@ void TraceStore::add(RecordedDecision decision, std::string_view text) {
 
 void TraceStore::add(const RecordedTransaction& transaction) { transactions_.add(transaction); }
 
-/// A transaction whose request is gone goes with it.
-void TraceStore::forget_torn() {
+/// Drops a transaction with its request.
+void TraceStore::drop_incomplete() {
     while (!frames_.empty() && !bytes_.has(frames_.at(0).place)) frames_.drop_oldest();
     const std::uint64_t oldest = frames_.empty() ? 0 : frames_.at(0).sequence;
     while (!transactions_.empty() && transactions_.at(0).first < oldest)
@@ -93,12 +93,12 @@ void TraceStore::copy(const TraceStore& from, std::uint64_t since) {
         const RecordedTransaction& one = from.transactions_.at(i);
         if (one.first > since) add(one);
     }
-    for (std::size_t i = from.frames_.place_behind(since); i < from.frames_.size(); ++i) {
+    for (std::size_t i = from.frames_.index_after(since); i < from.frames_.size(); ++i) {
         const RecordedFrame& one = from.frames_.at(i);
         add(one, from.bytes_.at(one.place, one.size));
     }
-    for (std::size_t i = from.decisions_.place_behind(since); i < from.decisions_.size(); ++i) {
-        const TraceDecision one = from.told(from.decisions_.at(i));
+    for (std::size_t i = from.decisions_.index_after(since); i < from.decisions_.size(); ++i) {
+        const TraceDecision one = from.decoded(from.decisions_.at(i));
         add(from.decisions_.at(i), one.text);
     }
 }
@@ -109,20 +109,20 @@ void TraceStore::clear() {
     transactions_.clear();
 }
 
-TraceFrame TraceStore::told(const RecordedFrame& frame) const {
+TraceFrame TraceStore::decoded(const RecordedFrame& frame) const {
     return {frame.sequence,     frame.at,   frame.kind,       bytes_.at(frame.place, frame.size),
             text_of(frame.why), frame.time, frame.transaction};
 }
 
-TraceDecision TraceStore::told(const RecordedDecision& decision) const {
+TraceDecision TraceStore::decoded(const RecordedDecision& decision) const {
     const Bytes text = text_.at(decision.place, decision.size);
     return {decision.sequence, decision.at, std::string(text.begin(), text.end()), decision.time};
 }
 
-TraceTransaction TraceStore::told(const RecordedTransaction& one) const {
+TraceTransaction TraceStore::decoded(const RecordedTransaction& one) const {
     TraceTransaction made;
     static_cast<TransactionFacts&>(made) = one;
-    for (std::size_t i = frames_.place_behind(one.first - 1); i < frames_.size(); ++i) {
+    for (std::size_t i = frames_.index_after(one.first - 1); i < frames_.size(); ++i) {
         const RecordedFrame& frame = frames_.at(i);
         if (frame.transaction != one.id) break;
         if (frame.sequence == one.first) {
@@ -133,35 +133,35 @@ TraceTransaction TraceStore::told(const RecordedTransaction& one) const {
         } else if (frame.kind == FrameKind::reply) {
             made.reply = bytes_.at(frame.place, frame.size);
         } else {
-            made.discarded.push_back(told(frame));
+            made.discarded.push_back(decoded(frame));
         }
     }
     return made;
 }
 
-template <class Told, class Recorded>
-std::vector<Told> TraceStore::in_words(const std::vector<Recorded>& recorded) const {
-    std::vector<Told> words;
-    words.reserve(recorded.size());
-    for (const Recorded& one : recorded) words.push_back(told(one));
-    return words;
+template <class Decoded, class Recorded>
+std::vector<Decoded> TraceStore::decoded_all(const std::vector<Recorded>& recorded) const {
+    std::vector<Decoded> list;
+    list.reserve(recorded.size());
+    for (const Recorded& one : recorded) list.push_back(decoded(one));
+    return list;
 }
 
 std::vector<TraceFrame> TraceStore::frames(std::size_t last) const {
-    return in_words<TraceFrame>(frames_.last(last));
+    return decoded_all<TraceFrame>(frames_.last(last));
 }
 
 std::vector<TraceFrame> TraceStore::frames_since(std::uint64_t sequence, std::size_t most) const {
-    return in_words<TraceFrame>(frames_.since(sequence, most));
+    return decoded_all<TraceFrame>(frames_.since(sequence, most));
 }
 
 std::vector<TraceDecision> TraceStore::decisions(std::size_t last) const {
-    return in_words<TraceDecision>(decisions_.last(last));
+    return decoded_all<TraceDecision>(decisions_.last(last));
 }
 
 std::vector<TraceDecision> TraceStore::decisions_since(std::uint64_t sequence,
                                                        std::size_t most) const {
-    return in_words<TraceDecision>(decisions_.since(sequence, most));
+    return decoded_all<TraceDecision>(decisions_.since(sequence, most));
 }
 
 /// Only the newest may still be open.
@@ -175,13 +175,13 @@ std::vector<TraceTransaction> TraceStore::transactions(std::size_t last) const {
     const std::size_t open = transactions_.size() - ended();
     auto some = transactions_.last(std::min(last, ended()) + open);
     if (open > 0) some.pop_back();
-    return in_words<TraceTransaction>(some);
+    return decoded_all<TraceTransaction>(some);
 }
 
 std::vector<TraceTransaction> TraceStore::transactions_since(std::uint64_t sequence,
                                                              std::size_t most) const {
-    const std::size_t before = std::min(transactions_.place_behind(sequence), ended());
-    return in_words<TraceTransaction>(
+    const std::size_t before = std::min(transactions_.index_after(sequence), ended());
+    return decoded_all<TraceTransaction>(
         transactions_.since(sequence, std::min(most, ended() - before)));
 }
 
@@ -194,27 +194,27 @@ TracePart TraceStore::part_since(std::uint64_t sequence, std::size_t most) const
             transactions_since(sequence, most)};
 }
 
-void IncidentBook::on_trouble(const Trouble& trouble, const TraceStore& trace) {
+void IncidentBook::on_error(const ErrorEvent& error, const TraceStore& trace) {
     if (settings_.incidents == 0) return;
-    if (open_ && trouble.at > until_) close();
-    if (!open_ && trouble.news) {
-        open(trouble, trace);
+    if (open_ && error.at > until_) close();
+    if (!open_ && error.is_new) {
+        open(error, trace);
     } else if (open_) {
         ++kept_.back()->head.errors;
     } else {
         return;
     }
     left_ = settings_.after;
-    until_ = trouble.at + settings_.near;
+    until_ = error.at + settings_.near;
 }
 
-void IncidentBook::open(const Trouble& trouble, const TraceStore& trace) {
+void IncidentBook::open(const ErrorEvent& error, const TraceStore& trace) {
     Kept& kept = place();
     kept.head = {};
     kept.head.id = ++count_;
-    kept.head.time = trouble.time;
-    kept.head.station = trouble.station;
-    kept.head.cause = trouble.cause;
+    kept.head.time = error.time;
+    kept.head.station = error.station;
+    kept.head.cause = error.cause;
     kept.head.errors = 1;
     kept.store.clear();
     const std::uint64_t first = trace.first_of_last(settings_.before + 1);
@@ -222,7 +222,7 @@ void IncidentBook::open(const Trouble& trouble, const TraceStore& trace) {
     open_ = true;
 }
 
-/// What somebody has read gives way first, then the oldest.
+/// Reuses the oldest incident already read, else the oldest.
 IncidentBook::Kept& IncidentBook::place() {
     if (kept_.size() < settings_.incidents) {
         kept_.push_back(std::make_unique<Kept>(IncidentHead{}, TraceStore(settings_.each)));
@@ -302,7 +302,7 @@ TraceBook::TraceBook(const Settings& settings, Wall& wall)
 void TraceBook::note(arbiter::Note note) {
     log_frame(settings_.name, note);
     RecordedFrame frame;
-    frame.sequence = ++happened_;
+    frame.sequence = ++sequence_;
     frame.at = note.at;
     frame.time = wall_.at(note.at);
     if (begins(note.kind)) begin(note, frame);
@@ -313,8 +313,8 @@ void TraceBook::note(arbiter::Note note) {
     incidents_.add(frame, note.bytes);
     store_.add(std::move(frame), note.bytes);
     if (note.kind != FrameKind::late || note.bytes.empty()) return;
-    if (is_stranger(note.bytes.front())) return;
-    incidents_.on_trouble({note.at, time, note.bytes.front(), "late"}, store_);
+    if (is_unlisted(note.bytes.front())) return;
+    incidents_.on_error({note.at, time, note.bytes.front(), "late"}, store_);
 }
 
 void TraceBook::begin(const arbiter::Note& note, const RecordedFrame& request) {
@@ -332,7 +332,7 @@ void TraceBook::begin(const arbiter::Note& note, const RecordedFrame& request) {
 void TraceBook::decide(TimePoint at, const std::string& text) {
     if (rt::log_enabled(rt::LogLevel::trace))
         rt::log(rt::LogLevel::trace, "decision", {{"line", settings_.name}, {"why", text}});
-    const RecordedDecision decision{++happened_, at, wall_.at(at)};
+    const RecordedDecision decision{++sequence_, at, wall_.at(at)};
     incidents_.add(decision, text);
     store_.add(decision, text);
 }
@@ -341,7 +341,7 @@ void TraceBook::end(const arbiter::Exchange& exchange) {
     const auto id = exchange.transaction == 0 ? current_ : exchange.transaction;
     RecordedTransaction* const found = store_.find(id);
     if (found == nullptr) return;
-    found->sequence = ++happened_;
+    found->sequence = ++sequence_;
     found->end = exchange.end;
     found->station = exchange.station;
     found->time = wall_.at(exchange.first_bit_out);
@@ -350,19 +350,19 @@ void TraceBook::end(const arbiter::Exchange& exchange) {
     judge(*found, exchange.last_bit_out);
 }
 
-/// What ends as the one before to the same station did is no news. The loss of a line is told by
-/// itself.
+/// A transaction that ends like the station's previous one opens no incident. on_line_down()
+/// handles the loss of a line.
 void TraceBook::judge(const RecordedTransaction& transaction, TimePoint at) {
     const TransactionEnd before = std::exchange(ends_[transaction.station], transaction.end);
     if (!is_error(transaction.end) || transaction.end == TransactionEnd::line_down) return;
-    if (transaction.end == TransactionEnd::timeout && is_stranger(transaction.station)) return;
-    incidents_.on_trouble({at, transaction.time, transaction.station, label(transaction.end),
-                           before != transaction.end},
-                          store_);
+    if (transaction.end == TransactionEnd::timeout && is_unlisted(transaction.station)) return;
+    incidents_.on_error({at, transaction.time, transaction.station, label(transaction.end),
+                         before != transaction.end},
+                        store_);
 }
 
-/// Nobody has listed it: its silence, and a reply behind the short wait for it, are expected.
-bool TraceBook::is_stranger(std::uint8_t station) const {
+/// An unlisted station's timeouts, and its replies after the short wait, are expected.
+bool TraceBook::is_unlisted(std::uint8_t station) const {
     return station != 0 && !settings_.stations.contains(station);
 }
 
@@ -375,7 +375,7 @@ void TraceBook::answered(arbiter::Transaction transaction, TimePoint at) {
 
 void TraceBook::on_line_down(TimePoint at) {
     if (store_.empty()) return;
-    incidents_.on_trouble({at, wall_.at(at), std::nullopt, "line_down"}, store_);
+    incidents_.on_error({at, wall_.at(at), std::nullopt, "line_down"}, store_);
 }
 
 }  // namespace panelgate::bus

@@ -19,8 +19,8 @@
 
 namespace panelgate::bus {
 
-/// What the clock on the wall showed at an instant. It is asked now and then, not each time: when
-/// somebody sets it, this follows a moment later.
+/// Converts instants to wall-clock time. Reads the wall clock at most every 100 ms, so it follows a
+/// clock change with that delay.
 class Wall {
   public:
     explicit Wall(rt::Clock& clock) : clock_(clock) {}
@@ -40,7 +40,7 @@ class Wall {
     WallTime shown_{};
 };
 
-/// As TraceFrame, but for the words; its bytes are elsewhere.
+/// Like TraceFrame, but its bytes are in a ByteRing and its reason is not text.
 struct RecordedFrame {
     std::uint64_t sequence = 0;
     TimePoint at;
@@ -58,9 +58,9 @@ struct RecordedDecision {
     std::uint64_t place = 0;
     std::size_t size = 0;
 };
-/// As TraceTransaction; its frames tell the rest.
+/// Like TraceTransaction; the rest is in its frames.
 struct RecordedTransaction : TransactionFacts {
-    static constexpr std::uint64_t kOpen = UINT64_MAX;  ///< its end has no number yet
+    static constexpr std::uint64_t kOpen = UINT64_MAX;  ///< sequence of a transaction still open
 
     RecordedTransaction() {
         sequence = kOpen;
@@ -68,38 +68,38 @@ struct RecordedTransaction : TransactionFacts {
     }
 };
 
-/// Frames, decisions and transactions of a line in memory of a fixed size. What is no longer whole
-/// is not told: a frame gives way with its bytes, a transaction with its request.
+/// Frames, decisions and transactions of a line in memory of a fixed size. Only complete records
+/// are returned: a frame is dropped with its bytes, a transaction with its request.
 class TraceStore {
   public:
     explicit TraceStore(const TraceSettings& settings);
-    /// What one takes at most, in bytes; but for the names of clients, which it shares.
+    /// Returns the maximum size in bytes, without the clients' names, which are shared.
     static std::size_t memory(const TraceSettings& settings);
 
     void add(RecordedFrame frame, ByteView bytes);
     void add(RecordedDecision decision, std::string_view text);
     void add(const RecordedTransaction& transaction);
-    /// The newest; null: none.
+    /// Returns the newest transaction; null if there is none.
     RecordedTransaction* newest();
-    /// Null: it is not remembered, or was never begun.
+    /// Returns null if the transaction was dropped or never begun.
     RecordedTransaction* find(std::uint64_t id);
-    /// Everything of `from` behind this sequence number, as it stands there.
+    /// Copies all records of `from` after this sequence number.
     void copy(const TraceStore& from, std::uint64_t since);
     void clear();
 
-    /// One more transaction with long frames would push nothing out.
+    /// True if one more transaction with long frames drops no record.
     bool has_room() const;
     bool empty() const { return frames_.empty(); }
-    /// Sequence number of the request of the transaction so many before the newest, or of the
-    /// oldest; 0: none.
+    /// Returns the sequence number of the request of the last but `count` transaction, or of the
+    /// oldest; 0 if there is none.
     std::uint64_t first_of_last(std::size_t count) const;
 
-    // Oldest first; of the newest, or of those behind a number.
+    // Oldest first: the last ones, or those after a sequence number.
     std::vector<TraceFrame> frames(std::size_t last) const;
     std::vector<TraceFrame> frames_since(std::uint64_t sequence, std::size_t most) const;
     std::vector<TraceDecision> decisions(std::size_t last) const;
     std::vector<TraceDecision> decisions_since(std::uint64_t sequence, std::size_t most) const;
-    /// Those that are over.
+    /// Finished transactions only.
     std::vector<TraceTransaction> transactions(std::size_t last) const;
     std::vector<TraceTransaction> transactions_since(std::uint64_t sequence,
                                                      std::size_t most) const;
@@ -108,13 +108,13 @@ class TraceStore {
     TracePart part_since(std::uint64_t sequence, std::size_t most) const;
 
   private:
-    TraceFrame told(const RecordedFrame& frame) const;
-    TraceDecision told(const RecordedDecision& decision) const;
-    TraceTransaction told(const RecordedTransaction& transaction) const;
-    template <class Told, class Recorded>
-    std::vector<Told> in_words(const std::vector<Recorded>& recorded) const;
+    TraceFrame decoded(const RecordedFrame& frame) const;
+    TraceDecision decoded(const RecordedDecision& decision) const;
+    TraceTransaction decoded(const RecordedTransaction& transaction) const;
+    template <class Decoded, class Recorded>
+    std::vector<Decoded> decoded_all(const std::vector<Recorded>& recorded) const;
     std::size_t ended() const;
-    void forget_torn();
+    void drop_incomplete();
 
     TraceSettings limits_;
     Recorder<RecordedFrame> frames_;
@@ -124,34 +124,34 @@ class TraceStore {
     ByteRing text_;
 };
 
-/// Something went wrong on the line.
-struct Trouble {
+/// An error on the line.
+struct ErrorEvent {
     TimePoint at;
     WallTime time{};
-    std::optional<std::uint8_t> station{};  ///< nothing: the whole line
-    std::string_view cause;                 ///< a literal
-    bool news = true;  ///< false: it goes on as it did, and is no incident of its own
+    std::optional<std::uint8_t> station{};  ///< nullopt: the whole line
+    std::string_view cause;                 ///< a string literal
+    bool is_new = true;                     ///< false: a repetition, which opens no incident
 };
 
-/// Keeps what happened around errors, the last of them, in memory of a fixed size: what stood in
-/// the trace before the first, and what came behind the last. Pure.
+/// Records what happened around errors in memory of a fixed size: the trace before the first error,
+/// and what follows the last. Pure.
 class IncidentBook {
   public:
     explicit IncidentBook(const IncidentSettings& settings) : settings_(settings) {}
 
-    /// `trace`: of the line, with what went wrong.
-    void on_trouble(const Trouble& trouble, const TraceStore& trace);
-    // What happens on the line, as it is recorded there: it belongs to the incident that is open.
+    /// `trace`: of the line, including the error.
+    void on_error(const ErrorEvent& error, const TraceStore& trace);
+    // Records as they are added to the trace: they go to the open incident, if any.
     void begin(const RecordedTransaction& transaction);
     void add(const RecordedFrame& frame, ByteView bytes);
     void add(const RecordedDecision& decision, std::string_view text);
     void update(const RecordedTransaction& transaction);
-    /// A transaction is over.
+    /// A transaction has ended.
     void end(const RecordedTransaction& transaction);
 
     /// The oldest first.
     std::vector<IncidentHead> heads() const;
-    /// One of them, which has been read then.
+    /// Returns an incident and marks it as read.
     std::optional<Incident> fetch(std::uint64_t id);
 
   private:
@@ -159,30 +159,30 @@ class IncidentBook {
         IncidentHead head;
         TraceStore store;
     };
-    void open(const Trouble& trouble, const TraceStore& trace);
+    void open(const ErrorEvent& error, const TraceStore& trace);
     Kept& place();
     void close();
 
     IncidentSettings settings_;
     std::vector<std::unique_ptr<Kept>> kept_;  ///< the oldest first
-    bool open_ = false;                        ///< the newest of them
-    std::size_t left_ = 0;                     ///< transactions that still belong to it
+    bool open_ = false;                        ///< the newest incident is open
+    std::size_t left_ = 0;                     ///< transactions still to be added to it
     TimePoint until_{};                        ///< … and not later than this
     std::uint64_t count_ = 0;
 };
 
-/// What happened on a line, frames, decisions and ends of transactions in one sequence: kept for
-/// those who ask, and told in the log at trace level. `settings` and `wall` outlive it.
+/// Records a line's frames, decisions and transaction ends in one sequence, and logs them at trace
+/// level. `settings` and `wall` outlive it.
 class TraceBook {
   public:
     TraceBook(const Settings& settings, Wall& wall);
 
-    /// A frame that was sent, or a master's request that was heard, begins a transaction.
+    /// A sent frame, or a request heard from another master, begins a transaction.
     void note(arbiter::Note note);
     void decide(TimePoint at, const std::string& text);
-    /// The transaction with this number is over; 0: the one that was begun last.
+    /// Ends the transaction with this number; 0: the last one begun.
     void end(const arbiter::Exchange& exchange);
-    /// Somebody is answered by this transaction; the first counts.
+    /// A request was answered by this transaction; only the first answer is recorded.
     void answered(arbiter::Transaction transaction, TimePoint at);
     void on_line_down(TimePoint at);
 
@@ -192,12 +192,12 @@ class TraceBook {
   private:
     void begin(const arbiter::Note& note, const RecordedFrame& request);
     void judge(const RecordedTransaction& transaction, TimePoint at);
-    bool is_stranger(std::uint8_t station) const;
+    bool is_unlisted(std::uint8_t station) const;
 
     const Settings& settings_;
     Wall& wall_;
-    std::uint64_t happened_ = 0;        ///< the last sequence number
-    arbiter::Transaction current_ = 0;  ///< the last that was begun
+    std::uint64_t sequence_ = 0;        ///< last sequence number
+    arbiter::Transaction current_ = 0;  ///< last transaction begun
     TraceStore store_;
     IncidentBook incidents_;
     std::array<TransactionEnd, 256> ends_{};  ///< of each station's last transaction

@@ -29,7 +29,7 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
         case arbiter::StationEvent::Kind::online:
             return say(rt::LogLevel::info, "station online", "");
         case arbiter::StationEvent::Kind::late:
-            // Behind a wait that was cut short no setting is wrong.
+            // After a shortened wait the settings are not at fault.
             if (event.by <= Duration::zero()) return say(rt::LogLevel::info, "late reply", "");
             return say(rt::LogLevel::warn, "late reply",
                        "raise its response_timeout by at least " + ms + "ms");
@@ -52,25 +52,25 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
 
 namespace {
 
-/// As `raw` takes it.
+/// Format of the `raw` request.
 std::string hex_of(ByteView pdu) {
     std::string hex = to_hex(pdu);
     std::erase(hex, ' ');
     return hex;
 }
 
-/// The first bytes of a long one: of a request that had no effect, and of which there may be many.
+/// Shortens a request that had no effect: there may be many of these.
 std::string shortened(const std::string& hex) {
     constexpr std::size_t kShown = 64;
     return hex.size() > kShown ? hex.substr(0, kShown) + "..." : hex;
 }
 
-/// No reads, and none of the numbers that are no functions (0, and exceptions from 128 on).
+/// False for reads, 0 and exception codes (128 and above), which are not functions.
 bool may_write(ByteView pdu) { return !modbus::is_pure_read(pdu) && pdu[0] != 0 && pdu[0] < 0x80; }
 
-/// It was on the wire, or has been carried out: whatever came of it, a panel may have changed.
-bool is_accepted(const Deed& deed, Outcome outcome) {
-    return deed.transaction != 0 || outcome == Outcome::ok;
+/// The write was transmitted or executed: a panel may have changed.
+bool is_accepted(const WriteRecord& write, Outcome outcome) {
+    return write.transaction != 0 || outcome == Outcome::ok;
 }
 
 std::string place_of(const modbus::Request& request) {
@@ -81,35 +81,39 @@ std::string place_of(const modbus::Request& request) {
 
 }  // namespace
 
-std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names) {
+std::optional<WriteRecord> write_record_of(const Request& request,
+                                           const arbiter::ClientNames& names) {
     if (request.poll || !may_write(request.request.pdu())) return std::nullopt;
-    return Deed{names.of(request.client), place_of(request.request), hex_of(request.request.pdu()),
-                0};
+    return WriteRecord{names.of(request.client), place_of(request.request),
+                       hex_of(request.request.pdu()), 0};
 }
 
-std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names) {
+std::optional<WriteRecord> write_record_of(ByteView pdu, ClientId client,
+                                           const arbiter::ClientNames& names) {
     if (!may_write(pdu)) return std::nullopt;
     const auto request =
         modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::wide);
-    return Deed{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu), 0};
+    return WriteRecord{names.of(client), request ? place_of(*request) : std::string(), hex_of(pdu),
+                       0};
 }
 
-void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome) {
+void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
+               Outcome outcome) {
     const std::string name =
         station == 0 ? std::string("broadcast") : name_of(settings.stations, station);
-    const std::string client = without_port(deed.client);
-    const std::string place = settings.name + '/' + name + ' ' + deed.place;
+    const std::string client = without_port(write.client);
+    const std::string place = settings.name + '/' + name + ' ' + write.place;
     const std::string ended(label(outcome));
-    const bool accepted = is_accepted(deed, outcome);
+    const bool accepted = is_accepted(write, outcome);
     std::vector<rt::LogField> fields{
-        {"line", settings.name}, {"station", name}, {"client", deed.client}};
-    if (!deed.place.empty()) fields.push_back({"at", deed.place});
-    fields.push_back({"pdu", accepted ? deed.pdu : shortened(deed.pdu)});
+        {"line", settings.name}, {"station", name}, {"client", write.client}};
+    if (!write.place.empty()) fields.push_back({"at", write.place});
+    fields.push_back({"pdu", accepted ? write.pdu : shortened(write.pdu)});
     fields.push_back({"outcome", ended});
-    const std::string transaction = std::to_string(deed.transaction);
-    if (deed.transaction != 0) fields.push_back({"transaction", transaction});
+    const std::string transaction = std::to_string(write.transaction);
+    if (write.transaction != 0) fields.push_back({"transaction", transaction});
     if (!accepted) return rt::log_deed("write", place + ' ' + client, fields);
-    rt::log_each("write", place, client + ' ' + deed.pdu + ' ' + ended, fields);
+    rt::log_each("write", place, client + ' ' + write.pdu + ' ' + ended, fields);
 }
 
 }  // namespace panelgate::bus

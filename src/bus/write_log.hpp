@@ -11,24 +11,27 @@
 
 namespace panelgate::bus {
 
-/// One line in the log, with what to do about it.
+/// Logs a station event in one line, with a hint.
 void log_event(const Settings& settings, const arbiter::StationEvent& event);
 
-/// What the log is to say of a client's write when it has ended.
-struct Deed {
+/// What is logged of a client's write when it ends.
+struct WriteRecord {
     std::string client;
     std::string place;  ///< "holding-registers/100", or empty
     std::string pdu;    ///< hex
-    /// The line's last one that was made for it, as in the trace; 0: none was.
+    /// The last transaction made for it, as in the trace; 0: none.
     arbiter::Transaction transaction = 0;
 };
 
-/// Nothing for what changes nothing and for what no client wants (polls, relays).
-std::optional<Deed> deed_of(const Request& request, const arbiter::ClientNames& names);
-/// The same of a PDU that nobody was asked; its place is not told when it is no request.
-std::optional<Deed> deed_of(ByteView pdu, ClientId client, const arbiter::ClientNames& names);
-/// At info. What was transmitted is in the log each time, with its whole PDU (rt::log_each); what
-/// was refused or given up before is told at a pace.
-void log_deed(const Settings& settings, std::uint8_t station, const Deed& deed, Outcome outcome);
+/// Returns nullopt for reads and for requests without a client (polls, relays).
+std::optional<WriteRecord> write_record_of(const Request& request,
+                                           const arbiter::ClientNames& names);
+/// The same for a PDU that was never submitted; without `place` if it is not a valid request.
+std::optional<WriteRecord> write_record_of(ByteView pdu, ClientId client,
+                                           const arbiter::ClientNames& names);
+/// Logs at info. Every transmitted write is logged with its whole PDU (rt::log_each); writes that
+/// were refused or abandoned before are rate-limited.
+void log_write(const Settings& settings, std::uint8_t station, const WriteRecord& write,
+               Outcome outcome);
 
 }  // namespace panelgate::bus

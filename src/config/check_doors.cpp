@@ -18,8 +18,8 @@ namespace panelgate::config {
 
 namespace {
 
-/// C0 but for the tab, DEL, C1 (in UTF-8: C2 80 to C2 9F), and the two separators that end a line
-/// for a browser.
+/// Returns the first control character: C0 except the tab, DEL, C1 (in UTF-8: C2 80 to C2 9F), or
+/// one of the two separators that end a line in a browser.
 std::optional<unsigned> control_character(std::string_view text) {
     for (std::size_t i = 0; i < text.size(); ++i) {
         const auto byte = static_cast<unsigned char>(text[i]);
@@ -32,7 +32,7 @@ std::optional<unsigned> control_character(std::string_view text) {
     return std::nullopt;
 }
 
-/// The text of a block begins as a list or a map does.
+/// True if a block text begins like a list or a map.
 bool is_yaml(std::string_view text) {
     const std::string_view first = text.substr(0, text.find('\n'));
     const std::size_t colon = first.find(':');
@@ -43,7 +43,7 @@ bool is_yaml(std::string_view text) {
     return first.starts_with("- ") || is_key;
 }
 
-/// `variable`: whose value the text is, or none's.
+/// `variable`: the variable that supplied the text, or "".
 void refuse(std::string_view text, yaml::Mark mark, const std::string& variable,
             yaml::Problems& problems) {
     const auto control = control_character(text);
@@ -87,7 +87,7 @@ const Node* find(const Node& map, std::string_view key) {
     return found == map.entries.end() ? nullptr : &found->value;
 }
 
-/// Of the key's value, or of the map when it is not there.
+/// Mark of the key's value, or of the map if it is absent.
 Mark mark_of(const Node& map, std::string_view key) {
     const Node* value = find(map, key);
     return value != nullptr ? value->mark : map.mark;
@@ -103,7 +103,7 @@ const Station* station_of(const Config& config, const UnitTarget& target) {
     return found == stations.end() ? nullptr : &*found;
 }
 
-/// One that means nobody yet.
+/// Returns a unit id that is not in use.
 std::string free_unit(const tcp_server::Settings& listener) {
     int unit = 101;
     while (unit < 247 && listener.units.contains(static_cast<std::uint8_t>(unit))) ++unit;
@@ -119,27 +119,27 @@ bool can_write(const Config& config, const tcp_server::Settings& listener) {
     return !listener.read_only && std::ranges::any_of(listener.lines, writable);
 }
 
-/// Listeners where they are written, all of them.
-struct Door {
+/// A listener and where it is configured.
+struct ListenAddress {
     Mark mark;
     std::string address;
     std::uint16_t port = 0;
     std::string name;
 };
 
-bool takes(const Door& all, const Door& other) {
+bool takes(const ListenAddress& all, const ListenAddress& other) {
     const bool same_family = is_ipv6(all.address) == is_ipv6(other.address);
     return same_family && all.port != 0 && all.port == other.port && is_any_address(all.address);
 }
 
-void warn_of_ports(Loading& loading, const std::vector<Door>& doors) {
-    for (std::size_t i = 0; i < doors.size(); ++i) {
+void warn_of_ports(Loading& loading, const std::vector<ListenAddress>& listeners) {
+    for (std::size_t i = 0; i < listeners.size(); ++i) {
         for (std::size_t j = 0; j < i; ++j) {
-            const bool later_is_all = takes(doors[i], doors[j]);
-            if (!later_is_all && !takes(doors[j], doors[i])) continue;
-            const Door& all = later_is_all ? doors[i] : doors[j];
-            const Door& one = later_is_all ? doors[j] : doors[i];
-            loading.warn(doors[i].mark,
+            const bool later_is_all = takes(listeners[i], listeners[j]);
+            if (!later_is_all && !takes(listeners[j], listeners[i])) continue;
+            const ListenAddress& all = later_is_all ? listeners[i] : listeners[j];
+            const ListenAddress& one = later_is_all ? listeners[j] : listeners[i];
+            loading.warn(listeners[i].mark,
                          all.name + " (line " + std::to_string(all.mark.line) + ") takes port " +
                              std::to_string(all.port) + " of every address, that of " + one.name +
                              " (line " + std::to_string(one.mark.line) +
@@ -149,13 +149,13 @@ void warn_of_ports(Loading& loading, const std::vector<Door>& doors) {
     }
 }
 
-bool lets_all_in(const std::vector<Network>& allow) {
+bool allows_all(const std::vector<Network>& allow) {
     return allow.empty() || std::ranges::count(allow, 0u, &Network::prefix) > 0;
 }
 
 void warn_of_open_listener(Loading& loading, const Node& node,
                            const tcp_server::Settings& listener) {
-    if (!is_any_address(listener.address) || !lets_all_in(listener.allow)) return;
+    if (!is_any_address(listener.address) || !allows_all(listener.allow)) return;
     if (!can_write(loading.config, listener)) return;
     loading.warn(mark_of(node, "listen"),
                  "whoever reaches port " + std::to_string(listener.port) +
@@ -164,9 +164,9 @@ void warn_of_open_listener(Loading& loading, const Node& node,
                      std::to_string(listener.port));
 }
 
-/// A datagram's sender is not proven: whoever asks in another's name has the answers sent there.
+/// A UDP sender address can be forged: the answers go to the forged address.
 void warn_of_open_udp(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
-    if (!listener.udp || !is_any_address(listener.address) || !lets_all_in(listener.allow)) return;
+    if (!listener.udp || !is_any_address(listener.address) || !allows_all(listener.allow)) return;
     loading.warn(mark_of(node, "udp"),
                  "udp: true on all addresses answers datagrams whose sender may be forged, with "
                  "up to twenty times what was sent; name who may ask, such as allow: "
@@ -174,7 +174,8 @@ void warn_of_open_udp(Loading& loading, const Node& node, const tcp_server::Sett
                      std::to_string(listener.port));
 }
 
-/// One station forbids them for all; where nothing can be written anyway, nobody wonders.
+/// One read-only station forbids broadcasts for all; no warning where nothing can be written
+/// anyway.
 void warn_of_broadcasts(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
     const bool sends = listener.broadcast != tcp_server::BroadcastMode::deny;
     if (!sends || !can_write(loading.config, listener)) return;
@@ -187,7 +188,7 @@ void warn_of_broadcasts(Loading& loading, const Node& node, const tcp_server::Se
                      "line by another listener");
 }
 
-/// A unit that is not the station of this id, and what is to be known of both.
+/// Warns if a unit hides the station of the same id, or if two units seem swapped.
 void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings& listener,
                   std::uint8_t unit, const UnitTarget& target) {
     const Station* reached = station_of(loading.config, target);
@@ -216,7 +217,7 @@ void warn_of_unit(Loading& loading, const Node& node, const tcp_server::Settings
     }
 }
 
-/// Docker and Podman mount secrets there for one container, readable by all that is in it.
+/// Docker and Podman mount secrets there for one container, readable by all in it.
 bool is_container_secret(std::string_view path) {
     return path.starts_with("/run/secrets/") || path.starts_with("/var/run/secrets/");
 }
@@ -235,7 +236,8 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
                                      "`, or a secret of the container platform in /run/secrets");
 }
 
-/// `panelgate health`, and with it the image's HEALTHCHECK, asks from where the listener is.
+/// `panelgate health`, and with it the image's HEALTHCHECK, connects from the listener's own
+/// address.
 void warn_of_health(Loading& loading, const Node& node, const web::Settings& http) {
     const std::string own = reachable(http.address);
     const auto holds = [&](const Network& network) {
@@ -261,7 +263,7 @@ void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Setting
 
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
     warn_of_health(loading, node, http);
-    const bool open = is_any_address(http.address) && lets_all_in(http.allow);
+    const bool open = is_any_address(http.address) && allows_all(http.allow);
     warn_of_plain_tokens(loading, node, http);
     if (open && http.anonymous == web::Role::viewer) {
         loading.warn(mark_of(node, "anonymous"),
@@ -291,12 +293,12 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
 
 }  // namespace
 
-void warn_of_doors(Loading& loading, const Node& tree) {
-    std::vector<Door> doors;
+void warn_of_listeners(Loading& loading, const Node& tree) {
+    std::vector<ListenAddress> listeners;
     for (std::size_t i = 0; i < loading.config.modbus_tcp.size(); ++i) {
         const Node& node = find(tree, "modbus_tcp")->items[i];
         const tcp_server::Settings& listener = loading.config.modbus_tcp[i];
-        doors.push_back(
+        listeners.push_back(
             {mark_of(node, "listen"), listener.address, listener.port, listener.name()});
         warn_of_open_listener(loading, node, listener);
         warn_of_open_udp(loading, node, listener);
@@ -307,10 +309,10 @@ void warn_of_doors(Loading& loading, const Node& tree) {
     if (loading.config.http) {
         const web::Settings& http = *loading.config.http;
         const Node& node = *find(tree, "http");
-        doors.push_back({mark_of(node, "listen"), http.address, http.port, http.name()});
+        listeners.push_back({mark_of(node, "listen"), http.address, http.port, http.name()});
         warn_of_http(loading, node, http);
     }
-    warn_of_ports(loading, doors);
+    warn_of_ports(loading, listeners);
 }
 
 }  // namespace panelgate::config

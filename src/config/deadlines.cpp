@@ -17,7 +17,7 @@
 
 namespace panelgate::config {
 
-/// One read of a station, and how many bytes of values answer it.
+/// One read of a station, and the size of its reply's values.
 struct Read {
     std::string what;
     std::size_t count = 0;
@@ -25,19 +25,19 @@ struct Read {
     Duration response_timeout{};
 
     std::size_t bytes() const { return bits ? (count + 7) / 8 : 2 * count; }
-    /// Nothing but the two frames: no read is quicker.
+    /// Time of the two frames alone, the lower bound of any read.
     Duration on_wire(const SerialFormat& serial) const;
 };
 
-/// Of the poll blocks.
+/// The longest of the poll blocks.
 std::optional<Read> longest_poll(const Line& line);
-/// What a client may ask of any station.
+/// The longest read that a client may request of any station.
 std::optional<Read> longest_read(const Line& line);
-/// How many items a read may have whose two frames take less than `within`; 0 = none can.
+/// Returns how many items a read may have whose two frames take less than `within`; 0 if none.
 std::size_t most_items(const SerialFormat& serial, bool bits, Duration within);
 
 const Station* forbids_broadcasts(const Config& config, const tcp_server::Settings& listener) {
-    if (listener.units.contains(0)) return nullptr;  // one station's alias, or one line's
+    if (listener.units.contains(0)) return nullptr;  // alias of one station, or of one line
     for (const Line& line : config.lines) {
         if (std::ranges::count(listener.lines, line.name) == 0) continue;
         const auto found = std::ranges::find_if(line.stations, &Station::read_only);
@@ -48,7 +48,7 @@ const Station* forbids_broadcasts(const Config& config, const tcp_server::Settin
 
 namespace {
 
-/// A read and its reply, but for the values.
+/// A read and its reply, without the values.
 constexpr std::size_t kReadOverhead = modbus::kReadRequestAdu + modbus::kReadReplyOverhead;
 
 void keep_longer(std::optional<Read>& longest, Read read) {
@@ -100,7 +100,7 @@ std::size_t most_items(const SerialFormat& serial, bool bits, Duration within) {
 namespace {
 
 constexpr Duration kDeadline = kQuickClient - 50ms;  // the rest is for the network and the client
-constexpr Duration kLeast = 50ms;  // less is too short for many panels and adapters
+constexpr Duration kMinTimeout = 50ms;  // shorter is too short for many panels and adapters
 constexpr Duration kStep = 10ms;
 
 int most_retries(const arbiter::Settings& line) {
@@ -117,8 +117,8 @@ Duration longest_gap(const Line& line) {
     return gap;
 }
 
-/// How long each attempt may wait, so that the last of them still has its reply in time: all send
-/// a request and keep a gap, and one brings `values` bytes.
+/// Returns how long each attempt may wait so that the last one still gets its reply in time: each
+/// sends a request and keeps a gap, and one brings `values` bytes.
 Duration wait_of(const Line& line, int retries, std::size_t values) {
     const SerialFormat& serial = line.device.serial;
     const Duration request = frame_time(serial, modbus::kReadRequestAdu) + longest_gap(line);
@@ -136,18 +136,18 @@ ClientTimeout client_timeout(const Line& line) {
     const auto longest = longest_read(line);
     std::size_t values = longest ? longest->bytes() : 0;
     const auto wait = [&] { return wait_of(line, quick.retries, values); };
-    if (wait() < kLeast) quick.retries = 0;
-    if (wait() < kLeast) {
+    if (wait() < kMinTimeout) quick.retries = 0;
+    if (wait() < kMinTimeout) {
         quick.most_registers = most_items(line.device.serial, false, kDeadline / 2);
         values = 2 * *quick.most_registers;
     }
     quick.response_timeout = wait();
-    if (quick.response_timeout >= kLeast && quick.most_registers != std::size_t{0})
+    if (quick.response_timeout >= kMinTimeout && quick.most_registers != std::size_t{0})
         client.quick = quick;
     return client;
 }
 
-// What the queue's deadline makes impossible: legal, and always answered 0B or 06.
+// What the queue's deadline makes impossible: legal, but always answered 0B or 06.
 
 namespace {
 
@@ -163,7 +163,7 @@ const Node* find(const Node* map, std::string_view key) {
     return nullptr;
 }
 
-/// Where the `timing` of a line or a station sets the longest wait, if it does.
+/// Returns where the `timing` of a line or a station sets the longest wait, if it does.
 std::optional<Mark> timeout_mark(const Node& body, const arbiter::StationSettings& settings) {
     const Node* timing = find(&body, "timing");
     const Node* ceiling = settings.adaptive_timeout ? find(timing, "adaptive_ceiling") : nullptr;
@@ -182,7 +182,7 @@ struct Wait {
     Mark mark;
 };
 
-/// The longest wait of all stations, and the key that sets it: the deadline's when none does.
+/// Returns the longest wait of all stations and the key that sets it; the deadline's if none does.
 Wait longest_wait(const Node& node, const Line& line) {
     const arbiter::StationSettings& unlisted = line.arbiter.unlisted;
     const Mark common = timeout_mark(node, unlisted).value_or(deadline_mark(node));

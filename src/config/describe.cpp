@@ -10,8 +10,8 @@ namespace panelgate::config {
 
 namespace {
 
-/// Has one of each map and list; keys are asked for whether they are there or not, but beside a
-/// word that stands for itself (auto) for nothing else.
+/// Has one of each map and list. Keys are recorded whether present or not; beside a keyword (auto)
+/// nothing else is read.
 constexpr std::string_view kSpecimen = R"(
 lines:
   - name: a

@@ -11,7 +11,7 @@ namespace panelgate::config {
 
 namespace {
 
-/// 32 or 128 for an address of that family, 0 for anything else.
+/// Returns 32 or 128 for an address of that family, 0 for anything else.
 unsigned bits_of_address(const std::string& text) {
     std::array<unsigned char, 16> buffer{};
     if (inet_pton(AF_INET, text.c_str(), buffer.data()) == 1) return 32;
@@ -27,7 +27,7 @@ bool is_mapped(const std::string& address) {
            std::equal(kMapped.begin(), kMapped.end(), buffer.begin());
 }
 
-/// IPv4 as ::ffff:10.0.0.1; nothing on what is no address.
+/// Maps IPv4 to ::ffff:10.0.0.1; returns nothing for invalid text.
 std::optional<AddressBytes> as_v6(const std::string& address) {
     AddressBytes bytes{};
     if (inet_pton(AF_INET6, address.c_str(), bytes.data()) == 1) return bytes;

@@ -24,7 +24,7 @@ bool is_port(std::string_view text) {
 
 std::string write(std::string_view text) { return "; write " + std::string(text); }
 
-/// Without `http://` and what follows host and port.
+/// Removes `http://` and what follows host and port.
 std::string_view bare(std::string_view text) {
     const std::size_t scheme = text.find("://");
     if (scheme != text.npos) text.remove_prefix(scheme + 3);
@@ -47,7 +47,7 @@ std::string host_hint(const std::string& host, std::string_view port) {
     return "; names are not looked up here: write an address of this machine";
 }
 
-/// How many bits of 255.255.255.0 are set, when they are the first.
+/// Returns the prefix length of 255.255.255.0; nothing if its set bits are not the first.
 std::optional<int> prefix_of_mask(const std::string& mask) {
     if (!parse_cidr(mask) || is_ipv6(mask)) return std::nullopt;
     std::uint32_t bits = 0;
@@ -61,14 +61,14 @@ std::optional<int> prefix_of_mask(const std::string& mask) {
     return prefix;
 }
 
-/// 127.0.0.1 10.0.0.0/8
+/// True for 127.0.0.1 10.0.0.0/8
 bool is_several(std::string_view text) {
     const std::size_t blank = text.find(' ');
     if (blank == text.npos) return parse_cidr(std::string(text)).has_value();
     return parse_cidr(std::string(text.substr(0, blank))) && is_several(text.substr(blank + 1));
 }
 
-/// 10.0.* and 10.0.0
+/// Returns the network meant by 10.0.* or 10.0.0
 std::string open_ended(std::string text) {
     while (text.ends_with(".*")) text.resize(text.size() - 2);
     if (text.ends_with('.')) text.pop_back();
@@ -100,7 +100,7 @@ std::string listen_hint(std::string_view typed) {
     if (is_port(text)) return port_hint(text);
     const std::string whole(text);
     if (parse_endpoint(text)) return write(text);
-    // ::1:502 is an address, too, but hardly meant as one.
+    // ::1:502 is an address too, but rarely meant as one.
     const std::size_t last = whole.rfind(':');
     const bool is_v6 = last != whole.npos && is_ipv6(whole.substr(0, last));
     if (is_v6 && is_port(text.substr(last + 1)))
@@ -157,7 +157,7 @@ std::string lower(std::string_view text) {
     return all;
 }
 
-/// The words and the numbers of a text, in order: 9600, 8, n and 1 of "9600-8N1".
+/// Returns the words and numbers of a text, in order: 9600, 8, n and 1 of "9600-8N1".
 std::vector<std::string> pieces(std::string_view text) {
     std::vector<std::string> all;
     for (std::size_t at = 0; at < text.size();) {
@@ -199,7 +199,7 @@ bool is_com_port(std::string_view text) {
     return text.size() > 3 && text.starts_with("com") && is_digit(text[3]);
 }
 
-/// Behind tcp://
+/// Hint for what follows tcp://
 std::string tcp_hint(std::string_view typed) {
     std::string_view rest = typed.substr(0, typed.find('/'));
     if (line::parse_tcp_device("tcp://" + std::string(rest)))
@@ -227,10 +227,10 @@ std::string serial_example(const yaml::Node* typed) {
     std::string mode;
     for (const std::string& piece : pieces(typed == nullptr ? "" : all_of(*typed))) {
         const auto number = yaml::parse_integer(piece);
-        constexpr std::int64_t kLeastBaud = 50;
+        constexpr std::int64_t kMinBaud = 50;
         if (piece == "ascii" || (piece == "7" && parity.empty())) {
             mode = "ascii";
-        } else if (number && *number >= kLeastBaud) {
+        } else if (number && *number >= kMinBaud) {
             if (baud.empty()) baud = piece;
         } else if (number && !parity.empty() && (piece == "1" || piece == "2")) {
             stop_bits = piece;

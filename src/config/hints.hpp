@@ -7,21 +7,20 @@
 
 namespace panelgate::config {
 
-// What a person meant by an address of the wrong form, as the end of a message: "; write
-// 127.0.0.1:502". Empty when nobody knows.
+// The probable meaning of a malformed address, as the end of a message: "; write 127.0.0.1:502".
+// Empty if there is none.
 
-/// Of `listen`.
+/// For `listen`.
 std::string listen_hint(std::string_view typed);
-/// Of an item of `allow`.
+/// For an item of `allow`.
 std::string network_hint(std::string_view typed);
-/// Of an item of a list whose words hold no blanks: "; a ',' is missing: write [a, b]".
+/// For an item of a list whose words have no blanks: "; a ',' is missing: write [a, b]".
 std::string missing_commas(std::string_view typed);
 
-/// `serial` as a map, of what was typed in its place: "9600 8N1" or [9600, 8, N, 1]. Only what was
-/// typed; an example when nothing of it is understood, or nothing was typed (nullptr).
+/// Returns `serial` as a map of what was typed instead: "9600 8N1" or [9600, 8, N, 1]. Only what
+/// was typed; an example if nothing is understood or typed (nullptr).
 std::string serial_example(const yaml::Node* typed);
-/// What a person meant by a `device` that is none, as the end of a message. Empty when nobody
-/// knows.
+/// The probable meaning of an invalid `device`, as the end of a message. Empty if there is none.
 std::string device_hint(std::string_view typed);
 
 }  // namespace panelgate::config

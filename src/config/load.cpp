@@ -55,7 +55,7 @@ void load_realtime(Loading& loading, MapReader& root) {
     in.finish();
 }
 
-/// The shipped profiles, with those of profiles_dir added or in their place.
+/// The shipped profiles; those of profiles_dir are added or replace them.
 std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapReader& root) {
     auto catalogue = std::make_shared<profile::Catalogue>(profile::Catalogue::shipped());
     const auto dir = root.text("profiles_dir");
@@ -67,7 +67,7 @@ std::shared_ptr<const profile::Catalogue> load_profiles(Loading& loading, MapRea
     return catalogue;
 }
 
-/// Keys for whoever writes the file: a place for anchors.
+/// Removes `x-` keys, where users may keep anchors.
 void drop_extensions(yaml::Node& tree) {
     std::erase_if(tree.entries,
                   [](const yaml::Entry& entry) { return entry.key.starts_with("x-"); });
@@ -75,7 +75,7 @@ void drop_extensions(yaml::Node& tree) {
 
 constexpr std::string_view kHttp = "did you mean 'http'? It serves REST, pages and metrics";
 
-/// Keys that people write at the left margin.
+/// Keys that users write at the left margin.
 constexpr std::array<yaml::Elsewhere, 17> kElsewhere{{{"rest", {}, {}, kHttp},
                                                       {"api", {}, {}, kHttp},
                                                       {"web", {}, {}, kHttp},
@@ -110,7 +110,7 @@ bool serves(MapReader& root) {
     });
 }
 
-/// Whoever is given a station may keep its profile.
+/// Lets holders of a station keep its profile: each reference owns the catalogue.
 void keep_profiles(Config& config) {
     for (Line& line : config.lines) {
         for (Station& station : line.stations)
@@ -128,7 +128,7 @@ void load_tree(Loading& loading, yaml::Node& tree) {
     loading.config.profiles = load_profiles(loading, root);
     load_lines(loading, root);
     keep_profiles(loading.config);
-    for (const yaml::Node& body : unused) judge_template(loading, body);
+    for (const yaml::Node& body : unused) check_template(loading, body);
     load_modbus_tcp(loading, root);
     load_serial_masters(loading, root);
     load_http(loading, root);
@@ -145,14 +145,14 @@ void load_tree(Loading& loading, yaml::Node& tree) {
                              "nothing to serve: add 'modbus_tcp' or 'http', such as modbus_tcp: "
                              "[{listen: 127.0.0.1:502}]");
     root.elsewhere(kElsewhere);
-    root.has("templates");  // known, though nothing of it is left
+    root.has("templates");  // known, though already resolved
     root.finish();
     if (loading.problems.empty() && loading.config.lines.empty()) refuse_no_lines(loading, root);
-    if (loading.problems.empty()) warn_of_doors(loading, tree);
+    if (loading.problems.empty()) warn_of_listeners(loading, tree);
 }
 
-/// All of `unset`, and of `found` what does not only follow from it, at the same place. What many
-/// stations have from one template is told once.
+/// Adds all of `unset` and those of `found` that do not merely follow from it (at the same place).
+/// What many stations have from one template is reported once.
 void tell(const yaml::Problems& unset, const yaml::Problems& found, yaml::Problems& problems) {
     std::set<std::pair<int, int>> silent;
     for (const yaml::Problem& problem : unset.list())
@@ -196,7 +196,7 @@ std::string name_hint(std::string_view typed) {
     constexpr std::size_t kLongest = 40;
     std::string name;
     for (const char c : typed) {
-        if (c < 0 || name.size() >= kLongest) return "";  // nobody knows its ASCII letters
+        if (c < 0 || name.size() >= kLongest) return "";  // its ASCII letters are unknown
         const char lower = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
         const std::string one(1, c == ' ' || c == '_' || c == '.' ? '-' : lower);
         if (is_name(one)) name += one;
@@ -242,7 +242,7 @@ std::optional<Config> load(std::string_view text, const Files& files, yaml::Prob
             problems.add({1, 1}, "the file is empty; a configuration needs at least 'lines'");
         return std::nullopt;
     }
-    drop_extensions(tree);  // before anything of them is judged
+    drop_extensions(tree);  // before their content is checked
     yaml::Problems unset(problems.file());
     yaml::expand_variables(tree, environment, unset);
     refuse_control_characters(tree, unset);

@@ -15,7 +15,7 @@ namespace panelgate::config {
 
 namespace {
 
-/// A name as a browser would send it, or an address without brackets.
+/// True for a name as a browser sends it, or an address without brackets.
 bool is_host(std::string_view text) {
     if (text.find('/') == text.npos && parse_cidr(text)) return true;
     if (line::is_broken_address(text)) return false;
@@ -25,7 +25,7 @@ bool is_host(std::string_view text) {
     });
 }
 
-/// [fd00::1], as an address stands in a URL.
+/// Returns [fd00::1], as written in a URL, without brackets.
 std::string without_brackets(const std::string& text) {
     if (!text.starts_with('[') || !text.ends_with(']')) return text;
     const std::string inside = text.substr(1, text.size() - 2);
@@ -63,21 +63,21 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-/// No header carries them; in text of two bytes a letter every second byte is one.
+/// HTTP headers cannot carry them; in an encoding of two bytes a character every second one may be zero.
 bool has_control_character(std::string_view text) {
     return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
 }
 
-/// The path that a variable brought: nobody sees it in the configuration. A text that is none may
-/// be the token itself.
+/// Returns a path that a variable supplied, as the configuration does not show it. Text that is no
+/// path may be the token itself.
 std::string path_of(const Node* file) {
     const bool is_path =
         file != nullptr && !file->variable.empty() && file->scalar.starts_with('/');
     return is_path ? ' ' + file->scalar : "";
 }
 
-/// A token's secret: the file's text without blanks around it, and without the mark that editors
-/// put before UTF-8. `elsewhere`: it stands where it must not, which is told.
+/// Reads a token's secret: the file's text without surrounding blanks and byte order mark.
+/// `elsewhere`: the secret is in the configuration, which is already a problem.
 std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
     constexpr std::string_view kBlanks = " \t\r\n";
     const auto file = elsewhere ? in.text("file") : in.required_text("file");
@@ -89,7 +89,7 @@ std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
     auto text = loading.files.read(*file);
     if (text) text->erase(0, byte_order_mark(*text));
     if (!text) {
-        // Not the text: whoever took the token for its file has written that.
+        // Does not show the text: users may have written the token itself there.
         in.problem("file", "cannot read the token file" + path_of(in.child("file")) +
                                "; give the path of a file that holds the token and "
                                "that this program may read");

@@ -54,7 +54,7 @@ void load_offline(Loading& loading, MapReader& line, arbiter::OfflineSettings& o
     in.finish();
 }
 
-/// 0 to 100 ms, which is what the kernel takes.
+/// 0 to 100 ms, as the kernel accepts.
 Duration load_rs485_delay(MapReader& in, std::string_view key, line::Rs485::Mode mode) {
     const Duration delay = in.duration(key, 0ms, 100ms).value_or(Duration::zero());
     if (mode == line::Rs485::Mode::kernel && delay % 1ms != Duration::zero()) {
@@ -99,7 +99,7 @@ void load_rs485(Loading& loading, MapReader& in_line, const Line& line, line::Rs
     in.finish();
 }
 
-/// /dev/ttyUSB0:9600 and the like; paths by name have colons, too.
+/// Refuses /dev/ttyUSB0:9600 and the like; other paths may contain colons.
 void check_path(MapReader& in, const std::string& path) {
     const std::size_t end = path.find_first_of(":,; \t");
     if (!path.starts_with("/dev/tty") || end == path.npos) return;
@@ -122,7 +122,7 @@ void check_path(MapReader& in, const std::string& path) {
                              ", and what is behind it as serial: " + serial_example(&behind));
 }
 
-/// sim#simulated, /dev/ttyUSB0#left: a '#' begins a comment behind a blank only.
+/// Refuses sim#simulated, /dev/ttyUSB0#left: a '#' begins a comment only after a blank.
 bool check_comment(MapReader& in, const std::string& device) {
     const std::size_t sign = device.find('#');
     const std::string path = device.substr(0, sign);
@@ -161,7 +161,7 @@ void load_device(Loading& loading, MapReader& in, Line& line) {
     }
 }
 
-/// Who asks on this line: the gateway, or somebody else.
+/// Reads which master is on this line: the gateway or another one.
 void load_mode(MapReader& in, Line& line) {
     const Node* given = in.child("mode");
     if (given != nullptr && (given->scalar == "kernel" || given->scalar == "rts")) {
@@ -207,7 +207,7 @@ constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}
 constexpr std::string_view kAtTheTop =
     "it stands at the top of the file, in the column of 'lines', not inside a line";
 
-/// Keys that people write beside `device`.
+/// Keys that users write beside `device`.
 constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
 constexpr std::array<yaml::Elsewhere, 30> kElsewhere{
     {{"baud", "serial", {}},
@@ -241,12 +241,12 @@ constexpr std::array<yaml::Elsewhere, 30> kElsewhere{
      {"framing", {}, {}, "a line has serial: {mode: ascii}, or is RTU without a word"},
      {"method", {}, {}, "remove it: a line is RTU, or has serial: {mode: ascii}"}}};
 
-/// What only who asks has a use for.
-void warn_of_idle_keys(Loading& loading, MapReader& in, const Line& line) {
-    if (line.device.rs485.mode != line::Rs485::Mode::off) warn_of_idle_key(loading, in, "rs485");
+/// Warns of keys that only a master uses.
+void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
+    if (line.device.rs485.mode != line::Rs485::Mode::off) warn_of_unused_key(loading, in, "rs485");
     for (const std::string_view key :
          {"echo", "retries", "queue", "quarantine", "unlisted_stations"}) {
-        if (in.has(key)) warn_of_idle_key(loading, in, key);
+        if (in.has(key)) warn_of_unused_key(loading, in, key);
     }
 }
 
@@ -278,7 +278,7 @@ Line load_line(Loading& loading, const Node& node) {
     }
     load_stations(loading, in, {line, serial_known, {}});
     in.finish();
-    if (line.listens) warn_of_idle_keys(loading, in, line);
+    if (line.listens) warn_of_unused_keys(loading, in, line);
     if (serial_known && !line.listens) warn_of_deadline(loading, node, line);
     return line;
 }
@@ -286,7 +286,7 @@ Line load_line(Loading& loading, const Node& node) {
 }  // namespace
 
 bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode mode) {
-    Line line;  // what a port has is a part of it
+    Line line;  // for load_rs485(): a port has some of a line's keys
     line.device.device = port.device = in.required_text("device").value_or("");
     in.looks_like("device", "^/");
     if (!port.device.empty() && port.device[0] != '/') {

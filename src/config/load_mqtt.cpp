@@ -33,7 +33,7 @@ constexpr std::array<yaml::Elsewhere, 9> kElsewhere{{{"host", {}, {}, kBroker},
                                                      {"tls", {}, {}, kTls},
                                                      {"ssl", {}, {}, kTls}}};
 
-/// "mqtt://HOST:PORT", "mqtts://HOST"; false on anything else.
+/// Parses "mqtt://HOST:PORT", "mqtts://HOST"; false for anything else.
 bool parse_broker(std::string_view text, mqtt::Settings& settings) {
     constexpr std::string_view kPlain = "mqtt://";
     constexpr std::string_view kSafe = "mqtts://";
@@ -59,7 +59,7 @@ void load_broker(MapReader& in, mqtt::Settings& settings) {
                    yaml::quote(*text));
 }
 
-/// A part of topics; `kind` says what it must be.
+/// Reads a part of topics; `kind` says in messages what it must be.
 void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
                std::string_view kind, std::string& part) {
     constexpr std::size_t kLongest = 128;
@@ -67,8 +67,9 @@ void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
     in.looks_like(key, "^(?![/$])(?!.*//)(?!.*/$)[^" + std::string(forbidden) + "]+$", true);
     in.no_longer(key, kLongest);
     if (!text) return;
-    const bool odd_end = text->starts_with('/') || text->ends_with('/') || text->starts_with('$');
-    if (odd_end || text->size() > kLongest || text->find_first_of(forbidden) != text->npos ||
+    const bool wrong_edge =
+        text->starts_with('/') || text->ends_with('/') || text->starts_with('$');
+    if (wrong_edge || text->size() > kLongest || text->find_first_of(forbidden) != text->npos ||
         text->find("//") != text->npos) {
         in.problem(key, std::string(key) + " must be " + std::string(kind) + ", not " +
                             yaml::quote(*text));
@@ -77,7 +78,7 @@ void load_part(MapReader& in, std::string_view key, std::string_view forbidden,
     part = *text;
 }
 
-/// The file's text without the line's end; "" and a problem when there is none.
+/// Returns the file's text without the line end; "" and a problem if there is none.
 std::string load_password(Loading& loading, MapReader& in) {
     const auto file = in.text("password_file");
     if (!file) return "";

@@ -63,7 +63,7 @@ void load_type(MapReader& in, Point& point) {
         in.problem("word_order", "word_order is for values of registers, not for type bool");
 }
 
-/// All the digits that were typed are reckoned with, or it is a problem.
+/// Reads a number; more digits than a double holds are a problem.
 double exact_number(MapReader& in, std::string_view key, double otherwise) {
     const auto number = in.number(key);
     const Node* written = in.child(key);
@@ -127,7 +127,7 @@ void load_label(MapReader& in, const yaml::Entry& entry, Point& point) {
     point.labels[*raw] = entry.value.scalar;
 }
 
-/// [stopped, running] as a map.
+/// Returns [stopped, running] as a map.
 std::string labels_example(const Node* typed) {
     constexpr std::size_t kMost = 8;
     if (typed == nullptr || typed->items.empty() || typed->items.size() > kMost)
@@ -188,7 +188,7 @@ void load_no_value(MapReader& in, Point& point) {
     }
 }
 
-/// All of the value has to be where the panel can be read, and written when it is to be.
+/// The whole value must be readable on the panel, and writable if the point is.
 void check_area(MapReader& in, const Point& point, const profile::Area& area,
                 const profile::PanelProfile& profile) {
     const std::uint32_t count = point.count();
@@ -197,7 +197,7 @@ void check_area(MapReader& in, const Point& point, const profile::Area& area,
                              " reach beyond the end of " + area.name + ", " +
                              format_notation(area, static_cast<std::uint16_t>(area.readable.last)));
     }
-    // Read in two pieces, half of it could be older than the other.
+    // In two reads, one half could be older than the other.
     if (point.type == Type::string) check_read_count(in, "length", profile, point.table, count);
     if (!point.writable) return;
     if (!area.writable) {
@@ -219,14 +219,14 @@ bool is_point_name(std::string_view text) {
     return !text.empty() && text.find_first_not_of(kNameLetters) == std::string_view::npos;
 }
 
-/// None, when a variable brings nothing.
+/// Reads the unit; empty if a variable is empty.
 std::string load_unit(MapReader& in) {
     const Node* typed = in.child("unit");
     if (typed != nullptr && !typed->variable.empty() && typed->scalar.empty()) return "";
     return in.text("unit").value_or("");
 }
 
-/// `temperature: UW100` for a point: told.
+/// Reports `temperature: UW100` in place of a point.
 bool refuse_short_form(Loading& loading, const Node& node) {
     constexpr std::array<std::string_view, 14> kKeys{
         "name",   "at",  "bit", "type", "length",   "word_order", "scale",
@@ -275,7 +275,7 @@ void load_point(Loading& loading, const Node& node, Station& station) {
     load_no_value(in, point);
     point.every = in.duration("every", 1ms, points::kSlowest).value_or(1s);
     if (item) check_area(in, point, *item->area, *station.profile);
-    warn_of_idle_keys(loading, in, point);
+    warn_of_unused_keys(loading, in, point);
     in.finish();
     if (item) station.points.push_back(std::move(point));
 }

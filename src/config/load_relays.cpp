@@ -27,16 +27,15 @@ struct Memory {
     }
 };
 
-/// What a relay does: item for item, in the same order. Both are of the same length.
+/// What a relay copies: item for item, in the same order; both have the same length.
 struct Copy {
     Memory from;
     Memory to;
 };
 
-/// The last of `copies` and those that bring an item of its source back to where it was, in that
-/// order; empty when no item ever comes back. Without the last there must be no circle; no two
-/// targets overlap.
-std::vector<std::size_t> find_circle(const std::vector<Copy>& copies);
+/// Returns the last of `copies` and those that bring an item of its source back to where it was, in
+/// that order; empty if there is no cycle. The others must have no cycle; no two targets overlap.
+std::vector<std::size_t> find_cycle(const std::vector<Copy>& copies);
 
 namespace {
 
@@ -49,17 +48,18 @@ struct Item {
     friend bool operator==(const Item&, const Item&) = default;
 };
 
-/// Each item is written by one copy at most, so the way back from it is one.
-class WayBack {
+/// Follows items back to their sources; each item is written by one copy at most, so there is one
+/// path.
+class SourceTrace {
   public:
-    explicit WayBack(const std::vector<Copy>& copies) : copies_(copies) {
+    explicit SourceTrace(const std::vector<Copy>& copies) : copies_(copies) {
         for (std::size_t i = 0; i < copies.size(); ++i) {
             const Memory& to = copies[i].to;
             by_target_.emplace(std::tuple(to.station, to.bits.table, to.bits.first), i);
         }
     }
 
-    /// The copy that writes it.
+    /// Returns the copy that writes the item.
     std::optional<std::size_t> writer(const Item& item) const {
         auto next = by_target_.upper_bound(std::tuple(item.station, item.table, item.bit));
         if (next == by_target_.begin()) return std::nullopt;
@@ -79,7 +79,7 @@ class WayBack {
     std::map<std::tuple<const Station*, modbus::Table, std::uint32_t>, std::size_t> by_target_;
 };
 
-/// Bits that go the same way: words, where all are of words.
+/// Returns how many bits share a path: a word if all copies are of whole words.
 std::uint32_t stride(const std::vector<Copy>& copies) {
     constexpr std::uint32_t kWord = 16;
     const auto whole = [](const Memory& memory) {
@@ -90,7 +90,7 @@ std::uint32_t stride(const std::vector<Copy>& copies) {
     return words ? kWord : 1;
 }
 
-/// As the values go, beginning with `last`, each once.
+/// Orders copies as the values flow, starting with `last`, each once.
 std::vector<std::size_t> in_order(std::vector<std::size_t> back, std::size_t last) {
     std::ranges::reverse(back);
     std::ranges::rotate(back, std::ranges::find(back, last));
@@ -103,12 +103,12 @@ std::vector<std::size_t> in_order(std::vector<std::size_t> back, std::size_t las
 
 }  // namespace
 
-std::vector<std::size_t> find_circle(const std::vector<Copy>& copies) {
-    const WayBack way(copies);
+std::vector<std::size_t> find_cycle(const std::vector<Copy>& copies) {
+    const SourceTrace way(copies);
     const std::size_t last = copies.size() - 1;
     const Memory& from = copies[last].from;
     const std::uint32_t step = stride(copies);
-    std::vector<bool> passed(from.bits.count);  // every circle goes through `last`
+    std::vector<bool> passed(from.bits.count);  // every cycle goes through `last`
     for (std::uint32_t i = 0; i < from.bits.count; i += step) {
         const Item begin{from.station, from.bits.table, from.bits.first + i};
         std::vector<std::size_t> back;
@@ -232,8 +232,8 @@ Memory memory_of(const End& end, std::uint32_t count) {
     return {end.station, {table, end.end.address * width, count * width}};
 }
 
-/// Two relays that write the same items: nobody could say which value they hold.
-/// False, and a problem, then.
+/// Returns false and adds a problem if two relays write the same items: their value would be
+/// undefined.
 bool check_overlap(MapReader& in, const Route& route, const std::vector<Route>& others) {
     for (const Route& other : others) {
         if (!route.to.overlaps(other.to)) continue;
@@ -243,7 +243,7 @@ bool check_overlap(MapReader& in, const Route& route, const std::vector<Route>& 
     return true;
 }
 
-/// False, and a problem, when it closes a circle.
+/// Returns false and adds a problem if it closes a cycle.
 bool check_loop(MapReader& in, const Route& route, const std::vector<Route>& others) {
     if (route.from.overlaps(route.to)) {
         in.problem("to", route.relay.to.at + " overlaps what the relay itself reads, " +
@@ -254,10 +254,10 @@ bool check_loop(MapReader& in, const Route& route, const std::vector<Route>& oth
     copies.reserve(others.size() + 1);
     for (const Route& other : others) copies.push_back({other.from, other.to});
     copies.push_back({route.from, route.to});
-    const std::vector<std::size_t> circle = find_circle(copies);
-    if (circle.empty()) return true;
+    const std::vector<std::size_t> cycle = find_cycle(copies);
+    if (cycle.empty()) return true;
     std::string text;
-    for (const std::size_t step : circle) {
+    for (const std::size_t step : cycle) {
         const Relay& relay = step < others.size() ? others[step].relay : route.relay;
         text += (text.empty() ? "" : ", then ") + relay.name();
     }

@@ -22,7 +22,7 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-/// RTU has 8, ASCII 7 as a rule, and 8 where panels have it so (serial line V1.02, 2.5.1, 2.5.2).
+/// RTU has 8, ASCII normally 7, and 8 on some panels (serial line V1.02, 2.5.1, 2.5.2).
 void load_data_bits(MapReader& in, SerialFormat& format) {
     const bool ascii = format.mode == SerialMode::ascii;
     const auto bits = in.integer("data_bits", 0, 99).value_or(ascii ? 7 : 8);
@@ -34,15 +34,14 @@ void load_data_bits(MapReader& in, SerialFormat& format) {
                                             "8, not '" + std::to_string(bits) + '\'');
 }
 
-/// The keys of `serial` that say what is said with the characters. Those of a line; of a port that
-/// is none, the mode stands elsewhere.
+/// Reads the keys of `serial` that set the protocol of a line; a serial master sets it elsewhere.
 void load_serial_mode(MapReader& in, SerialFormat& format, modbus::HexDigits* digits) {
     if (digits == nullptr) {
         if (!in.has("mode")) return;
         in.problem("mode",
                    "a serial master's mode is its framing; write framing: ascii beside "
                    "serial, or leave it out for RTU");
-        format.mode = SerialMode::ascii;  // which goes with any data bits
+        format.mode = SerialMode::ascii;  // accepts 7 and 8 data bits
         return;
     }
     constexpr std::array<std::pair<std::string_view, modbus::HexDigits>, 2> kLowerCase{
@@ -94,7 +93,7 @@ using tcp_server::BroadcastMode;
 constexpr std::string_view kExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
 constexpr std::string_view kListExample = "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
 
-void load_manners(MapReader& in, Settings& settings) {
+void load_policies(MapReader& in, Settings& settings) {
     constexpr std::array<std::pair<std::string_view, Framing>, 2> kFramings{
         {{"rtu", Framing::rtu}, {"ascii", Framing::ascii}}};
     constexpr std::array<std::pair<std::string_view, BroadcastMode>, 2> kBroadcasts{
@@ -118,7 +117,7 @@ void check_name(Loading& loading, MapReader& in, const Settings& settings) {
         in.problem("name", "there are two serial masters '" + settings.name + '\'');
 }
 
-/// Two users of one device would take each other's bytes. What is none has been told.
+/// Two users of one device would take each other's bytes. An invalid device is a problem already.
 void check_device(Loading& loading, MapReader& in, const line::Settings& port) {
     if (!port.device.starts_with('/')) return;
     for (const Line& line : loading.config.lines) {
@@ -143,7 +142,7 @@ void check_units(MapReader& in, const Settings& settings) {
     }
 }
 
-/// Of the stations that it can reach, by their own ids or by units.
+/// Visits the stations that it can reach, by their own ids or by units.
 template <class Use>
 void each_station(const Config& config, const Settings& settings, Use use) {
     for (const Line& line : config.lines) {
@@ -165,7 +164,7 @@ Duration longest_read(const Line& line, const arbiter::StationSettings& station)
                       modbus::kReadRequestAdu + modbus::kReadReplyOverhead + bytes, 2);
 }
 
-/// What a panel may still answer comes too late for a master that waits for less.
+/// Warns if a panel may reply after this master's own timeout.
 void warn_of_timeout(Loading& loading, MapReader& in, const Settings& settings) {
     if (!settings.response_timeout) return;
     Duration needed{};
@@ -190,7 +189,7 @@ void warn_of_timeout(Loading& loading, MapReader& in, const Settings& settings) 
                      "station");
 }
 
-void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
+void warn_of_no_stations(Loading& loading, MapReader& in, const Settings& settings) {
     bool reaches_any = !settings.access.units.empty();
     each_station(loading.config, settings, [&](const auto&...) { reaches_any = true; });
     if (reaches_any) return;
@@ -201,7 +200,7 @@ void warn_of_nobody(Loading& loading, MapReader& in, const Settings& settings) {
                                 (lines.empty() ? "LINE" : lines.front()) + "/31}");
 }
 
-/// What `framing` says; its faults are told where it is read.
+/// Returns the mode set by `framing`; load_policies() reports a wrong value.
 SerialMode mode_of(const Node& master) {
     const auto framing = std::ranges::find(master.entries, "framing", &yaml::Entry::key);
     const bool ascii =
@@ -209,7 +208,7 @@ SerialMode mode_of(const Node& master) {
     return ascii ? SerialMode::ascii : SerialMode::rtu;
 }
 
-/// Keys that people write where a line has them.
+/// Keys that users write as on a line.
 constexpr std::array<yaml::Elsewhere, 2> kElsewhere{
     {{"mode", {}, {}, "its mode is its framing: write framing: ascii, or leave it out for RTU"},
      {"baud", "serial", {}}}};
@@ -225,12 +224,12 @@ Settings load_master(Loading& loading, const Node& node) {
     check_device(loading, in, settings.device);
     load_access(loading, in, settings.access);
     check_units(in, settings);
-    load_manners(in, settings);
+    load_policies(in, settings);
     refuse_empty_access(in);
     in.finish();
     if (!loading.problems.empty()) return settings;
     if (serial_known) warn_of_timeout(loading, in, settings);
-    warn_of_nobody(loading, in, settings);
+    warn_of_no_stations(loading, in, settings);
     return settings;
 }
 

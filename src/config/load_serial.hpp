@@ -7,12 +7,12 @@
 
 namespace panelgate::config {
 
-/// `device`, `serial` and `rs485` of a serial port that is no line; its mode is known. False when
-/// its serial format had a fault: then nothing may be concluded from it.
+/// Reads `device`, `serial` and `rs485` of a serial port that is not a line; its mode is known.
+/// False if its serial format had a fault and must not be used.
 bool load_port(Loading& loading, yaml::MapReader& in, line::Settings& port, SerialMode mode);
 
-/// `serial` of a line or a port; `digits` of a line, nothing where the mode stands elsewhere and is
-/// in `format` already. False when there was a fault: then nothing may be concluded from it.
+/// Reads `serial` of a line or a port; `digits` is for a line, nullptr if the mode is set elsewhere
+/// and in `format` already. False if there was a fault: the format must not be used.
 bool load_serial(Loading& loading, yaml::MapReader& in, SerialFormat& format,
                  modbus::HexDigits* digits);
 

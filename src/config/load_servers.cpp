@@ -16,8 +16,8 @@
 
 namespace panelgate::config {
 
-/// The keys of a listener that say how its clients speak: `framing`, `udp`, `ascii_lower_case`,
-/// `broadcast` and `retransmissions`.
+/// Reads a listener's protocol keys: `framing`, `udp`, `ascii_lower_case`, `broadcast` and
+/// `retransmissions`.
 void load_framing(yaml::MapReader& in, tcp_server::Settings& settings);
 
 namespace {
@@ -47,7 +47,7 @@ std::string framing_is(Framing framing) {
     return "framing: " + std::string(modbus::label(framing));
 }
 
-/// What RTU and ASCII have no means for.
+/// Refuses what RTU and ASCII do not support.
 void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings) {
     const std::string here = " with " + framing_is(settings.framing);
     if (in.has("broadcast") && settings.broadcast == BroadcastMode::reply)
@@ -118,7 +118,7 @@ const Line* find_line(const Config& config, std::string_view name) {
     return found == config.lines.end() ? nullptr : &*found;
 }
 
-/// nullptr, and a problem at `mark`, when there is none.
+/// Returns nullptr and adds a problem at `mark` if there is none.
 const Line* find_line(Loading& loading, yaml::Mark mark, const std::string& name) {
     if (const Line* line = find_line(loading.config, name)) return line;
     std::vector<std::string_view> names;
@@ -164,7 +164,7 @@ void load_listener_lines(Loading& loading, MapReader& in, tcp_server::Settings& 
         in.problem("lines", "lines must name at least one line; leave it out for all");
 }
 
-/// A station of `line` by id or name; 0 is everybody on it.
+/// Finds a station of `line` by id or name; 0 is a broadcast to it.
 std::optional<std::uint8_t> find_station(const Line& line, const std::string& text) {
     const auto id = yaml::parse_integer(text);
     for (const Station& known : line.stations) {
@@ -175,7 +175,7 @@ std::optional<std::uint8_t> find_station(const Line& line, const std::string& te
     return static_cast<std::uint8_t>(*id);
 }
 
-/// A line with a list has all that is there, as a rule; without one nobody lists anything.
+/// Warns of a station that is missing from its line's list, if the line has one.
 void warn_of_unlisted(Loading& loading, yaml::Mark mark, const Line& line, std::uint8_t station) {
     const bool listed = std::ranges::count(line.stations, station, &Station::id) > 0;
     if (listed || line.stations.empty()) return;
@@ -184,7 +184,7 @@ void warn_of_unlisted(Loading& loading, yaml::Mark mark, const Line& line, std::
                            "'stations', or correct the number");
 }
 
-/// The line of a station that was named alone.
+/// Suggests the line of a station that was named without one.
 std::string line_hint(const Config& config, const std::string& station) {
     for (const Line& line : config.lines) {
         for (const Station& known : line.stations) {
@@ -195,7 +195,7 @@ std::string line_hint(const Config& config, const std::string& station) {
     return "";
 }
 
-/// "floor1/31" or "floor1/press" -> line and station; problems at `mark`.
+/// Parses "floor1/31" or "floor1/press" into line and station; problems at `mark`.
 std::optional<tcp_server::UnitTarget> unit_target(Loading& loading, const Node& node) {
     const std::size_t slash = node.scalar.find('/');
     if (slash == std::string::npos) {
@@ -251,7 +251,7 @@ std::string two_lines(std::uint8_t station, const std::string& first, const std:
     return text + '/' + id + '}';
 }
 
-/// A station id on two lines of one listener must be told apart by `units`.
+/// `units` must distinguish a station id that is on two lines of one listener.
 void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& settings) {
     std::map<int, std::string> owner;
     const auto aliased = [&](const std::string& line, std::uint8_t station) {
@@ -272,7 +272,7 @@ void check_overlap(Loading& loading, MapReader& in, const tcp_server::Settings& 
     }
 }
 
-/// The gateway's own unit must not hide a station; a default one gives way to an alias.
+/// The gateway's own unit must not hide a station; the default one gives way to an alias.
 void load_diagnostics(Loading& loading, MapReader& in, tcp_server::Settings& settings) {
     in.may_be_null("diagnostics_unit", true);
     if (!in.has("diagnostics_unit")) return;
@@ -332,7 +332,7 @@ void refuse_tls(MapReader& in) {
     in.refuse("tls", "is not in this version; remove it and listen on a trusted network only");
 }
 
-/// Keys that people write where other programs have their serial lines.
+/// Keys that users write as for the serial lines of other programs.
 constexpr std::array<yaml::Elsewhere, 5> kElsewhere{
     {{"type", {}, {}, "remove it: serial lines stand in 'lines'"},
      {"method", {}, {}, "remove it: serial lines stand in 'lines'"},

@@ -34,8 +34,8 @@ std::string join(const std::vector<T>& values, const Format& format) {
     return list;
 }
 
-/// The line's serial format against what the panel can be set to. Manuals speak of RTU.
-void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& profile) {
+/// Checks the line's serial format against the panel's settings. Manuals describe RTU only.
+void check_serial(MapReader& in, const LineContext& work, const PanelProfile& profile) {
     if (!work.serial_known || work.line.device.serial.mode == SerialMode::ascii) return;
     const profile::Serial& serial = profile.serial;
     const SerialFormat& format = work.line.device.serial;
@@ -55,7 +55,7 @@ void check_serial(MapReader& in, const LineInWork& work, const PanelProfile& pro
         refuse("stop_bits", join(serial.stop_bits, number), number(format.stop_bits));
 }
 
-/// `generic` (and a problem) when the file names one that nobody knows.
+/// Returns `generic` and adds a problem if the profile is unknown.
 const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
     const std::string name = in.text("profile").value_or("generic");
     const profile::Catalogue& catalogue = *loading.config.profiles;
@@ -69,7 +69,7 @@ const PanelProfile* load_profile_name(Loading& loading, MapReader& in) {
     return catalogue.find("generic");
 }
 
-/// 0: none, and a problem.
+/// Returns 0 and adds a problem if there is none.
 std::uint8_t load_id(MapReader& in, const Line& line) {
     const Node* node = in.child("id");
     const bool plain = node != nullptr && node->kind == Node::Kind::scalar && !node->is_text();
@@ -115,7 +115,7 @@ std::string load_station_name(Loading& loading, MapReader& in, const Line& line,
     return *name;
 }
 
-/// `simulate` of a station: what its simulated panel does wrong.
+/// Reads `simulate` of a station: the faults of its simulated panel.
 void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults) {
     const Node* node = station.map("simulate", "{dead: true}");
     if (node == nullptr) return;
@@ -132,7 +132,8 @@ void load_faults(Loading& loading, MapReader& station, sim::Misbehaviour& faults
     in.finish();
 }
 
-/// Items that every read of these functions may have: the panel's limit within the standard's.
+/// Returns the items that every read of these functions may have: the panel's limit within the
+/// standard's.
 std::uint16_t read_limit(const PanelProfile& profile, std::initializer_list<std::uint8_t> functions,
                          unsigned standard) {
     unsigned limit = standard;
@@ -150,11 +151,11 @@ void check_range(MapReader& in, const PanelProfile& profile, std::uint8_t id) {
                          std::to_string(id) + " (" + profile.manual + ')');
 }
 
-/// What only requests of ours have.
-void warn_of_idle_keys(Loading& loading, MapReader& in, const StationSettings& settings,
-                       const Station& station) {
+/// Warns of keys that only the gateway's own requests use.
+void warn_of_unused_keys(Loading& loading, MapReader& in, const StationSettings& settings,
+                         const Station& station) {
     const auto warn = [&](std::string_view key, bool is_set) {
-        if (is_set && in.has(key)) warn_of_idle_key(loading, in, key);
+        if (is_set && in.has(key)) warn_of_unused_key(loading, in, key);
     };
     warn("retries", true);
     warn("retry_writes", settings.retry_writes);
@@ -163,8 +164,8 @@ void warn_of_idle_keys(Loading& loading, MapReader& in, const StationSettings& s
     warn("translate", !station.translate);
 }
 
-/// What a template may give: all but id, name and profile, which `station` has.
-StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& work,
+/// Reads what a template may have: all but id, name and profile, which `station` has.
+StationSettings load_body(Loading& loading, MapReader& in, const LineContext& work,
                           Station& station) {
     station.read_only = load_read_only(in).value_or(false);
     station.listens = work.line.listens;
@@ -189,7 +190,7 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     settings.max_registers =
         read_limit(*station.profile, {kReadHoldingRegisters, kReadInputRegisters}, 125);
     settings.max_bits = read_limit(*station.profile, {kReadCoils, kReadDiscreteInputs}, 2000);
-    settings.vouched = station.profile->name != "generic";  // which says what anybody could
+    settings.vouched = station.profile->name != "generic";  // generic only repeats the standard
     settings.max_age = in.duration("max_age", 0ms, 24h).value_or(0ms);
     station.guard = in.boolean("guard").value_or(false);
     constexpr std::array<std::string_view, 2> kTranslate{"auto", "off"};
@@ -197,11 +198,11 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineInWork& wor
     load_faults(loading, in, station.faults);
     load_points(loading, in, station);
     in.finish();
-    if (station.listens) warn_of_idle_keys(loading, in, settings, station);
+    if (station.listens) warn_of_unused_keys(loading, in, settings, station);
     return settings;
 }
 
-/// Keys that people write beside `id`.
+/// Keys that users write beside `id`.
 constexpr std::array<yaml::Elsewhere, 9> kElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
@@ -213,10 +214,10 @@ constexpr std::array<yaml::Elsewhere, 9> kElsewhere{
      {"device", {}, "a line"},
      {"at", {}, "a point"}}};
 
-Station load_station(Loading& loading, const Node& node, const LineInWork& work) {
+Station load_station(Loading& loading, const Node& node, const LineContext& work) {
     MapReader in(node, loading.problems, "a station", "{id: 31, name: press}");
     in.elsewhere(kElsewhere);
-    in.has("template");  // known, though apply_templates() has left nothing of it
+    in.has("template");  // known, though apply_templates() has removed it
     Station station;
     station.id = load_id(in, work.line);
     station.name = load_station_name(loading, in, work.line, station.id);
@@ -227,8 +228,7 @@ Station load_station(Loading& loading, const Node& node, const LineInWork& work)
     return station;
 }
 
-/// What is wrong with a template's body on a panel of this profile; on nullptr, of the one it
-/// names.
+/// Returns the problems of a template's body with this profile; nullptr: with the one it names.
 yaml::Problems faults_of(Loading& loading, const Node& body, const PanelProfile* profile) {
     yaml::Problems faults(loading.problems.file());
     Config config;
@@ -251,12 +251,12 @@ bool needs_8n1(const Station& station) {
 }
 
 /// RTU characters have 11 bits, those of ASCII 10 (serial line V1.02, 2.5.1, 2.5.2).
-void warn_of_character(Loading& loading, MapReader& in, const LineInWork& work) {
+void warn_of_character(Loading& loading, MapReader& in, const LineContext& work) {
     const SerialFormat& format = work.line.device.serial;
     const bool ascii = format.mode == SerialMode::ascii;
     const int right = ascii ? 10 : 11;
     if (!work.serial_known || format.bits_per_character() == right) return;
-    if (ascii && format.data_bits == 8) return;  // as its panels have it
+    if (ascii && format.data_bits == 8) return;  // as some panels require
     const bool needed = std::ranges::any_of(work.line.stations, needs_8n1);
     if (format.bits_per_character() == 10 && needed) return;
     const bool common = !ascii && format.bits_per_character() == 10;
@@ -282,13 +282,13 @@ void warn_of_broadcasts(Loading& loading, MapReader& in, const Line& line) {
 
 }  // namespace
 
-void warn_of_idle_key(Loading& loading, MapReader& in, std::string_view key) {
+void warn_of_unused_key(Loading& loading, MapReader& in, std::string_view key) {
     loading.warn(in.mark(key), std::string(key) +
                                    " does nothing on a line that is only listened to (mode: "
                                    "listen): nothing is sent there; leave it out");
 }
 
-void judge_template(Loading& loading, const Node& body) {
+void check_template(Loading& loading, const Node& body) {
     const bool named = std::ranges::count(body.entries, "profile", &yaml::Entry::key) > 0;
     yaml::Problems least = faults_of(loading, body, nullptr);
     for (const auto& [name, profile] : loading.config.profiles->all()) {
@@ -299,7 +299,7 @@ void judge_template(Loading& loading, const Node& body) {
     loading.problems.take(least);
 }
 
-void load_stations(Loading& loading, MapReader& in, LineInWork work) {
+void load_stations(Loading& loading, MapReader& in, LineContext work) {
     load_line_timing(loading, in, work);
     StationSettings& settings = work.timing.settings;
     settings.retries = static_cast<int>(in.integer("retries", 0, 10).value_or(settings.retries));
@@ -339,13 +339,13 @@ void load_response_timeout(MapReader& in, StationSettings& settings) {
     }
 }
 
-/// 3.5 characters at any rate: what tells frames apart for a panel that counts its own characters.
-/// The standard's 1.75 ms above 19200 bit/s only spare it short timers (serial line
-/// V1.02, 2.5.1.1). ASCII tells them apart without any.
+/// Returns 3.5 characters at any rate: this separates frames for a panel that counts character
+/// times. The standard's 1.75 ms above 19200 bit/s only avoids short timers (serial line V1.02,
+/// 2.5.1.1). ASCII needs no gap to separate frames.
 Duration shortest_gap(const SerialFormat& serial) { return wire_time(serial, 7) / 2; }
 
-/// Nothing = auto. Where the wire does not begin at the gateway, any gap will do.
-void load_frame_gap(MapReader& in, const LineInWork& work, Timing& timing) {
+/// Nothing = auto. A line without a serial device here may have any gap.
+void load_frame_gap(MapReader& in, const LineContext& work, Timing& timing) {
     if (in.is_word("frame_gap", "auto")) {
         timing.frame_gap.reset();
         return;
@@ -372,9 +372,9 @@ std::string standard(const SerialFormat& serial) {
     return "the standard asks for (t3.5 at " + to_string(serial) + ")";
 }
 
-/// A panel that inherits its line's gap gets a warning of its own only when it asks for more than
-/// the standard does, and only the first of its kind: the line's key has had one.
-bool was_warned(const LineInWork& work, const Station& station, Duration gap, Duration asked) {
+/// True if an inherited gap needs no warning of its own: the panel asks for no more than the
+/// standard, or a station with this profile and gap was warned already.
+bool was_warned(const LineContext& work, const Station& station, Duration gap, Duration asked) {
     if (asked <= silent_interval(work.line.device.serial)) return true;
     for (std::size_t i = 0; i < work.line.stations.size(); ++i) {
         const bool alike = work.line.stations[i].profile == station.profile;
@@ -383,9 +383,9 @@ bool was_warned(const LineInWork& work, const Station& station, Duration gap, Du
     return false;
 }
 
-/// `timing` is the station's, its own keys already over the line's; `own` is where it says so
-/// itself.
-void check_gap(Loading& loading, const LineInWork& work, const Station& station,
+/// `timing` is the station's, merged over the line's; `own` is where the station itself sets the
+/// gap.
+void check_gap(Loading& loading, const LineContext& work, const Station& station,
                const Timing& timing, std::optional<yaml::Mark> own, yaml::Mark place) {
     const SerialFormat& serial = work.line.device.serial;
     const Duration asked = profile::asked_gap(serial, *station.profile);
@@ -398,11 +398,11 @@ void check_gap(Loading& loading, const LineInWork& work, const Station& station,
                 by_panel ? station.profile->name + " asks for" : standard(serial));
 }
 
-/// What no healthy way to the panels exceeds. A tty: a USB latency timer (16 ms), a busy machine,
-/// and the time of one chunk of an adapter's FIFO, because its bytes are handed over together: at
-/// low rates that alone is longer. TCP: a segment that is lost twice; the first retransmission
-/// comes after 200 ms at least, the second after twice as long (RFC 6298, 5.5; Linux). In ASCII the
-/// panel may pause besides, for a second (serial line V1.02, 2.5.2.1).
+/// Returns the longest pause inside a reply on a healthy transport. A tty: a USB latency timer (16
+/// ms), a busy machine, and one chunk of an adapter's FIFO, delivered as a whole: at low rates that
+/// alone is longer. TCP: a segment lost twice; the first retransmission comes after at least 200
+/// ms, the second after twice as long (RFC 6298, 5.5; Linux). In ASCII the panel may also pause for
+/// a second (serial line V1.02, 2.5.2.1).
 Duration automatic_hole(const Line& line) {
     constexpr std::size_t kChunk = 32;
     if (line.device.serial.mode == SerialMode::ascii) return 1s;
@@ -428,8 +428,8 @@ void load_late_window(Loading& loading, MapReader& in, StationSettings& settings
     }
 }
 
-/// The keys that a line and a station have.
-void load_common(Loading& loading, MapReader& in, const LineInWork& work, Timing& timing) {
+/// Reads the keys that lines and stations share.
+void load_common(Loading& loading, MapReader& in, const LineContext& work, Timing& timing) {
     load_response_timeout(in, timing.settings);
     load_frame_gap(in, work, timing);
     load_late_window(loading, in, timing.settings);
@@ -438,7 +438,7 @@ void load_common(Loading& loading, MapReader& in, const LineInWork& work, Timing
 
 }  // namespace
 
-void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
+void load_line_timing(Loading& loading, MapReader& in, LineContext& work) {
     const SerialFormat& serial = work.line.device.serial;
     work.line.arbiter.reply_hole = automatic_hole(work.line);
     if (const Node* node = in.map("timing", "{response_timeout: 500ms}")) {
@@ -458,7 +458,7 @@ void load_line_timing(Loading& loading, MapReader& in, LineInWork& work) {
     settings.frame_gap = work.timing.frame_gap.value_or(silent_interval(serial));
 }
 
-StationSettings load_station_timing(Loading& loading, MapReader& in, const LineInWork& work,
+StationSettings load_station_timing(Loading& loading, MapReader& in, const LineContext& work,
                                     Station& station) {
     Timing timing = work.timing;
     std::optional<yaml::Mark> own_gap;

@@ -31,26 +31,26 @@ struct Loading {
 
 /// Line and station names: [a-z0-9-]+.
 bool is_name(std::string_view text);
-/// A regular expression of texts of these letters, a '-' among them the last.
+/// Returns a regular expression for texts of these letters; a '-' must be the last of them.
 std::string pattern_of(std::string_view letters);
-/// The key `name`; nothing when it is absent or not a name (then a problem). `pattern`: what the
-/// schema says of it.
+/// Reads the key `name`; nothing if it is absent or invalid (a problem). `pattern` is for the
+/// schema.
 std::optional<std::string> load_name(yaml::MapReader& in, bool required,
                                      const std::string& pattern = name_pattern());
-/// "; write big-press" for "Big Press"; "" when nothing of it is left.
+/// Returns "; write big-press" for "Big Press"; "" if no letter is usable.
 std::string name_hint(std::string_view typed);
-/// The key `access`: true for read_only.
+/// Reads the key `access`: true for read_only.
 std::optional<bool> load_read_only(yaml::MapReader& in);
-/// "; did you mean 'x'?" when one of `known` is near, else "; known NOUN are a, b, c".
+/// Returns "; did you mean 'x'?" if one of `known` is near, else "; known NOUN are a, b, c".
 std::string did_you_mean(std::string_view typed, std::span<const std::string_view> known,
                          std::string_view noun);
 
-/// A key with nothing behind it, or with all of it commented out, says neither "all" nor "none": a
-/// problem that ends with `instead`. Call it when all keys have been read.
+/// Reports a key without a value, or with all of it commented out, as it means neither "all" nor
+/// "none"; the message ends with `instead`. Call it after all keys have been read.
 void refuse_empty(yaml::MapReader& in, std::string_view key, std::string_view instead);
 
-/// Without lines it tells so, but where a key is likely to be meant as `lines`: then
-/// refuse_no_lines() has to be called when finish() found nothing wrong with that key.
+/// Reports missing lines, unless a key is probably a mistyped `lines`: then call refuse_no_lines()
+/// if finish() accepted that key.
 void load_lines(Loading& loading, yaml::MapReader& root);
 void refuse_no_lines(Loading& loading, yaml::MapReader& root);
 void load_relays(Loading& loading, yaml::MapReader& root);

@@ -25,12 +25,12 @@ namespace panelgate::config {
 
 struct MbusdNumber {
     std::int64_t value = 0;
-    bool plain = true;  ///< decimal, without anything behind it: nobody reads it otherwise
+    bool plain = true;  ///< decimal and nothing after it: other programs read the same
 };
 
-/// A number as mbusd reads it (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for 8,
-/// and whatever stands behind the digits is ignored. Nothing where there is no digit, of which
-/// mbusd makes 0, and of what is negative or beyond 2^31 - 1.
+/// Parses a number as mbusd does (strtoul() with base 0; cfg.c, cfg_handle_param()): 0x1F6, 010 for
+/// 8; text after the digits is ignored. Nothing without a digit (0 to mbusd), if negative or beyond
+/// 2^31 - 1.
 std::optional<MbusdNumber> mbusd_number(std::string_view text);
 
 /// One NAME = VALUE of an mbusd.conf.
@@ -41,9 +41,9 @@ struct MbusdLine {
     yaml::Mark value_mark;  ///< or of the end of the line
 };
 
-/// A line that begins with '#' is a comment, as is nothing else: what stands behind a value is part
-/// of it. A line ends with LF, CR or both; a byte order mark before the first is skipped. Lines
-/// that are none are added to `problems`.
+/// Only a line that begins with '#' is a comment: text after a value belongs to the value. Lines
+/// end with LF, CR or both; a leading byte order mark is skipped. Invalid lines are added to
+/// `problems`.
 std::vector<MbusdLine> mbusd_lines(std::string_view text, yaml::Problems& problems);
 
 namespace {
@@ -151,20 +151,20 @@ std::string lower(std::string_view text) {
     return made;
 }
 
-/// What a comment may hold whatever the file was written in.
+/// Returns text that a comment may hold, whatever the file's encoding.
 std::string as_ascii(std::string text) {
     std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
     return text;
 }
 
-/// In single quotes nothing means anything, but a variable.
+/// In single quotes only quotes and variables need escaping.
 std::string quoted(std::string_view text) {
     std::string made = "'";
     for (const char c : text) made += c == '\'' ? "''" : c == '$' ? "$$" : std::string(1, c);
     return made + '\'';
 }
 
-/// Of an address in text, IPv6 with brackets or without.
+/// Parses an address, IPv6 with brackets or without.
 std::optional<Endpoint> endpoint_of(const std::string& address, std::int64_t port) {
     const std::string end = ':' + std::to_string(port);
     const bool bare = address.find(':') != address.npos && address[0] != '[';
@@ -200,7 +200,7 @@ class Reader {
         for (const auto& [name, read] : kKeys) {
             names.push_back(name);
             if (name != line.name) continue;
-            tell_of_first(line);
+            note_overridden(line);
             if (line.value.empty() && name != "trx_sysfile" && name != "logfile")
                 wrong("has no value; leave the line out for the default");
             else
@@ -211,7 +211,7 @@ class Reader {
                                      did_you_mean(line.name, names, "settings"));
     }
 
-    /// What the lines mean together, in whichever order they stood.
+    /// Combines the settings, in whichever order they were.
     void finish() {
         if (rts_) mbusd_.rs485 = rts_text_;
         if (!kernel_) return;
@@ -235,8 +235,8 @@ class Reader {
     void wrong_value(const std::string& wanted) {
         wrong("must be " + wanted + ", not " + yaml::quote(line_->value));
     }
-    /// Of what stands twice mbusd takes the last.
-    void tell_of_first(const MbusdLine& line) {
+    /// mbusd uses the last of repeated settings.
+    void note_overridden(const MbusdLine& line) {
         const auto [first, added] = seen_.emplace(line.name, line);
         if (added) return;
         line_ = &first->second;
@@ -244,7 +244,7 @@ class Reader {
         line_ = &line;
         first->second = line;
     }
-    /// What has no counterpart, and why.
+    /// Records what has no counterpart, and why.
     void note(const std::string& why) {
         const std::string told = as_ascii(line_->name + " = " + line_->value) + ": " + why;
         comments_.push_back(told);
@@ -360,8 +360,8 @@ class Reader {
     const MbusdLine* line_ = nullptr;
     Mbusd mbusd_;
     bool kernel_ = false;
-    std::optional<MbusdLine> rts_;  ///< that has RTS switched
-    std::string rts_text_;          ///< what it means
+    std::optional<MbusdLine> rts_;  ///< the trx_control that selects RTS
+    std::string rts_text_;          ///< its equivalent here
     std::map<std::string, MbusdLine> seen_;
     std::vector<std::string> notes_;
     std::vector<std::string> comments_;
@@ -374,7 +374,7 @@ std::string serial_text(const Mbusd& mbusd) {
            ", stop_bits: " + mbusd.mode[2] + '}';
 }
 
-/// All tries have to fit; the default where they do.
+/// All attempts must fit; empty if the default is enough.
 std::string deadline_text(const Mbusd& mbusd) {
     constexpr std::int64_t kDefault = 2000;
     const std::int64_t needed = (mbusd.retries + 1) * (mbusd.wait + 100) + 100;

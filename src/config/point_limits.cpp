@@ -31,7 +31,7 @@ void warn_of_limits(Loading& loading, yaml::MapReader& in, const Point& point) {
                                    keys + " out");
 }
 
-/// CDAB turns words round, and nothing else; strings keep the order of theirs.
+/// CDAB only swaps words; strings keep their order.
 void warn_of_order(Loading& loading, yaml::MapReader& in, const Point& point) {
     const bool turns = points::registers_of(point.type) > 1 && point.type != Type::string;
     if (point.type == Type::boolean || turns || point.word_order != points::WordOrder::cdab) return;
@@ -45,7 +45,7 @@ void warn_of_order(Loading& loading, yaml::MapReader& in, const Point& point) {
 
 }  // namespace
 
-void warn_of_idle_keys(Loading& loading, yaml::MapReader& in, const Point& point) {
+void warn_of_unused_keys(Loading& loading, yaml::MapReader& in, const Point& point) {
     warn_of_limits(loading, in, point);
     warn_of_order(loading, in, point);
 }
@@ -63,14 +63,14 @@ RawRange unsigned_range(unsigned bits) {
     return {0, bits >= 63 ? kMost : (std::int64_t{1} << bits) - 1};
 }
 
-/// Of the value: what the type holds, by scale and offset.
+/// The range of the scaled value.
 struct ValueRange {
     double low = 0;
     double high = 0;
     bool contains(double value) const { return value >= low && value <= high; }
     std::string text() const { return shown(low) + " to " + shown(high); }
 
-    /// 3276.7, though 32767 * 0.1 is a little more.
+    /// Formats 3276.7, though 32767 * 0.1 is a little more.
     static std::string shown(double value) {
         std::array<char, 32> digits{};
         const auto [end, error] = std::to_chars(digits.data(), digits.data() + digits.size(), value,
@@ -96,14 +96,14 @@ ValueRange value_range(const Point& point) {
     } else {
         const RawRange range = label_range(point.type);
         low = static_cast<double>(range.low);
-        // The signed 64 bits of a RawRange end before those of a u64 do.
+        // A RawRange has signed 64 bits, which cannot hold all of a u64.
         high = point.type == Type::u64 ? 0x1p64 : static_cast<double>(range.high);
     }
     const auto [least, most] = std::minmax({value(low), value(high)});
     return {least, most};
 }
 
-/// With all the digits that are written.
+/// With all the digits as written.
 std::optional<Decimal> limit_of(yaml::MapReader& in, std::string_view key) {
     const auto number = in.number(key);
     if (!number) return std::nullopt;
@@ -114,7 +114,7 @@ std::optional<Decimal> limit_of(yaml::MapReader& in, std::string_view key) {
 void check_limit(yaml::MapReader& in, std::string_view key, const Point& point,
                  std::optional<Decimal>& limit) {
     const ValueRange range = value_range(point);
-    // A half of the last digit: 6553.5 is 65535 * 0.1, whatever the last bit of it is.
+    // Tolerates rounding: 6553.5 is 65535 * 0.1, whatever its last bit.
     const double slack = std::max(std::abs(range.low), std::abs(range.high)) * 1e-12;
     if (!limit || ValueRange{range.low - slack, range.high + slack}.contains(limit->nearest()))
         return;
@@ -127,7 +127,7 @@ void check_limit(yaml::MapReader& in, std::string_view key, const Point& point,
     limit.reset();
 }
 
-/// Whole raw numbers between them, if there is any: 0 and 10 with scale 10, but nothing of 1 to 9.
+/// True if a whole raw number is between them: with scale 10, 0 and 10 are, but none of 1 to 9.
 bool has_value_between(const Point& point, double min, double max) {
     const auto raw = [&](double value) { return (value - point.offset) / point.scale; };
     const auto [low, high] = std::minmax({raw(min), raw(max)});

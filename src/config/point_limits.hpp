@@ -9,11 +9,11 @@
 
 namespace panelgate::config {
 
-/// Warns of what is legal and does nothing: a limit of what nobody may write, an order of words
-/// where there is only one.
-void warn_of_idle_keys(Loading& loading, yaml::MapReader& in, const points::Point& point);
+/// Warns of keys without effect: limits of a point that is not writable, a word order for a single
+/// word.
+void warn_of_unused_keys(Loading& loading, yaml::MapReader& in, const points::Point& point);
 
-/// Raw numbers of a whole type, as far as 64 signed bits hold them.
+/// Raw numbers of an integer type, as far as a signed 64-bit integer holds them.
 struct RawRange {
     std::int64_t low = 0;
     std::int64_t high = 0;
@@ -21,13 +21,13 @@ struct RawRange {
     std::string text() const { return std::to_string(low) + " to " + std::to_string(high); }
 };
 
-/// Of labels; of a type that is not whole, everything.
+/// Range for labels; unlimited for other than integer types.
 RawRange label_range(points::Type type);
-/// Of no_value: 65535 and -1 are the same register.
+/// Range for no_value: 65535 and -1 are the same register.
 RawRange no_value_range(points::Type type);
 
-/// The keys `min` and `max` of a point whose type, scale and offset are known: numbers that the
-/// point can have.
+/// Reads the keys `min` and `max` of a point whose type, scale and offset are known; both must be
+/// values that the point can have.
 void load_limits(yaml::MapReader& in, points::Point& point);
 
 }  // namespace panelgate::config

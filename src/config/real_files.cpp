@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// A read-only file system in memory: how Kubernetes mounts secrets, anywhere.
-bool is_mounted_for_one(const std::string& path) {
+/// True for a read-only file system in memory, as Kubernetes mounts secrets, at any path.
+bool is_secret_mount(const std::string& path) {
     struct statfs system{};
     if (statfs(path.c_str(), &system) != 0) return false;
     const auto type = static_cast<unsigned>(system.f_type);
@@ -30,20 +30,20 @@ bool is_mounted_for_one(const std::string& path) {
     return in_memory && (system.f_flags & ST_RDONLY) != 0;
 }
 
-/// Waits for one a moment where it can be missing: at a pipe that has a name. Else EPIPE.
+/// Waits up to a second for the writer of a named pipe; other files need none. Otherwise EPIPE.
 bool has_writer(int file) {
-    constexpr int kMoment = 1000;  // ms
+    constexpr int kWriterTimeout = 1000;  // ms
     struct stat status{};
     struct statfs system{};
     if (::fstat(file, &status) != 0 || ::fstatfs(file, &system) != 0) return false;
     if (!S_ISFIFO(status.st_mode) || system.f_type == PIPEFS_MAGIC) return true;
     pollfd written{file, POLLIN, 0};
-    const int ready = ::poll(&written, 1, kMoment);
+    const int ready = ::poll(&written, 1, kWriterTimeout);
     if (ready == 0) errno = EPIPE;
     return ready > 0;
 }
 
-/// From an open file, for as long as that takes; 16 MiB at most.
+/// Reads an open file without a time limit; 16 MiB at most.
 std::optional<std::string> read_all(int file) {
     constexpr std::size_t kMost = std::size_t{16} * 1024 * 1024;
     const int flags = ::fcntl(file, F_GETFL);
@@ -82,7 +82,7 @@ std::optional<std::string> RealFiles::read_any(const std::string& path) {
         errno = EISDIR;
         return std::nullopt;
     }
-    // A pipe without a writer would hold up the opening itself.
+    // Opening a pipe without a writer would block.
     const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
     if (file < 0) return std::nullopt;
     auto text = has_writer(file) ? read_all(file) : std::nullopt;
@@ -105,7 +105,7 @@ std::optional<std::vector<std::string>> RealFiles::list_yaml(const std::string& 
 }
 
 bool RealFiles::is_readable_by_all(const std::string& path) const {
-    if (is_mounted_for_one(path)) return false;
+    if (is_secret_mount(path)) return false;
     std::error_code error;
     const fs::perms rights = fs::status(path, error).permissions();
     return !error && (rights & fs::perms::others_read) != fs::perms::none;

@@ -54,7 +54,7 @@ Size size_of(const Node& node) {
     return size;
 }
 
-/// Adds what `map` does not say itself.
+/// Adds the keys that `map` does not have.
 void add_missing(Node& map, const Node& from) {
     for (const Entry& entry : from.entries) {
         Node* own = find(map, entry.key);
@@ -66,7 +66,7 @@ void add_missing(Node& map, const Node& from) {
     }
 }
 
-/// What an alias repeats keeps the places of its keys.
+/// Repetitions by an alias keep the places of their keys.
 using Place = std::pair<int, int>;
 Place place_of(const Entry& entry) { return {entry.mark.line, entry.mark.column}; }
 
@@ -127,7 +127,7 @@ class Templates {
         }
     }
 
-    /// `lines` may have taken something of them over by a merge key.
+    /// A merge key in `lines` may have used part of them.
     std::vector<Node> take_unused(Node* lines) {
         std::set<Place> taken;
         for_stations(lines, [&](const Node& station) {
@@ -146,7 +146,7 @@ class Templates {
     }
 
   private:
-    /// The keys of a station behind a name without a body are meant as this.
+    /// Reports a station's keys that follow a name without a body, and takes them as that body.
     void move_bodies(Node& list) {
         constexpr std::array<std::string_view, 11> kKeys{
             "profile", "access",   "timing", "retries", "retry_writes", "max_age",
@@ -207,7 +207,7 @@ class Templates {
     Loading& loading_;
     std::map<std::string, Template> templates_;
     Size given_;
-    std::set<std::string> opened_;  ///< whose bodies do not stand deeper
+    std::set<std::string> opened_;  ///< names whose bodies are not indented
 };
 
 }  // namespace

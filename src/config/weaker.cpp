@@ -23,15 +23,15 @@ bool covers(const Network& wide, const Network& narrow) {
     return bits_of(wide) <= bits_of(narrow) && is_in(narrow.address, wide.address, wide.prefix);
 }
 
-/// What a door lets in now and did not before. An empty list lets all in.
-void compare_allow(Lines& all, const std::string& door, const std::vector<Network>& running,
+/// Lists what a listener newly allows. An empty list allows all.
+void compare_allow(Lines& all, const std::string& endpoint, const std::vector<Network>& running,
                    const std::vector<Network>& next) {
     if (running.empty()) return;
-    if (next.empty()) all.push_back(door + ": allow lets all addresses in");
+    if (next.empty()) all.push_back(endpoint + ": allow lets all addresses in");
     for (const Network& network : next) {
-        const auto had = [&](const Network& one) { return covers(one, network); };
-        if (std::ranges::none_of(running, had))
-            all.push_back(door + ": allow lets " + text_of(network) + " in");
+        const auto was_allowed = [&](const Network& one) { return covers(one, network); };
+        if (std::ranges::none_of(running, was_allowed))
+            all.push_back(endpoint + ": allow lets " + text_of(network) + " in");
     }
 }
 
@@ -39,60 +39,60 @@ void compare_access(Lines& all, const std::string& what, bool was_read_only, boo
     if (was_read_only && !is_read_only) all.push_back(what + ": access read_only -> read_write");
 }
 
-/// Whether who reaches `door` could reach `before`.
-template <class Door>
-bool was_open(const Door& before, const Door& door) {
-    if (before.port != door.port) return false;
-    if (before.address == door.address) return before.ipv6_only || !door.ipv6_only;
-    const bool took_both = is_ipv6(before.address) && !before.ipv6_only;
+/// True if clients that reach `endpoint` could reach `before`.
+template <class ListenAddress>
+bool was_open(const ListenAddress& before, const ListenAddress& endpoint) {
+    if (before.port != endpoint.port) return false;
+    if (before.address == endpoint.address) return before.ipv6_only || !endpoint.ipv6_only;
+    const bool was_dual_stack = is_ipv6(before.address) && !before.ipv6_only;
     return is_any_address(before.address) &&
-           (took_both || is_ipv6(before.address) == is_ipv6(door.address));
+           (was_dual_stack || is_ipv6(before.address) == is_ipv6(endpoint.address));
 }
 
-/// What a client of Modbus may do through these.
-void compare_rights(Lines& all, const std::string& door, const tcp_server::Settings& running,
+/// Compares what a Modbus client may do.
+void compare_rights(Lines& all, const std::string& endpoint, const tcp_server::Settings& running,
                     const tcp_server::Settings& next) {
     using tcp_server::BroadcastMode;
-    compare_access(all, door, running.read_only, next.read_only);
+    compare_access(all, endpoint, running.read_only, next.read_only);
     if (running.broadcast == BroadcastMode::deny && next.broadcast != BroadcastMode::deny)
-        all.push_back(door + ": broadcast deny -> " +
+        all.push_back(endpoint + ": broadcast deny -> " +
                       (next.broadcast == BroadcastMode::reply ? "reply" : "silent"));
     for (const std::string& line : next.lines) {
         if (std::ranges::find(running.lines, line) == running.lines.end())
-            all.push_back(door + ": reaches line " + line);
+            all.push_back(endpoint + ": reaches line " + line);
     }
     for (const auto& [unit, target] : next.units) {
         const auto was = running.units.find(unit);
         if (was == running.units.end() || was->second != target)
-            all.push_back(door + ": unit " + std::to_string(unit) + " is station " +
+            all.push_back(endpoint + ": unit " + std::to_string(unit) + " is station " +
                           std::to_string(target.station) + " of " + target.line);
     }
 }
 
 void compare_listeners(Lines& all, const Config& running, const Config& next) {
     for (const tcp_server::Settings& listener : next.modbus_tcp) {
-        const std::string door = "modbus_tcp " + listener.name();
+        const std::string endpoint = "modbus_tcp " + listener.name();
         const auto was = std::ranges::find_if(
             running.modbus_tcp, [&](const auto& before) { return was_open(before, listener); });
         if (was == running.modbus_tcp.end()) {
-            all.push_back(door + ": is opened");
+            all.push_back(endpoint + ": is opened");
             continue;
         }
-        if (!was->udp && listener.udp) all.push_back(door + ": udp false -> true");
-        compare_allow(all, door, was->allow, listener.allow);
-        compare_rights(all, door, *was, listener);
+        if (!was->udp && listener.udp) all.push_back(endpoint + ": udp false -> true");
+        compare_allow(all, endpoint, was->allow, listener.allow);
+        compare_rights(all, endpoint, *was, listener);
     }
 }
 
 void compare_serial_masters(Lines& all, const Config& running, const Config& next) {
     for (const serial_server::Settings& master : next.serial_masters) {
-        const std::string door = "serial master " + master.name;
+        const std::string endpoint = "serial master " + master.name;
         const auto was =
             std::ranges::find(running.serial_masters, master.name, &serial_server::Settings::name);
         if (was == running.serial_masters.end()) {
-            all.push_back(door + ": is opened");
+            all.push_back(endpoint + ": is opened");
         } else {
-            compare_rights(all, door, was->access, master.access);
+            compare_rights(all, endpoint, was->access, master.access);
         }
     }
 }
@@ -155,13 +155,13 @@ void compare_hosts(Lines& all, const web::Settings& running, const web::Settings
 
 void compare_http(Lines& all, const Config& running, const Config& next) {
     if (!next.http) return;
-    const std::string door = "http " + next.http->name();
+    const std::string endpoint = "http " + next.http->name();
     if (!running.http) {
-        all.push_back(door + ": is opened");
+        all.push_back(endpoint + ": is opened");
         return;
     }
-    if (!was_open(*running.http, *next.http)) all.push_back(door + ": is opened");
-    compare_allow(all, door, running.http->allow, next.http->allow);
+    if (!was_open(*running.http, *next.http)) all.push_back(endpoint + ": is opened");
+    compare_allow(all, endpoint, running.http->allow, next.http->allow);
     compare_hosts(all, *running.http, *next.http);
     if (next.http->anonymous > running.http->anonymous)
         all.push_back("http: anonymous " + std::string(label(running.http->anonymous)) + " -> " +

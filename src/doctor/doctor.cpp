@@ -29,7 +29,7 @@ static_assert(sizeof(Symptoms) ==
                   sizeof(std::uint64_t) * (kCounts.size() + kOthers + 2 * Symptoms::kPauses),
               "every count of Symptoms has to be in kCounts");
 
-/// Applies `combine` to every count of both; the rest is that of `a`.
+/// Applies `combine` to every counter of both; other values are those of `a`.
 template <class Combine>
 Symptoms each(Symptoms a, const Symptoms& b, Combine combine) {
     for (const auto count : kCounts) a.*count = combine(a.*count, b.*count);
@@ -113,7 +113,7 @@ bool holds(const std::vector<Finding>& list, const Finding& finding) {
         list, [&](const Finding& other) { return other.is_about_the_same(finding); });
 }
 
-/// Those of `list` that `other` does not have.
+/// Returns the findings of `list` that `other` does not have.
 std::vector<Finding> without(const std::vector<Finding>& list, const std::vector<Finding>& other) {
     std::vector<Finding> rest;
     for (const Finding& finding : list) {
@@ -131,7 +131,7 @@ void Doctor::begin(TimePoint now, Sample counted) {
     if (!marks_.empty()) {
         const Sample window = difference(counted, marks_.front().counted);
         const arbiter::Symptoms all = window.total();
-        // Damage that goes on across openings, one after another, is one trouble.
+        // Damage that continues across reopenings is one fault.
         if (all.damaged() > 0 && all.answered == 0) return;
     }
     marks_.clear();

@@ -6,7 +6,7 @@
 
 namespace panelgate::doctor {
 
-// What concerns everybody on the line.
+// Rules for the whole line.
 
 using arbiter::Symptoms;
 
@@ -41,9 +41,9 @@ std::string silence_advice(const LineFacts& facts) {
            to_string(facts.serial) + ") and the stations' addresses.";
 }
 
-/// Good frames of stations that nobody here has asked. After a broadcast whoever speaks may be
-/// answering it, which is wrong, but no master.
-std::uint64_t strangers(const Case& c) {
+/// Good frames of stations that this gateway has not asked. After a broadcast they may be wrong
+/// answers to it, which show no other master.
+std::uint64_t foreign_frames(const Case& c) {
     if (c.window.broadcasts > 0) return 0;
     std::uint64_t frames = 0;
     for (const auto& [id, symptoms] : c.window.stations) {
@@ -61,10 +61,10 @@ void find_no_answer(Case& c) {
     std::uint64_t stations = 0;
     for (const auto& [id, symptoms] : c.window.stations) {
         if (symptoms.attempts() == 0) continue;
-        // A scan of unlisted addresses finds nobody: that says nothing about the line.
+        // A scan of unlisted addresses without a panel says nothing about the line.
         if (id == 0 && symptoms.answered == 0 && c.window.stations.size() > 1) continue;
         if (symptoms.mute_in_a_row < bar.enough(3)) return;
-        if (symptoms.wrong * 2 >= symptoms.attempts()) return;  // not what was asked, yet a voice
+        if (symptoms.wrong * 2 >= symptoms.attempts()) return;  // a wrong reply is still a reply
         mute += symptoms.mute_in_a_row;
         ++stations;
     }
@@ -83,7 +83,7 @@ void find_no_answer(Case& c) {
 
 void find_other_master(Case& c) {
     const Bar bar{c, Cause::other_master};
-    const std::uint64_t frames = strangers(c);
+    const std::uint64_t frames = foreign_frames(c);
     if (c.all.requests + frames < bar.enough(3)) return;
     const bool heard = c.all.requests > 0;
     c.add(Cause::other_master, {},
@@ -124,10 +124,10 @@ void find_overrun(Case& c) {
 
 namespace {
 
-/// Something follows most replies. A copy of the reply is another story: duplicate_address.
+/// True if bytes follow most replies. Duplicates are duplicate_address.
 bool trails(const Case& c, std::uint8_t station, const Symptoms& s) {
     Bar bar{c, Cause::trailing_bytes, named(station)};
-    bar.low = bar.low || c.stands(Cause::trailing_bytes);
+    bar.low = bar.low || c.is_standing(Cause::trailing_bytes);
     const std::uint64_t followed = s.trailed - std::min(s.trailed, s.doubled);
     return followed >= bar.enough(5) && followed * (bar.low ? 4 : 2) >= s.answered;
 }
@@ -158,11 +158,11 @@ void find_trailing_bytes(Case& c) {
         add_trailing(c, named(id), station_text(c, id), c.window.stations.at(id));
 }
 
-// Replies that came and were damaged: by what, the whole line's or one panel's.
+// Damaged replies: of the whole line, or of one panel.
 
 namespace {
 
-/// Nearly everything that comes is damaged: one in ten may be good by chance.
+/// Nearly all replies are damaged: one in ten may be good by chance.
 bool is_all_damaged(const Case& c, const Symptoms& s) {
     const Bar bar{c, cause_of_damage(c, s)};
     return s.damaged() >= bar.enough(5) && s.answered * 10 <= s.damaged();
@@ -172,14 +172,14 @@ double share(std::uint64_t part, std::uint64_t whole) {
     return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// What one address or another cause explains tells nothing about the line.
+/// Counts without stations whose damage another cause explains: they say nothing about the line.
 Symptoms unexplained(const Case& c) {
     Sample rest;
     for (const auto& [id, symptoms] : c.window.stations) {
         const bool explained =
             c.has(Cause::duplicate_address, id) || c.has(Cause::damaged_replies, id) ||
             (id != 0 && c.has(Cause::wrong_baud, id)) ||
-            (id != 0 && c.has(Cause::wrong_parity, id)) || is_told_by_its_frames(c, id);
+            (id != 0 && c.has(Cause::wrong_parity, id)) || explained_by_frames(c, id);
         if (explained) continue;
         Symptoms& own = rest.stations[id] = symptoms;
         if (c.has_of_line(Cause::trailing_bytes) || c.has(Cause::trailing_bytes, id))
@@ -188,7 +188,7 @@ Symptoms unexplained(const Case& c) {
     return rest.total();
 }
 
-/// All of few damaged replies came from one of several stations: it may be that one, or chance.
+/// All of a few damaged replies came from one of several stations: that station, or chance.
 bool may_be_one_station(const Case& c, const Symptoms& s) {
     constexpr std::uint64_t kFew = 8;
     if (s.damaged() >= kFew) return false;
@@ -200,13 +200,13 @@ bool may_be_one_station(const Case& c, const Symptoms& s) {
     return one && others;
 }
 
-/// One damaged frame in a thousand is life; one in a hundred is a fault.
+/// One damaged frame in a thousand is normal; one in a hundred is a fault.
 bool is_too_often(const Case& c, const Bar& bar, const Symptoms& s, std::uint64_t damaged) {
     return damaged >= bar.enough(3) && (bar.low || !may_be_one_station(c, s)) &&
            share(damaged, damaged + s.answered) >= (bar.low ? 0.003 : 0.01);
 }
 
-/// A long reply is hit more often than by its length alone: what reflections do.
+/// True if long replies are damaged more often than their length explains, as by reflections.
 bool hits_long_replies(const Symptoms& s) {
     const std::uint64_t short_damaged = s.damaged() - s.long_damaged;
     const std::uint64_t short_answered = s.answered - s.long_answered;
@@ -216,17 +216,17 @@ bool hits_long_replies(const Symptoms& s) {
                3 * share(short_damaged, short_damaged + short_answered);
 }
 
-bool has_better_than_noise(const Case& c) {
+bool has_better_explanation(const Case& c) {
     return c.has(Cause::echo) || c.has_of_line(Cause::wrong_baud) || c.has(Cause::other_master) ||
            c.has(Cause::collision) || c.has_of_line(Cause::wrong_parity);
 }
 
 }  // namespace
 
-/// The length tells the pace, and zeros tell bytes that the parity check has thrown away.
+/// The length indicates the rate, and zeros indicate bytes that the parity check has dropped.
 Cause cause_of_damage(const Case& c, const Symptoms& s) {
     const bool same_pace = s.damaged_exact * 5 >= s.damaged() * 4;
-    // Bytes that pass a wrong parity check all have the same parity; what noise leaves has both.
+    // Bytes that pass a wrong parity check all have the same parity; those left by noise have both.
     const std::uint64_t left = s.damaged_bytes - s.damaged_zeros;
     const bool alike = std::min(s.damaged_odd, left - s.damaged_odd) * 20 <= left;
     const bool checked = c.facts.serial.parity != Parity::none;
@@ -234,7 +234,7 @@ Cause cause_of_damage(const Case& c, const Symptoms& s) {
         const line::UartErrors& uart = *c.window.uart;
         return uart.parity > uart.framing ? Cause::wrong_parity : Cause::wrong_baud;
     }
-    if (c.facts.serial.mode == SerialMode::ascii)  // what is damaged has no bytes to count
+    if (c.facts.serial.mode == SerialMode::ascii)  // damaged ASCII has no bytes to count
         return s.damaged_heads * 2 >= s.damaged() ? Cause::noise : Cause::wrong_baud;
     if (checked && same_pace && alike && s.damaged_zeros * 4 >= s.damaged_bytes)
         return Cause::wrong_parity;
@@ -282,7 +282,7 @@ void find_all_damaged(Case& c) {
     const std::string evidence = damage_text(c, s);
     const std::string now = to_string(c.facts.serial);
     if (c.facts.over_tcp) {
-        // Another length may as well be what lies between.
+        // Another length may also be caused by the connection.
         if (cause != Cause::wrong_parity || s.damaged_exact != s.damaged()) return;
         c.add(cause, {}, "Replies have the right length and wrong bytes: parity or data bits.",
               "Set the parity, data and stop bits of the server's serial port as in the panels' "
@@ -309,12 +309,12 @@ void find_all_damaged(Case& c) {
 }
 
 void find_noise(Case& c) {
-    if (has_better_than_noise(c) || c.has(Cause::tcp_framing)) return;
+    if (has_better_explanation(c) || c.has(Cause::tcp_framing)) return;
     const Bar bar{c, Cause::noise};
     const Symptoms s = unexplained(c);
     const bool overrun =
         c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
-    // Over TCP replies are cut short where the connection stalls, and their rests come alone.
+    // Over TCP replies are cut where the connection stalls, and the rest arrives alone.
     const std::uint64_t damaged = c.facts.over_tcp ? s.damaged_exact : s.damaged();
     const bool damage = is_too_often(c, bar, s, damaged);
     const bool strays =
@@ -340,11 +340,11 @@ void find_noise(Case& c) {
           std::move(evidence), std::move(figures));
 }
 
-/// What lies between changes lengths: telnet doubles bytes or takes them out. A wrong byte in a
-/// reply of the right length comes from the wire behind the server, and one that is cut short from
-/// a connection that stalls, unless nothing else ever comes.
+/// The connection changes lengths: telnet doubles or removes bytes. A wrong byte in a reply of the
+/// right length comes from the wire behind the server, and a truncated reply from a connection that
+/// stalls, unless all are truncated.
 void find_tcp_framing(Case& c) {
-    if (has_better_than_noise(c)) return;
+    if (has_better_explanation(c)) return;
     const Bar bar{c, Cause::tcp_framing};
     const Symptoms s = unexplained(c);
     const bool never_right = is_all_damaged(c, s) && s.damaged_exact * 2 < s.damaged() &&

@@ -11,22 +11,22 @@
 
 namespace panelgate::doctor {
 
-/// Whom a finding names: stations that the configuration does not list share entry 0 and have none.
+/// Returns the station that a finding names: unlisted stations share entry 0 and have none.
 inline std::optional<std::uint8_t> named(std::uint8_t station) {
     if (station == 0) return std::nullopt;
     return station;
 }
 
-/// What one diagnosis works on. Rules add to `findings`, and look at what earlier ones have found:
-/// damage that is explained is not noise as well.
+/// State of one diagnosis. Rules add to `findings`, and look at earlier ones: explained damage is
+/// not reported as noise as well.
 struct Case {
     const LineFacts& facts;
     const Sample& window;
     arbiter::Symptoms all;                 ///< of all stations
-    const std::vector<Finding>& standing;  ///< what was found before
+    const std::vector<Finding>& standing;  ///< findings of the previous look
     std::vector<Finding> findings;
 
-    bool stands(Cause cause, std::optional<std::uint8_t> station = {}) const {
+    bool is_standing(Cause cause, std::optional<std::uint8_t> station = {}) const {
         return std::ranges::any_of(
             standing, [&](const Finding& f) { return f.cause == cause && f.station == station; });
     }
@@ -46,27 +46,27 @@ struct Case {
     }
 };
 
-/// How much evidence one finding needs: about half when it is there already.
+/// How much evidence one finding needs: about half if it is already standing.
 struct Bar {
     Bar(const Case& c, Cause cause, std::optional<std::uint8_t> station = {})
-        : low(c.stands(cause, station)) {}
+        : low(c.is_standing(cause, station)) {}
 
-    /// How often something must have been seen.
+    /// Required number of observations.
     std::uint64_t enough(std::uint64_t to_appear) const {
         return low ? std::max<std::uint64_t>(1, to_appear / 2) : to_appear;
     }
     bool low = false;
 };
 
-/// Its damage is explained: the frames are right, and written in another way.
-inline bool is_told_by_its_frames(const Case& c, std::uint8_t station) {
+/// True if its damage is explained: the frames are right, in another encoding.
+inline bool explained_by_frames(const Case& c, std::uint8_t station) {
     return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station);
 }
 
-/// What only bytes that are all damaged can tell: Cause::wrong_parity, wrong_baud or noise.
+/// Returns the cause of damage in all replies: Cause::wrong_parity, wrong_baud or noise.
 Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 
-// Each adds at most one finding a line or a station.
+// Each adds at most one finding per line or station.
 void find_echo(Case& c);
 void find_no_answer(Case& c);
 void find_other_master(Case& c);
@@ -91,13 +91,14 @@ void find_silent_station(Case& c, std::uint8_t station, const arbiter::Symptoms&
 std::string share_text(std::uint64_t part, std::uint64_t whole, const char* what);
 /// "32ms", as the configuration writes it; rounded up.
 std::string duration_text(Duration duration);
-/// How the damage looked: "10 of right length, 2 shorter, …"; with the driver's error counts.
+/// Describes the damage: "10 of right length, 2 shorter, …"; with the driver's error counts.
 std::string damage_text(const Case& c, const arbiter::Symptoms& symptoms);
-/// damaged, of replies, and as exact, short or long.
+/// Counts of damaged replies, of all replies, and of damaged ones by length.
 Figures damage_figures(const arbiter::Symptoms& symptoms);
-/// As duration_text() has it.
+/// The number in duration_text().
 std::uint64_t whole_ms(Duration duration);
-/// Its name ("press"), "station 7" without one, or the ones without an entry; first in a sentence.
+/// Its name ("press"), else "station 7", or a phrase for unlisted stations; `first`: it begins a
+/// sentence.
 std::string station_text(const Case& c, std::uint8_t station, bool first = false);
 
 }  // namespace panelgate::doctor

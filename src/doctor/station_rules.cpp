@@ -1,4 +1,4 @@
-// What concerns one address.
+// Rules for one address.
 
 #include <optional>
 
@@ -10,9 +10,9 @@ using arbiter::Symptoms;
 
 namespace {
 
-/// If the line damaged everybody's replies as often as this one's, the others would have had at
-/// least five (0.7 % chance of none); they have had a fifth of what was to be expected, or less.
-/// Not when only long replies are hit and nobody else has any: that may be the line after all.
+/// True if only this station's replies are damaged: at its rate of damage the others would have had
+/// at least five (0.7 % chance of none), but have had a fifth of the expected number, or less.
+/// False if only long replies are damaged and no other station has any: that may be the line.
 bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     const std::uint64_t others_answered = c.all.answered - s.answered;
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
@@ -21,12 +21,13 @@ bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
     const bool hit = s.damaged() >= bar.enough(3) && s.damaged() * 100 >= s.answered;
     const bool others_fine =
         expected >= bar.enough(5) * own && others_damaged * 5 * own <= expected;
-    const bool unfair = s.long_damaged == s.damaged() && c.all.long_answered < s.long_answered + 5;
-    return hit && others_fine && !unfair;
+    const bool only_long =
+        s.long_damaged == s.damaged() && c.all.long_answered < s.long_answered + 5;
+    return hit && others_fine && !only_long;
 }
 
-/// Damaged at least twice as often as the others, as far as there are any: not by the line alone.
-bool is_hit_more(const Case& c, const Symptoms& s) {
+/// True if its replies are damaged at least twice as often as the others', if there are any.
+bool is_damaged_more(const Case& c, const Symptoms& s) {
     const std::uint64_t others = c.all.answered + c.all.damaged() - s.answered - s.damaged();
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
     return s.damaged() * others >= 2 * others_damaged * (s.answered + s.damaged());
@@ -50,27 +51,27 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
           std::move(figures));
 }
 
-/// Replies longer than they can be, that begin rightly: a second voice, which no cable adds.
-bool has_second_voice(const Bar& bar, const Symptoms& s) {
+/// True if replies are too long but begin rightly: a second sender, not a cable fault.
+bool has_second_sender(const Bar& bar, const Symptoms& s) {
     return s.damaged_long >= bar.enough(3) && s.damaged_long * 4 >= s.damaged() &&
            s.damaged_heads * 4 >= s.damaged();
 }
 
-/// Its cable, its transceiver or its settings: what one panel alone suffers from.
+/// Adds damage of one panel alone: its cable, transceiver or settings.
 void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
-    const std::string who = station_text(c, station);
+    const std::string name = station_text(c, station);
     const std::string evidence = damage_text(c, s) + "; the other stations are fine";
     const bool always = s.damaged() >= 5 && s.answered * 10 <= s.damaged();
     const Cause cause = always ? cause_of_damage(c, s) : Cause::noise;
     const std::string line = " to those of the line (" + to_string(c.facts.serial) + ").";
     if (!c.facts.over_tcp && cause == Cause::wrong_parity)
-        return c.add(cause, station, "All replies of " + who + " have wrong bytes.",
+        return c.add(cause, station, "All replies of " + name + " have wrong bytes.",
                      "Set this panel's parity and data bits" + line, evidence, damage_figures(s));
     if (!c.facts.over_tcp && cause == Cause::wrong_baud)
-        return c.add(cause, station, "All that " + who + " sends is no Modbus at this speed.",
+        return c.add(cause, station, "All that " + name + " sends is no Modbus at this speed.",
                      "Set this panel's baud" + line, evidence, damage_figures(s));
     c.add(
-        Cause::damaged_replies, station, "Only the replies of " + who + " are damaged.",
+        Cause::damaged_replies, station, "Only the replies of " + name + " are damaged.",
         "Look at this panel's terminals, its branch of the cable and its shield; if the damage "
         "goes with the panel to another place, its transceiver is faulty" +
             std::string(always ? ", or its communication settings differ from the others'." : "."),
@@ -82,25 +83,25 @@ void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
 void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     const bool line = c.has_of_line(Cause::wrong_baud) || c.has_of_line(Cause::wrong_parity) ||
                       c.has(Cause::echo);
-    // Another master that reads what we read makes replies come twice.
+    // Another master that reads the same makes replies come twice.
     const bool masters =
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
-    if (station == 0 || line || masters || is_told_by_its_frames(c, station)) return;
+    if (station == 0 || line || masters || explained_by_frames(c, station)) return;
     const Bar bar{c, Cause::duplicate_address, station};
-    const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_hit_more(c, s);
+    const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_damaged_more(c, s);
     if (s.doubled >= bar.enough(3) || mixed) return add_duplicate(c, station, s);
-    // A connection that stalls cuts replies short; that takes no second panel.
+    // A connection that stalls truncates replies without a second panel.
     if (c.facts.over_tcp && s.damaged_short * 2 > s.damaged()) return;
     if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s)) return;
-    has_second_voice(bar, s) ? add_duplicate(c, station, s) : add_damage(c, station, s);
+    has_second_sender(bar, s) ? add_duplicate(c, station, s) : add_damage(c, station, s);
 }
 
 namespace {
 
-/// Beyond, one reply of a bad moment may have set the mark: no figure follows from it.
+/// Above this, a single reply may have set the maximum: no timeout is derived from it.
 constexpr Duration kClustered = 2s;
 
-/// In steps of 10 ms, a quarter more than what was needed.
+/// A quarter more than needed, in steps of 10 ms.
 Duration enough_for(Duration lateness) { return (lateness * 5 / 4 + 10ms - 1ns) / 10ms * 10ms; }
 
 std::string timeout_advice(const LineFacts& facts, Duration timeout, Duration lateness) {
@@ -118,7 +119,7 @@ std::string timeout_advice(const LineFacts& facts, Duration timeout, Duration la
 
 }  // namespace
 
-/// One late reply, or one of another master that looks like it, says nothing about the timeout.
+/// One late reply, or another master's reply that looks like it, says nothing about the timeout.
 void find_short_timeout(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::timeout_too_short, named(station)};
     if (s.late < bar.enough(3) || c.has(Cause::other_master)) return;
@@ -152,7 +153,7 @@ struct GapSplit {
     std::uint64_t silent_above = 0, answered_above = 0;
 };
 
-/// A pause below which half of the requests and more stay without reply, and from which on hardly
+/// Finds a pause below which at least half of the requests stay unanswered, and above which hardly
 /// any do.
 std::optional<GapSplit> split_by_pause(const Bar& bar, const Symptoms& s) {
     GapSplit split;
@@ -178,8 +179,8 @@ std::optional<GapSplit> split_by_pause(const Bar& bar, const Symptoms& s) {
 }  // namespace
 
 void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
-    // Silences count that the same read, asked again, was answered behind. A station that is
-    // silent otherwise, too, has another reason.
+    // Only silences count after which the same read, asked again, was answered. A station that is
+    // also silent otherwise has another fault.
     std::uint64_t heard_again = 0;
     for (const std::uint64_t count : s.silent_after) heard_again += count;
     if (heard_again * 2 < s.silent) return;
@@ -189,7 +190,7 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
         return;
     const auto split = split_by_pause({c, Cause::gap_too_short, named(station)}, s);
     if (!split) return;
-    // Users of slow panels report 10 to 40 ms; from there on it is doubled until it suffices.
+    // Users of slow panels report 10 to 40 ms; if that is not enough, it is doubled.
     const Duration advised = std::max<Duration>(10ms, 2 * split->below);
     c.add(Cause::gap_too_short, named(station),
           "Requests right behind another frame are lost on " + station_text(c, station) + ".",
@@ -208,7 +209,7 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
            {"advised_ms", whole_ms(advised)}});
 }
 
-/// What it refuses is told by its own function only (AP 7): a stray frame may say anything.
+/// An exception is only recognised by its own function (AP 7): an unsolicited frame may carry any.
 void find_wrong_exception(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_exception, named(station)};
     if (s.wrong_exceptions < bar.enough(3) || s.wrong_exceptions * 2 < s.wrong) return;
@@ -228,9 +229,9 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::answers_broadcasts, named(station)};
     if (s.broadcast_replies < bar.enough(3) || s.broadcast_replies * 4 < c.window.broadcasts)
         return;
-    const std::string who = station_text(c, station, true);
+    const std::string name = station_text(c, station, true);
     c.add(Cause::answers_broadcasts, named(station),
-          who + " answers broadcasts, which nobody may (serial line V1.02, 2.1).",
+          name + " answers broadcasts, which nobody may (serial line V1.02, 2.1).",
           "Its replies run into those of other panels that do the same, and into the next request "
           "where they take longer than `timing.broadcast_turnaround`: make that long enough, or "
           "write to each station by itself.",
@@ -239,15 +240,15 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
           {{"replies", s.broadcast_replies}, {"broadcasts", c.window.broadcasts}});
 }
 
-/// A frame that is good, of the station that was asked, and not what was asked: the wire is fine.
+/// Good frames of the asked station that do not answer the request: the wire is fine.
 void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
     const Bar bar{c, Cause::wrong_reply, named(station)};
     const bool masters = c.has(Cause::other_master) && s.wrong <= c.all.requests;
     if (s.wrong < bar.enough(3) || s.wrong * 20 < s.answered || masters) return;
     if (c.has(Cause::wrong_exception, station)) return;
-    const std::string who = station_text(c, station, true);
+    const std::string name = station_text(c, station, true);
     c.add(Cause::wrong_reply, named(station),
-          who + " answers with frames that do not fit the request.",
+          name + " answers with frames that do not fit the request.",
           "Compare the line's trace with the panel's manual: another function, length or address "
           "than was asked comes back. Another function or a shorter read may be what it can do.",
           share_text(s.wrong, s.attempts(), "requests") + " were answered so, " +
@@ -255,7 +256,7 @@ void find_wrong_reply(Case& c, std::uint8_t station, const Symptoms& s) {
           {{"wrong", s.wrong}, {"requests", s.attempts()}, {"right", s.answered}});
 }
 
-/// Late replies, doubled ones and another master's are known as such.
+/// Late replies, duplicates and another master's replies are excluded.
 void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0 || s.attempts() == 0 || c.has(Cause::other_master) || c.has(Cause::echo))
         return;

@@ -62,7 +62,7 @@ void Readiness::want(std::uint32_t events) {
     wait();
 }
 
-/// Once at a time. It looks anew whenever it begins: what came before is not missed.
+/// One wait at a time. Each one checks the set anew, so that earlier events are not missed.
 void Readiness::wait() {
     if (waiting_) return;
     waiting_ = true;
@@ -78,7 +78,7 @@ void Readiness::wait() {
 
 namespace {
 
-/// Bytes a second.
+/// Bytes per second.
 std::size_t rate_of(const Settings& settings) {
     const auto characters = settings.serial.baud / settings.serial.bits_per_character();
     return std::max<std::size_t>(settings.input_rate, static_cast<std::size_t>(4 * characters));
@@ -125,7 +125,7 @@ std::string DescriptorLine::adopt(int fd) {
     std::string error = readiness_.watch(fd);
     if (error.empty()) {
         fd_ = fd;
-        floods_ = false;
+        throttled_ = false;
         next_reading_->cancel();
     } else {
         ::close(fd);
@@ -150,28 +150,29 @@ void DescriptorLine::open_failed(const std::string& why) {
 void DescriptorLine::opened() {
     if (openings_++ > 0) ++counters_.reopens;
     last_error_.clear();
-    has_brought_ = false;
+    has_received_ = false;
     events_->on_up();
 }
 
 void DescriptorLine::lost(const std::string& why) {
     close();
-    go_down(settings_.device + " is gone: " + why, has_brought_ || may_be_back());
+    go_down(settings_.device + " is gone: " + why, has_received_ || may_have_returned());
 }
 
 void DescriptorLine::reset(const std::string& why) {
     if (!is_open()) return;
     close(true);
-    go_down(settings_.device + " is opened anew: " + why, has_brought_);
+    go_down(settings_.device + " is opened anew: " + why, has_received_);
 }
 
-/// An opening that has brought nothing waits as one that failed: the next may be as useless.
-void DescriptorLine::go_down(const std::string& why, bool look_at_once) {
+/// After an opening without a received byte it backs off as after a failure: the next may be as
+/// useless.
+void DescriptorLine::go_down(const std::string& why, bool retry_at_once) {
     last_error_ = why;
     if (events_ != nullptr) events_->on_down(why);
     if (events_ == nullptr) return;
     retry_later();
-    if (look_at_once) open_soon();
+    if (retry_at_once) open_soon();
 }
 
 void DescriptorLine::retry_later() {
@@ -179,8 +180,8 @@ void DescriptorLine::retry_later() {
     open_at(clock_.now() + reopen_.next_pause());
 }
 
-/// A device that comes changes its folder several times (node, owner, link): one attempt each
-/// 20 ms is enough, and the last change must not be missed.
+/// A device that appears changes its folder several times (node, owner, link): one attempt per 20
+/// ms is enough, and the last change must not be missed.
 void DescriptorLine::open_soon() {
     if (events_ == nullptr || is_open()) return;
     constexpr Duration kPause = 20ms;
@@ -190,7 +191,7 @@ void DescriptorLine::open_soon() {
     open_at(when);
 }
 
-/// What should have left long ago is not to be sent when nobody waits for it any more.
+/// Discards overdue bytes: no client waits for their reply any more.
 void DescriptorLine::close(bool discard) {
     if (is_open()) close_device(discard || undelivered());
     unsent_.clear();
@@ -208,16 +209,16 @@ void DescriptorLine::on_ready() {
 
 void DescriptorLine::read_all() {
     std::array<std::uint8_t, 1024> buffer;
-    constexpr int kMaxReads = 16;  // a babbling line must not keep the loop from the others
-    if (floods_) return;
+    constexpr int kMaxReads = 16;  // a babbling line must not block the others
+    if (throttled_) return;
     const TimePoint now = clock_.now();
     for (int i = 0; i < kMaxReads; ++i) {
-        if (!budget_.allows(now)) return let_rest(budget_.next());
+        if (!budget_.allows(now)) return pause_reading(budget_.next());
         const ssize_t n = get(buffer);
         if (n > 0) {
             budget_.spend(now, static_cast<std::size_t>(n));
             counters_.bytes_received += static_cast<std::uint64_t>(n);
-            if (!std::exchange(has_brought_, true)) reopen_.succeeded();
+            if (!std::exchange(has_received_, true)) reopen_.succeeded();
             events_->on_bytes(ByteView(buffer).first(static_cast<std::size_t>(n)));
             if (events_ == nullptr || !is_open()) return;
             if (static_cast<std::size_t>(n) < buffer.size()) return;
@@ -229,18 +230,18 @@ void DescriptorLine::read_all() {
     }
 }
 
-void DescriptorLine::let_rest(TimePoint until) {
-    floods_ = true;
+void DescriptorLine::pause_reading(TimePoint until) {
+    throttled_ = true;
     want_input();
     next_reading_->arm(until, [this] {
-        floods_ = false;
+        throttled_ = false;
         want_input();
     });
 }
 
 void DescriptorLine::write(ByteView bytes) {
     if (!is_open()) return;
-    if (undelivered()) return reset(takes_nothing());
+    if (undelivered()) return reset(blocked_reason());
     counters_.bytes_sent += bytes.size();
     budget_.on_sent();
     unsent_.assign(bytes.begin(), bytes.end());

@@ -15,11 +15,11 @@ namespace panelgate::line {
 Driver look_at_driver(int fd, PortOps& ops) {
     Driver driver;
     serial_struct info{};
-    // A pseudo-terminal has no such thing, and its TIOCOUTQ says nothing about a wire.
+    // A pseudo-terminal does not support this, and its TIOCOUTQ does not describe a wire.
     if (ops.control(fd, TIOCGSERIAL, &info) < 0) return driver;
     int queued = 0;
     driver.tells_queue = ops.control(fd, TIOCOUTQ, &queued) >= 0;
-    // For adapters on USB it would be a message there and back: the loop must not wait for that.
+    // On a USB adapter it would be a round trip, which must not block the loop.
     unsigned status = 0;
     driver.tells_empty = info.type != PORT_UNKNOWN && ops.control(fd, TIOCSERGETLSR, &status) >= 0;
     return driver;
@@ -40,7 +40,7 @@ void drop_unsent(int fd, PortOps& ops) {
 
 namespace {
 
-/// Empty when the adapter has no such timer, or has it at 1 ms now.
+/// Returns an empty text if the adapter has no such timer, or it is now 1 ms.
 std::string lower_latency_timer(const std::string& device, const std::string& sysfs) {
     namespace fs = std::filesystem;
     std::error_code error;
@@ -86,7 +86,7 @@ std::optional<UartErrors> UartErrorCount::look(int fd, PortOps& ops) {
     if (!seen_) return sum_;
     const auto now = read(fd, ops);
     if (!now) return sum_;
-    // The driver's counters are 32 bits wide and wrap: so does this difference.
+    // The driver's counters are 32 bits wide and wrap; so does this difference.
     sum_->framing += now->framing - seen_->framing;
     sum_->parity += now->parity - seen_->parity;
     sum_->overruns += now->overruns - seen_->overruns;

@@ -9,33 +9,33 @@
 
 namespace panelgate::line {
 
-/// What else the driver of an open device can do. None of it is needed; each is asked for once.
+/// Optional features of an open device's driver; each is queried once.
 struct Driver {
-    bool tells_queue = false;  ///< TIOCOUTQ counts what has not left
-    bool tells_empty = false;  ///< TIOCSERGETLSR tells when the last bit has: a real UART
+    bool tells_queue = false;  ///< TIOCOUTQ counts unsent bytes
+    bool tells_empty = false;  ///< TIOCSERGETLSR reports when the last bit has left: a real UART
 };
 Driver look_at_driver(int fd, PortOps& ops);
 
-/// How long the wire still needs for what was written, as far as the driver tells: never blocks.
+/// Time until all written bytes have left, as far as the driver reports it. Never blocks.
 Duration unsent_time(int fd, const Driver& driver, Duration character, PortOps& ops);
 
-/// Throws away what was written and has not left. usbserial cannot, and goes on holding it.
+/// Discards unsent bytes. usbserial cannot, and keeps them.
 void drop_unsent(int fd, PortOps& ops);
 
-/// Received bytes are to be handed over at once and not when a timer of the adapter says so (FTDI:
-/// 16 ms): ASYNC_LOW_LATENCY, else the adapter's `latency_timer` under `sysfs`. Empty when that is
-/// done or there is nothing to do; else what slows the line down, and what helps.
+/// Asks for received bytes at once and not after an adapter's timer (FTDI: 16 ms): sets
+/// ASYNC_LOW_LATENCY, and the adapter's `latency_timer` under `sysfs` if it is still higher than 1
+/// ms. Returns an empty text if done or not needed; else what slows the line down, and what helps.
 std::string ask_low_latency(int fd, const std::string& device, PortOps& ops,
                             const std::string& sysfs = "/sys");
 
-/// The driver's error counters since the first look, over all openings of the device.
+/// Sums the driver's error counters over all openings of the device.
 class UartErrorCount {
   public:
-    /// A device was opened: it counts from here on.
+    /// A device was opened: starts from its current counters.
     void opened(int fd, PortOps& ops);
-    /// Nothing when the driver does not count.
+    /// Returns the sum; std::nullopt if the driver does not count.
     std::optional<UartErrors> look(int fd, PortOps& ops);
-    /// While the device is closed.
+    /// Returns the last sum, while the device is closed.
     std::optional<UartErrors> last() const { return sum_; }
 
   private:

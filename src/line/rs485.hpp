@@ -6,11 +6,11 @@
 
 namespace panelgate::line {
 
-/// Mode kernel: has the driver switch the transceiver, and reads back what it took. A driver that
-/// cannot is an error, for a panel would never hear anything.
+/// Mode kernel: makes the driver switch the transceiver, and reads back what it took. A driver that
+/// cannot is an error, as no panel would hear anything.
 SetUp set_up_rs485(int fd, const Rs485& settings, PortOps& ops);
 
-/// Mode rts: RTS to what `sending` asks for. Empty, or why not.
+/// Mode rts: switches RTS for sending or receiving. Returns an empty text, or the error.
 std::string switch_rts(int fd, const Rs485& settings, bool sending, PortOps& ops);
 
 }  // namespace panelgate::line

@@ -8,7 +8,7 @@
 namespace panelgate::line {
 namespace {
 
-/// Of a driver that cannot tell when the last bit has left: an adapter on USB gets its bytes a
+/// For a driver that cannot report when the last bit has left: a USB adapter gets its bytes a USB
 /// frame (1 ms) later, and begins after the next.
 constexpr Duration kBlindMargin = 2ms;
 
@@ -40,13 +40,13 @@ void RtsSender::write(ByteView bytes) {
     held_.insert(held_.end(), bytes.begin(), bytes.end());
     if (!switch_to(true)) return;
     if (settings_.rs485.delay_before_send > Duration::zero()) {
-        at(clock_.now() + settings_.rs485.delay_before_send, &RtsSender::send_held);
+        at(clock_.now() + settings_.rs485.delay_before_send, &RtsSender::send_pending);
     } else {
-        send_held();
+        send_pending();
     }
 }
 
-void RtsSender::send_held() {
+void RtsSender::send_pending() {
     const Bytes bytes = std::exchange(held_, {});
     const auto alive = alive_;
     owner_.send(bytes);

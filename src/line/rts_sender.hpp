@@ -12,9 +12,9 @@
 
 namespace panelgate::line {
 
-/// RS-485 mode rts: raises RTS, sends, and lowers it when the last bit should have left. Best
-/// effort: timers and USB make it late by up to some milliseconds, never early as far as the driver
-/// tells. One thread; one frame at a time (a second one during the first extends it).
+/// RS-485 mode rts: raises RTS, sends, and lowers RTS when the last bit should have left. Best
+/// effort: timers and USB make it late by some milliseconds, never early as far as the driver
+/// reports. Single-threaded; one frame at a time (a second one during the first extends it).
 class RtsSender {
   public:
     struct Owner {
@@ -24,15 +24,15 @@ class RtsSender {
     /// `clock`, `settings` and `ops` outlive it.
     RtsSender(rt::Clock& clock, const Settings& settings, Owner owner, PortOps& ops);
 
-    /// The device is open: RTS to receiving. Empty, or why that does not work.
+    /// After opening: sets RTS to receiving. Returns an empty text, or the error.
     std::string opened(int fd, const Driver& driver);
     void write(ByteView bytes);
-    /// The device is about to be closed: forgets what was to come.
+    /// Before closing: drops pending bytes.
     void closing();
 
   private:
     void at(TimePoint when, void (RtsSender::*next)());
-    void send_held();
+    void send_pending();
     void release();
     bool switch_to(bool sending);
 

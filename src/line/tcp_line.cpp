@@ -33,17 +33,17 @@
 
 namespace panelgate::line {
 
-/// Finds the addresses of one host. A name server may be silent for half a minute, and nobody can
-/// take the question back: so each look-up has a thread of its own, at most one for an object, that
-/// nobody waits for, also at the program's end. All else happens in the one thread that runs the
-/// executor; nothing is told after cancel() or the object's end.
+/// Resolves one host name. A name server may be silent for half a minute, and a query cannot be
+/// cancelled: so each look-up has its own thread, at most one per object, which is never joined,
+/// not even at the program's end. Everything else runs in the executor's thread; no callback after
+/// cancel() or the object's end.
 class NameLookup {
   public:
     using Addresses = boost::asio::ip::tcp::resolver::results_type;
     using Found =
         std::function<void(const boost::system::error_code& error, const Addresses& addresses)>;
-    /// Threads of the whole program; who comes when all are held by silent servers is told to try
-    /// again.
+    /// Limit for the whole program; if silent servers occupy all threads, a look-up fails with
+    /// try_again.
     static constexpr int kMostThreads = 64;
 
     NameLookup(boost::asio::any_io_executor executor, TcpEndpoint endpoint);
@@ -51,15 +51,15 @@ class NameLookup {
     NameLookup(const NameLookup&) = delete;
     NameLookup& operator=(const NameLookup&) = delete;
 
-    /// Takes the place of what was asked before. A question that is still open is not asked twice:
-    /// its answer is this one's, too.
+    /// Starts a look-up and replaces the previous one. A pending query is not sent twice: its
+    /// answer serves this call, too.
     void ask(Found found);
     void cancel();
     bool waits() const;
 
   private:
     struct State;
-    std::shared_ptr<State> state_;  ///< the thread's share of it
+    std::shared_ptr<State> state_;  ///< shared with the thread
 };
 
 namespace asio = boost::asio;
@@ -75,10 +75,10 @@ struct NameLookup::State : std::enable_shared_from_this<NameLookup::State> {
     void tell(const error_code& error, const Addresses& addresses);
 
     asio::any_io_executor executor;
-    std::mutex mutex;                           ///< of `loop`, all that the thread shares
-    std::optional<asio::any_io_executor> loop;  ///< nothing: nobody is there any more
+    std::mutex mutex;                           ///< guards `loop`, all that the thread shares
+    std::optional<asio::any_io_executor> loop;  ///< std::nullopt: the owner is gone
     const TcpEndpoint endpoint;
-    std::optional<asio::any_io_executor> work;  ///< the loop has something to wait for
+    std::optional<asio::any_io_executor> work;  ///< keeps the loop running
     Found found;
     bool under_way = false;
 };
@@ -87,7 +87,7 @@ namespace {
 
 std::atomic<int> threads;
 
-/// The calling thread waits for as long as the system's resolver does.
+/// Blocks the calling thread for as long as the system's resolver takes.
 std::pair<error_code, NameLookup::Addresses> resolve(const TcpEndpoint& endpoint) {
     asio::io_context own;
     tcp::resolver resolver(own);
@@ -99,11 +99,11 @@ std::pair<error_code, NameLookup::Addresses> resolve(const TcpEndpoint& endpoint
 
 }  // namespace
 
-/// In the thread. The loop may have ended meanwhile, and only the lock tells.
+/// Runs in the thread. The loop may have ended meanwhile: check under the lock.
 void NameLookup::State::look_up() {
     sigset_t all;
     sigfillset(&all);
-    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are the loop's
+    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals are the loop's
     auto [error, addresses] = resolve(endpoint);
     --threads;
     const std::lock_guard lock(mutex);
@@ -162,19 +162,19 @@ namespace {
 
 constexpr Duration kConnectTimeout = 5s;
 
-/// How long the kernel goes on with bytes that the server does not acknowledge, or has no room for
-/// (TCP_USER_TIMEOUT). Its own patience, 15 minutes, would keep the line up without a server. Five
+/// TCP_USER_TIMEOUT: how long the kernel retries bytes that the server does not acknowledge, or has
+/// no room for. The default, 15 minutes, would keep the line up without a server. Five
 /// retransmissions fit in (after 0.2, 0.6, 1.4, 3 and 6.2 s, the last one at the limit).
 constexpr std::chrono::seconds kPatience{6};
 
-/// Probes of an idle connection. The patience above ends them too, in place of their number: so the
-/// first has to be early enough for three of them. A server that has gone is noticed within it also
-/// while nobody asks.
+/// Keep-alive of an idle connection. TCP_USER_TIMEOUT ends it too, in place of the number of
+/// probes: so the first is early enough for three of them. A lost server is noticed in that time
+/// also while the line is idle.
 constexpr rt::KeepAlive kKeepAlive{3s, 1s, 3};
 static_assert(kKeepAlive.silence + kKeepAlive.probes * kKeepAlive.pause <= kPatience);
 
-/// A server may keep an acknowledgement back until there is something to send with it: Linux and
-/// Windows up to 200 ms. What it has had for a shorter time says nothing.
+/// A server may delay an acknowledgement until it has data to send: Linux and Windows up to 200 ms.
+/// Before that, a missing acknowledgement proves nothing.
 constexpr Duration kDelayedAck = 200ms;
 
 void set_options(int fd) {
@@ -183,7 +183,7 @@ void set_options(int fd) {
     ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &patience, sizeof patience);
 }
 
-/// Nothing on a name. A number needs no look-up, and no thread for it.
+/// std::nullopt for a name. A numeric address needs no look-up, and no thread for it.
 std::optional<tcp::endpoint> numeric(const TcpEndpoint& endpoint) {
     error_code is_name;
     const asio::ip::address address = asio::ip::make_address(endpoint.host, is_name);
@@ -211,7 +211,7 @@ class TcpLine final : public DescriptorLine {
   private:
     void begin_open() override;
     void close_device(bool discard) override;
-    std::string takes_nothing() const override { return "the connection takes nothing"; }
+    std::string blocked_reason() const override { return "the connection takes nothing"; }
     std::optional<TimePoint> unacknowledged_since();
     void resolve();
     ssize_t put(ByteView bytes) override {
@@ -225,7 +225,7 @@ class TcpLine final : public DescriptorLine {
         cancel_open();
         open_failed("cannot reach " + settings().device + ": " + why);
     }
-    /// For completions: nothing of an attempt that was given up.
+    /// For completions: true if their attempt is still the current one.
     auto current() const {
         return
             [alive = alive(), this, attempt = attempt_] { return *alive && attempt == attempt_; };
@@ -238,7 +238,7 @@ class TcpLine final : public DescriptorLine {
     std::uint64_t attempt_ = 0;
     TimePoint last_write_{};
     std::size_t last_size_ = 0;
-    TimePoint older_{};  ///< of what had not been acknowledged when the last frame was written
+    TimePoint older_{};  ///< of the bytes unacknowledged at the last write
 };
 
 void TcpLine::begin_open() {
@@ -291,8 +291,8 @@ void TcpLine::cancel_open() {
     socket_.close(ignored);
 }
 
-/// What the kernel has seen of the way there and back, and four times how much that varies: the
-/// same allowance as TCP's own (RFC 6298).
+/// The kernel's round-trip time plus four times its variation: the same allowance as TCP's own (RFC
+/// 6298).
 Duration TcpLine::latency() {
     tcp_info info{};
     socklen_t size = sizeof info;
@@ -302,7 +302,7 @@ Duration TcpLine::latency() {
 
 void TcpLine::write(ByteView bytes) {
     if (!is_open() || settings().listen_only) return;
-    if (undelivered()) return reset(takes_nothing());  // what follows makes this frame the last one
+    if (undelivered()) return reset(blocked_reason());  // the rest makes this frame the last one
     const TimePoint now = clock().now();
     older_ = unacknowledged_since().value_or(now);
     last_write_ = now;
@@ -324,7 +324,7 @@ bool TcpLine::undelivered() {
     return since && clock().now() - *since >= latency() + kDelayedAck;
 }
 
-/// Discarding needs a reset (RST): after a usual end the kernel goes on sending what it holds.
+/// Discarding needs a reset (RST): after a normal close the kernel goes on sending its buffer.
 void TcpLine::close_device(bool discard) {
     const linger at_once{1, 0};
     if (discard) ::setsockopt(fd(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);

@@ -14,7 +14,7 @@ namespace {
 
 termios2 raw(const termios2& before, const SerialFormat& format) {
     termios2 t = before;
-    t.c_iflag = IGNBRK;  // a break is no byte; parity errors pass and CRC or LRC judge
+    t.c_iflag = IGNBRK;  // ignore breaks; parity errors pass, CRC or LRC detects them
     t.c_oflag = 0;
     t.c_lflag = 0;
     t.c_cflag &=
@@ -34,7 +34,7 @@ termios2 raw(const termios2& before, const SerialFormat& format) {
     return t;
 }
 
-/// What a receiver tolerates (serial line V1.02, 3.2).
+/// True if within what a receiver tolerates (serial line V1.02, 3.2).
 bool is_near(speed_t rate, int baud) {
     constexpr long long kTolerance = 50;  // a fiftieth: 2 %
     return std::llabs(static_cast<long long>(rate) - baud) * kTolerance <= baud;
@@ -64,7 +64,7 @@ SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops) {
     };
     termios2 before{};
     const int asked = ops.control(descriptor, TCGETS2, &before);
-    // As a ttyS without hardware answers, and an adapter that was unplugged a moment ago.
+    // The answer of a ttyS without hardware, or an adapter unplugged a moment ago.
     if (asked == -EIO) return failed("there is no UART behind it", asked);
     if (asked < 0) return failed("not a serial device", asked);
     termios2 wanted = raw(before, format);
@@ -73,7 +73,7 @@ SetUp set_up_tty(int descriptor, const SerialFormat& format, PortOps& ops) {
     termios2 got{};
     if (const int result = ops.control(descriptor, TCGETS2, &got); result < 0)
         return failed("cannot read the settings back", result);
-    // What an earlier user left behind goes.
+    // Discards what an earlier user left behind.
     ops.control(descriptor, TCFLSH, reinterpret_cast<void*>(std::uintptr_t{TCIOFLUSH}));
     return SetUp{{}, difference(wanted, got, format)};
 }

@@ -26,9 +26,9 @@
 
 namespace panelgate::line {
 
-/// Notices that something changed where a device should be, so that a plugged-in adapter is opened
-/// at once and not at the end of a pause. Only an accelerator: without inotify, or where nothing is
-/// told, the pauses do it alone. One thread.
+/// Watches for changes where a device should be, so that a plugged-in adapter is opened at once and
+/// not after a pause. Only an accelerator: without inotify or its events the pauses suffice.
+/// Single-threaded.
 class DeviceWatch {
   public:
     /// `changed` may be called at any time between look() and stop().
@@ -38,11 +38,11 @@ class DeviceWatch {
     DeviceWatch(const DeviceWatch&) = delete;
     DeviceWatch& operator=(const DeviceWatch&) = delete;
 
-    /// Watches the directory of the device, or the nearest one above that exists: by-id folders go
-    /// with their last device. Again after each failed attempt; harmless when nothing is new.
+    /// Watches the device's directory, or the nearest existing parent: by-id folders vanish with
+    /// their last device. Called again after each failed attempt; harmless if nothing is new.
     void look();
-    /// Nothing more is told until look(). Cheap: closing an inotify descriptor, which the kernel
-    /// makes wait for tens of milliseconds at times, is left to the end.
+    /// Stops notifications until look(). Cheap: the inotify descriptor, whose closing can block for
+    /// tens of milliseconds, stays open to the end.
     void stop();
 
   private:
@@ -54,7 +54,7 @@ class DeviceWatch {
     boost::asio::posix::stream_descriptor inotify_;
     std::string device_;
     std::function<void()> changed_;
-    std::vector<int> watched_;  ///< one folder after another, the device's own at last
+    std::vector<int> watched_;  ///< parents first, the device's folder last
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(false);  ///< between look() and stop()
 };
 
@@ -80,11 +80,11 @@ bool DeviceWatch::prepare() {
 void DeviceWatch::look() {
     if (!prepare()) return;
     if (!*alive_) take_all();  // what stop() left behind
-    constexpr std::uint32_t kNews = IN_CREATE | IN_MOVED_TO | IN_ATTRIB | IN_DELETE_SELF;
+    constexpr std::uint32_t kWatchedEvents = IN_CREATE | IN_MOVED_TO | IN_ATTRIB | IN_DELETE_SELF;
     std::filesystem::path folder = std::filesystem::path(device_).parent_path();
     int watch = -1;
     while ((watch = ::inotify_add_watch(inotify_.native_handle(), folder.c_str(),
-                                        kNews | IN_ONLYDIR)) < 0) {
+                                        kWatchedEvents | IN_ONLYDIR)) < 0) {
         if (folder == folder.parent_path()) return;
         folder = folder.parent_path();
     }
@@ -94,7 +94,7 @@ void DeviceWatch::look() {
     wait();
 }
 
-/// Folders that come and go have a new number each time.
+/// A recreated folder has a new watch number; the oldest are removed.
 void DeviceWatch::remember(int watch) {
     constexpr std::size_t kMost = 16;
     if (std::ranges::find(watched_, watch) != watched_.end()) return;
@@ -124,7 +124,7 @@ void DeviceWatch::wait() {
                         });
 }
 
-/// What changed does not matter: the device is tried.
+/// Drains the events: what changed does not matter, the device is tried.
 void DeviceWatch::take_all() {
     std::array<char, 4096> events;
     while (::read(inotify_.native_handle(), events.data(), events.size()) > 0) {
@@ -133,10 +133,10 @@ void DeviceWatch::take_all() {
 
 namespace {
 
-/// What a driver may take longer than the wire: an adapter on a busy USB or one that wakes up.
+/// Time a driver may take beyond the wire: an adapter on a busy USB, or one that wakes up.
 constexpr Duration kTransferTime = 50ms;
 
-/// For the closing of a device that keeps what it was given although it was told to drop it.
+/// Limit for closing a device that keeps bytes it was to drop.
 constexpr Duration kCloseWait = 10ms;
 
 class TtyLine final : public DescriptorLine {
@@ -166,8 +166,8 @@ class TtyLine final : public DescriptorLine {
     void waiting() override { watch_.look(); }
     void cancel_open() override { watch_.stop(); }
     void close_device(bool discard) override;
-    bool may_be_back() const override { return true; }
-    bool holds_nothing() { return unsent().value_or(Duration::zero()) == Duration::zero(); }
+    bool may_have_returned() const override { return true; }
+    bool is_drained() { return unsent().value_or(Duration::zero()) == Duration::zero(); }
     std::optional<UartErrors> uart_errors() override {
         return is_open() ? errors_.look(fd(), ops_) : errors_.last();
     }
@@ -180,12 +180,12 @@ class TtyLine final : public DescriptorLine {
     DeviceWatch watch_;
     RtsSender rts_;
     Driver driver_;
-    UartErrorCount errors_;  ///< asked when somebody asks
+    UartErrorCount errors_;  ///< read on demand
     std::string last_warning_;
     std::string last_rs485_warning_;
-    std::string last_slow_;
-    TimePoint gone_by_{};     ///< a driver that still holds something then is stuck
-    bool exclusive_ = false;  ///< by us: another program's hold is not ours to lift
+    std::string last_latency_warning_;
+    TimePoint drain_deadline_{};  ///< a driver with unsent bytes after this is stuck
+    bool exclusive_ = false;      ///< set by us: another program's lock must stay
 };
 
 void TtyLine::begin_open() {
@@ -195,7 +195,7 @@ void TtyLine::begin_open() {
     opened();
 }
 
-/// Empty when the device is ready.
+/// Returns an empty text if the device is ready.
 std::string TtyLine::try_open() {
     const std::string& device = settings().device;
     const int access = settings().listen_only ? O_RDONLY : O_RDWR;
@@ -203,7 +203,7 @@ std::string TtyLine::try_open() {
     if (opened < 0) return explain_open_error(device, errno);
     if (std::string error = adopt(opened); !error.empty()) return error;
     if (flock(fd(), LOCK_EX | LOCK_NB) != 0) return holder_of_lock(fd()) + " holds it";
-    exclusive_ = ops_.control(fd(), TIOCEXCL, nullptr) >= 0;  // for those who ask for no lock
+    exclusive_ = ops_.control(fd(), TIOCEXCL, nullptr) >= 0;  // against programs without flock()
     return set_up();
 }
 
@@ -212,9 +212,10 @@ std::string TtyLine::set_up() {
     if (!result.error.empty()) return result.error;
     if (!settings().simulated) warn_once(last_warning_, "device settings differ", result.warning);
     driver_ = look_at_driver(fd(), ops_);
-    gone_by_ = clock().now() + kTransferTime;
+    drain_deadline_ = clock().now() + kTransferTime;
     errors_.opened(fd(), ops_);
-    warn_once(last_slow_, "slow adapter", ask_low_latency(fd(), settings().device, ops_));
+    warn_once(last_latency_warning_, "slow adapter",
+              ask_low_latency(fd(), settings().device, ops_));
     return set_up_sending();
 }
 
@@ -233,7 +234,7 @@ std::string TtyLine::set_up_sending() {
     std::abort();
 }
 
-/// Once a device, not at each of its openings.
+/// Warns once per device, not at each opening.
 void TtyLine::warn_once(std::string& last, const std::string& what, const std::string& why) {
     if (!why.empty() && why != last) {
         rt::log(rt::LogLevel::warn, what, {{"device", settings().device}, {"why", why}});
@@ -244,11 +245,11 @@ void TtyLine::warn_once(std::string& last, const std::string& what, const std::s
 void TtyLine::close_device(bool discard) {
     rts_.closing();
     if (std::exchange(exclusive_, false)) ops_.control(fd(), TIOCNXCL, nullptr);
-    std::optional<Impatience> impatience;
+    std::optional<CallInterrupter> interrupter;
     if (discard) {
         drop_unsent(fd(), ops_);
-        if (!holds_nothing()) impatience.emplace(kCloseWait);
-        // Nothing follows: whoever else is on the line must not find it held.
+        if (!is_drained()) interrupter.emplace(kCloseWait);
+        // Nothing follows: release the bus for the other stations.
         if (settings().rs485.mode == Rs485::Mode::rts)
             switch_rts(fd(), settings().rs485, false, ops_);
     }
@@ -257,8 +258,8 @@ void TtyLine::close_device(bool discard) {
 
 void TtyLine::write(ByteView bytes) {
     if (!is_open() || settings().listen_only) return;
-    if (holds_nothing()) {
-        gone_by_ =
+    if (is_drained()) {
+        drain_deadline_ =
             clock().now() + lead() + wire_time(settings().serial, bytes.size()) + kTransferTime;
     }
     if (settings().rs485.mode == Rs485::Mode::rts) return rts_.write(bytes);
@@ -268,7 +269,7 @@ void TtyLine::write(ByteView bytes) {
 bool TtyLine::undelivered() {
     if (!is_open()) return false;
     if (DescriptorLine::undelivered()) return true;
-    return clock().now() >= gone_by_ && !holds_nothing();
+    return clock().now() >= drain_deadline_ && !is_drained();
 }
 
 bool TtyLine::set_format(const SerialFormat& format) {

@@ -72,8 +72,8 @@ timespec to_timespec(Duration d) {
 
 }  // namespace
 
-Impatience::Impatience(Duration patience) {
-    // Once for the program: a signal that comes late must not meet the default, which ends it.
+CallInterrupter::CallInterrupter(Duration patience) {
+    // Once per program: a late signal must not meet the default action, which ends the program.
     static const bool handled = [] {
         struct sigaction nothing{};
         nothing.sa_handler = [](int) {};  // without SA_RESTART
@@ -88,7 +88,7 @@ Impatience::Impatience(Duration patience) {
     if (armed_) ::timer_settime(timer_, 0, &times, nullptr);
 }
 
-Impatience::~Impatience() {
+CallInterrupter::~CallInterrupter() {
     if (armed_) ::timer_delete(timer_);
 }
 

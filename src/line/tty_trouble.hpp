@@ -7,24 +7,23 @@
 
 namespace panelgate::line {
 
-/// Why open() of a device failed, with what would help: for EACCES who owns it, who we are, and the
-/// flag that Docker needs.
+/// Explains why open() of a device failed, and what would help: for EACCES its owner, the user of
+/// this process, and the flag that Docker needs.
 std::string explain_open_error(const std::string& device, int error);
-/// Who holds the flock() of this descriptor, from /proc/locks: "process 4711", or "another
-/// program".
+/// Returns the owner of the flock() on this descriptor, from /proc/locks: "process 4711", or
+/// "another program".
 std::string holder_of_lock(int fd);
 
-/// While it lives, a call of this thread that sleeps in the kernel is interrupted after `patience`,
-/// and again: one that is not started anew ends with EINTR. The last close() of a serial device
-/// sleeps for up to 30 s until its driver has sent everything (closing_wait, which only root may
-/// change), and on the one loop all lines would wait with it; interrupted, it drops the rest. Takes
-/// SIGALRM for it.
-class Impatience {
+/// While it lives, a blocking system call of this thread is interrupted after `patience`, and
+/// again: unless restarted, it ends with EINTR. The last close() of a serial device blocks for up
+/// to 30 s until its driver has sent everything (closing_wait, which only root may change), and
+/// with it all lines on the one loop; interrupted, it drops the rest. Uses SIGALRM.
+class CallInterrupter {
   public:
-    explicit Impatience(Duration patience);
-    ~Impatience();
-    Impatience(const Impatience&) = delete;
-    Impatience& operator=(const Impatience&) = delete;
+    explicit CallInterrupter(Duration patience);
+    ~CallInterrupter();
+    CallInterrupter(const CallInterrupter&) = delete;
+    CallInterrupter& operator=(const CallInterrupter&) = delete;
 
   private:
     timer_t timer_{};

@@ -33,7 +33,7 @@ void each_station(const Snapshot& snapshot, Add add) {
     }
 }
 
-/// Seen with 0 from a function's first use on: how that ends on any day.
+/// Outcomes that every function can have at any time; exported with 0 from its first use on.
 constexpr std::array kUsualOutcomes{Outcome::ok, Outcome::exception, Outcome::timeout};
 
 bool is_usual(Outcome outcome) {
@@ -196,7 +196,7 @@ constexpr std::array kUartCounters = {
                 &line::UartErrors::breaks},
 };
 
-/// Only of lines whose driver counts: an unknown number is absent, not 0 (P10).
+/// Exports only lines whose driver counts: an unknown number is absent, not 0 (P10).
 void add_uart_counters(Families& out, const Snapshot& snapshot) {
     for (const UartCounter& counter : kUartCounters) {
         Family family = make_counter(counter.name, counter.help);
@@ -356,7 +356,7 @@ constexpr Part kParts[] = {
 
 }  // namespace
 
-void exposition(const Snapshot& snapshot, const TakeText& take) {
+void exposition(const Snapshot& snapshot, const TextSink& take) {
     Families families(take);
     for (const Part add : kParts) {
         if (families.ended()) return;

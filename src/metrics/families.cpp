@@ -17,7 +17,7 @@ void Families::push_back(prometheus::MetricFamily family) {
     one.push_back(std::move(family));
     std::ostringstream text;
     prometheus::TextSerializer{}.Serialize(text, one);
-    ended_ = !take_(text.view());
+    ended_ = !sink_(text.view());
 }
 
 Family::Family(std::string name, std::string help, MetricType type) {

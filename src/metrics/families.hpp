@@ -12,18 +12,18 @@ namespace panelgate::metrics {
 
 using Labels = std::vector<prometheus::ClientMetric::Label>;
 
-/// Takes families as they are made and hands on their text: one is in memory at a time. A family
-/// without a metric has none.
+/// Serializes each family as soon as it is added, so only one is in memory at a time. A family
+/// without metrics produces no text.
 class Families {
   public:
-    explicit Families(const TakeText& take) : take_(take) {}
+    explicit Families(const TextSink& take) : sink_(take) {}
 
     void push_back(prometheus::MetricFamily family);
-    /// Nobody wants the text any more: what is still to be made need not be.
+    /// True once the receiver wants no more text; further families need not be made.
     bool ended() const { return ended_; }
 
   private:
-    const TakeText& take_;
+    const TextSink& sink_;
     bool ended_ = false;
 };
 
@@ -51,16 +51,16 @@ Family make_counter(std::string name, std::string help);
 Family make_gauge(std::string name, std::string help);
 Family make_histogram(std::string name, std::string help);
 
-/// Nothing when there is no HTTP server.
+/// Adds nothing if there is no HTTP server.
 void add_http(Families& out, const Snapshot& snapshot);
 
-/// Of the broker; nothing without one.
+/// Adds the MQTT families; nothing without a broker.
 void add_mqtt(Families& out, const Snapshot& snapshot);
 
 void add_points(Families& out, const Snapshot& snapshot);
 void add_relays(Families& out, const Snapshot& snapshot);
 
-/// Of masters on serial ports; nothing where there are none.
+/// Adds the families of serial masters; nothing if there are none.
 void add_serial_masters(Families& out, const Snapshot& snapshot);
 
 }  // namespace panelgate::metrics

@@ -39,7 +39,7 @@ std::optional<double> count_open_fds() {
         entry.increment(error);
     }
     if (error) return std::nullopt;
-    return count - 1;  // the directory itself was open
+    return count - 1;  // minus the descriptor of the directory itself
 }
 
 std::optional<double> max_fds() {

@@ -61,7 +61,7 @@ AsciiReader::Step AsciiReader::take(std::uint8_t character) {
     if (character == kBegin) {
         state_ = State::digits;
         bytes_.clear();
-        half_ = false;
+        has_half_byte_ = false;
         return Step::begun;
     }
     if (state_ == State::between) return Step::outside;
@@ -72,14 +72,14 @@ AsciiReader::Step AsciiReader::take(std::uint8_t character) {
 
 AsciiReader::Step AsciiReader::take_digit(std::uint8_t character) {
     if (character == kCarriageReturn) {
-        if (half_ || bytes_.size() < kMinBytes) return end(Step::broken);
+        if (has_half_byte_ || bytes_.size() < kMinBytes) return end(Step::broken);
         state_ = State::at_end;
         return Step::inside;
     }
     const auto value = value_of(character, digits_);
-    const bool full = bytes_.size() == longest_ && !half_;
+    const bool full = bytes_.size() == longest_ && !has_half_byte_;
     if (!value || full) return end(Step::broken);
-    if (std::exchange(half_, !half_)) {
+    if (std::exchange(has_half_byte_, !has_half_byte_)) {
         bytes_.back() = static_cast<std::uint8_t>(unsigned{bytes_.back()} << 4 | *value);
         return Step::byte;
     }
@@ -89,7 +89,7 @@ AsciiReader::Step AsciiReader::take_digit(std::uint8_t character) {
 
 AsciiReader::Step AsciiReader::end(Step step) {
     state_ = State::between;
-    if (std::exchange(half_, false)) bytes_.pop_back();
+    if (std::exchange(has_half_byte_, false)) bytes_.pop_back();
     return step;
 }
 
@@ -118,7 +118,7 @@ std::optional<SerialAdu> AsciiFramer::next() {
     return adu;
 }
 
-/// Does it make a frame whole?
+/// True if the character completes a frame.
 bool AsciiFramer::take(std::uint8_t character) {
     if (character == kBegin && partial()) drop();
     switch (reader_.take(character)) {
@@ -152,9 +152,9 @@ std::size_t AsciiFramer::take_faults() { return std::exchange(faults_, 0); }
 
 namespace {
 
-constexpr std::size_t kHead = 2;  // station and function: the LRC stands behind them
-/// With the LRC in place of the CRC. Panels and requests are longer than the standard here and
-/// there (REST, polls), as in RTU.
+constexpr std::size_t kHead = 2;  // station and function; the LRC comes later
+/// With the LRC in place of the CRC. Frames of some panels and requests (REST, polls) exceed the
+/// standard's length, as in RTU.
 constexpr std::size_t kLongest = kMaxLongRequestPdu + 2;
 
 }  // namespace
@@ -215,14 +215,14 @@ void AsciiTranscript::take(std::uint8_t character, Piece& piece) {
             piece.end = Piece::End::frame;
             return;
         case AsciiReader::Step::broken:
-            if (!last) return break_off(character, piece);
+            if (!last) return abort_frame(character, piece);
             write_check(piece, false);
             piece.end = Piece::End::damage;
             return;
     }
 }
 
-/// The last byte may be the LRC: it is given when the next one shows that it is not.
+/// Writes the bytes with a delay of one: the last one may be the LRC.
 void AsciiTranscript::write_byte(Piece& piece) {
     const Bytes& bytes = reader_.bytes();
     const std::size_t here = bytes.size();
@@ -233,14 +233,14 @@ void AsciiTranscript::write_byte(Piece& piece) {
     }
 }
 
-/// It never was an LRC.
+/// Writes the delayed byte, which was no LRC.
 void AsciiTranscript::write_rest(Piece& piece) {
     if (!reader_.partial()) return;
     reader_.give_up();
     if (reader_.bytes().size() > kHead) piece.bytes.push_back(reader_.bytes().back());
 }
 
-/// In the place of the LRC. A wrong one is wrong in either order.
+/// Writes a CRC in place of the LRC; a wrong one is wrong in either order.
 void AsciiTranscript::write_check(Piece& piece, bool good) {
     const std::uint16_t crc = crc16(ByteView(reader_.bytes()).first(reader_.bytes().size() - 1));
     const auto low = static_cast<std::uint8_t>(crc & 0xFF);
@@ -249,8 +249,8 @@ void AsciiTranscript::write_check(Piece& piece, bool good) {
     piece.bytes.push_back(high);
 }
 
-/// The rest of the line belongs to what is damaged.
-void AsciiTranscript::break_off(std::uint8_t character, Piece& piece) {
+/// Breaks off a damaged frame; the rest of its line belongs to it.
+void AsciiTranscript::abort_frame(std::uint8_t character, Piece& piece) {
     if (reader_.bytes().size() > kHead) piece.bytes.push_back(reader_.bytes().back());
     piece.bytes.push_back(character);
     noise_ = true;

@@ -76,7 +76,7 @@ Bytes encode_mbap(std::uint16_t transaction, std::uint8_t unit, ByteView pdu) {
 
 namespace {
 
-/// The first ADU of the stream is there, whole.
+/// True if the stream begins with a whole ADU.
 bool begins_with_mbap(ByteView first) {
     MbapFramer framer;
     framer.feed(first);
@@ -84,7 +84,7 @@ bool begins_with_mbap(ByteView first) {
     return event && std::holds_alternative<Adu>(*event);
 }
 
-/// Size of the request at the front that nobody would send by accident; 0: there is none.
+/// Size of the plausible request at the front; 0 if there is none.
 std::size_t rtu_request(ByteView bytes) {
     const RequestLength length = request_length(bytes);
     if (length.kind != RequestLength::Kind::known || length.length > bytes.size()) return 0;
@@ -94,8 +94,8 @@ std::size_t rtu_request(ByteView bytes) {
     return broadcast && !is_broadcastable(frame->pdu[0]) ? 0 : length.length;
 }
 
-/// Of a Modbus/TCP listener: a transaction id in 65536 would make the bytes of a good ADU fit a
-/// CRC, so they are doubted only when they are nothing but RTU, or no ADU.
+/// On a Modbus/TCP listener one transaction id in 65536 makes a valid ADU fit a CRC: so the bytes
+/// count as RTU only if they are nothing but RTU, or do not begin with an ADU.
 bool speaks_rtu(Framing expected, ByteView first) {
     std::size_t taken = 0;
     while (const std::size_t size = rtu_request(first.subspan(taken))) taken += size;
@@ -103,7 +103,7 @@ bool speaks_rtu(Framing expected, ByteView first) {
     return expected != Framing::tcp || taken == first.size() || !begins_with_mbap(first);
 }
 
-/// Nothing but whole requests that somebody would send.
+/// True if the bytes are nothing but whole, plausible requests.
 bool is_mbap(ByteView first) {
     MbapFramer framer;
     framer.feed(first);
@@ -116,7 +116,7 @@ bool is_mbap(ByteView first) {
     return any && !framer.partial();
 }
 
-/// Bytes that may still become a request in RTU are left alone.
+/// Bytes that may still become an RTU request are left alone.
 bool speaks_tcp(Framing expected, ByteView first) {
     if (!is_mbap(first)) return false;
     if (expected != Framing::rtu) return true;

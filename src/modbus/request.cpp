@@ -25,7 +25,7 @@ std::uint16_t field(ByteView pdu, std::size_t offset) {
     return in.u16();
 }
 
-/// 0F and 10: the byte count at offset 5 says what follows and what the quantity needs.
+/// 0F and 10: the byte count at offset 5 must match the data and the quantity.
 bool is_multiple_write(ByteView pdu, std::size_t data_size) {
     constexpr std::size_t kHeader = 6;
     return pdu.size() >= kHeader && pdu[kHeader - 1] == data_size &&
@@ -43,7 +43,7 @@ bool is_file_read(ByteView pdu) {
     return pdu.size() >= 2 && pdu.size() == 2u + pdu[1] && pdu[1] % kFileReference == 0;
 }
 
-/// The sub-requests of 15h add up to the byte count exactly.
+/// 15h: the sub-requests add up to the byte count exactly.
 bool is_file_write(ByteView pdu) {
     if (pdu.size() < 2 || pdu.size() != 2u + pdu[1]) return false;
     Reader in(pdu.subspan(2));
@@ -62,7 +62,7 @@ bool is_encapsulated(ByteView pdu) {
     return pdu.size() >= 2 && (pdu[1] != kMeiDeviceIdentification || pdu.size() == 4);
 }
 
-/// Lengths of requests (PDU-07). Functions without a row have no rule.
+/// Request lengths (PDU-07). Functions without a case have no rule.
 bool length_matches(ByteView pdu) {
     switch (pdu[0]) {
         case kReadCoils:
@@ -115,7 +115,7 @@ Limits limits_of(QuantityCheck check) {
     std::abort();
 }
 
-/// What the sub-requests of 14h ask for: a length byte, a type byte and 2N data bytes each.
+/// Data size of the reply to 14h: a length byte, a type byte and 2N data bytes per sub-request.
 std::size_t file_reply_size(ByteView pdu) {
     Reader in(pdu);
     in.take(2);

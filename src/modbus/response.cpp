@@ -14,21 +14,23 @@ namespace {
 
 constexpr std::size_t kAddressAndCount = 5;  // function, address, quantity
 
-/// Function, byte count, then exactly as many bytes.
-bool counts_itself(ByteView reply) { return reply.size() >= 2 && reply.size() == 2u + reply[1]; }
+/// True for function, byte count and exactly as many bytes.
+bool has_true_byte_count(ByteView reply) {
+    return reply.size() >= 2 && reply.size() == 2u + reply[1];
+}
 
-/// The first `size` bytes of the request, and nothing else.
+/// True if the reply is the first `size` bytes of the request.
 bool repeats(ByteView request, ByteView reply, std::size_t size) {
     return request.size() >= size && reply.size() == size &&
            std::equal(reply.begin(), reply.end(), request.begin());
 }
 
-/// As large as the request lets expect (FRM-04).
+/// True if the reply has the length that the request determines (FRM-04).
 bool has_expected_size(ByteView request, ByteView reply) {
     return reply_length_from_request(request) == reply.size() + kAduOverhead;
 }
 
-/// 08: the sub-function comes back; 0000 returns the whole request.
+/// 08: the sub-function is echoed; 0000 returns the whole request.
 bool answers_diagnostics(ByteView request, ByteView reply) {
     if (request.size() < 3 || !has_expected_size(request, reply)) return false;
     const bool loopback = request[1] == 0 && request[2] == 0;
@@ -40,7 +42,7 @@ bool answers_diagnostics(ByteView request, ByteView reply) {
 
 /// 14h: each group has the length and the reference type that its sub-request asked for.
 bool answers_file_read(ByteView request, ByteView reply) {
-    if (!counts_itself(reply) || !has_expected_size(request, reply)) return false;
+    if (!has_true_byte_count(reply) || !has_expected_size(request, reply)) return false;
     Reader asked(request.subspan(2));
     Reader given(reply.subspan(2));
     while (asked.ok() && asked.left() > 0) {
@@ -53,7 +55,7 @@ bool answers_file_read(ByteView request, ByteView reply) {
     return asked.finished() && given.finished();
 }
 
-/// 18h: a byte count of two bytes, which counts the value count and the values.
+/// 18h: a byte count of two bytes, which covers the value count and the values.
 bool is_fifo_reply(ByteView reply) {
     Reader in(reply);
     in.u8();
@@ -63,8 +65,8 @@ bool is_fifo_reply(ByteView reply) {
     return in.finished() && byte_count == 2 + 2 * values;
 }
 
-/// 2B: the MEI type comes back; with 0E also the code, in a header of 7 bytes. The objects are not
-/// walked: panels miscount them (FRM-10).
+/// 2B: the MEI type is echoed; with 0E also the code, in a header of 7 bytes. The objects are not
+/// parsed: panels miscount them (FRM-10).
 bool answers_encapsulated(ByteView request, ByteView reply) {
     if (request.size() < 2 || reply.size() < 2 || reply[1] != request[1]) return false;
     if (request[1] != kMeiDeviceIdentification) return true;
@@ -83,7 +85,7 @@ bool answers(ByteView request, ByteView reply) {
         case kReadHoldingRegisters:
         case kReadInputRegisters:
         case kReadWriteMultipleRegisters:
-            return counts_itself(reply) && has_expected_size(request, reply);
+            return has_true_byte_count(reply) && has_expected_size(request, reply);
         case kWriteSingleCoil:
         case kWriteSingleRegister:
         case kWriteFileRecord:
@@ -99,7 +101,7 @@ bool answers(ByteView request, ByteView reply) {
             return answers_diagnostics(request, reply);
         case kGetCommEventLog:
         case kReportServerId:
-            return counts_itself(reply);
+            return has_true_byte_count(reply);
         case kReadFileRecord:
             return answers_file_read(request, reply);
         case kReadFifoQueue:
@@ -150,25 +152,25 @@ SingleWrite single_write(const Bytes& pdu) {
     return {address, in.u16()};
 }
 
-std::optional<Bytes> coil_by_coils(const Bytes& pdu) {
+std::optional<Bytes> as_write_coils(const Bytes& pdu) {
     constexpr std::uint16_t kOn = 0xFF00;
     const SingleWrite write = single_write(pdu);
     if (write.value != kOn && write.value != 0) return std::nullopt;
     return encode_write_coils(write.address, {write.value == kOn});
 }
 
-Bytes register_by_registers(const Bytes& pdu) {
+Bytes as_write_registers(const Bytes& pdu) {
     const SingleWrite write = single_write(pdu);
     return encode_write_registers(write.address, {write.value});
 }
 
-std::optional<Bytes> by_other_function(const Bytes& pdu) {
+std::optional<Bytes> with_other_function(const Bytes& pdu) {
     Bytes same = pdu;
     switch (pdu[0]) {
         case kWriteSingleCoil:
-            return coil_by_coils(pdu);
+            return as_write_coils(pdu);
         case kWriteSingleRegister:
-            return register_by_registers(pdu);
+            return as_write_registers(pdu);
         case kReadDiscreteInputs:
             same[0] = kReadCoils;
             return same;
@@ -183,7 +185,7 @@ std::optional<Bytes> by_other_function(const Bytes& pdu) {
 }  // namespace
 
 std::optional<Request> translated(const Request& request) {
-    auto pdu = by_other_function(request.pdu());
+    auto pdu = with_other_function(request.pdu());
     if (!pdu) return std::nullopt;
     auto made = Request::make(std::move(*pdu), QuantityCheck::wide);
     if (!made) return std::nullopt;

@@ -11,7 +11,7 @@
 
 namespace panelgate::modbus {
 
-/// Of the reply at the front. 0: that cannot be told yet, or only by silence.
+/// Length of the reply at the front. 0: not known yet, or only by silence.
 inline std::size_t known_reply_length(ByteView heard) {
     const ReplyLength length = reply_length(heard);
     return length.kind == ReplyLength::Kind::known ? length.length : 0;
@@ -93,7 +93,7 @@ ReplyFramer::ReplyFramer(std::uint8_t station, Bytes request_pdu, const CrcOrder
 std::optional<Bytes> ReplyFramer::feed(ByteView bytes) {
     heard_.insert(heard_.end(), bytes.begin(), bytes.end());
     if (ends_ == Ends::told) {
-        look_at_head();
+        find_start_at_head();
     } else if (auto reply = scan(false)) {
         return reply;
     }
@@ -118,8 +118,8 @@ std::optional<Bytes> ReplyFramer::on_end(bool good) {
     return reply;
 }
 
-/// A frame begins with what was fed first.
-void ReplyFramer::look_at_head() {
+/// The frame begins with the first byte fed.
+void ReplyFramer::find_start_at_head() {
     if (looked_ > 0 || heard_.size() < 2) return;
     looked_ = heard_.size();
     open_length_ = is_start(heard_[0], heard_[1]);
@@ -131,8 +131,8 @@ std::vector<Unused> ReplyFramer::take_unused() {
     return std::exchange(unused_, {});
 }
 
-/// Judges the possible starts from the first on. One that still waits for bytes holds up the later
-/// ones: bytes inside a reply must not pass for a reply.
+/// Judges the possible starts in order. One that still waits for bytes blocks the later ones: bytes
+/// inside a reply must not pass for a reply.
 std::optional<Bytes> ReplyFramer::scan(bool silence) {
     collect_starts();
     open_length_ = false;
@@ -157,8 +157,8 @@ std::optional<Bytes> ReplyFramer::scan(bool silence) {
     return std::nullopt;
 }
 
-/// Data of another frame may look like the reply: as long as the other one may still become whole
-/// nobody knows.
+/// Whether [start, end) lies in another frame, whose data may look like the reply; `perhaps`
+/// while that frame may still become complete.
 ReplyFramer::Inside ReplyFramer::inside_other(std::size_t start, std::size_t end) const {
     Inside result = Inside::no;
     for (std::size_t i = 0; i < start; ++i) {
@@ -219,14 +219,14 @@ void ReplyFramer::collect_starts() {
     }
 }
 
-/// How many bytes the frame at the front of `rest` has: 0 = none can be there; more than there are
-/// = wait for them.
+/// Size of the frame at the front of `rest`: 0 = no frame possible; more than available = wait for
+/// more.
 std::size_t ReplyFramer::frame_size(ByteView rest, bool silence) const {
     ReplyLength want = reply_length(rest);
     const bool exception = (rest[1] & kExceptionBit) != 0;
     if (exception) return want.length;
     if (want.kind == ReplyLength::Kind::by_silence && expected_) want = known(*expected_);
-    // An object count that disagrees with the bytes leaves it to silence and the CRC (FRM-10).
+    // If the object count disagrees with the bytes, silence and the CRC decide (FRM-10).
     const bool walked = rest[1] == kEncapsulatedInterface;
     const bool incomplete = want.kind != ReplyLength::Kind::known || want.length > rest.size();
     if (silence && incomplete && (walked || want.kind == ReplyLength::Kind::by_silence))
@@ -236,8 +236,8 @@ std::size_t ReplyFramer::frame_size(ByteView rest, bool silence) const {
     return want.length;
 }
 
-/// The reply PDU, if a good answer starts at `start`. `open` says that more bytes could still make
-/// it one.
+/// Returns the reply PDU if a valid reply begins at `start`. `open` is set if more bytes could
+/// still complete one.
 std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& open) const {
     const ByteView rest = ByteView(heard_).subspan(start);
     const std::size_t size = frame_size(rest, silence);
@@ -247,7 +247,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
         return std::nullopt;
     }
     if (!crc_ok(rest.first(size), orders_) && rest[1] == kEncapsulatedInterface) {
-        // An object count that is too low: only silence tells the end (FRM-10).
+        // The object count is too low: only silence marks the end (FRM-10).
         open = !silence;
         if (!silence || !crc_ok(rest, orders_)) return std::nullopt;
         return answering(rest);
@@ -255,7 +255,7 @@ std::optional<Bytes> ReplyFramer::judge(std::size_t start, bool silence, bool& o
     return answering(rest.first(size));
 }
 
-/// The PDU of this frame, when it is good and answers.
+/// Returns the PDU of this frame if it is valid and matches the request.
 std::optional<Bytes> ReplyFramer::answering(ByteView frame) const {
     if (frame.size() > kMaxLongRtuAdu || !crc_ok(frame, orders_)) return std::nullopt;
     const ByteView pdu = pdu_of(frame);
@@ -275,7 +275,7 @@ std::optional<Bytes> ReplyFramer::accept(std::size_t start, Bytes pdu) {
     return pdu;
 }
 
-/// Gives up the first `count` bytes heard.
+/// Discards the first `count` received bytes.
 void ReplyFramer::discard(std::size_t count) {
     classify(ByteView(heard_).first(count));
     heard_.erase(heard_.begin(), heard_.begin() + static_cast<std::ptrdiff_t>(count));
@@ -284,7 +284,7 @@ void ReplyFramer::discard(std::size_t count) {
     if (ends_ == Ends::by_length) collect_starts();
 }
 
-// What is heard and is no reply: what it was instead.
+// Received bytes that are no reply: their classification.
 
 bool ReplyFramer::holds_start(ByteView bytes) const {
     if (ends_ == Ends::told) return bytes.size() > 1 && is_start(bytes[0], bytes[1]);
@@ -294,7 +294,7 @@ bool ReplyFramer::holds_start(ByteView bytes) const {
     return false;
 }
 
-/// Not a part of our own frame, which may begin like it.
+/// True for our damaged reply, and not for our own frame, which may begin like it.
 bool ReplyFramer::is_own_reply(ByteView damaged) const {
     if (!is_read(request_[0]) || !expected_) return false;
     const auto count = static_cast<std::uint8_t>(*expected_ - kReadReplyOverhead);
@@ -316,7 +316,7 @@ void ReplyFramer::step_over(Unused part) {
         damaged_whole_ = damaged_whole_ || part.bytes.size() >= expected_.value_or(0);
         own_header_ = own_header_ || is_own_reply(part.bytes);
     }
-    constexpr std::size_t kKept = 64;  // parts; beyond, only their bytes matter
+    constexpr std::size_t kKept = 64;  // parts; further bytes go to the last one
     if (unused_.size() < kKept) {
         unused_.push_back(std::move(part));
     } else if (unused_.back().bytes.size() < kMaxHeard) {

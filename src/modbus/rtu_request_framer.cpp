@@ -14,25 +14,27 @@ using Kind = RequestLength::Kind;
 
 RequestLength known(std::size_t length) { return {Kind::known, length}; }
 
-/// `overhead`, and what the byte at `count` says.
+/// Returns `overhead` plus the value of the byte at `count`.
 RequestLength counted(ByteView b, std::size_t count, std::size_t overhead) {
     return b.size() <= count ? RequestLength{} : known(overhead + b[count]);
 }
 
 bool is_frame(ByteView b) { return b.size() >= kMinAdu && b.size() <= kMaxRtuAdu && crc_ok(b); }
 
-/// Size of the good frame of a known length that begins here; 0: there is none.
+/// Size of the valid frame of known length that begins here; 0 if there is none.
 std::size_t known_frame(ByteView b) {
     const RequestLength length = request_length(b);
     if (length.kind != Kind::known || length.length > b.size()) return 0;
     return is_frame(b.first(length.length)) ? length.length : 0;
 }
 
-/// 08/0000 with one word of data, whose CRC has not come.
-bool may_be_usual(ByteView b) { return b[1] == kDiagnostics && b.size() < kReadRequestAdu; }
+/// True if it may be 08/0000 with one word of data, before its CRC is complete.
+bool may_be_usual_diagnostics(ByteView b) {
+    return b[1] == kDiagnostics && b.size() < kReadRequestAdu;
+}
 
-/// A function of somebody's own, whose data may begin behind it.
-bool may_hide_at_once(ByteView b) {
+/// True for a function without a length rule, whose data may begin right after it.
+bool may_hide_data(ByteView b) {
     if (b.size() < 2 || b[1] == 0 || (b[1] & kExceptionBit) != 0) return false;
     return request_length(b).kind == Kind::by_silence;
 }
@@ -110,7 +112,8 @@ RtuRequestFramer::Judgement RtuRequestFramer::judge(ByteView start) const {
     const RequestLength length = usual_request_length(start);
     if (length.kind == Kind::need_more) return {Judgement::Kind::open};
     if (length.kind == Kind::by_silence) {
-        const bool may_be = (trusted_ && start.size() <= kMaxRtuAdu) || may_be_usual(start);
+        const bool may_be =
+            (trusted_ && start.size() <= kMaxRtuAdu) || may_be_usual_diagnostics(start);
         return {may_be ? Judgement::Kind::open : Judgement::Kind::nothing};
     }
     if (length.length > kMaxRtuAdu) return {};
@@ -129,13 +132,13 @@ void RtuRequestFramer::on_silence() {
         step_over(start);
         break;
     }
-    // What waits is left of something damaged, and what comes next begins by itself; not so if it
-    // was a request that is half there, whose rest may come behind the pause.
-    if (was_lost && !trusted_ && silence_behind_ == 0) silence_behind_ = heard_.size();
+    // Pending bytes are left of a damaged frame, and the next frame begins after this silence; not
+    // so if they are half a request, whose rest may follow the pause.
+    if (was_lost && !trusted_ && bytes_to_silence_ == 0) bytes_to_silence_ = heard_.size();
 }
 
-/// Size of the frame at the front that nothing but a silence tells: it ends with what has come, or
-/// where a frame of a known length begins. 0: there is none.
+/// Size of the frame at the front that only silence ends: it ends with the last byte, or where a
+/// frame of known length begins. 0 if there is none.
 std::size_t RtuRequestFramer::size_by_silence() const {
     const ByteView all = heard_.view();
     if (!trusted_) return 0;
@@ -152,48 +155,48 @@ SerialAdu RtuRequestFramer::take(std::size_t size) {
     if (sure()) trust();
     discarded_ = 0;
     aligned_ = true;
-    go_on_in_row(size);
+    extend_run(size);
     return adu;
 }
 
-/// A good frame that may be data.
+/// Rejects a valid frame that may be data.
 void RtuRequestFramer::refuse(std::size_t size) {
     ++faults_;
     discarded_ += size;
-    go_on_in_row(size);
+    extend_run(size);
 }
 
 void RtuRequestFramer::step_over(std::size_t count) {
     if (std::exchange(aligned_, false)) ++faults_;
-    if (trusted_) lose_trust();
+    if (trusted_) clear_trust();
     discarded_ += count;
-    in_row_ = 0;
+    run_length_ = 0;
     consume(count);
 }
 
-void RtuRequestFramer::lose_trust() {
+void RtuRequestFramer::clear_trust() {
     constexpr std::size_t kGlitch = 3;  // of a transceiver that is switched
     trusted_ = false;
     since_lost_ = 0;
-    in_row_ = 0;
-    silence_behind_ = 0;
-    glitch_limit_ = may_hide_at_once(heard_.view()) ? 1 : kGlitch;
+    run_length_ = 0;
+    bytes_to_silence_ = 0;
+    glitch_limit_ = may_hide_data(heard_.view()) ? 1 : kGlitch;
 }
 
 void RtuRequestFramer::trust() { aligned_ = trusted_ = true; }
 
-void RtuRequestFramer::go_on_in_row(std::size_t size) {
+void RtuRequestFramer::extend_run(std::size_t size) {
     consume(size);
-    in_row_ += size;
-    if (in_row_ > kMaxRtuAdu) trust();
+    run_length_ += size;
+    if (run_length_ > kMaxRtuAdu) trust();
 }
 
 void RtuRequestFramer::consume(std::size_t count) {
     heard_.take(count);
     since_lost_ += count;
-    if (silence_behind_ == 0) return;
-    if (silence_behind_ == count) trust();
-    silence_behind_ -= std::min(silence_behind_, count);
+    if (bytes_to_silence_ == 0) return;
+    if (bytes_to_silence_ == count) trust();
+    bytes_to_silence_ -= std::min(bytes_to_silence_, count);
 }
 
 void RtuRequestFramer::drop_pending() {

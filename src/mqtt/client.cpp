@@ -25,11 +25,11 @@
 
 namespace panelgate::mqtt {
 
-/// Makes connections beside the loop: names are looked up, and a silent network is waited for, in a
-/// thread of their own that nobody waits for, also at the program's end. One at a time.
+/// Connects without blocking the loop: name look-up and connect run in a detached thread, which is
+/// never joined, not even at program exit. One connection at a time.
 class Dialling {
   public:
-    /// With the connection, and why it could not be made.
+    /// Receives the connection, and the error text ("" on success).
     using Done = std::function<void(std::shared_ptr<Connection>, const std::string& failed)>;
 
     explicit Dialling(boost::asio::any_io_executor executor);
@@ -37,15 +37,14 @@ class Dialling {
     Dialling(const Dialling&) = delete;
     Dialling& operator=(const Dialling&) = delete;
 
-    /// `done` comes from the loop, once, unless cancel() or the end of this object is sooner. Not
-    /// while one is under way.
+    /// Calls `done` once from the loop, unless cancelled or destroyed first. Not while under way.
     void connect(std::shared_ptr<Connection> connection, Message will, Done done);
     void cancel();
     bool under_way() const;
 
   private:
     struct State;
-    std::shared_ptr<State> state_;  ///< the thread's share of it
+    std::shared_ptr<State> state_;  ///< shared with the thread
 };
 
 namespace asio = boost::asio;
@@ -94,7 +93,7 @@ void Leaving::State::drain() {
                           });
 }
 
-/// False: the broker has closed as well, or there is no connection any more.
+/// Discards input; false if the broker has closed or the connection failed.
 bool Leaving::State::discard() {
     std::array<char, 4096> nobody_reads{};
     while (true) {
@@ -131,17 +130,17 @@ struct Dialling::State : std::enable_shared_from_this<Dialling::State> {
     void dial(std::shared_ptr<Connection> connection, const Message& will);
     void tell(std::shared_ptr<Connection> connection, const std::string& failed);
 
-    std::mutex mutex;                           ///< of `loop`, all that the thread shares
-    std::optional<asio::any_io_executor> loop;  ///< nothing: nobody is there any more
+    std::mutex mutex;                           ///< guards `loop`, all that the thread shares
+    std::optional<asio::any_io_executor> loop;  ///< nullopt: the owner is gone
     Done done;
     bool under_way = false;
 };
 
-/// In the thread. The loop may have ended meanwhile, and only the lock tells.
+/// Runs in the thread. The loop may have ended meanwhile; checked under the lock.
 void Dialling::State::dial(std::shared_ptr<Connection> connection, const Message& will) {
     sigset_t all;
     sigfillset(&all);
-    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // they are the loop's
+    ::pthread_sigmask(SIG_BLOCK, &all, nullptr);  // signals belong to the loop's thread
     std::string failed = connection->connect(will);
     const std::lock_guard lock(mutex);
     if (!loop) return;
@@ -183,7 +182,7 @@ void Dialling::cancel() { state_->done = nullptr; }
 bool Dialling::under_way() const { return state_->under_way; }
 
 namespace {
-constexpr Duration kLook = 1s;  // libmosquitto wants to be looked after so often
+constexpr Duration kLook = 1s;  // interval for libmosquitto's housekeeping
 }
 
 struct Client::State : std::enable_shared_from_this<Client::State> {
@@ -200,10 +199,10 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     void dial();
     void dialled(std::shared_ptr<Connection> made, const std::string& failed);
     void attach();
-    void wait_for_bytes();
-    void wait_for_room();
+    void await_readable();
+    void await_writable();
     void read();
-    void look_after();
+    void housekeep();
     void digest();
     void accepted();
     void take_commands(const std::vector<Connection::Received>& received);
@@ -212,7 +211,7 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     void pump();
     void wake();
     bool send(const Publisher::Outgoing& outgoing);
-    /// For completions: nothing of a connection that has gone.
+    /// Guards completions: false once their connection is gone.
     auto current() {
         return [self = shared_from_this(), now = attempt] {
             return self->running && self->attempt == now;
@@ -226,17 +225,17 @@ struct Client::State : std::enable_shared_from_this<Client::State> {
     OnCommand on_command;
     Dialling dialling;
     line::Reopen pauses;
-    std::unique_ptr<rt::Alarm> alarm;  ///< the next attempt, or the next look
+    std::unique_ptr<rt::Alarm> alarm;  ///< next attempt, or next housekeeping
     std::shared_ptr<Connection> connection;
-    /// Of the same socket as libmosquitto's, which closes its own whenever it likes.
+    /// A duplicate of libmosquitto's socket, which libmosquitto may close at any time.
     std::optional<stream_descriptor> descriptor;
     OpenMessages open;
     std::uint64_t attempt = 0;
-    std::optional<TimePoint> accept_by;  ///< the broker has not said yet whether it takes us
+    std::optional<TimePoint> connack_due;  ///< CONNACK deadline, while it is awaited
     bool running = false;
     bool accepted_once = false;
     bool connected = false;
-    bool awake = false;  ///< a turn is to come
+    bool awake = false;  ///< a pump() is posted
     bool writing = false;
     std::uint64_t published = 0;
     std::uint64_t reconnects = 0;
@@ -258,17 +257,17 @@ void Client::State::dialled(std::shared_ptr<Connection> made, const std::string&
     const int own = ::dup(connection->socket());
     if (own < 0) return lost(std::strerror(errno));
     descriptor.emplace(executor, own);
-    accept_by = clock.now() + settings.accepted_in;
+    connack_due = clock.now() + settings.connack_timeout;
     attach();
 }
 
 void Client::State::attach() {
-    wait_for_bytes();
-    wait_for_room();
-    look_after();
+    await_readable();
+    await_writable();
+    housekeep();
 }
 
-void Client::State::wait_for_bytes() {
+void Client::State::await_readable() {
     descriptor->async_wait(stream_descriptor::wait_read,
                            [this, is_current = current()](const error_code& error) {
                                if (!is_current()) return;
@@ -280,13 +279,13 @@ void Client::State::wait_for_bytes() {
 void Client::State::read() {
     const std::string why = connection->read();
     digest();
-    if (!connection) return;  // the broker has refused us
+    if (!connection) return;  // the broker refused the connection
     if (!why.empty()) return lost(why);
-    wait_for_bytes();
+    await_readable();
     wake();
 }
 
-void Client::State::wait_for_room() {
+void Client::State::await_writable() {
     if (writing || !connection->wants_write()) return;
     writing = true;
     descriptor->async_wait(stream_descriptor::wait_write,
@@ -297,31 +296,31 @@ void Client::State::wait_for_room() {
                                const std::string why = connection->write();
                                if (!why.empty()) return lost(why);
                                wake();
-                               wait_for_room();
+                               await_writable();
                            });
 }
 
-void Client::State::look_after() {
-    if (accept_by && clock.now() >= *accept_by) return lost("the broker does not answer");
-    const std::string why = connection->look_after();
+void Client::State::housekeep() {
+    if (connack_due && clock.now() >= *connack_due) return lost("the broker does not answer");
+    const std::string why = connection->housekeep();
     if (!why.empty()) return lost(why);
-    wait_for_room();
-    alarm->arm(clock.now() + kLook, [this] { look_after(); });
+    await_writable();
+    alarm->arm(clock.now() + kLook, [this] { housekeep(); });
 }
 
-/// What libmosquitto has told while it read.
+/// Processes the events libmosquitto reported while reading.
 void Client::State::digest() {
     const Connection::Happened happened = connection->take();
     if (!happened.refused.empty()) return lost("the broker refuses: " + happened.refused);
     if (happened.accepted) accepted();
-    if (!happened.delivered.empty()) pauses.succeeded();  // it keeps us, and takes what we say
+    if (!happened.delivered.empty()) pauses.succeeded();  // a stable session that accepts messages
     for (const int id : happened.delivered)
         for (const std::uint64_t change : open.delivered(id)) publisher.delivered(change);
     take_commands(happened.received);
 }
 
 void Client::State::accepted() {
-    accept_by.reset();
+    connack_due.reset();
     connected = true;
     if (accepted_once) ++reconnects;
     accepted_once = true;
@@ -345,7 +344,7 @@ void Client::State::lost(const std::string& why) {
     ++attempt;
     connected = false;
     writing = false;
-    accept_by.reset();
+    connack_due.reset();
     descriptor.reset();
     connection.reset();
     open.clear();
@@ -366,7 +365,7 @@ void Client::State::wake() {
     });
 }
 
-/// Fills what may be on its way, as long as the socket takes it.
+/// Sends messages up to the in-flight limit, as long as the socket accepts them.
 void Client::State::pump() {
     std::size_t sent = 0;
     while (open.size() < settings.in_flight && !connection->wants_write()) {
@@ -379,7 +378,7 @@ void Client::State::pump() {
         if (!send(*outgoing)) return lost("the connection takes nothing");
     }
     if (open.wants_barrier()) open.barrier(connection->barrier());
-    wait_for_room();
+    await_writable();
 }
 
 bool Client::State::send(const Publisher::Outgoing& outgoing) {
@@ -412,7 +411,7 @@ std::unique_ptr<Leaving> Client::stop() {
         state_->connection->disconnect();
         leaving = std::make_unique<Leaving>(state_->executor, state_->descriptor->release(),
                                             state_->clock, std::move(state_->connection),
-                                            state_->settings.leave_within);
+                                            state_->settings.disconnect_timeout);
     }
     state_->descriptor.reset();
     state_->connection.reset();

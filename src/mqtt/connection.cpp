@@ -11,13 +11,13 @@ namespace panelgate::mqtt {
 
 namespace {
 
-/// The C library's state, for as long as the program runs.
+/// Initialises the C library, once per program.
 void set_up_library() {
     static const int ready = mosquitto_lib_init();
     static_cast<void>(ready);
 }
 
-/// errno is of the call that has just failed.
+/// Returns the error text; errno must be that of the failed call.
 std::string why(int code) {
     if (code == MOSQ_ERR_SUCCESS) return "";
     if (code == MOSQ_ERR_ERRNO) return std::strerror(errno);
@@ -36,13 +36,13 @@ mosquitto* new_session(const std::string& client_id, void* owner) {
 }
 
 constexpr int kVerifyPeer = 1;  // SSL_VERIFY_PEER
-constexpr int kReads = 64;      // of one wake-up
+constexpr int kReads = 64;      // per wake-up
 constexpr const char* kNothing = "panelgate/barrier";
 constexpr const char* kSystemTrust = "/etc/ssl/certs";
 
 }  // namespace
 
-/// In the order of libmosquitto's parameters; nothing is called back from here.
+/// libmosquitto's callbacks, with its parameter order; they do not call back into it.
 struct Connection::Callbacks {
     static Connection& of(void* owner) { return *static_cast<Connection*>(owner); }
 
@@ -60,7 +60,7 @@ struct Connection::Callbacks {
     static void received(mosquitto*, void* owner, const mosquitto_message* message) {
         const Settings& settings = of(owner).settings_;
         const auto size = static_cast<std::size_t>(message->payloadlen);
-        // What is too long is told apart by one byte more.
+        // One byte more marks an oversized payload.
         const std::size_t kept = size > settings.payload ? settings.payload + 1 : size;
         of(owner).happened_.received.push_back(
             {message->topic, std::string(static_cast<const char*>(message->payload), kept),
@@ -90,7 +90,7 @@ std::string Connection::set_up(const Message& will) {
     mosquitto_unsubscribe_callback_set(session, Callbacks::delivered);
     mosquitto_message_callback_set(session, Callbacks::received);
     mosquitto_int_option(session, MOSQ_OPT_TCP_NODELAY, 1);
-    // Whoever publishes sees to it; one more is the farewell.
+    // The publisher enforces the limit; one more is for the farewell.
     mosquitto_max_inflight_messages_set(session, static_cast<unsigned>(settings_.in_flight) + 1);
     int code =
         mosquitto_will_set(session, will.topic.c_str(), static_cast<int>(will.payload.size()),
@@ -114,7 +114,7 @@ int Connection::socket() const { return mosquitto_socket(session_.get()); }
 
 bool Connection::wants_write() const { return mosquitto_want_write(session_.get()); }
 
-/// TLS may hold what the socket does not show any more: so until there is nothing.
+/// Reads until nothing is left: TLS may buffer data that the socket no longer signals.
 std::string Connection::read() {
     for (int i = 0; i < kReads; ++i) {
         errno = 0;
@@ -127,7 +127,7 @@ std::string Connection::read() {
 
 std::string Connection::write() { return why(mosquitto_loop_write(session_.get(), 1)); }
 
-std::string Connection::look_after() { return why(mosquitto_loop_misc(session_.get())); }
+std::string Connection::housekeep() { return why(mosquitto_loop_misc(session_.get())); }
 
 int Connection::publish(const Message& message) {
     int id = 0;

@@ -17,11 +17,11 @@ struct mosquitto;
 
 namespace panelgate::mqtt {
 
-/// The messages of one connection that the broker may not have. Those of quality of service 0 are
-/// there when a barrier behind them is acknowledged. Pure.
+/// Messages of one connection the broker may not have received. A QoS 0 message counts as delivered
+/// when a barrier sent after it is acknowledged. Pure.
 class OpenMessages {
   public:
-    /// `change`: 0 where it is none.
+    /// `change`: 0 if the message is not a change.
     void sent(int id, bool acknowledged, std::uint64_t change) {
         if (acknowledged) {
             open_[id] = {change};
@@ -29,15 +29,15 @@ class OpenMessages {
             unconfirmed_.push_back(change);
         }
     }
-    /// There are some behind the last barrier, and it has been acknowledged.
+    /// True if unconfirmed messages follow the last barrier and none is outstanding.
     bool wants_barrier() const { return !barrier_ && !unconfirmed_.empty(); }
-    /// It was sent behind all of them; 0: it could not be.
+    /// A barrier was sent after all of them; 0: sending failed.
     void barrier(int id) {
         if (id == 0) return;
         barrier_ = id;
         behind_.swap(unconfirmed_);
     }
-    /// The changes that the broker has now.
+    /// Returns the changes now delivered to the broker.
     std::vector<std::uint64_t> delivered(int id) {
         if (barrier_ == id) {
             barrier_.reset();
@@ -53,15 +53,15 @@ class OpenMessages {
     void clear() { *this = {}; }
 
   private:
-    std::map<int, std::vector<std::uint64_t>> open_;  ///< each until it is acknowledged
-    std::vector<std::uint64_t> unconfirmed_;          ///< behind the last barrier
-    std::vector<std::uint64_t> behind_;               ///< in front of it
+    std::map<int, std::vector<std::uint64_t>> open_;  ///< until acknowledged
+    std::vector<std::uint64_t> unconfirmed_;          ///< sent after the last barrier
+    std::vector<std::uint64_t> behind_;               ///< sent before it
     std::optional<int> barrier_;
 };
 
-/// One connection to the broker, from its making to its end: a session of libmosquitto that is
-/// never used again. Does nothing by itself; one thread at a time. "" is success, anything else is
-/// why the connection is over.
+/// One connection to the broker: a libmosquitto session that is never reused. Passive; one thread
+/// at a time. Functions that return a string return "" on success, otherwise the reason why the
+/// connection is over.
 class Connection {
   public:
     Connection(const Settings& settings, const std::string& client_id);
@@ -69,23 +69,23 @@ class Connection {
     Connection(const Connection&) = delete;
     Connection& operator=(const Connection&) = delete;
 
-    /// Looks the name up and connects; waits for as long as the system does.
+    /// Resolves the name and connects; blocks as long as the system does.
     std::string connect(const Message& will);
-    /// -1: none.
+    /// Returns the socket, -1 if there is none.
     int socket() const;
     bool wants_write() const;
     std::string read();
     std::string write();
-    /// Once a second.
-    std::string look_after();
+    /// Must be called once per second.
+    std::string housekeep();
 
-    /// What it is called in Happened::delivered; 0: it could not be sent.
+    /// Returns the id used in Happened::delivered; 0: not sent.
     int publish(const Message& message);
     bool subscribe(const std::string& filter);
-    /// Acknowledged behind everything that was published before: for messages of quality of service
-    /// 0, which nobody acknowledges. An UNSUBSCRIBE from nothing (MQTT 3.1.1, 3.10.4). 0: not sent.
+    /// Sends a barrier for QoS 0 messages, which have no acknowledgement: its own arrives after all
+    /// published before. An UNSUBSCRIBE from nothing (MQTT 3.1.1, 3.10.4). 0: not sent.
     int barrier();
-    /// Takes leave: nobody is told that it was lost.
+    /// Disconnects cleanly: the broker does not publish the will.
     void disconnect();
 
     struct Received {
@@ -93,10 +93,10 @@ class Connection {
         std::string payload;
         bool retained = false;
     };
-    /// What has come since the last call.
+    /// Events since the last take().
     struct Happened {
         bool accepted = false;
-        std::string refused;         ///< by the broker, and why
+        std::string refused;         ///< reason given by the broker
         std::vector<int> delivered;  ///< of publish() and barrier()
         std::vector<Received> received;
     };

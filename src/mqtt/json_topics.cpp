@@ -27,7 +27,7 @@ std::string payload_of(const Subject& subject, const State& state) {
     return web::json_text(object);
 }
 
-/// A value, or an object that has one.
+/// Parses a value, or an object with a member `value`.
 Command command_of(std::size_t point, std::string_view topic, std::string_view payload) {
     auto parsed = web::parse_json(payload);
     if (!parsed) return BadCommand{std::string(topic), parsed.error().detail};

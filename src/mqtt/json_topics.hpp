@@ -5,10 +5,10 @@
 
 namespace panelgate::mqtt {
 
-/// A topic a point, retained: TOPIC/STATION/POINT. See deploy/operations.md.
+/// The JSON format: one retained topic per point, TOPIC/STATION/POINT. See deploy/operations.md.
 class JsonTopics final : public Wording {
   public:
-    /// The subjects outlive it.
+    /// The subjects must outlive it.
     JsonTopics(const Settings& settings, const Subjects& subjects)
         : settings_(settings), subjects_(subjects) {}
 

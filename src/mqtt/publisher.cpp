@@ -11,7 +11,7 @@ namespace panelgate::mqtt {
 
 namespace {
 
-// Numbers that no change ever has
+// Numbers outside the range of changes
 constexpr std::uint64_t kFirstCleared = std::uint64_t{1} << 63;
 constexpr std::uint64_t kFirstResult = std::uint64_t{1} << 62;
 
@@ -44,11 +44,11 @@ void Publisher::take_over(const Publisher& before) {
         if (here[change.subject]) store_.add(*here[change.subject], change.state);
     if (settings_.broker() != before.settings_.broker()) return;
     for (const auto& [number, message] : before.results_.messages()) results_.add(message);
-    clear_what_went(before);
+    clear_stale_topics(before);
 }
 
-/// All of the one before; of those before it what the store's limit allows.
-void Publisher::clear_what_went(const Publisher& before) {
+/// Clears all topics of the previous publisher; earlier ones up to the store's limit.
+void Publisher::clear_stale_topics(const Publisher& before) {
     const std::vector<std::string> told = before.wording_->retained();
     std::set<std::string> went(told.begin(), told.end());
     const std::size_t most = went.size() + settings_.store;

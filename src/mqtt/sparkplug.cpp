@@ -177,9 +177,9 @@ std::string Sparkplug::topic_of(std::size_t point) const {
 }
 
 std::vector<Command> Sparkplug::device_commands(std::size_t station, std::string_view topic,
-                                                const std::vector<HeardMetric>& metrics) const {
+                                                const std::vector<ReceivedMetric>& metrics) const {
     std::vector<Command> commands;
-    for (const HeardMetric& heard : metrics) {
+    for (const ReceivedMetric& heard : metrics) {
         std::optional<std::size_t> point;
         if (!heard.name.empty()) point = subjects_.find_point(station, heard.name);
         if (heard.name.empty() && heard.alias && *heard.alias > station &&
@@ -216,7 +216,7 @@ std::vector<Command> Sparkplug::commands(std::string_view topic, std::string_vie
         if (!station) return {BadCommand{name, "there is no such device"}};
         return device_commands(*station, topic, *metrics);
     }
-    for (const HeardMetric& heard : *metrics) {
+    for (const ReceivedMetric& heard : *metrics) {
         const bool* wanted = heard.value ? std::get_if<bool>(&*heard.value) : nullptr;
         if (heard.name == kRebirth && wanted != nullptr && *wanted) return {Rebirth{}};
     }

@@ -12,7 +12,7 @@ namespace panelgate::mqtt {
 /// subject's number its alias.
 class Sparkplug final : public Wording {
   public:
-    /// The subjects outlive it.
+    /// The subjects must outlive it.
     Sparkplug(const Settings& settings, const Subjects& subjects);
 
     Message will() override;
@@ -32,10 +32,10 @@ class Sparkplug final : public Wording {
     std::optional<Message> result(const WriteResult&) const override { return std::nullopt; }
 
   private:
-    /// What has been said of a station, or of the node.
+    /// The published birth state of a station or of the node.
     struct Birth {
         bool alive = false;
-        std::uint64_t next_change = 0;  ///< when it was born: older changes are history
+        std::uint64_t next_change = 0;  ///< at birth; older changes are historical
     };
 
     std::string topic(std::string_view kind, std::string_view device = {}) const;
@@ -50,11 +50,11 @@ class Sparkplug final : public Wording {
     Metric metric(std::size_t subject, const std::optional<State>& state, bool birth,
                   WallTime now) const;
     std::vector<Command> device_commands(std::size_t station, std::string_view topic,
-                                         const std::vector<HeardMetric>& metrics) const;
+                                         const std::vector<ReceivedMetric>& metrics) const;
 
     Settings settings_;
     const Subjects& subjects_;
-    std::vector<std::size_t> devices_;       ///< stations that have points
+    std::vector<std::size_t> devices_;       ///< stations with points
     std::map<std::size_t, Birth> stations_;  ///< by their subject
     Birth node_;
     std::uint64_t next_death_ = 0;  ///< bdSeq of the next connection

@@ -142,7 +142,7 @@ std::uint32_t code_of(points::Quality quality) {
     std::abort();
 }
 
-/// As a whole number, whose bits are those of its two's complement.
+/// Converts to an integer in two's complement.
 struct Whole {
     std::uint64_t operator()(bool value) const { return value ? 1 : 0; }
     std::uint64_t operator()(std::int64_t value) const { return static_cast<std::uint64_t>(value); }
@@ -165,7 +165,7 @@ void add_value(ProtobufWriter& out, DataType type, const points::Value& value) {
         case DataType::uint16:
             out.varint(metric::kInt, static_cast<std::uint32_t>(whole));
             return;
-        case DataType::uint32:  // as Tahu has it
+        case DataType::uint32:  // as in Tahu
         case DataType::int64:
         case DataType::uint64:
             out.varint(metric::kLong, whole);
@@ -221,7 +221,7 @@ std::string text_of(const Metric& one) {
     return out.take();
 }
 
-void read_field(const ProtobufField& field, HeardMetric& heard) {
+void read_field(const ProtobufField& field, ReceivedMetric& heard) {
     switch (field.number) {
         case metric::kName:
             heard.name = field.bytes;
@@ -255,8 +255,8 @@ void read_field(const ProtobufField& field, HeardMetric& heard) {
     }
 }
 
-std::optional<HeardMetric> parse_metric(std::string_view text) {
-    HeardMetric heard;
+std::optional<ReceivedMetric> parse_metric(std::string_view text) {
+    ReceivedMetric heard;
     ProtobufReader in(text);
     bool is_null = false;
     while (const auto field = in.next()) {
@@ -281,8 +281,9 @@ std::string sparkplug_payload(WallTime time, const std::vector<Metric>& metrics,
     return out.take();
 }
 
-std::optional<std::vector<HeardMetric>> parse_sparkplug(std::string_view text, std::size_t most) {
-    std::vector<HeardMetric> metrics;
+std::optional<std::vector<ReceivedMetric>> parse_sparkplug(std::string_view text,
+                                                           std::size_t most) {
+    std::vector<ReceivedMetric> metrics;
     ProtobufReader in(text);
     while (const auto field = in.next()) {
         if (field->number != payload::kMetrics || !field->has_length) continue;
@@ -294,7 +295,7 @@ std::optional<std::vector<HeardMetric>> parse_sparkplug(std::string_view text, s
     return metrics;
 }
 
-std::optional<points::Value> value_of(const HeardMetric& metric, DataType fallback) {
+std::optional<points::Value> value_of(const ReceivedMetric& metric, DataType fallback) {
     if (!metric.value || !metric.is_integer) return metric.value;
     const auto bits = std::get<std::uint64_t>(*metric.value);
     const auto type = metric.type.value_or(static_cast<std::uint32_t>(fallback));

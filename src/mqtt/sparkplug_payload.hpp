@@ -13,8 +13,8 @@
 
 namespace panelgate::mqtt {
 
-// The wire format of Protocol Buffers (protobuf.dev/programming-guides/encoding), as far as a
-// Sparkplug payload needs it.
+// The Protocol Buffers wire format (protobuf.dev/programming-guides/encoding), as far as Sparkplug
+// payloads need it.
 
 /// Appends fields of a message.
 class ProtobufWriter {
@@ -22,7 +22,7 @@ class ProtobufWriter {
     ProtobufWriter& varint(unsigned field, std::uint64_t value);
     ProtobufWriter& fixed32(unsigned field, std::uint32_t value);
     ProtobufWriter& fixed64(unsigned field, std::uint64_t value);
-    /// Bytes, a text or a message.
+    /// Appends bytes, a string or a message.
     ProtobufWriter& bytes(unsigned field, std::string_view value);
 
     std::string take() { return std::move(text_); }
@@ -37,17 +37,17 @@ class ProtobufWriter {
 /// A field of a message.
 struct ProtobufField {
     unsigned number = 0;
-    std::uint64_t value = 0;   ///< of a varint or a fixed one
-    std::string_view bytes{};  ///< of one with a length
+    std::uint64_t value = 0;   ///< of a varint or fixed field
+    std::string_view bytes{};  ///< of a length-delimited field
     bool has_length = false;
 };
 
-/// The fields of a message, one after the other. Reads nothing that is not there.
+/// Reads a message field by field, never past its end.
 class ProtobufReader {
   public:
     explicit ProtobufReader(std::string_view text) : text_(text) {}
 
-    /// Nothing at the end, and where the text is broken (then ok() is false).
+    /// Returns the next field; nullopt at the end, or if malformed (then ok() is false).
     std::optional<ProtobufField> next();
     bool ok() const { return ok_; }
 
@@ -74,35 +74,35 @@ enum class DataType : std::uint32_t {
     string = 12,
 };
 
-/// A metric that is told.
+/// A metric to publish.
 struct Metric {
-    std::string name{};  ///< empty: its alias alone
+    std::string name{};  ///< empty: identified by alias only
     std::optional<std::uint64_t> alias{};
     WallTime time{};
     DataType type = DataType::boolean;
     bool historical = false;
-    std::optional<points::Value> value{};      ///< nothing: is_null
+    std::optional<points::Value> value{};      ///< nullopt: is_null
     std::optional<points::Quality> quality{};  ///< as the property Quality
     std::string unit{};                        ///< as the property engUnit; empty: none
 };
 
-/// What the whole payload says. `seq`: nothing in an NDEATH.
+/// Encodes a payload. `seq`: nullopt in an NDEATH.
 std::string sparkplug_payload(WallTime time, const std::vector<Metric>& metrics,
                               std::optional<std::uint8_t> seq);
 
-/// A metric that a host has sent.
-struct HeardMetric {
+/// A metric received from a host.
+struct ReceivedMetric {
     std::string name{};
     std::optional<std::uint64_t> alias{};
     std::optional<std::uint32_t> type{};
-    std::optional<points::Value> value{};  ///< nothing: null, or of a kind that no point has
-    bool is_integer = false;               ///< its sign follows from the type
+    std::optional<points::Value> value{};  ///< nullopt: null, or of an unsupported type
+    bool is_integer = false;               ///< the type gives its signedness
 };
-/// Nothing when the text is no payload, or has more than `most` metrics.
-std::optional<std::vector<HeardMetric>> parse_sparkplug(std::string_view text, std::size_t most);
+/// Parses a payload; nullopt if malformed, or with more than `most` metrics.
+std::optional<std::vector<ReceivedMetric>> parse_sparkplug(std::string_view text, std::size_t most);
 
-/// What a metric means, where `fallback` is its type if it does not say: integers stand there
-/// without a sign.
-std::optional<points::Value> value_of(const HeardMetric& metric, DataType fallback);
+/// Returns a metric's value; `fallback` is the type if it names none: integers are encoded
+/// unsigned.
+std::optional<points::Value> value_of(const ReceivedMetric& metric, DataType fallback);
 
 }  // namespace panelgate::mqtt

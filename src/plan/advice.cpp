@@ -18,25 +18,25 @@
 
 namespace panelgate::plan {
 
-/// Something that could be done, and the line on which it is done.
+/// A possible change, and the changed line.
 struct Change {
     std::string what;
     Line line;
 };
 
-/// Another rate: the lowest that is enough, else the highest that all panels have.
-std::optional<Change> quicker(const Line& line);
-/// The dearest read alone, where that is enough and it need not become ten times as rare. What is
-/// changed is all that is asked of this station from its first item to its last.
-std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan);
-/// All intervals by one factor; a refresh of a relay stays.
-std::optional<Change> all_rarer(const Line& line, const LinePlan& plan);
-/// One relay in the place of several. Points and poll blocks are joined anyway.
-std::optional<Change> fewer_relays(const Line& line);
+/// A higher rate: the lowest that is enough, else the highest that all panels support.
+std::optional<Change> higher_baud(const Line& line);
+/// A longer interval for the costliest read only, if that is enough with less than ten times the
+/// interval. Applies to everything asked of this station from the read's first item to its last.
+std::optional<Change> slow_costliest_read(const Line& line, const LinePlan& plan);
+/// One factor on all intervals; a relay's refresh stays.
+std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan);
+/// One relay instead of several. Points and poll blocks are joined anyway.
+std::optional<Change> merge_relays(const Line& line);
 
 namespace {
 
-/// The panel takes them in one request, and its memory has them in one piece.
+/// True if the panel supports this read in one request, within one area.
 bool can_read(const Line& line, const Relay::End& end) {
     const Station& station = line.stations[end.station];
     const profile::Area* area = station.profile->find_area(end.span.table, end.span.first);
@@ -54,16 +54,16 @@ bool can_write(const Line& line, const Relay::End& end) {
            end.span.count <= panel.max_count(function);
 }
 
-/// What one relay writes another one may read: joined with its neighbour it could close a circle.
-bool is_read_on(const Line& line, std::size_t station) {
+/// True if a relay reads from this station: joining relays that write to it could close a circle.
+bool is_relay_source(const Line& line, std::size_t station) {
     return std::ranges::any_of(line.relays, [&](const Relay& relay) {
         return relay.from && relay.from->station == station;
     });
 }
 
-/// One relay in the place of both.
+/// Returns one relay instead of both, if possible.
 std::optional<Relay> merged(const Line& line, const Relay& a, const Relay& b) {
-    if (!a.continues_in(b) || is_read_on(line, a.to->station)) return std::nullopt;
+    if (!a.continues_in(b) || is_relay_source(line, a.to->station)) return std::nullopt;
     Relay both = a;
     both.from->span.count += b.from->span.count;
     both.to->span.count += b.to->span.count;
@@ -71,8 +71,8 @@ std::optional<Relay> merged(const Line& line, const Relay& a, const Relay& b) {
     return both;
 }
 
-/// Joins the first two that can be; false when there are none.
-bool merge_two(Line& line, std::string& which) {
+/// Merges the first two relays that can be merged; returns false if there are none.
+bool merge_first_pair(Line& line, std::string& which) {
     for (Relay& first : line.relays) {
         for (auto next = line.relays.begin(); next != line.relays.end(); ++next) {
             const auto both = merged(line, first, *next);
@@ -88,10 +88,10 @@ bool merge_two(Line& line, std::string& which) {
 
 }  // namespace
 
-std::optional<Change> fewer_relays(const Line& line) {
+std::optional<Change> merge_relays(const Line& line) {
     Line made = line;
     std::string which;
-    while (merge_two(made, which)) {
+    while (merge_first_pair(made, which)) {
     }
     if (which.empty()) return std::nullopt;
     return Change{"one relay instead of " + which, std::move(made)};
@@ -109,7 +109,7 @@ bool all_have(const Line& line, int baud) {
 
 }  // namespace
 
-std::optional<Change> quicker(const Line& line) {
+std::optional<Change> higher_baud(const Line& line) {
     std::optional<Change> found;
     for (const int baud : kRates) {
         if (baud <= line.serial.baud || !all_have(line, baud)) continue;
@@ -124,38 +124,38 @@ namespace {
 
 using yaml::format_duration;
 
-constexpr int kRarest = 10;          // times, of one read alone
-constexpr int kMostTenths = 10'000;  // of the factor for all
+constexpr int kMaxReadFactor = 10;  // factor, for one read alone
+constexpr int kMaxTenths = 10'000;  // factor for all intervals, in tenths
 
 bool is_enough(const Line& line) { return verdict(make_plan(line)) == Verdict::fine; }
 
-/// Reads that serve the same: several of a block that is cut.
-struct Dearest {
+/// Reads with the same wants: several if a block is cut.
+struct CostliestRead {
     const Poll* first = nullptr;
     Duration wire{};
     double load = 0;
 };
 
-Dearest dearest_of(const LinePlan& plan) {
-    std::map<std::pair<std::string, std::vector<std::size_t>>, Dearest> reads;
+CostliestRead costliest_read_of(const LinePlan& plan) {
+    std::map<std::pair<std::string, std::vector<std::size_t>>, CostliestRead> reads;
     for (const Poll& poll : plan.polls) {
-        Dearest& sum = reads[{poll.station, poll.asked}];
+        CostliestRead& sum = reads[{poll.station, poll.asked}];
         if (sum.first == nullptr) sum.first = &poll;
         sum.wire += poll.wire;
         sum.load += poll.load;
     }
-    const auto dearest =
+    const auto costliest =
         std::ranges::max_element(reads, {}, [](const auto& entry) { return entry.second.load; });
-    return dearest == reads.end() ? Dearest() : dearest->second;
+    return costliest == reads.end() ? CostliestRead() : costliest->second;
 }
 
 /// What a read serves, as a range of one station's items.
 struct Scope {
     std::size_t station = 0;
-    const Asked* first = nullptr;
-    const Asked* last = nullptr;
+    const PolledItem* first = nullptr;
+    const PolledItem* last = nullptr;
 
-    bool holds(const Asked& asked) const {
+    bool contains(const PolledItem& asked) const {
         const modbus::Span& span = asked.want.span;
         return span.table == first->want.span.table && span.first >= first->want.span.first &&
                span.first <= last->want.span.first;
@@ -166,7 +166,7 @@ Scope scope_of(const Line& line, const Poll& poll) {
     const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
     Scope scope{static_cast<std::size_t>(station - line.stations.begin()), nullptr, nullptr};
     for (const std::size_t index : poll.asked) {
-        const Asked& asked = station->asked[index];
+        const PolledItem& asked = station->asked[index];
         const std::uint32_t at = asked.want.span.first;
         if (scope.first == nullptr || at < scope.first->want.span.first) scope.first = &asked;
         if (scope.last == nullptr || at > scope.last->want.span.first) scope.last = &asked;
@@ -176,18 +176,18 @@ Scope scope_of(const Line& line, const Poll& poll) {
 
 Line with(const Line& line, const Scope& scope, Duration every) {
     Line made = line;
-    for (Asked& asked : made.stations[scope.station].asked) {
-        if (scope.holds(asked)) asked.want.every = std::max(asked.want.every, every);
+    for (PolledItem& asked : made.stations[scope.station].asked) {
+        if (scope.contains(asked)) asked.want.every = std::max(asked.want.every, every);
     }
     return made;
 }
 
-/// "100ms", or "100ms to 130ms": what is asked more often than that now.
+/// "100ms", or "100ms to 130ms": the current intervals shorter than `every`.
 std::string intervals_of(const Line& line, const Scope& scope, Duration every) {
     Duration shortest = every;
     Duration longest{};
-    for (const Asked& asked : line.stations[scope.station].asked) {
-        if (!scope.holds(asked) || asked.want.every >= every) continue;
+    for (const PolledItem& asked : line.stations[scope.station].asked) {
+        if (!scope.contains(asked) || asked.want.every >= every) continue;
         shortest = std::min(shortest, asked.want.every);
         longest = std::max(longest, asked.want.every);
     }
@@ -202,20 +202,20 @@ std::string text_of(const Poll& poll, const Scope& scope) {
     return text + " (" + std::to_string(scope.first->want.span.count) + ')';
 }
 
-/// Of what may at most be left for the dearest read.
-double left_for(const Dearest& dearest, const LinePlan& plan) {
-    return std::min(kHigh - plan.load, kFull - plan.most) + dearest.load;
+/// Returns the load that the costliest read may have at most.
+double budget_for(const CostliestRead& costliest, const LinePlan& plan) {
+    return std::min(kHigh - plan.load, kFull - plan.most) + costliest.load;
 }
 
-/// The least factor with which it is enough, in tenths and not below `first`; 0 = there is none.
-int tenths_of(const Line& line, int first) {
+/// Returns the least sufficient factor, in tenths and at least `first`; 0: none.
+int least_tenths(const Line& line, int first) {
     const auto enough = [&](int tenths) { return is_enough(at_intervals(line, tenths / 10.0)); };
     int low = first - 1;
     int high = first;
     while (!enough(high)) {
-        if (high >= kMostTenths) return 0;
+        if (high >= kMaxTenths) return 0;
         low = high;
-        high = std::min(2 * high, kMostTenths);
+        high = std::min(2 * high, kMaxTenths);
     }
     while (high - low > 1) {
         const int middle = (low + high) / 2;
@@ -228,13 +228,14 @@ bool reaches_slowest(const Line& line) {
     const auto is_slowest = [](Duration every) { return every >= points::kSlowest; };
     return std::ranges::any_of(line.relays, is_slowest, &Relay::every) ||
            std::ranges::any_of(line.stations, [&](const Station& station) {
-               return std::ranges::any_of(
-                   station.asked, [&](const Asked& asked) { return is_slowest(asked.want.every); });
+               return std::ranges::any_of(station.asked, [&](const PolledItem& asked) {
+                   return is_slowest(asked.want.every);
+               });
            });
 }
 
-/// What a reader of "all intervals" might take for one, or could not set.
-std::string exceptions_of(const Line& line) {
+/// Returns what "all intervals" does not include or cannot reach, as text.
+std::string remarks_of(const Line& line) {
     std::string text;
     if (reaches_slowest(line)) text = "24h at most";
     const auto has_refresh = [](const Relay& relay) { return relay.to && relay.refresh; };
@@ -245,35 +246,35 @@ std::string exceptions_of(const Line& line) {
 
 }  // namespace
 
-std::optional<Change> dearest_read_rarer(const Line& line, const LinePlan& plan) {
-    const Dearest dearest = dearest_of(plan);
-    if (dearest.load <= 0) return std::nullopt;
-    const Duration now = dearest.first->every;
-    const Duration rarest = std::min<Duration>(kRarest * now, points::kSlowest);
-    const double left = left_for(dearest, plan);
-    if (left * kRarest < dearest.load) return std::nullopt;
-    const Scope scope = scope_of(line, *dearest.first);
+std::optional<Change> slow_costliest_read(const Line& line, const LinePlan& plan) {
+    const CostliestRead costliest = costliest_read_of(plan);
+    if (costliest.load <= 0) return std::nullopt;
+    const Duration now = costliest.first->every;
+    const Duration max_every = std::min<Duration>(kMaxReadFactor * now, points::kSlowest);
+    const double left = budget_for(costliest, plan);
+    if (left * kMaxReadFactor < costliest.load) return std::nullopt;
+    const Scope scope = scope_of(line, *costliest.first);
     Duration every = rounded_up(std::chrono::duration_cast<Duration>(
-        std::chrono::duration<double>(to_seconds(dearest.wire) / left)));
-    for (; every <= rarest; every = rounded_up(every + every / 20)) {
+        std::chrono::duration<double>(to_seconds(costliest.wire) / left)));
+    for (; every <= max_every; every = rounded_up(every + every / 20)) {
         if (every <= now) continue;
         Line made = with(line, scope, every);
         if (!is_enough(made)) continue;
-        return Change{text_of(*dearest.first, scope) + " every " + format_duration(every) +
+        return Change{text_of(*costliest.first, scope) + " every " + format_duration(every) +
                           " instead of " + intervals_of(line, scope, every),
                       std::move(made)};
     }
     return std::nullopt;
 }
 
-std::optional<Change> all_rarer(const Line& line, const LinePlan& plan) {
-    const double least = std::max(plan.load / kHigh, plan.most / kFull);  // nothing shrinks faster
-    if (least * 10 > kMostTenths) return std::nullopt;
-    const int tenths = tenths_of(line, std::max(11, static_cast<int>(std::ceil(least * 10))));
+std::optional<Change> slow_all_intervals(const Line& line, const LinePlan& plan) {
+    const double least = std::max(plan.load / kHigh, plan.most / kFull);  // no load shrinks faster
+    if (least * 10 > kMaxTenths) return std::nullopt;
+    const int tenths = least_tenths(line, std::max(11, static_cast<int>(std::ceil(least * 10))));
     if (tenths == 0) return std::nullopt;
     Line made = at_intervals(line, tenths / 10.0);
-    const std::string besides = exceptions_of(made);
-    return Change{"all intervals " + number_text(tenths / 10.0) + " times as long" + besides,
+    const std::string remarks = remarks_of(made);
+    return Change{"all intervals " + number_text(tenths / 10.0) + " times as long" + remarks,
                   std::move(made)};
 }
 
@@ -282,12 +283,12 @@ std::vector<Advice> advise(const Line& line, const LinePlan& plan) {
     if (verdict(plan) == Verdict::fine) return all;
     const bool changing = is_high_by_changes(plan);
     const auto judged = [&](const auto& one) { return changing ? one.most : one.load; };
-    const auto changes = {quicker(line), dearest_read_rarer(line, plan), all_rarer(line, plan),
-                          fewer_relays(line)};
+    const auto changes = {higher_baud(line), slow_costliest_read(line, plan),
+                          slow_all_intervals(line, plan), merge_relays(line)};
     for (const std::optional<Change>& change : changes) {
         if (!change) continue;
         const LinePlan then = make_plan(change->line);
-        if (judged(plan) - judged(then) >= kWorthwhile)
+        if (judged(plan) - judged(then) >= kMinGain)
             all.push_back({change->what, then.load, then.most});
     }
     std::ranges::sort(all, {}, [&](const Advice& one) { return std::pair(judged(one), one.what); });
@@ -298,14 +299,14 @@ namespace {
 
 using yaml::format_milliseconds;
 
-constexpr std::size_t kNamed = 3;  // stations of one warning
+constexpr std::size_t kMaxNamed = 3;  // stations named per warning
 
 bool is_asked(const LinePlan& plan, const Station& station) {
     const auto is_its = [&](const auto& request) { return request.station == station.name; };
     return std::ranges::any_of(plan.polls, is_its) || std::ranges::any_of(plan.relays, is_its);
 }
 
-/// From the end of a request to the start of its reply: silence tells the panel that it has ended.
+/// Time from the end of a request to the start of its reply: the panel detects the end by silence.
 Duration answers_after(const Line& line, const Station& station) {
     return silent_interval(line.serial) + station.think_time;
 }
@@ -316,14 +317,15 @@ bool is_too_late(const Line& line, const Station& station) {
 
 std::string named(const std::vector<std::string>& names) {
     std::string all;
-    for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i)
+    for (std::size_t i = 0; i < std::min(names.size(), kMaxNamed); ++i)
         all += (i == 0 ? "'" : ", '") + names[i] + '\'';
-    if (names.size() > kNamed) all += " and " + std::to_string(names.size() - kNamed) + " more";
+    if (names.size() > kMaxNamed)
+        all += " and " + std::to_string(names.size() - kMaxNamed) + " more";
     return all;
 }
 
-/// One for all stations that are alike.
-void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::string>& told) {
+/// One warning for all stations with the same times.
+void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::string>& messages) {
     std::map<std::pair<Duration, Duration>, std::vector<std::string>> alike;
     for (const Station& station : line.stations) {
         if (is_asked(plan, station) && is_too_late(line, station))
@@ -332,7 +334,7 @@ void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::s
     for (const auto& [times, names] : alike) {
         const auto& [think, timeout] = times;
         const Duration after = silent_interval(line.serial) + think;
-        told.push_back(
+        messages.push_back(
             "line " + line.name + ": think_time " + yaml::format_duration(think) + " of " +
             named(names) + " makes replies begin " + format_milliseconds(after) +
             " after a request, above the response_timeout of " + yaml::format_duration(timeout) +
@@ -341,11 +343,11 @@ void warn_of_timeouts(const Line& line, const LinePlan& plan, std::vector<std::s
     }
 }
 
-/// A request that goes out again and again, and whose items could be fewer.
+/// A periodic request whose items could be fewer.
 struct Transaction {
     std::string what;
     Duration wire{};
-    const Poll* poll = nullptr;  ///< nothing: of a relay
+    const Poll* poll = nullptr;  ///< null: of a relay
 };
 
 std::vector<Transaction> longest_two(const LinePlan& plan) {
@@ -356,7 +358,7 @@ std::vector<Transaction> longest_two(const LinePlan& plan) {
                        poll.wire, &poll});
     }
     for (const RelayLoad& relay : plan.relays) {
-        if (relay.request == RelayLoad::Request::reread) continue;  // polls
+        if (relay.request == RelayLoad::Request::reread) continue;  // already among the polls
         all.push_back({"the " + std::string(label(relay.request)) + " of relay " + relay.relay,
                        relay.wire, nullptr});
     }
@@ -366,7 +368,8 @@ std::vector<Transaction> longest_two(const LinePlan& plan) {
     return all;
 }
 
-/// Items of a block with which its read takes no longer; 0 where it is none, or none would do.
+/// Returns the items of a block whose read takes at most `within`; 0 if not a single block, or none
+/// fits.
 std::uint32_t most_items(const Line& line, const Poll& poll, Duration within) {
     const auto station = std::ranges::find(line.stations, poll.station, &Station::name);
     if (poll.asked.size() != 1) return 0;
@@ -377,7 +380,7 @@ std::uint32_t most_items(const Line& line, const Poll& poll, Duration within) {
     return most;
 }
 
-void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::string>& told) {
+void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::string>& messages) {
     const std::vector<Transaction> longest = longest_two(plan);
     if (longest.empty()) return;
     const Duration before = longest.size() > 1 ? longest[1].wire : Duration::zero();
@@ -394,16 +397,17 @@ void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::s
     const std::uint32_t most =
         poll == nullptr ? 0 : most_items(line, *poll, line.deadline - before);
     if (most > 0) warning += ", or read at most " + std::to_string(most) + " at once";
-    told.push_back(std::move(warning));
+    messages.push_back(std::move(warning));
 }
 
 }  // namespace
 
 std::vector<std::string> warnings(const Line& line, const LinePlan& plan) {
-    std::vector<std::string> told;
-    warn_of_timeouts(line, plan, told);
-    if (told.empty()) warn_of_deadline(line, plan, told);  // else think times are in the way
-    return told;
+    std::vector<std::string> messages;
+    warn_of_timeouts(line, plan, messages);
+    if (messages.empty())
+        warn_of_deadline(line, plan, messages);  // otherwise the think times are at fault
+    return messages;
 }
 
 }  // namespace panelgate::plan

@@ -54,7 +54,7 @@ Line at_rate(const Line& line, int baud) {
 Line at_intervals(const Line& line, double times) {
     Line made = line;
     for (Station& station : made.stations) {
-        for (Asked& asked : station.asked)
+        for (PolledItem& asked : station.asked)
             asked.want.every = times_as_long(asked.want.every, times);
     }
     for (Relay& relay : made.relays) relay.every = times_as_long(relay.every, times);
@@ -65,17 +65,17 @@ namespace {
 
 double share(Duration wire, Duration every) { return to_seconds(wire) / to_seconds(every); }
 
-/// As whoever wrote the configuration calls the first item.
+/// Returns the first item in the notation of the configuration.
 std::string notation_of(const Station& station, const points::PlannedRead& read) {
     for (const std::size_t index : read.wants) {
-        const Asked& asked = station.asked[index];
+        const PolledItem& asked = station.asked[index];
         if (asked.want.span.first == read.span.first) return asked.notation;
     }
     return profile::format_notation(*station.profile, read.span.table,
                                     static_cast<std::uint16_t>(read.span.first));
 }
 
-/// What the poller will make of a station.
+/// A station's reads as the poller will plan them.
 struct Planned {
     points::PlanLimits limits;
     std::vector<points::PlannedRead> reads;
@@ -83,7 +83,7 @@ struct Planned {
 
 Planned planned(const Line& line, const Station& station) {
     std::vector<points::Want> wants;
-    for (const Asked& asked : station.asked) wants.push_back(asked.want);
+    for (const PolledItem& asked : station.asked) wants.push_back(asked.want);
     Planned made{limits_of(line, station), {}};
     made.reads = points::plan_reads(wants, made.limits);
     return made;
@@ -123,20 +123,20 @@ RelayLoad write_of(const Line& line, const Relay& relay) {
     return made;
 }
 
-/// At this interval all of it goes out, unless that is more than a station's extra turns.
+/// Returns the load of rereads at this interval, limited by the station's extra turns.
 double share_of_extra(Duration wire, std::size_t reads, Duration every) {
     const Duration least = static_cast<int>(reads) * points::PollSchedule::Settings().extra_every;
     return share(wire, std::max(every, least));
 }
 
-/// Nothing where no poll of the target shows what is written.
+/// Returns nullopt if no poll of the target shows what is written.
 std::optional<RelayLoad> rereads_of(const Station& station, const Planned& planned,
                                     const Relay& relay) {
     RelayLoad made{
         relay.name, station.name, RelayLoad::Request::reread, relay.writes_every(), {}, 0, 0};
     std::size_t reads = 0;
     for (const points::PlannedRead& read : planned.reads) {
-        if (points::spares(station.memory, relay.to->span, read.span)) continue;
+        if (points::leaves_unchanged(station.memory, relay.to->span, read.span)) continue;
         made.wire += points::read_cost(planned.limits, read.span.table, read.span.count);
         ++reads;
     }
@@ -146,7 +146,7 @@ std::optional<RelayLoad> rereads_of(const Station& station, const Planned& plann
     return made;
 }
 
-/// Of the polls and relays of one station.
+/// Returns the load of one station's polls and relays.
 double load_of(const LinePlan& plan, const std::string& station) {
     double load = 0;
     for (const Poll& poll : plan.polls) load += poll.station == station ? poll.load : 0;
@@ -154,9 +154,9 @@ double load_of(const LinePlan& plan, const std::string& station) {
     return load;
 }
 
-/// The first silence costs a response timeout (P4), with the request and the gap around it, and the
-/// rest where all have to wait for what may come late.
-Duration silence_of(const Line& line, const Station& station) {
+/// Returns the cost of a station's first failure: a response timeout (P4) with the request and the
+/// gap, and the suspension while all wait for a late reply.
+Duration outage_of(const Line& line, const Station& station) {
     const Duration once = frame_time(line.serial, modbus::kReadRequestAdu) +
                           station.response_timeout + gap_of(line, station);
     if (station.line_rest == Duration::zero()) return once;
@@ -169,7 +169,7 @@ std::optional<OneDead> worst_case(const Line& line, const LinePlan& plan) {
     Duration holds{};
     for (const Station& station : line.stations) {
         const double load = plan.load - load_of(plan, station.name) + kProbes;
-        holds = std::max(holds, silence_of(line, station));
+        holds = std::max(holds, outage_of(line, station));
         if (!worst || load > worst->load) worst = OneDead{station.name, load, {}};
     }
     if (worst) worst->holds = holds;
@@ -254,12 +254,12 @@ constexpr int kHalvings = 24;
 
 LinePlan at(const Line& line, double times) { return make_plan(at_intervals(line, 1 / times)); }
 
-/// Where all load is in proportion.
-double proportional(const LinePlan& plan) {
+/// Assumes that all loads are proportional to the rate.
+double proportional_rate(const LinePlan& plan) {
     return std::min(kHigh / plan.load, kFull / std::max(plan.most, plan.load));
 }
 
-/// What a refresh or a limit of extra turns holds down lets the rest go further, or less far.
+/// Needed with relays: a refresh or the limit of extra turns makes loads not proportional.
 double search(const Line& line, double first) {
     const auto is_fine = [&](double times) { return verdict(at(line, times)) == Verdict::fine; };
     double low = first;
@@ -278,7 +278,7 @@ double search(const Line& line, double first) {
 
 std::optional<HighestRate> highest_rate(const Line& line, const LinePlan& plan) {
     if (plan.load <= 0) return std::nullopt;
-    HighestRate found{proportional(plan), false};
+    HighestRate found{proportional_rate(plan), false};
     if (!line.relays.empty()) found.times = search(line, found.times);
     const LinePlan then = at(line, found.times);
     found.changing = then.most / kFull > then.load / kHigh;

@@ -23,7 +23,7 @@ struct Limits {
     Decimal high;
 };
 
-/// A finite one.
+/// `value` is a finite number.
 Decimal decimal_of(const Value& value) {
     if (const bool* b = std::get_if<bool>(&value)) return *b ? 1 : 0;
     if (const auto* i = std::get_if<std::int64_t>(&value)) return *i;
@@ -38,7 +38,7 @@ Limits limits_of() {
             Decimal(std::numeric_limits<Number>::max())};
 }
 
-/// Of the raw number.
+/// Range of the raw number.
 Limits limits_of(Type type) {
     switch (type) {
         case Type::boolean:
@@ -108,20 +108,20 @@ WriteRefusal beyond_limits(const Point& point, const Value& value) {
     return refusal(limits_text(point) + ", not " + to_string(value));
 }
 
-/// Its raw number is.
+/// The raw number is outside the type's range.
 WriteRefusal beyond_type(const Point& point, const Value& value) {
     if (!within_limits(point, value)) return beyond_limits(point, value);
     return refusal(point.name + " must be from " + range_text(point) + ", not " + to_string(value));
 }
 
-/// The nearest on both sides, or the nearest float and the next.
+/// The nearest values on both sides, or the nearest float and the next one.
 struct Neighbours {
     std::optional<Value> one;
     std::optional<Value> other;
 };
 
-/// "x cannot be exactly 21.55 (i16, scale 0.1); the nearest that it can be are 21.5 and 21.6": of
-/// those that its limits allow.
+/// "x cannot be exactly 21.55 (i16, scale 0.1); the nearest that it can be are 21.5 and 21.6":
+/// names only values within the point's limits.
 WriteRefusal inexact(const Point& point, const Value& value, Neighbours nearest) {
     auto& [one, other] = nearest;
     if (one && other && decimal_of(*one) > decimal_of(*other)) std::swap(one, other);
@@ -139,8 +139,8 @@ WriteRefusal inexact(const Point& point, const Value& value, Neighbours nearest)
             .inexact = true};
 }
 
-/// Of what is rounded, too.
-Encoded<Words> judge_written(const Point& point, const Value& value, Words words) {
+/// Checks the value as it would be written, also after rounding.
+Encoded<Words> check_written(const Point& point, const Value& value, Words words) {
     const auto written = decode(point, words);
     if (!written)
         return refusal(point.name + " cannot be " + to_string(value) + ": that means no value");
@@ -150,15 +150,15 @@ Encoded<Words> judge_written(const Point& point, const Value& value, Words words
                    to_string(*written));
 }
 
-/// The raw number is within the type's range.
+/// `raw` is within the type's range.
 Words words_of(const Point& point, const Decimal& raw) {
     const auto i = raw.as_int64();
     const std::uint64_t bits = i ? static_cast<std::uint64_t>(*i) : raw.as_uint64().value_or(0);
-    return reordered(parted(is_bcd(point.type) ? to_bcd(bits) : bits, point.count()),
+    return reordered(split_words(is_bcd(point.type) ? to_bcd(bits) : bits, point.count()),
                      point.word_order, false);
 }
 
-/// What a raw number is shown as, if it may be written.
+/// Returns the value of a raw number, if it may be written.
 std::optional<Value> allowed(const Point& point, const Decimal& raw) {
     if (!within_type(point.type, raw)) return std::nullopt;
     auto value = decode(point, words_of(point, raw));
@@ -179,17 +179,17 @@ Encoded<Words> encode_whole(const Point& point, const Value& value, Rounding rou
     }
     if (!exact && rounding == Rounding::exact && allowed(point, raw))
         return inexact(point, value, {allowed(point, around.below), allowed(point, around.above)});
-    return judge_written(point, value, words_of(point, raw));
+    return check_written(point, value, words_of(point, raw));
 }
 
 Decimal as_shown(float number) { return as_printed(number); }
 Decimal as_shown(double number) { return number; }
 
-/// Of a number that a float is to hold, too: the float nearest to it, for nobody means the last bit
-/// of a fraction; but a whole number is meant exactly, as is a fraction where floats have none, and
-/// what is not 0 must not become 0 or lose most of its digits.
+/// True if `number`, the nearest float, may stand for the value. Fractions need not be exact to the
+/// last bit. Integers must be, and fractions where floats have none; a value other than 0 must not
+/// become 0 or lose most of its digits.
 template <class Float>
-bool is_held(const Point& point, const Value& value, Float number) {
+bool float_holds(const Point& point, const Value& value, Float number) {
     if (!is_plain(point)) return true;
     const Decimal given = decimal_of(value);
     const auto held = static_cast<double>(number);
@@ -199,7 +199,7 @@ bool is_held(const Point& point, const Value& value, Float number) {
     return !given.is_whole() && size >= std::numeric_limits<Float>::min() && size < kWhole;
 }
 
-/// With the float that is nearest on the other side of the value.
+/// Names this float and the next one on the other side of the value.
 template <class Float>
 WriteRefusal inexact_float(const Point& point, const Value& value, Float number) {
     constexpr Float kMost = std::numeric_limits<Float>::max();
@@ -213,10 +213,10 @@ Encoded<Words> encode_f32(const Point& point, const Value& value, double raw, Ro
     const float number = std::abs(raw) > static_cast<double>(kMost)
                              ? std::copysign(kMost, static_cast<float>(raw < 0 ? -1 : 1))
                              : static_cast<float>(raw);
-    if (rounding == Rounding::exact && !is_held(point, value, number))
+    if (rounding == Rounding::exact && !float_holds(point, value, number))
         return inexact_float(point, value, number);
     const auto bits = std::bit_cast<std::uint32_t>(number);
-    return judge_written(point, value, reordered(parted(bits, 2), point.word_order, false));
+    return check_written(point, value, reordered(split_words(bits, 2), point.word_order, false));
 }
 
 Encoded<Words> encode_number(const Point& point, const Value& value, Rounding rounding) {
@@ -228,10 +228,10 @@ Encoded<Words> encode_number(const Point& point, const Value& value, Rounding ro
     if (rounding == Rounding::exact && !within_limits(point, value))
         return beyond_limits(point, value);
     if (point.type == Type::f32) return encode_f32(point, value, raw, rounding);
-    if (rounding == Rounding::exact && !is_held(point, value, raw))
+    if (rounding == Rounding::exact && !float_holds(point, value, raw))
         return inexact_float(point, value, raw);
     const auto bits = std::bit_cast<std::uint64_t>(raw);
-    return judge_written(point, value, reordered(parted(bits, 4), point.word_order, false));
+    return check_written(point, value, reordered(split_words(bits, 4), point.word_order, false));
 }
 
 Encoded<Words> encode_text(const Point& point, const std::string& text) {
@@ -244,7 +244,7 @@ Encoded<Words> encode_text(const Point& point, const std::string& text) {
     return reordered(text_to_words(text, point.count()), point.word_order, true);
 }
 
-/// The raw value behind a label.
+/// Returns the raw value of a label.
 std::optional<std::int64_t> raw_of_label(const Point& point, const std::string& text) {
     for (const auto& [raw, name] : point.labels) {
         if (name == text) return raw;
@@ -260,9 +260,9 @@ std::string labels_of(const Point& point) {
     return list;
 }
 
-/// A text that is none of the point's labels.
-WriteRefusal no_label(const Point& point, const std::string& text) {
-    if (is_no_number(text))
+/// The text is not one of the point's labels.
+WriteRefusal unknown_label(const Point& point, const std::string& text) {
+    if (is_non_finite(text))
         return {.message = point.name + " takes finite numbers only, not '" + text + '\'',
                 .malformed = true};
     if (!point.labels.empty())
@@ -291,8 +291,8 @@ Encoded<std::vector<std::uint16_t>> encode(const Point& point, const Value& valu
     Value given = value;
     if (text != nullptr) {
         const auto raw = raw_of_label(point, *text);
-        if (!raw) return no_label(point, *text);
-        given = *raw;  // raw, so it has to become a value first where there is a scale
+        if (!raw) return unknown_label(point, *text);
+        given = *raw;  // a raw number: scaled to a value first if the point has a scale
         if (!is_plain(point)) given = Scaling(point.scale, point.offset).value_of(Decimal(*raw));
     }
     if (point.type == Type::boolean) return encode_bit(point, given);
@@ -308,14 +308,14 @@ bool writes_coils(const profile::PanelProfile& profile) {
            profile.has_function(modbus::kWriteMultipleCoils);
 }
 
-/// The panel has one of the two functions.
+/// Requires one of the two functions.
 Bytes write_coil(const profile::PanelProfile& profile, std::uint16_t address, bool on) {
     if (profile.has_function(modbus::kWriteSingleCoil))
         return modbus::encode_write_coil(address, on);
     return modbus::encode_write_coils(address, {on});
 }
 
-/// The panel's own view of this word's bits, when it can be written (Autonics UB over UW).
+/// Returns the panel's bit view of this word if it is writable (Autonics UB over UW).
 const profile::Area* bit_view(const profile::PanelProfile& profile, const Point& point) {
     const profile::Area* words = profile.find_area(point.table, point.address);
     if (words == nullptr) return nullptr;
@@ -329,7 +329,7 @@ const profile::Area* bit_view(const profile::PanelProfile& profile, const Point&
     return nullptr;
 }
 
-/// The panel has one of the two ways.
+/// Requires one of the two ways.
 Bytes write_bit(const profile::PanelProfile& profile, const Point& point, bool on) {
     if (bit_view(profile, point) != nullptr) {
         const auto coil = static_cast<std::uint16_t>(point.address * 16u + *point.bit);
@@ -374,7 +374,7 @@ Bytes pdu_of(const profile::PanelProfile& profile, const Point& point,
     return modbus::encode_write_registers(point.address, items);
 }
 
-/// What a read of these items will show; of one bit of a word there is only the bit.
+/// Returns the value that a read of these items will give.
 Value written_value(const Point& point, const std::vector<std::uint16_t>& items) {
     if (point.type == Type::boolean) return items.front() != 0;
     return *decode(point, items);

@@ -25,8 +25,8 @@ Items words_in(ByteView data) {
     return items;
 }
 
-/// What a write says of its items, from the first on; nothing where only the panel knows.
-Items written_by(ByteView request, std::uint32_t count) {
+/// Returns the items that a write contains; empty if only the panel knows the result.
+Items items_written(ByteView request, std::uint32_t count) {
     constexpr std::size_t kOne = 3;   // function and address
     constexpr std::size_t kMany = 6;  // ... quantity and byte count
     switch (request[0]) {
@@ -43,13 +43,13 @@ Items written_by(ByteView request, std::uint32_t count) {
     }
 }
 
-Items read_by(const modbus::Span& span, ByteView reply) {
+Items items_read(const modbus::Span& span, ByteView reply) {
     if (!modbus::is_bit_table(span.table)) return modbus::registers_of(reply);
     const std::vector<bool> bits = modbus::bits_of(reply, span.count);
     return {bits.begin(), bits.end()};
 }
 
-/// Whether it was executed or not: of one that its panel refused, surely not.
+/// False only if the panel refused the write.
 bool may_have_written(const tap::Transaction& heard) {
     return heard.doubtful || !modbus::exception_of(heard.reply);
 }
@@ -63,22 +63,22 @@ std::vector<std::size_t> HeardValues::on_heard(const tap::Transaction& heard) {
     changed_.clear();
     if (!modbus::check_request(heard.request, modbus::QuantityCheck::wide)) return {};
     const modbus::Access access = modbus::access_of(heard.request);
-    if (access.write && may_have_written(heard)) wrote(access.write, heard);
+    if (access.write && may_have_written(heard)) apply_write(access.write, heard);
     const bool plain = access.read && heard.request[0] != modbus::kReadFifoQueue;
-    if (plain && !heard.doubtful && !read(*access.read, heard))
-        failed(*access.read, modbus::exception_of(heard.reply));
+    if (plain && !heard.doubtful && !apply_read(*access.read, heard))
+        apply_failure(*access.read, modbus::exception_of(heard.reply));
     std::ranges::sort(changed_);
     const auto twice = std::ranges::unique(changed_);
     changed_.erase(twice.begin(), twice.end());
     return std::exchange(changed_, {});
 }
 
-/// False when it was no success.
-bool HeardValues::read(const modbus::Span& span, const tap::Transaction& heard) {
+/// Returns false if the read failed.
+bool HeardValues::apply_read(const modbus::Span& span, const tap::Transaction& heard) {
     if (heard.end != tap::End::answered || modbus::exception_of(heard.reply)) return false;
-    const Items items = read_by(span, heard.reply);
+    const Items items = items_read(span, heard.reply);
     if (items.size() < span.count) return false;
-    // 17h reads behind its own write (AP 6.17).
+    // 17h reads after its own write (AP 6.17).
     const bool writes = heard.request[0] == modbus::kReadWriteMultipleRegisters;
     const TimePoint sampled = writes ? heard.sent : heard.sampled;
     for (std::size_t i = 0; i < wants_.size(); ++i) {
@@ -87,21 +87,22 @@ bool HeardValues::read(const modbus::Span& span, const tap::Transaction& heard) 
     return true;
 }
 
-void HeardValues::wrote(const std::optional<modbus::Span>& span, const tap::Transaction& heard) {
+void HeardValues::apply_write(const std::optional<modbus::Span>& span,
+                              const tap::Transaction& heard) {
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         if (!may_change(memory_, span, wants_[i].span)) continue;
         readings_[i].written = heard.sent;
         changed_.push_back(i);
     }
     if (heard.doubtful || heard.end != tap::End::answered) return;
-    const Items items = written_by(heard.request, span->count);
+    const Items items = items_written(heard.request, span->count);
     if (items.size() < span->count) return;
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         if (span->contains(wants_[i].span)) set(i, *span, items, heard.sent);
     }
 }
 
-void HeardValues::failed(const modbus::Span& span, std::optional<std::uint8_t> exception) {
+void HeardValues::apply_failure(const modbus::Span& span, std::optional<std::uint8_t> exception) {
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         if (!span.contains(wants_[i].span)) continue;
         readings_[i].failing = true;

@@ -10,18 +10,19 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     struct Station {
         std::uint8_t id = 0;
         std::string name;
-        bus::ClientId client = bus::next_client_id();  ///< of its own: stations take turns
+        bus::ClientId client =
+            bus::next_client_id();  ///< one client each, so that stations take turns
         PlanLimits limits;
         std::shared_ptr<StationPolls> polls;
     };
-    using StationPtr = std::shared_ptr<Station>;  ///< shared with answers that are under way
+    using StationPtr = std::shared_ptr<Station>;  ///< shared with outstanding requests
 
     State(rt::Clock& c, bus::BusClient& b) : clock(c), bus(b), alarm(c.make_alarm()) {}
 
-    void ask_all();
+    void send_due();
     StationPtr make(PolledStation wanted) const;
     void apply(std::vector<PolledStation> wanted);
-    void introduce(const Station& station);
+    void set_client_name(const Station& station);
     void ask(const StationPtr& station, StationPolls::Due due);
     void on_answer(Station& station, std::size_t read, const bus::Answer& answer, TimePoint asked);
     void on_write(const bus::WriteEvent& write);
@@ -35,7 +36,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     bool running = false;
 };
 
-void Poller::State::ask_all() {
+void Poller::State::send_due() {
     const TimePoint now = clock.now();
     for (const StationPtr& station : stations) {
         for (StationPolls::Due& due : station->polls->take_due(now)) ask(station, std::move(due));
@@ -52,7 +53,7 @@ void Poller::State::ask(const StationPtr& station, StationPolls::Due due) {
                  [weak = weak_from_this(), of = std::weak_ptr(station), read = due.read,
                   asked = clock.now()](const bus::Answer& answer) {
                      const auto self = weak.lock();
-                     const auto alive = of.lock();  // it is still polled, and so
+                     const auto alive = of.lock();  // null if the station was removed or replaced
                      if (self && self->running && alive)
                          self->on_answer(*alive, read, answer, asked);
                  });
@@ -60,7 +61,7 @@ void Poller::State::ask(const StationPtr& station, StationPolls::Due due) {
 
 void Poller::State::on_answer(Station& station, std::size_t read, const bus::Answer& answer,
                               TimePoint asked) {
-    // Asked is the safe side: the value is at most as old as that.
+    // The time of asking is the safe choice: the value is not older than that.
     const auto wants = station.polls->on_answer(clock.now(), read, answer.pdu, asked);
     if (update && !wants.empty()) update(station.id, wants);
     arm();
@@ -76,7 +77,7 @@ Poller::State::StationPtr Poller::State::make(PolledStation wanted) const {
     return made;
 }
 
-void Poller::State::introduce(const Station& station) {
+void Poller::State::set_client_name(const Station& station) {
     const std::string called =
         station.name.empty() ? "station " + std::to_string(station.id) : station.name;
     bus.name_client(station.client, "poll of " + called);
@@ -90,13 +91,13 @@ void Poller::State::apply(std::vector<PolledStation> wanted) {
         if (known && (*found)->polls->wants() == one.wants && (*found)->limits == one.limits) {
             (*found)->polls->apply(std::move(one.memory));
             (*found)->name = std::move(one.name);
-            if (running) introduce(**found);
+            if (running) set_client_name(**found);
             stations.push_back(*found);
             continue;
         }
         stations.push_back(make(std::move(one)));
         if (known) stations.back()->polls->adopt(*(*found)->polls);
-        if (running) introduce(*stations.back());
+        if (running) set_client_name(*stations.back());
     }
     for (const StationPtr& old : before) {
         if (running && std::ranges::find(stations, old) == stations.end()) bus.cancel(old->client);
@@ -104,7 +105,7 @@ void Poller::State::apply(std::vector<PolledStation> wanted) {
     if (running) arm();
 }
 
-/// Asks nobody: it is told from inside the bus.
+/// Called from inside the bus: makes no requests.
 void Poller::State::on_write(const bus::WriteEvent& write) {
     const TimePoint now = clock.now();
     for (const StationPtr& station : stations) {
@@ -126,7 +127,7 @@ void Poller::State::arm() {
         if (due && (!next || *due < *next)) next = due;
     }
     if (next) {
-        alarm->arm(*next, [this] { ask_all(); });
+        alarm->arm(*next, [this] { send_due(); });
     } else {
         alarm->cancel();
     }
@@ -152,7 +153,7 @@ std::function<void(const bus::WriteEvent&)> Poller::write_listener() const {
 
 void Poller::start() {
     state_->running = true;
-    for (const State::StationPtr& station : state_->stations) state_->introduce(*station);
+    for (const State::StationPtr& station : state_->stations) state_->set_client_name(*station);
     state_->arm();
 }
 

@@ -54,7 +54,7 @@ std::uint32_t TableMap::reach(std::uint32_t first) const {
 
 namespace {
 
-/// Part of a want, or all of it.
+/// A want, or a part of one.
 struct Piece {
     std::uint32_t first = 0;
     std::uint32_t end = 0;
@@ -75,7 +75,7 @@ void sort_by_start(std::vector<Piece>& pieces) {
     });
 }
 
-/// A read before it is known whom it serves.
+/// A read that has no wants assigned yet.
 struct Box {
     std::uint32_t first = 0;
     std::uint32_t end = 0;
@@ -110,11 +110,11 @@ class TablePlanner {
     }
 
     std::vector<PlannedRead> run() const {
-        std::vector<Box> boxes = interval_after_interval();
+        std::vector<Box> boxes = plan_by_interval();
         if (has_intervals()) {
             std::vector<Box> together = plan_runs(pieces_);
             if (load(together) < load(boxes)) boxes = std::move(together);
-            if (pieces_.size() <= kFew) try_all(boxes);
+            if (pieces_.size() <= kMaxExhaustive) search_exhaustively(boxes);
         }
         std::vector<PlannedRead> reads = serve(std::move(boxes));
         add_refused(reads);
@@ -136,11 +136,11 @@ class TablePlanner {
         });
     }
 
-    static constexpr std::size_t kFew = 8;  ///< pieces: at most 4140 partitions
+    static constexpr std::size_t kMaxExhaustive = 8;  ///< pieces: at most 4140 partitions
 
-    /// Takes the cheapest of all partitions when it is cheaper than `best`. A read only becomes
-    /// dearer by what joins it, so that what costs as much already is not followed.
-    void try_all(std::vector<Box>& best) const {
+    /// Replaces `best` by the cheapest of all partitions, if that is cheaper. Adding to a read
+    /// never makes it cheaper, so partitions that already cost as much are not pursued.
+    void search_exhaustively(std::vector<Box>& best) const {
         std::vector<Box> boxes;
         double least = load(best);
         add_piece(0, boxes, least, best);
@@ -157,7 +157,7 @@ class TablePlanner {
         const Piece& piece = pieces_[index];
         for (std::size_t i = 0; i < boxes.size(); ++i) {
             const Box before = boxes[i];
-            boxes[i].end = std::max(before.end, piece.end);  // pieces come sorted by start
+            boxes[i].end = std::max(before.end, piece.end);  // pieces are sorted by start
             boxes[i].every = std::min(before.every, piece.every);
             if (boxes[i].end <= map_.reach(before.first)) add_piece(index + 1, boxes, least, best);
             boxes[i] = before;
@@ -176,9 +176,9 @@ class TablePlanner {
         return sum;
     }
 
-    /// The cheapest partition of sorted pieces into runs: best[i] is the least load of all pieces
-    /// from i. Of pieces of one interval this is the cheapest of all partitions: without those that
-    /// lie in another, starts and ends both ascend, and what a read may contain, its parts may.
+    /// Returns the cheapest partition of sorted pieces into runs: best[i] is the minimum load of
+    /// all pieces from i. For pieces of one interval it is the cheapest of all partitions: without
+    /// contained pieces, starts and ends both ascend, and any part of an allowed read is allowed.
     std::vector<Box> plan_runs(const std::vector<Piece>& sorted) const {
         const std::vector<Piece> pieces = without_contained(sorted);
         std::vector<double> best(pieces.size() + 1, std::numeric_limits<double>::infinity());
@@ -203,7 +203,7 @@ class TablePlanner {
         return boxes;
     }
 
-    /// Leaves out what lies in another piece that is wanted as often.
+    /// Removes pieces contained in another piece with the same or a shorter interval.
     static std::vector<Piece> without_contained(const std::vector<Piece>& sorted) {
         std::vector<Piece> kept;
         std::map<Duration, std::uint32_t> furthest;  // end so far, by interval
@@ -218,15 +218,16 @@ class TablePlanner {
         return kept;
     }
 
-    /// Intervals by themselves from the shortest, without what is served already; then joined.
-    std::vector<Box> interval_after_interval() const {
+    /// Plans each interval by itself from the shortest, without pieces already served, then joins
+    /// reads.
+    std::vector<Box> plan_by_interval() const {
         std::map<Duration, std::vector<Piece>> intervals;
         for (const Piece& piece : pieces_) intervals[piece.every].push_back(piece);
         std::vector<Box> boxes;
         for (auto& [every, pieces] : intervals) {
             sort_by_start(boxes);
             std::erase_if(pieces, [&](const Piece& piece) {
-                return find_server(boxes, piece) != boxes.end();
+                return find_box_for(boxes, piece) != boxes.end();
             });
             const std::vector<Box> added = plan_runs(pieces);
             boxes.insert(boxes.end(), added.begin(), added.end());
@@ -235,9 +236,9 @@ class TablePlanner {
         return join(boxes);
     }
 
-    /// The last of sorted boxes that serves this piece.
-    std::vector<Box>::const_iterator find_server(const std::vector<Box>& boxes,
-                                                 const Piece& piece) const {
+    /// Returns the last of the sorted boxes that serves this piece.
+    std::vector<Box>::const_iterator find_box_for(const std::vector<Box>& boxes,
+                                                  const Piece& piece) const {
         auto box = std::upper_bound(
             boxes.begin(), boxes.end(), piece.first,
             [](std::uint32_t first, const Box& candidate) { return first < candidate.first; });
@@ -249,7 +250,7 @@ class TablePlanner {
         return boxes.end();
     }
 
-    /// Neighbours as one read, where that is allowed and not dearer per second.
+    /// Joins neighbours where that is allowed and costs no more per second.
     std::vector<Box> join(const std::vector<Box>& boxes) const {
         std::vector<Box> kept;
         for (Box last : boxes) {
@@ -265,7 +266,7 @@ class TablePlanner {
         return kept;
     }
 
-    /// Gives every piece to a read; reads that nobody needs any more are left out.
+    /// Assigns every piece to a read; drops reads without pieces.
     std::vector<PlannedRead> serve(std::vector<Box> boxes) const {
         sort_by_start(boxes);
         std::vector<PlannedRead> reads;
@@ -273,14 +274,14 @@ class TablePlanner {
         for (const Box& box : boxes)
             reads.push_back({{table_, box.first, box.end - box.first}, box.every, {}, false});
         for (const Piece& piece : pieces_) {
-            const auto index = find_server(boxes, piece) - boxes.cbegin();
+            const auto index = find_box_for(boxes, piece) - boxes.cbegin();
             reads[static_cast<std::size_t>(index)].wants.push_back(piece.want);
         }
         std::erase_if(reads, [](const PlannedRead& read) { return read.wants.empty(); });
         return reads;
     }
 
-    /// Pieces with a refused span in them are asked for alone; those of the same items share it.
+    /// Reads pieces that contain a refused span alone; pieces of the same items share a read.
     void add_refused(std::vector<PlannedRead>& reads) const {
         const Piece* before = nullptr;
         for (const Piece& piece : refused_) {
@@ -295,12 +296,12 @@ class TablePlanner {
     const PlanLimits& limits_;
     modbus::Table table_;
     TableMap map_;
-    std::vector<double> seconds_;  ///< cost of a read, by its items
-    std::vector<Piece> pieces_;    ///< sorted; none has a refused span in it
-    std::vector<Piece> refused_;   ///< sorted; all others
+    std::vector<double> seconds_;  ///< cost of a read, by number of items
+    std::vector<Piece> pieces_;    ///< sorted; without refused spans
+    std::vector<Piece> refused_;   ///< sorted; the others
 };
 
-/// The read of exactly these pieces.
+/// Returns the read of exactly these pieces.
 PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces) {
     PlannedRead read{{whole.span.table, pieces.front().first, 0}, Duration::max(), {}, false};
     std::uint32_t end = 0;
@@ -314,7 +315,7 @@ PlannedRead read_of(const PlannedRead& whole, std::span<const Piece> pieces) {
     return read;
 }
 
-/// Where to cut pieces that are sorted by start: index of the first of the right half.
+/// Returns where to cut pieces sorted by start: the index of the first piece of the right half.
 std::size_t cut_index(const std::vector<Piece>& pieces) {
     std::size_t best = 0;
     std::int64_t widest = -1;
@@ -362,7 +363,7 @@ std::size_t data_size(modbus::Table table, std::uint32_t count) {
     return modbus::is_bit_table(table) ? (std::size_t{count} + 7) / 8 : std::size_t{count} * 2;
 }
 
-/// A panel knows the request by the silence behind it, whatever gap it is given besides.
+/// A panel recognises the end of a request by the standard's silence, whatever gap is configured.
 Duration exchange_time(const PlanLimits& limits, std::size_t request, std::size_t reply) {
     return frame_time(limits.serial, request) + silent_interval(limits.serial) + limits.think_time +
            frame_time(limits.serial, reply) + limits.gap;
@@ -410,7 +411,7 @@ std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& rea
     return std::pair(read_of(read, all.first(at)), read_of(read, all.subspan(at)));
 }
 
-std::optional<modbus::Span> seam(const PlannedRead& left, const PlannedRead& right) {
+std::optional<modbus::Span> refused_between(const PlannedRead& left, const PlannedRead& right) {
     const modbus::Table table = left.span.table;
     if (table != right.span.table || right.span.first < left.span.end()) return std::nullopt;
     const std::uint32_t first = left.span.end() - 1;

@@ -10,12 +10,12 @@ namespace panelgate::points {
 
 namespace {
 
-constexpr std::int64_t kExact = std::int64_t{1}
-                                << 53;  ///< a double holds every whole number to here
-constexpr int kMostDigits = 18;         ///< of an int64, whatever they are
-constexpr int kEveryDouble = 17;        ///< digits that tell any two doubles apart
-constexpr double kTens[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
-                            1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
+constexpr std::int64_t kMaxExactInteger = std::int64_t{1}
+                                          << 53;  ///< a double holds every integer up to this
+constexpr int kMostDigits = 18;                   ///< digits that always fit in an int64
+constexpr int kRoundTripDigits = 17;              ///< digits that distinguish any two doubles
+constexpr double kPowersOfTen[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8, 1e9,
+                                   1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18};
 
 }  // namespace
 
@@ -36,14 +36,16 @@ std::optional<Scaling::Whole> Scaling::whole() const {
 }
 
 double Scaling::value_of(double raw) const {
-    const bool is_whole = raw == std::floor(raw) && std::abs(raw) <= static_cast<double>(kExact);
+    const bool is_whole =
+        raw == std::floor(raw) && std::abs(raw) <= static_cast<double>(kMaxExactInteger);
     if (whole_ && is_whole) {
         std::int64_t sum = 0;
         const bool fits =
             !__builtin_mul_overflow(static_cast<std::int64_t>(raw), whole_->scale, &sum) &&
-            !__builtin_add_overflow(sum, whole_->offset, &sum) && sum <= kExact && sum >= -kExact;
-        // Both are exact, so the quotient is the nearest double there is.
-        if (fits) return static_cast<double>(sum) / kTens[-whole_->exponent];
+            !__builtin_add_overflow(sum, whole_->offset, &sum) && sum <= kMaxExactInteger &&
+            sum >= -kMaxExactInteger;
+        // Both are exact, so the quotient is the nearest double.
+        if (fits) return static_cast<double>(sum) / kPowersOfTen[-whole_->exponent];
     }
     return raw * scale_ + offset_;
 }
@@ -62,12 +64,12 @@ Decimal::Around Scaling::around(const Decimal& value) const {
     return (value + -decimal_offset_).divided_by(decimal_scale_);
 }
 
-/// Not that of another one as well.
+/// nullopt if a neighbouring raw number is shown the same.
 std::optional<Decimal> Scaling::raw_shown_as(double value) const {
     const auto whole = around(value);
     if (whole.below == whole.above) return whole.nearest;
     const double raw = whole.nearest.nearest();
-    if (std::abs(raw) >= static_cast<double>(kExact) || value_of(raw) != value ||
+    if (std::abs(raw) >= static_cast<double>(kMaxExactInteger) || value_of(raw) != value ||
         value_of(raw - 1) == value || value_of(raw + 1) == value)
         return std::nullopt;
     return whole.nearest;
@@ -77,7 +79,7 @@ std::optional<Decimal> Scaling::exact_raw_of(const Decimal& value) const {
     const auto whole = around(value);
     if (whole.below == whole.above) return whole.nearest;
     const double nearest = value.nearest();
-    if (value == Decimal(nearest) || value == Decimal::exactly(nearest, kEveryDouble))
+    if (value == Decimal(nearest) || value == Decimal::exactly(nearest, kRoundTripDigits))
         return raw_shown_as(nearest);
     return std::nullopt;
 }
@@ -116,7 +118,7 @@ std::vector<std::uint16_t> text_to_words(std::string_view text, unsigned count) 
     return words;
 }
 
-bool is_no_number(std::string text) {
+bool is_non_finite(std::string text) {
     std::ranges::transform(text, text.begin(), [](char c) {
         return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
     });
@@ -133,8 +135,8 @@ std::uint16_t swapped(std::uint16_t word) {
     return static_cast<std::uint16_t>(word << 8 | word >> 8);
 }
 
-/// n when the scale is 1/n and all there is: dividing by n gives the double nearest to the decimal
-/// number, as Scaling does, at less expense.
+/// Returns n if the scale is 1/n and there is no offset: dividing by n gives the double nearest to
+/// the decimal number, like Scaling but cheaper.
 std::optional<double> divisor_of(const Point& point) {
     const double inverse = std::round(1 / point.scale);
     if (point.offset != 0 || std::abs(point.scale) >= 1 || 1 / inverse != point.scale)
@@ -151,13 +153,13 @@ Words reordered(std::span<const std::uint16_t> items, WordOrder order, bool keep
     return words;
 }
 
-std::uint64_t joined(const Words& words) {
+std::uint64_t join_words(const Words& words) {
     std::uint64_t raw = 0;
     for (const std::uint16_t word : words) raw = raw << 16 | word;
     return raw;
 }
 
-Words parted(std::uint64_t raw, unsigned count) {
+Words split_words(std::uint64_t raw, unsigned count) {
     Words words(count);
     for (unsigned i = count; i-- > 0; raw >>= 16) words[i] = static_cast<std::uint16_t>(raw);
     return words;
@@ -185,14 +187,14 @@ double from_raw(const Point& point, double raw) {
     return Scaling(point.scale, point.offset).value_of(raw);
 }
 
-bool means_none(const Point& point, std::uint64_t number) {
+bool is_no_value(const Point& point, std::uint64_t number) {
     const unsigned unused = 64 - 16 * registers_of(point.type);
     return std::ranges::any_of(point.no_value, [&](std::int64_t none) {
         return (static_cast<std::uint64_t>(none) ^ number) << unused == 0;
     });
 }
 
-bool means_none(const Point& point, double number) {
+bool is_no_value(const Point& point, double number) {
     return std::ranges::any_of(
         point.no_value, [&](std::int64_t none) { return static_cast<double>(none) == number; });
 }

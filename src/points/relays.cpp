@@ -34,7 +34,7 @@ namespace {
 
 constexpr auto kRepairPause = 1s;  ///< between two repairs of one relay
 
-/// Does such a write change what this relay's target holds, as far as is known?
+/// True if the write changes the target of this relay, as far as is known.
 bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
     if (write.station != 0 && write.station != route.to_station) return false;
     if (!write.items) return true;
@@ -43,7 +43,7 @@ bool changes_target(const RelayRoute& route, const bus::WriteEvent& write) {
     return route.to_memory.changes(*write.items, target).value_or(false);
 }
 
-/// The same registers are copied between the same panels, however often.
+/// True if both copy the same registers between the same panels, at any interval.
 bool is_same(const RelayRoute& one, const RelayRoute& other) {
     return one.relay.name() == other.relay.name() && one.relay.count == other.relay.count &&
            one.relay.from == other.relay.from && one.relay.to == other.relay.to &&
@@ -52,14 +52,14 @@ bool is_same(const RelayRoute& one, const RelayRoute& other) {
            one.to_station == other.to_station && one.to_has_multiple == other.to_has_multiple;
 }
 
-/// Why an answer is none; empty when it is one.
+/// Returns why the answer is a failure; empty if it is not.
 std::string failure_of(const bus::Answer& answer) {
     if (!answer.pdu) return std::string(label(outcome_of(answer.pdu.error())));
     const auto code = modbus::exception_of(*answer.pdu);
     return code ? "exception " + std::to_string(*code) : std::string();
 }
 
-/// The request that writes what this reply holds.
+/// Returns the request that writes the values of this reply.
 Bytes write_of(const RelayRoute& route, ByteView reply) {
     const std::uint16_t address = route.relay.to.address;
     const bool single = route.relay.count == 1 && !route.to_has_multiple;
@@ -85,41 +85,41 @@ struct Relays::State : std::enable_shared_from_this<Relays::State> {
         TimePoint due;
         RelayStatus status;
         bus::ClientId client = bus::next_client_id();
-        Bytes writing;              ///< the write that is under way
-        Bytes written;              ///< the last write that was confirmed
-        TimePoint written_for;      ///< the turn that it was of
-        std::uint64_t returns = 0;  ///< of the target, then
-        bool open = false;          ///< a request is under way, which will lead to arm()
-        bool overwritten = false;   ///< by somebody else, and not repaired yet
-        bool repairing = false;     ///< the next write that is confirmed undoes that
-        TimePoint next_repair{};    ///< not earlier
+        Bytes writing;              ///< the write in progress
+        Bytes written;              ///< the last confirmed write
+        TimePoint written_turn;     ///< its turn
+        std::uint64_t returns = 0;  ///< of the target, at that time
+        bool open = false;          ///< a request is outstanding; its answer leads to arm()
+        bool overwritten = false;   ///< by another client, not repaired yet
+        bool repairing = false;     ///< the next confirmed write is a repair
+        TimePoint next_repair{};    ///< earliest time
     };
     explicit State(rt::Clock& c) : clock(c) {}
-    using Then = void (State::*)(Entry&, const bus::Answer&);
+    using Continuation = void (State::*)(Entry&, const bus::Answer&);
 
     void arm(Entry& entry);
     void read(Entry& entry);
     void on_read(Entry& entry, const bus::Answer& answer);
     void on_written(Entry& entry, const bus::Answer& answer);
-    bool holds(const Entry& entry, const Bytes& write) const;
+    bool target_is_current(const Entry& entry, const Bytes& write) const;
     void check_target(Entry& entry);
     void on_write(const std::string& line, const bus::WriteEvent& write);
     void apply(std::vector<RelayRoute> routes);
     void begin(Entry& entry, TimePoint due);
     void end(Entry& entry);
-    void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Then then);
+    void ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu, Continuation then);
     void set(Entry& entry, RelayState state, std::string why = {});
 
     rt::Clock& clock;
-    using EntryPtr = std::shared_ptr<Entry>;  ///< shared with answers that are under way
+    using EntryPtr = std::shared_ptr<Entry>;  ///< shared with outstanding requests
     std::vector<EntryPtr> entries;
     std::set<bus::ClientId> clients;  ///< of the relays
     Changed changed;
     bool running = false;
 };
 
-/// The next turn that is still to come: what a slow panel has missed is missed. One for a repair
-/// comes in between.
+/// Arms the alarm for the next turn in the future (turns missed by a slow panel are lost), or
+/// earlier for a repair.
 void Relays::State::arm(Entry& entry) {
     const TimePoint now = clock.now();
     const Duration every = entry.route.relay.every;
@@ -131,7 +131,7 @@ void Relays::State::arm(Entry& entry) {
 }
 
 void Relays::State::ask(Entry& entry, bus::BusClient& bus, std::uint8_t station, Bytes pdu,
-                        Then then) {
+                        Continuation then) {
     auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
     if (!request) return (this->*then)(entry, bus::Answer{.pdu = request.error()});
     bus.transact(
@@ -165,7 +165,7 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     }
     ++entry.status.reads;
     Bytes write = write_of(entry.route, *answer.pdu);
-    if (entry.route.relay.on_change && holds(entry, write)) {
+    if (entry.route.relay.on_change && target_is_current(entry, write)) {
         check_target(entry);
         arm(entry);
         return;
@@ -174,15 +174,15 @@ void Relays::State::on_read(Entry& entry, const bus::Answer& answer) {
     ask(entry, *entry.route.to, entry.route.to_station, std::move(write), &State::on_written);
 }
 
-/// The target has this, as far as anybody can know without asking it.
-bool Relays::State::holds(const Entry& entry, const Bytes& write) const {
+/// True if the target holds these values, as far as can be known without reading it.
+bool Relays::State::target_is_current(const Entry& entry, const Bytes& write) const {
     const RelayRoute& route = entry.route;
     return !entry.repairing && write == entry.written &&
-           entry.due - entry.written_for < route.relay.refresh &&
+           entry.due - entry.written_turn < route.relay.refresh &&
            route.to->station_status(route.to_station).returns == entry.returns;
 }
 
-/// Nothing has to be written; but a target that has gone may come back with something else.
+/// Nothing to write: reports a target that is gone, and writes again when it returns.
 void Relays::State::check_target(Entry& entry) {
     const bool line_up = entry.route.to->status().up;
     const Health health = entry.route.to->station_status(entry.route.to_station).state;
@@ -194,7 +194,7 @@ void Relays::State::check_target(Entry& entry) {
 
 void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
     if (const std::string why = failure_of(answer); !why.empty()) {
-        entry.written.clear();  // whatever the target holds now: it is written again
+        entry.written.clear();  // the target's content is unknown: write again
         ++entry.status.write_failures;
         set(entry, RelayState::target_failing, why);
     } else {
@@ -202,23 +202,23 @@ void Relays::State::on_written(Entry& entry, const bus::Answer& answer) {
         entry.status.last_write = clock.now();
         if (std::exchange(entry.repairing, false)) ++entry.status.repairs;
         entry.written = std::move(entry.writing);
-        entry.written_for = entry.due;
+        entry.written_turn = entry.due;
         entry.returns = entry.route.to->station_status(entry.route.to_station).returns;
         set(entry, RelayState::ok);
     }
     arm(entry);
 }
 
-/// Told from inside the bus: asks nobody.
+/// Called from inside the bus: makes no requests.
 void Relays::State::on_write(const std::string& line, const bus::WriteEvent& write) {
     if (write.ended) return;
     for (const auto& entry : entries) {
         if (entry->route.to_line != line) continue;
-        if (write.client == entry->client) {  // what was written before is written over now
+        if (write.client == entry->client) {  // overwrites what was written before
             if (std::exchange(entry->overwritten, false)) entry->repairing = true;
             continue;
         }
-        // What relays write is what their user wants, and their targets lie apart.
+        // Relays may write to the same line as configured: their targets do not overlap.
         if (clients.contains(write.client) || !changes_target(entry->route, write)) continue;
         entry->overwritten = true;
         if (!entry->open) arm(*entry);
@@ -232,7 +232,7 @@ void Relays::State::set(Entry& entry, RelayState state, std::string why) {
     if (changed) changed(entry.status);
 }
 
-/// The entry of an unchanged relay goes on: what it has written is not written again.
+/// Entries of unchanged relays continue and do not write again.
 void Relays::State::apply(std::vector<RelayRoute> routes) {
     std::vector<EntryPtr> before = std::exchange(entries, {});
     clients.clear();
@@ -241,9 +241,9 @@ void Relays::State::apply(std::vector<RelayRoute> routes) {
             before, [&](const EntryPtr& entry) { return entry && is_same(entry->route, route); });
         if (found != before.end()) {
             entries.push_back(std::move(*found));
-            const bool other_pace = entries.back()->route.relay.every != route.relay.every;
+            const bool interval_changed = entries.back()->route.relay.every != route.relay.every;
             entries.back()->route = std::move(route);
-            if (other_pace && running && !entries.back()->open) {
+            if (interval_changed && running && !entries.back()->open) {
                 entries.back()->due = clock.now();
                 arm(*entries.back());
             }

@@ -53,7 +53,7 @@ PointReading StationPoints::read(const Point& point, TimePoint now) const {
 
 namespace {
 
-/// What a slot holds where the point was bad; values are finite.
+/// Slot value where the point was bad; real values are finite.
 constexpr double kBad = std::numeric_limits<double>::infinity();
 
 }  // namespace
@@ -88,9 +88,9 @@ void StationHistory::record(TimePoint now, const Point& point, const PointReadin
 
 std::vector<HistorySample> StationHistory::samples(const Point& point, TimePoint now) const {
     std::vector<HistorySample> samples;
-    const Duration patience = std::max(bad_after(point.every), 2 * width_);
+    const Duration max_pause = std::max(bad_after(point.every), 2 * width_);
     const auto end_before = [&](TimePoint next) {
-        if (samples.empty() || !samples.back().value || next - samples.back().at <= patience)
+        if (samples.empty() || !samples.back().value || next - samples.back().at <= max_pause)
             return;
         samples.push_back({samples.back().at + width_, std::nullopt});
     };

@@ -24,10 +24,10 @@ PollSchedule::PollSchedule(std::span<const Duration> intervals, TimePoint start,
 void PollSchedule::set_phases(std::span<const Duration> intervals) {
     std::map<Duration, std::vector<std::size_t>> groups;
     for (std::size_t i = 0; i < intervals.size(); ++i)
-        groups[std::max(intervals[i], kShortest)].push_back(i);
+        groups[std::max(intervals[i], kMinInterval)].push_back(i);
     if (groups.empty()) return;
-    // The groups share out the shortest step between two entries of one interval: 1 s and 2 s would
-    // otherwise meet every 2 s.
+    // Shifts the groups against each other by a part of the shortest step: 1 s and 2 s would
+    // otherwise coincide every 2 s.
     Duration shortest = Duration::max();
     for (const auto& [every, members] : groups)
         shortest = std::min(shortest, every / static_cast<Duration::rep>(members.size()));
@@ -45,8 +45,8 @@ void PollSchedule::set_phases(std::span<const Duration> intervals) {
     }
 }
 
-/// Moves an entry to its first turn after `now`. Gives how many turns that passes over, the one
-/// that was due included.
+/// Moves an entry to its first turn after `now`. Returns how many turns this passes, including the
+/// due one.
 std::uint64_t PollSchedule::advance(std::size_t index, TimePoint now) {
     Entry& entry = entries_[index];
     const TimePoint origin = start_ + entry.phase;
@@ -56,7 +56,7 @@ std::uint64_t PollSchedule::advance(std::size_t index, TimePoint now) {
     const auto passed = turn_after(now) - turn_after(entry.due);
     queue_.erase({entry.due, index});
     entry.due = origin + turn_after(now) * entry.every;
-    entry.hastened = false;
+    entry.is_extra = false;
     queue_.emplace(entry.due, index);
     return static_cast<std::uint64_t>(passed) + 1;
 }
@@ -84,20 +84,20 @@ std::vector<std::size_t> PollSchedule::take_due(TimePoint now) {
     return due;
 }
 
-void PollSchedule::hasten(std::size_t index, TimePoint now) {
+void PollSchedule::request_extra_turn(std::size_t index, TimePoint now) {
     Entry& entry = entries_[index];
-    if (entry.under_way || entry.hastened) return;
+    if (entry.under_way || entry.is_extra) return;
     const Duration burst =
         settings_.extra_every * static_cast<Duration::rep>(settings_.extra_burst - 1);
     const TimePoint turn = std::max({now, extra_free_ - burst, last_extra_ + 1ns});
     if (entry.due <= turn) return;
     last_extra_ = turn;
     extra_free_ = std::max(extra_free_, now) + settings_.extra_every;
-    again_at(index, turn);
-    entry.hastened = true;
+    retry_at(index, turn);
+    entry.is_extra = true;
 }
 
-void PollSchedule::again_at(std::size_t index, TimePoint when) {
+void PollSchedule::retry_at(std::size_t index, TimePoint when) {
     Entry& entry = entries_[index];
     if (entry.under_way || entry.due <= when) return;
     queue_.erase({entry.due, index});
@@ -109,16 +109,16 @@ void PollSchedule::on_done(std::size_t index, TimePoint now) {
     if (index >= entries_.size() || !entries_[index].under_way) return;
     entries_[index].under_way = false;
     --outstanding_;
-    // A turn that came meanwhile is lost, or this entry would overtake all that wait.
+    // A turn due meanwhile is lost, or this entry would overtake those waiting.
     if (entries_[index].due <= now) counters_.skipped += advance(index, now);
 }
 
 namespace {
 
-/// What was written and could not be read behind that is asked for again so soon.
-constexpr Duration kAgain = 5s;
-/// … where the panel has not been asked, as while a connection is opened anew.
-constexpr Duration kSoon = 500ms;
+/// Delay before reading again what was written, when the read after the write failed.
+constexpr Duration kRereadAfterFailure = 5s;
+/// … when that read was not sent, as while a connection is being reopened.
+constexpr Duration kRereadUnsent = 500ms;
 
 std::vector<Duration> intervals_of(const std::vector<PlannedRead>& plan) {
     std::vector<Duration> intervals;
@@ -212,19 +212,21 @@ std::vector<std::size_t> StationPolls::on_answer(TimePoint now, std::size_t read
                                                  const Result<Bytes>& pdu, TimePoint sampled) {
     schedule_.on_done(read, now);
     const PlannedRead planned = plan_[read];
-    // Written since it was asked for: whatever came of it, it is old.
-    const bool overtaken = std::ranges::any_of(planned.wants, [&](std::size_t want) {
+    // Written since the request was sent: the result is outdated in any case.
+    const bool written_meanwhile = std::ranges::any_of(planned.wants, [&](std::size_t want) {
         return readings_[want].written && sampled < *readings_[want].written;
     });
-    if (overtaken) schedule_.hasten(read, now);
+    if (written_meanwhile) schedule_.request_extra_turn(read, now);
     const auto exception = pdu ? modbus::exception_of(*pdu) : std::nullopt;
-    const bool good = pdu && !exception && take(planned, *pdu, sampled);
+    const bool good = pdu && !exception && store(planned, *pdu, sampled);
     if (!good) {
         const bool about_range = exception && (*exception == 2 || *exception == 3);
         if (about_range && split(now, read)) return {};
         fail(planned, exception);
-        const bool unasked = !pdu && pdu.error() != Fault::timeout && pdu.error() != Fault::damaged;
-        if (is_outdated(planned)) schedule_.again_at(read, now + (unasked ? kSoon : kAgain));
+        const bool not_sent =
+            !pdu && pdu.error() != Fault::timeout && pdu.error() != Fault::damaged;
+        if (is_outdated(planned))
+            schedule_.retry_at(read, now + (not_sent ? kRereadUnsent : kRereadAfterFailure));
     }
     return planned.wants;
 }
@@ -235,21 +237,21 @@ std::vector<std::size_t> StationPolls::on_write(TimePoint now,
     for (std::size_t i = 0; i < wants_.size(); ++i) {
         Reading& reading = readings_[i];
         if (!may_change(memory_, items, wants_[i].span)) continue;
-        const bool was_old = reading.outdated();
+        const bool was_outdated = reading.outdated();
         reading.written = now;
-        if (!was_old && reading.outdated()) outdated.push_back(i);
+        if (!was_outdated && reading.outdated()) outdated.push_back(i);
     }
     return outdated;
 }
 
 void StationPolls::on_written(TimePoint now, const std::optional<modbus::Span>& items) {
-    for (const bool themselves : {true, false}) {
+    for (const bool own_items : {true, false}) {
         for (std::size_t i = 0; i < plan_.size(); ++i) {
             const modbus::Span& span = plan_[i].span;
             const bool direct = items && items->overlaps(span);
-            if (direct != themselves || spares(memory_, items, span)) continue;
+            if (direct != own_items || leaves_unchanged(memory_, items, span)) continue;
             if (is_outdated(plan_[i]) || !may_change(memory_, items, span))
-                schedule_.hasten(i, now);
+                schedule_.request_extra_turn(i, now);
         }
     }
 }
@@ -260,8 +262,8 @@ bool may_change(const SharedMemory& memory, const std::optional<modbus::Span>& w
     return known ? *known : modbus::may_change(written, items);
 }
 
-bool spares(const SharedMemory& memory, const std::optional<modbus::Span>& written,
-            const modbus::Span& items) {
+bool leaves_unchanged(const SharedMemory& memory, const std::optional<modbus::Span>& written,
+                      const modbus::Span& items) {
     return memory.known ? !may_change(memory, written, items) : !modbus::may_change(written, items);
 }
 
@@ -270,8 +272,8 @@ bool StationPolls::is_outdated(const PlannedRead& read) const {
                                [&](std::size_t want) { return readings_[want].outdated(); });
 }
 
-/// False of a reply that holds less than was asked for, which no bus gives.
-bool StationPolls::take(const PlannedRead& read, ByteView reply, TimePoint sampled) {
+/// Returns false if the reply holds fewer items than requested; no bus returns that.
+bool StationPolls::store(const PlannedRead& read, ByteView reply, TimePoint sampled) {
     const std::vector<std::uint16_t> items = items_of(read, reply);
     if (items.size() < read.span.count) return false;
     for (const std::size_t index : read.wants) {
@@ -310,7 +312,7 @@ void StationPolls::fail(const PlannedRead& read, std::optional<std::uint8_t> exc
     }
 }
 
-/// False when this read is for one want only.
+/// Returns false if this read is for one want only.
 bool StationPolls::split(TimePoint now, std::size_t read) {
     auto halves = bisect(plan_[read], wants_);
     if (!halves) return false;

@@ -14,11 +14,11 @@
 namespace panelgate::points {
 namespace {
 
-/// An integer type's raw number: signed types sign-extended; u64 beyond int64 does not fit here.
+/// Raw number of an integer type: signed types are sign-extended; u64 above int64 goes to `large`.
 struct Raw {
     bool is_unsigned = false;
     std::int64_t number = 0;
-    std::uint64_t large = 0;  ///< of u64
+    std::uint64_t large = 0;  ///< for u64
 };
 
 std::optional<Raw> raw_of(Type type, std::uint64_t bits) {
@@ -55,8 +55,8 @@ std::optional<Value> scaled(const Point& point, double raw) {
     return Value(value);
 }
 
-/// As a double where that tells all the digits.
-Value told(const Decimal& value) {
+/// Returns a double if it holds all the digits.
+Value plain_value_of(const Decimal& value) {
     const double number = value.nearest();
     const bool is_small = std::abs(number) < 1e15;
     if (is_small && Decimal(number) == value) return number;
@@ -66,13 +66,13 @@ Value told(const Decimal& value) {
 }
 
 std::optional<Value> decode_double(const Point& point, double raw) {
-    if (means_none(point, raw)) return std::nullopt;
+    if (is_no_value(point, raw)) return std::nullopt;
     return scaled(point, raw);
 }
 
-/// As a float prints, 0.1: widened to a double it would be 0.10000000149011612.
+/// Uses the shortest digits, 0.1: widened to a double it would be 0.10000000149011612.
 std::optional<Value> decode_float(const Point& point, float raw) {
-    if (means_none(point, static_cast<double>(raw))) return std::nullopt;
+    if (is_no_value(point, static_cast<double>(raw))) return std::nullopt;
     return scaled(point, as_printed(raw));
 }
 
@@ -98,24 +98,24 @@ std::optional<Value> decode(const Point& point, std::span<const std::uint16_t> i
     const Words words =
         reordered(items.first(point.count()), point.word_order, point.type == Type::string);
     if (point.type == Type::string) return Value(text_of_words(words, point.length));
-    const std::uint64_t bits = joined(words);
+    const std::uint64_t bits = join_words(words);
     if (point.type == Type::f32)
         return decode_float(point, std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
     if (point.type == Type::f64) return decode_double(point, std::bit_cast<double>(bits));
     const auto raw = raw_of(point.type, bits);
-    if (!raw || means_none(point, static_cast<std::uint64_t>(raw->number))) return std::nullopt;
+    if (!raw || is_no_value(point, static_cast<std::uint64_t>(raw->number))) return std::nullopt;
     if (point.type == Type::boolean) return Value(raw->number != 0);
     if (is_plain(point)) return raw->is_unsigned ? Value(raw->large) : Value(raw->number);
     if (registers_of(point.type) < 4) return scaled(point, static_cast<double>(raw->number));
     const Decimal number = raw->is_unsigned ? Decimal(raw->large) : Decimal(raw->number);
-    return told(Scaling(point.scale, point.offset).value_of(number));
+    return plain_value_of(Scaling(point.scale, point.offset).value_of(number));
 }
 
 std::optional<std::string> label_of(const Point& point, std::span<const std::uint16_t> items) {
     if (point.labels.empty() || items.size() < point.count() || !is_integer(point.type))
         return std::nullopt;
-    const auto raw =
-        raw_of(point.type, joined(reordered(items.first(point.count()), point.word_order, false)));
+    const auto raw = raw_of(
+        point.type, join_words(reordered(items.first(point.count()), point.word_order, false)));
     const auto found = raw ? point.labels.find(raw->number) : point.labels.end();
     if (found == point.labels.end()) return std::nullopt;
     return found->second;

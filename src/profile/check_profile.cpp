@@ -13,7 +13,7 @@ namespace {
 using modbus::Table;
 
 constexpr std::uint32_t kBitsPerWord = 16;
-constexpr unsigned kMostBits = 2040;  // one byte of byte count: 255 data bytes
+constexpr unsigned kMostBits = 2040;  // the byte count is one byte: 255 data bytes
 constexpr unsigned kMostWords = 127;
 
 /// User-defined function codes (AP 5).
@@ -21,7 +21,7 @@ bool is_user_defined(std::uint8_t code) {
     return (code >= 65 && code <= 72) || (code >= 100 && code <= 110);
 }
 
-/// The most items that one frame with this function can carry; 0 for functions without a quantity.
+/// Returns the maximum items of a frame with this function; 0 for functions without a quantity.
 unsigned most_items(std::uint8_t code) {
     switch (code) {
         case modbus::kReadCoils:
@@ -98,8 +98,8 @@ std::string view_problem(const PanelProfile& profile, const Area& area) {
     return {};
 }
 
-/// An item that an earlier area takes by the same text could never be named.
-std::string clash_problem(const PanelProfile& profile, const Area& area) {
+/// Items that an earlier area matches by the same text could never be named.
+std::string conflict_problem(const PanelProfile& profile, const Area& area) {
     for (const Area& earlier : profile.areas) {
         if (&earlier == &area) return {};
         if (earlier.name == area.name) return "there are two areas " + quoted(area.name);
@@ -137,7 +137,7 @@ void check_areas(const PanelProfile& profile, const yaml::Node& areas, yaml::Pro
     for (std::size_t i = 0; i < profile.areas.size(); ++i) {
         const Area& area = profile.areas[i];
         for (std::string why : {table_problem(area), notation_problem(area),
-                                view_problem(profile, area), clash_problem(profile, area)}) {
+                                view_problem(profile, area), conflict_problem(profile, area)}) {
             if (!why.empty()) problems.add(areas.items[i].mark, std::move(why));
         }
     }

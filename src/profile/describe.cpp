@@ -52,8 +52,8 @@ std::string listed(const std::vector<T>& values, const Format& format) {
 
 std::string cited(const std::string& source) { return source.empty() ? "" : "  [" + source + ']'; }
 
-/// Those of `codes` that the profile has: "5, 15", or "none".
-std::string known_of(const PanelProfile& profile, std::initializer_list<std::uint8_t> codes) {
+/// Returns those of `codes` that the profile has: "5, 15", or "none".
+std::string supported_of(const PanelProfile& profile, std::initializer_list<std::uint8_t> codes) {
     std::string text;
     for (const std::uint8_t code : codes) {
         if (profile.find_function(code) == nullptr) continue;
@@ -62,25 +62,25 @@ std::string known_of(const PanelProfile& profile, std::initializer_list<std::uin
     return text.empty() ? "none" : text;
 }
 
-/// Functions of the profile that reach this table, for reading or writing.
+/// Returns the profile's functions that read and write this table.
 std::string functions_of(const PanelProfile& profile, Table table, bool writable) {
     using namespace modbus;
     const bool words = table == Table::holding_registers;
     const std::string reads =
-        words ? known_of(profile, {kReadHoldingRegisters, kReadWriteMultipleRegisters})
-              : known_of(profile, {read_function(table)});
+        words ? supported_of(profile, {kReadHoldingRegisters, kReadWriteMultipleRegisters})
+              : supported_of(profile, {read_function(table)});
     std::string writes = "none";
     if (writable && words) {
-        writes = known_of(profile, {kWriteSingleRegister, kWriteMultipleRegisters,
-                                    kMaskWriteRegister, kReadWriteMultipleRegisters});
+        writes = supported_of(profile, {kWriteSingleRegister, kWriteMultipleRegisters,
+                                        kMaskWriteRegister, kReadWriteMultipleRegisters});
     } else if (writable && table == Table::coils) {
-        writes = known_of(profile, {kWriteSingleCoil, kWriteMultipleCoils});
+        writes = supported_of(profile, {kWriteSingleCoil, kWriteMultipleCoils});
     }
     return "read by function " + reads + ", written by " + writes;
 }
 
-/// The same memory in the profile's other notations.
-std::string neighbours(const PanelProfile& profile, const Area& area, std::uint16_t address) {
+/// Returns the same memory in the profile's other notations.
+std::string other_notations(const PanelProfile& profile, const Area& area, std::uint16_t address) {
     if (!area.view_of.empty()) {
         const Area* words = profile.find_area(std::string_view(area.view_of));
         const auto word = static_cast<std::uint16_t>(address / kBitsPerWord);
@@ -99,7 +99,7 @@ std::string neighbours(const PanelProfile& profile, const Area& area, std::uint1
 
 std::string details(const PanelProfile& profile, const Area& area, std::uint16_t address) {
     const bool writable = area.writable && area.writable->contains(address);
-    std::string text = neighbours(profile, area, address);
+    std::string text = other_notations(profile, area, address);
     text += "  " + functions_of(profile, area.table, writable) + (writable ? "" : " (read only)") +
             '\n';
     for (const Table table : area.also) {
@@ -120,8 +120,9 @@ std::optional<std::uint32_t> number(std::string_view text) {
     return value;
 }
 
-/// "coil/288", "holding-registers 0x64" -> table and address text; nothing when it names no table.
-std::optional<std::pair<Table, std::string_view>> parse_place(std::string_view text) {
+/// Parses "coil/288", "holding-registers 0x64" into table and address text; nullopt if no table is
+/// named.
+std::optional<std::pair<Table, std::string_view>> parse_address(std::string_view text) {
     const std::size_t cut = text.find_last_of("/ ");
     if (cut == std::string_view::npos) return std::nullopt;
     std::string table(text.substr(0, cut));
@@ -191,7 +192,7 @@ std::string describe(const PanelProfile& profile) {
 
 boost::system::result<std::string, NotationError> describe_address(const PanelProfile& profile,
                                                                    std::string_view what) {
-    if (const auto named = parse_place(what)) {
+    if (const auto named = parse_address(what)) {
         const auto& [table, text] = *named;
         const auto wanted = number(text);
         if (!wanted) {

@@ -8,12 +8,11 @@
 namespace panelgate::profile {
 namespace {
 
-/// 17h: AP 6.17 lets a request write 121 registers, so that it fits a PDU, but read 125.
+/// 17h: AP 6.17 limits the written registers to 121 so that the request fits a PDU; reads to 125.
 unsigned write_limit(const PanelProfile& profile, std::uint8_t function) {
-    constexpr unsigned kMostBesidesARead = 121;
+    constexpr unsigned kMaxWithRead = 121;
     const unsigned most = profile.max_count(function);
-    return function == modbus::kReadWriteMultipleRegisters ? std::min(most, kMostBesidesARead)
-                                                           : most;
+    return function == modbus::kReadWriteMultipleRegisters ? std::min(most, kMaxWithRead) : most;
 }
 
 bool within(const std::optional<modbus::Span>& span, unsigned most) {

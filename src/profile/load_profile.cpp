@@ -17,7 +17,7 @@
 
 namespace panelgate::profile {
 
-/// Reads a profile's `simulation` map; its areas are known already.
+/// Reads a profile's `simulation` map; profile.areas must be loaded.
 void load_simulation(const yaml::Node& node, PanelProfile& profile, yaml::Problems& problems);
 
 namespace {
@@ -30,7 +30,7 @@ using Kind = Simulation::Motion::Kind;
 constexpr std::array<std::pair<std::string_view, Kind>, 4> kKinds{
     {{"ramp", Kind::ramp}, {"sine", Kind::sine}, {"toggle", Kind::toggle}, {"clock", Kind::clock}}};
 
-/// Area and address of a cell; a problem when the profile has no such item.
+/// Reads area and address of a cell; adds a problem if the profile has no such item.
 std::uint32_t place(MapReader& in, const PanelProfile& profile, std::string& area_name,
                     std::size_t items) {
     area_name = in.required_text("area").value_or("");
@@ -121,7 +121,7 @@ Tables tables() {
     return words;
 }
 
-/// The integers of a list, each inside [min, max].
+/// Reads a list of integers within [min, max].
 std::vector<int> integers(MapReader& in, std::string_view key, int min, int max) {
     std::vector<int> values;
     const Node* list = in.sequence(key);
@@ -138,7 +138,7 @@ std::vector<int> integers(MapReader& in, std::string_view key, int min, int max)
     return values;
 }
 
-/// The words of a list, each one of `words`.
+/// Reads a list of words out of `words`.
 template <class T, std::size_t N>
 std::vector<T> choices(MapReader& in, std::string_view key,
                        const std::array<std::pair<std::string_view, T>, N>& words) {
@@ -160,7 +160,7 @@ std::vector<T> choices(MapReader& in, std::string_view key,
     return values;
 }
 
-/// A list, and its absence is a problem.
+/// Reads a list; adds a problem if it is missing.
 const Node* required_sequence(MapReader& in, std::string_view key, std::string_view what) {
     const Node* list = in.sequence(key);
     if (in.child(key) == nullptr)
@@ -197,7 +197,7 @@ void load_stations(const Node& node, PanelProfile& profile, Problems& problems) 
     in.finish();
 }
 
-/// Without a default of its own, the first of what is allowed.
+/// Without a default in the file, uses the first allowed values.
 void load_default(const Node* node, Serial& serial, Problems& problems) {
     SerialFormat& f = serial.default_format;
     if (!serial.baud.empty()) f.baud = serial.baud[0];
@@ -256,7 +256,7 @@ Area load_area(const Node& node, Problems& problems) {
     area.description = in.text("description").value_or("");
     if (const Node* notation = in.map("notation"))
         area.notation = load_notation(*notation, problems);
-    const bool is_map = node.kind == Node::Kind::map;  // what is none has been told
+    const bool is_map = node.kind == Node::Kind::map;  // otherwise already reported
     for (const std::string_view key : {"notation", "table", "readable"}) {
         if (is_map && in.child(key) == nullptr)
             in.problem(key, "an area needs '" + std::string(key) + '\'');
@@ -402,7 +402,7 @@ std::optional<PanelProfile> load_profile(std::string_view text, std::string name
 }
 
 Catalogue Catalogue::shipped() {
-    static const Catalogue kShipped = read_shipped();  // they cannot change: read once
+    static const Catalogue kShipped = read_shipped();  // constant: read once
     return kShipped;
 }
 

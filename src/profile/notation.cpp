@@ -16,9 +16,9 @@
 
 namespace panelgate::profile {
 
-/// What a person meant by a notation that the panel does not have, as the end of a message: ";
-/// write 400101". Of numbers alone, of reference numbers (40101, 4x101), of other makers' words for
-/// a register (%MW100, HR100, 0x64), of blanks inside and of ranges. Empty when nobody knows.
+/// Suggests what the user meant by an unknown notation, as the end of a message: "; write 400101".
+/// Handles plain numbers, reference numbers (40101, 4x101), other vendors' register names (%MW100,
+/// HR100, 0x64), inner blanks, and ranges. Empty without a suggestion.
 std::string notation_hint(const PanelProfile& profile, std::string_view typed);
 
 namespace {
@@ -34,8 +34,8 @@ int hex_digit(char c) {
     return u >= 'A' && u <= 'F' ? u - 'A' + 10 : -1;
 }
 
-/// What stands behind the prefix, or nothing when the text has another prefix.
-std::optional<std::string_view> behind_prefix(const Notation& notation, std::string_view text) {
+/// Returns the text after the prefix; nullopt if the prefix differs.
+std::optional<std::string_view> after_prefix(const Notation& notation, std::string_view text) {
     if (text.size() <= notation.prefix.size()) return std::nullopt;
     for (std::size_t i = 0; i < notation.prefix.size(); ++i) {
         if (upper(text[i]) != upper(notation.prefix[i])) return std::nullopt;
@@ -54,7 +54,7 @@ std::optional<std::uint64_t> decimal(std::string_view text) {
     return value;
 }
 
-/// The item number that `rest` writes, before any range is looked at.
+/// Returns the item number in `rest`, without a range check.
 std::optional<std::uint64_t> item_number(const Notation& notation, std::string_view rest) {
     switch (notation.bit) {
         case BitDigits::none: {
@@ -129,7 +129,7 @@ boost::system::result<Item, NotationError> parse_notation(const PanelProfile& pr
     const Area* same_prefix = nullptr;
     bool read = false;
     for (const Area& area : profile.areas) {
-        const auto rest = behind_prefix(area.notation, text);
+        const auto rest = after_prefix(area.notation, text);
         if (!rest) continue;
         same_prefix = &area;
         const auto number = item_number(area.notation, *rest);
@@ -141,7 +141,7 @@ boost::system::result<Item, NotationError> parse_notation(const PanelProfile& pr
     }
     for (const Unreachable& hint : profile.unreachable) {
         const Notation notation{hint.prefix};
-        if (same_prefix == nullptr && behind_prefix(notation, text)) {
+        if (same_prefix == nullptr && after_prefix(notation, text)) {
             return NotationError{NotationError::Kind::unknown,
                                  std::string(text) + ": " + hint.reason};
         }
@@ -168,7 +168,7 @@ std::string format_notation(const Area& area, std::uint16_t address) {
             break;
     }
     std::string digits = text;
-    // UB0 is the first bit, not UB00; but UB0A keeps its zero, a number starts with a digit.
+    // UB0 is the first bit, not UB00; but UB0A keeps its zero: a number starts with a digit.
     if (area.notation.bit == BitDigits::hex && word == 0 && bit <= 9) digits.erase(0, 1);
     return area.notation.prefix + digits;
 }
@@ -204,7 +204,7 @@ std::string upper(std::string_view text) {
     return all;
 }
 
-/// How the panel writes an item, "" when it has none there.
+/// Returns the panel's notation of an item, "" if it has none.
 std::string at(const PanelProfile& profile, Table table, std::int64_t address) {
     if (address < 0 || address > 0xFFFF) return "";
     return format_notation(profile, table, static_cast<std::uint16_t>(address));
@@ -233,7 +233,7 @@ struct Word {
     std::string_view word;
     Table table;
 };
-/// Other programs' and makers' words for the tables; the number behind them counts from 0.
+/// Table names of other programs and vendors; the number after them counts from 0.
 constexpr std::array<Word, 16> kWords{{{"HR", Table::holding_registers},
                                        {"HOLDING", Table::holding_registers},
                                        {"HOLDINGREGISTER", Table::holding_registers},
@@ -251,8 +251,8 @@ constexpr std::array<Word, 16> kWords{{{"HR", Table::holding_registers},
                                        {"DI", Table::discrete_inputs},
                                        {"DISCRETE", Table::discrete_inputs}}};
 
-/// Letters, digits and dots of a text: "UW 100" and "UW-100" are UW100.
-std::string squeezed(std::string_view text) {
+/// Returns the letters, digits and dots of a text: "UW 100" and "UW-100" are UW100.
+std::string normalised(std::string_view text) {
     std::string all;
     for (const char c : text) {
         if (std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '.') all += c;
@@ -264,8 +264,8 @@ std::string squeezed(std::string_view text) {
 std::string range_hint(const PanelProfile& profile, std::string_view typed) {
     const std::size_t sign = typed.find_first_of("-~:", 1);
     if (sign == typed.npos || sign + 1 == typed.size()) return "";
-    const auto first = parse_notation(profile, squeezed(typed.substr(0, sign)));
-    const auto last = parse_notation(profile, squeezed(typed.substr(sign + 1)));
+    const auto first = parse_notation(profile, normalised(typed.substr(0, sign)));
+    const auto last = parse_notation(profile, normalised(typed.substr(sign + 1)));
     if (!first || !last || first->area != last->area || last->address < first->address) return "";
     return "; write the first, " + format_notation(*first->area, first->address) +
            ", and how many behind it: count: " + std::to_string(last->address - first->address + 1);
@@ -283,7 +283,7 @@ std::string reference_hint(const PanelProfile& profile, const std::string& typed
     return write(at(profile, *table, static_cast<std::int64_t>(*item) - 1));
 }
 
-/// 100: of areas with letters, the one that it is a number of; else a holding register.
+/// 100: an item of an area whose prefix has letters; otherwise a holding register.
 std::string number_hint(const PanelProfile& profile, const std::string& text) {
     const auto value = number(text);
     if (!value) return "";
@@ -328,7 +328,7 @@ std::string notation_hint(const PanelProfile& profile, std::string_view typed) {
     constexpr std::size_t kLongest = 40;
     if (typed.size() > kLongest) return "";
     if (std::string hint = range_hint(profile, typed); !hint.empty()) return hint;
-    const std::string text = upper(squeezed(typed));
+    const std::string text = upper(normalised(typed));
     if (text != upper(typed)) {
         if (const auto item = parse_notation(profile, text))
             return write(format_notation(*item->area, item->address));

@@ -7,7 +7,7 @@ namespace panelgate::profile {
 
 namespace {
 
-/// Items in one request as the Application Protocol has it (AP 6.1 to 6.17).
+/// Returns the maximum items per request of the Application Protocol (AP 6.1 to 6.17).
 unsigned standard_limit(std::uint8_t function) {
     switch (function) {
         case modbus::kReadCoils:

@@ -15,7 +15,7 @@ namespace {
 
 using modbus::Table;
 
-/// Some memory, all of these items in one area, is shown through both tables.
+/// True if one area contains all these items and is shown in both tables.
 bool is_same_memory(const PanelProfile& profile, const modbus::Span& items, Table other) {
     return std::ranges::any_of(profile.areas, [&](const Area& area) {
         return area.reaches(items.table) && area.reaches(other) &&
@@ -64,8 +64,8 @@ namespace {
 
 constexpr std::uint32_t kBitsPerWord = 16;
 
-/// What of the items lies in the area, by whichever of its tables.
-std::optional<modbus::Span> part_in(const Area& area, const modbus::Span& items) {
+/// Returns the items that lie in the area, through any of its tables.
+std::optional<modbus::Span> intersection(const Area& area, const modbus::Span& items) {
     if (!area.reaches(items.table)) return std::nullopt;
     const std::uint32_t first = std::max(items.first, area.readable.first);
     const std::uint32_t end = std::min(items.end(), area.readable.last + 1);
@@ -73,7 +73,7 @@ std::optional<modbus::Span> part_in(const Area& area, const modbus::Span& items)
     return modbus::Span{area.table, first, end - first};
 }
 
-void add_by_all_tables(const Area& area, modbus::Span items, std::vector<modbus::Span>& shown) {
+void add_in_all_tables(const Area& area, modbus::Span items, std::vector<modbus::Span>& shown) {
     shown.push_back(items);
     for (const modbus::Table table : area.also) {
         items.table = table;
@@ -85,7 +85,7 @@ void add_bits_of(const PanelProfile& profile, const Area& words, const modbus::S
                  std::vector<modbus::Span>& shown) {
     for (const Area& bits : profile.areas) {
         if (bits.view_of != words.name) continue;
-        add_by_all_tables(
+        add_in_all_tables(
             bits, {bits.table, items.first * kBitsPerWord, items.count * kBitsPerWord}, shown);
     }
 }
@@ -95,16 +95,16 @@ void add_bits_of(const PanelProfile& profile, const Area& words, const modbus::S
 std::vector<modbus::Span> shown_as(const PanelProfile& profile, const modbus::Span& written) {
     std::vector<modbus::Span> shown{written};
     for (const Area& area : profile.areas) {
-        const auto items = part_in(area, written);
+        const auto items = intersection(area, written);
         if (!items) continue;
-        add_by_all_tables(area, *items, shown);
+        add_in_all_tables(area, *items, shown);
         add_bits_of(profile, area, *items, shown);
         if (area.view_of.empty()) continue;
         const Area& words = *profile.find_area(std::string_view(area.view_of));
         const std::uint32_t first = items->first / kBitsPerWord;
         const std::uint32_t last = (items->end() - 1) / kBitsPerWord;
         const modbus::Span viewed{words.table, first, last - first + 1};
-        add_by_all_tables(words, viewed, shown);
+        add_in_all_tables(words, viewed, shown);
         add_bits_of(profile, words, viewed, shown);
     }
     return shown;

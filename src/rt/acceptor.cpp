@@ -89,7 +89,8 @@ void Acceptor::State::accept() {
 void Acceptor::State::on_accept(const error_code& error, tcp::socket socket) {
     if (!acceptor.is_open()) return;
     if (error && error != asio::error::connection_aborted) {
-        // Without descriptors the next try would fail at once, and the loop would do nothing else.
+        // Without descriptors the next attempt would fail at once: without a pause the loop would
+        // spin.
         if (!std::exchange(fails, true)) failing(error);
         pause.expires_after(kPause);
         pause.async_wait([self = shared_from_this()](const error_code& stopped) {

@@ -15,9 +15,9 @@ namespace panelgate::rt {
 
 namespace asio = boost::asio;
 
-/// All armed alarms of a clock, in their order, and the one timer of the system that wakes for the
-/// first of them. It is moved only when it must ring earlier: most alarms never ring, because what
-/// they wait for comes first, and who wakes in vain sets it again.
+/// All armed alarms of a clock, by time, and the one timerfd that wakes for the first. It is reset
+/// only to wake earlier: most alarms are cancelled before they fire, and a wake-up with nothing due
+/// sets it again.
 class AsioClock::Alarms {
   public:
     class One;
@@ -48,7 +48,7 @@ class AsioClock::Alarms {
     void set();
     void wait();
     void on_time();
-    /// A loop that has nothing else to do ends.
+    /// Lets a loop without other work end.
     void rest() {
         if (!std::exchange(waiting_, false)) return;
         ++waits_;
@@ -56,12 +56,12 @@ class AsioClock::Alarms {
     }
 
     asio::posix::stream_descriptor timer_;
-    LeadTime lead_;  ///< of all of them: they ring from one loop
+    LeadTime lead_;  ///< shared: they fire from one loop
     PoolMap<Key, One*> armed_;
     std::uint64_t added_ = 0;
     TimePoint set_for_{};
-    unsigned waits_ = 0;    ///< what was due when it was cancelled completes nevertheless
-    bool waiting_ = false;  ///< the system's timer is set
+    unsigned waits_ = 0;    ///< a wait that was due when cancelled completes nevertheless
+    bool waiting_ = false;  ///< the timerfd is set
     bool ringing_ = false;
     std::shared_ptr<bool> alive_ = std::make_shared<bool>(true);
 };
@@ -77,7 +77,7 @@ class AsioClock::Alarms::One final : public Alarm {
         const Handler gone = std::exchange(ring_, nullptr);
         if (std::exchange(armed_, false)) alarms_->remove(key_);
     }
-    /// It is time, and it was taken off the list.
+    /// Called when due, after removal from armed_.
     void ring() {
         armed_ = false;
         if (sharp_) watch_clock();
@@ -101,7 +101,7 @@ class AsioClock::Alarms::One final : public Alarm {
         alarms_->lead().on_rung(now, woken - key_.first, now - woken);
     }
 
-    std::shared_ptr<Alarms> alarms_;  ///< what a loop still holds when it ends may be the last
+    std::shared_ptr<Alarms> alarms_;  ///< a handler left in an ended loop may own the last alarm
     Key key_{};
     TimePoint when_{};
     Handler ring_;
@@ -110,12 +110,12 @@ class AsioClock::Alarms::One final : public Alarm {
 };
 
 void AsioClock::Alarms::set() {
-    if (ringing_) return;  // afterwards
+    if (ringing_) return;  // on_time() calls it afterwards
     if (armed_.empty()) return rest();
     const TimePoint first = armed_.begin()->first.first;
     if (waiting_ && set_for_ <= first) return;
     set_for_ = first;
-    // In the past, it rings at once; nothing at all would stop it.
+    // A time in the past fires at once; 0 would disarm the timer.
     const auto since = std::max<Duration>(first.time_since_epoch(), 1ns);
     itimerspec at{};
     at.it_value.tv_sec = static_cast<std::time_t>(since / 1s);
@@ -124,7 +124,7 @@ void AsioClock::Alarms::set() {
     if (!waiting_) wait();
 }
 
-/// Setting the timer takes back that it has rung, so nobody reads that from it.
+/// Setting the timerfd clears its expiration, so it is never read.
 void AsioClock::Alarms::wait() {
     waiting_ = true;
     timer_.async_wait(asio::posix::stream_descriptor::wait_read,
@@ -133,7 +133,7 @@ void AsioClock::Alarms::wait() {
                       });
 }
 
-/// What is armed meanwhile waits for the next turn, so that the others in the loop have theirs.
+/// Alarms armed by the handlers wait for the next turn, so that the rest of the loop gets its turn.
 void AsioClock::Alarms::on_time() {
     waiting_ = false;
     ringing_ = true;

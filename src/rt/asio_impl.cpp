@@ -1,3 +1,3 @@
-// Asio's and Beast's compiled parts: once in the program (BOOST_ASIO_SEPARATE_COMPILATION).
+// Compiles Asio and Beast, once in the program (BOOST_ASIO_SEPARATE_COMPILATION).
 #include <boost/asio/impl/src.hpp>
 #include <boost/beast/src.hpp>

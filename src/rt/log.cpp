@@ -20,7 +20,7 @@ namespace {
 
 LogSettings g_settings;
 
-/// As the configuration calls them.
+/// The words of the configuration.
 std::string_view word(LogLevel level) {
     switch (level) {
         case LogLevel::error:
@@ -37,7 +37,7 @@ std::string_view word(LogLevel level) {
     std::abort();
 }
 
-/// Where lines go, as it is when the first one does.
+/// Where lines go; determined at the first line.
 struct Destination {
     Destination() : Destination(stderr_is_journal()) {}
     explicit Destination(bool its_journal) : Destination(its_journal, open(its_journal)) {}
@@ -48,7 +48,7 @@ struct Destination {
     static int open(bool journal) { return journal ? connect_to_journal() : -1; }
 
     bool journal;
-    bool native;  ///< by journald's own protocol
+    bool native;  ///< journald's native protocol
     LogOutput output;
 };
 
@@ -59,7 +59,7 @@ Destination& destination() {
 
 LogOutput& output() { return destination().output; }
 
-/// The journal has its own time.
+/// Text for the journal has no time: the journal adds its own.
 std::string pattern() {
     if (g_settings.format == LogFormat::json) return R"({"time":"%Y-%m-%dT%H:%M:%S.%eZ",%v})";
     return destination().journal ? "%v" : "%Y-%m-%dT%H:%M:%S.%eZ %v";
@@ -72,7 +72,7 @@ std::string with_time(const std::string& text) {
     return {line.data(), line.size()};
 }
 
-/// As it is written.
+/// Returns the line as written to the output.
 std::string whole(LogLevel level, const LogLine& line) {
     const std::string text = with_time(line.text);
     if (destination().native) return line.fields + "MESSAGE=" + text;
@@ -80,14 +80,14 @@ std::string whole(LogLevel level, const LogLine& line) {
     return fmt::format("<{}>{}", journal_priority(level), text);
 }
 
-/// Of the LogTap that lives.
-std::shared_ptr<std::vector<std::string>> g_tapped;
+/// Lines of the active LogTap, if any.
+std::shared_ptr<std::vector<std::string>> g_tap_lines;
 
-/// Who has said what lately.
+/// Recent lines, for throttling.
 LogThrottle g_throttle;
 LogRepeats g_repeats;
 
-/// JSON string escapes; good for text too.
+/// Escapes as in a JSON string; also used for text.
 std::string escaped(std::string_view text) {
     std::string out;
     for (const char c : text) {
@@ -146,13 +146,13 @@ void append(LogLine& line, std::string_view key, const std::string& value) {
 
 void put(LogLevel level, LogLine line, std::uint64_t left_out) {
     if (left_out > 0) append(line, "left_out", std::to_string(left_out));
-    if (g_tapped) return g_tapped->push_back(std::move(line.text));
+    if (g_tap_lines) return g_tap_lines->push_back(std::move(line.text));
     output().write(whole(level, line));
 }
 
-/// From error to info: unless its subject has said the same too often.
-void put_at_pace(LogLevel level, std::string_view event, std::string_view subject,
-                 std::span<const LogField> fields, const LogThrottle::Pace& pace) {
+/// Writes the line, unless its subject exceeds `pace`: then the throttle keeps it.
+void write_throttled_line(LogLevel level, std::string_view event, std::string_view subject,
+                          std::span<const LogField> fields, const LogThrottle::Pace& pace) {
     const auto passed =
         g_throttle.pass(std::chrono::steady_clock::now(), event, subject, pace, client_of(fields));
     LogLine line = line_of(level, event, fields);
@@ -160,8 +160,8 @@ void put_at_pace(LogLevel level, std::string_view event, std::string_view subjec
     g_throttle.hold(event, subject, level, std::move(line));
 }
 
-void put_held(TimePoint now) {
-    for (LogThrottle::Held& held : g_throttle.take_held(now))
+void write_throttled(TimePoint now) {
+    for (LogThrottle::Held& held : g_throttle.take_kept(now))
         put(held.level, std::move(held.line), held.left_out);
     for (const LogThrottle::LeftOut& one : g_throttle.take_left_out(now)) {
         std::vector<LogField> fields{{"of", one.event}};
@@ -171,7 +171,7 @@ void put_held(TimePoint now) {
     }
 }
 
-void put_gathered(std::vector<LogRepeats::Gathered> gathered) {
+void write_merged(std::vector<LogRepeats::Gathered> gathered) {
     for (LogRepeats::Gathered& one : gathered) {
         append(one.line, "repeated", std::to_string(one.repeated));
         append(one.line, "first", rfc3339(one.first));
@@ -201,26 +201,26 @@ void log(LogLevel level, std::string_view event, std::initializer_list<LogField>
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields) {
     if (!log_enabled(level)) return;
     if (level > LogLevel::info) return put(level, line_of(level, event, fields), 0);
-    put_at_pace(level, event, subject_of(fields), fields, LogThrottle::kIncidents);
+    write_throttled_line(level, event, subject_of(fields), fields, LogThrottle::kIncidents);
 }
 
 void log_about(std::string_view subject, LogLevel level, std::string_view event,
                std::initializer_list<LogField> fields) {
     if (!log_enabled(level)) return;
-    put_at_pace(level, event, subject, std::span(fields.begin(), fields.size()),
-                LogThrottle::kIncidents);
+    write_throttled_line(level, event, subject, std::span(fields.begin(), fields.size()),
+                         LogThrottle::kIncidents);
 }
 
 void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
-    put_at_pace(LogLevel::info, event, subject, fields, LogThrottle::kDeeds);
+    write_throttled_line(LogLevel::info, event, subject, fields, LogThrottle::kActions);
 }
 
 void log_each(std::string_view event, std::string_view place, std::string_view what,
               std::span<const LogField> fields) {
     if (!log_enabled(LogLevel::info)) return;
     const bool again = g_repeats.is_repeat(std::chrono::steady_clock::now(), place, what);
-    put_gathered(g_repeats.take_ended());
+    write_merged(g_repeats.take_ended());
     LogLine line = line_of(LogLevel::info, event, fields);
     if (!again) return put(LogLevel::info, std::move(line), 0);
     g_repeats.gather(place, std::move(line), wall_now());
@@ -230,12 +230,12 @@ struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
     explicit State(Clock& its_clock)
         : clock(its_clock), alarm(clock.make_alarm()), held(clock.make_alarm()) {}
 
-    void tell_held() {
+    void write_throttled_later() {
         constexpr Duration kPause = 10s;
         held->arm(clock.now() + kPause, [self = shared_from_this()] {
-            put_held(self->clock.now());
-            put_gathered(g_repeats.take_due(self->clock.now()));
-            self->tell_held();
+            write_throttled(self->clock.now());
+            write_merged(g_repeats.take_due(self->clock.now()));
+            self->write_throttled_later();
         });
     }
 
@@ -250,31 +250,31 @@ struct LogDrain::State : std::enable_shared_from_this<LogDrain::State> {
 
     Clock& clock;
     std::unique_ptr<Alarm> alarm;
-    std::unique_ptr<Alarm> held;  ///< for what was left out and nothing follows
+    std::unique_ptr<Alarm> held;  ///< writes throttled lines that nothing follows
 };
 
 LogDrain::LogDrain(Clock& clock) : state_(std::make_shared<State>(clock)) {
     output().on_pending([state = state_.get()] { state->watch(); });
     state_->watch();
-    state_->tell_held();
+    state_->write_throttled_later();
 }
 
 LogDrain::~LogDrain() {
     output().on_pending({});
     state_->alarm->cancel();
     state_->held->cancel();
-    put_held(TimePoint::max());
-    put_gathered(g_repeats.take_due(TimePoint::max()));
+    write_throttled(TimePoint::max());
+    write_merged(g_repeats.take_due(TimePoint::max()));
     output().flush();
 }
 
 LogTap::LogTap() : lines_(std::make_shared<std::vector<std::string>>()) {
-    g_tapped = lines_;
+    g_tap_lines = lines_;
     g_throttle = {};
     g_repeats = {};
 }
 
-LogTap::~LogTap() { g_tapped.reset(); }
+LogTap::~LogTap() { g_tap_lines.reset(); }
 
 std::size_t LogTap::count(std::string_view part) const {
     return static_cast<std::size_t>(std::ranges::count_if(

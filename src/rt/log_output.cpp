@@ -32,7 +32,7 @@ LogOutput::LogOutput(int descriptor, std::size_t most_pending)
         if (S_ISREG(file.st_mode)) kind_ = Kind::file;
         if (kind_ != Kind::shared) return;
     }
-    // O_NONBLOCK on the descriptor itself would hold for everybody who has inherited it.
+    // O_NONBLOCK on the descriptor itself would affect every process that inherited it.
     const std::string path = "/proc/self/fd/" + std::to_string(descriptor);
     own_ = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC | O_APPEND);
     if (own_ >= 0) {
@@ -46,7 +46,7 @@ LogOutput::~LogOutput() {
     if (own_ >= 0) ::close(own_);
 }
 
-/// How many bytes are gone; nothing when it cannot take them at all.
+/// Returns the number of bytes written; std::nullopt if writing fails.
 std::optional<std::size_t> LogOutput::hand_over(std::string_view bytes) {
     ssize_t sent = 0;
     switch (kind_) {
@@ -54,20 +54,20 @@ std::optional<std::size_t> LogOutput::hand_over(std::string_view bytes) {
             sent = ::write(own_, bytes.data(), bytes.size());
             break;
         case Kind::file:
-            // Takes all at once, and at the one place where others write to it, too (2>&1).
+            // Takes all at once, at the shared offset where others write too (2>&1).
             sent = ::write(descriptor_, bytes.data(), bytes.size());
             break;
         case Kind::socket:
             sent = ::send(descriptor_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
             break;
         case Kind::shared:
-            // A pipe that polls writable takes so much in one piece (pipe(7)).
+            // A pipe that polls writable takes this much in one piece (pipe(7)).
             if (!takes_some(descriptor_)) return 0;
             sent =
                 ::write(descriptor_, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
             break;
         case Kind::terminal:
-            // One that polls writable takes a byte at least, and would wait for room for the rest.
+            // A terminal that polls writable takes at least one byte, and would block for more.
             if (!takes_some(descriptor_)) return 0;
             sent = ::write(descriptor_, bytes.data(), 1);
             break;
@@ -96,14 +96,14 @@ void LogOutput::flush() {
         pending_.pop_front();
         begun_ = false;
     }
-    if (untold_ == 0 || !took || !lost_line_) return;
-    keep(lost_line_(std::exchange(untold_, 0)));
+    if (unreported_ == 0 || !took || !lost_line_) return;
+    keep(lost_line_(std::exchange(unreported_, 0)));
     flush();
 }
 
 void LogOutput::drop() {
     ++dropped_;
-    ++untold_;
+    ++unreported_;
 }
 
 void LogOutput::write(std::string_view line) {
@@ -136,7 +136,7 @@ std::string name_of(std::string_view key) {
     return name;
 }
 
-/// A value of several lines goes behind its length.
+/// A value of several lines follows its length.
 void append(std::string& fields, std::string_view name, std::string_view value) {
     fields += name;
     if (value.find('\n') == std::string_view::npos) {

@@ -44,7 +44,7 @@ std::vector<LogRepeats::Gathered> LogRepeats::take_due(TimePoint now) {
     return take_ended();
 }
 
-/// The place that was told of longest ago gives way.
+/// Evicts the place logged longest ago.
 void LogRepeats::make_room() {
     if (places_.size() < kMostPlaces) return;
     const auto oldest =
@@ -76,7 +76,7 @@ std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view e
     const auto found = seen_.find(key);
     if (found != seen_.end()) {
         Seen& seen = found->second;
-        // Credit comes back one at a time: what was quiet for long may speak freely again.
+        // Credit returns one per interval: a subject that was quiet regains its burst.
         const auto earned = (now - seen.last) / pace.interval;
         if (earned > 0)
             seen.credit =
@@ -86,7 +86,7 @@ std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view e
             return std::nullopt;
         }
     }
-    // A subject beyond the budget is not even remembered: there may be any number of them.
+    // A subject beyond the budget is not even stored: there may be any number of them.
     if (!is_within_budget(now, event, client)) return std::nullopt;
     Seen& seen = found != seen_.end() ? found->second : new_subject(now, std::move(key), pace);
     --seen.credit;
@@ -102,7 +102,7 @@ LogThrottle::Seen& LogThrottle::new_subject(TimePoint now, std::string key, cons
 
 bool LogThrottle::is_within_budget(TimePoint now, std::string_view event, std::string_view client) {
     if (!client.empty()) {
-        Budget& own = budget(of_clients_, now, event, client, kByClient);
+        Budget& own = budget(client_budgets_, now, event, client, kByClient);
         if (own.credit == 0) {
             count(own.left_out, own.since, now, 1);
             return false;
@@ -110,7 +110,7 @@ bool LogThrottle::is_within_budget(TimePoint now, std::string_view event, std::s
         --own.credit;
         make_room_for_client(now);
     }
-    Budget& all = budget(of_events_, now, event, {}, kByEvent);
+    Budget& all = budget(event_budgets_, now, event, {}, kByEvent);
     if (all.credit == 0) {
         count(all.left_out, all.since, now, 1);
         return false;
@@ -134,22 +134,22 @@ LogThrottle::Budget& LogThrottle::budget(Budgets& budgets, TimePoint now, std::s
     return one;
 }
 
-/// The client that has been quiet longest gives way; what it was left out counts for the event.
+/// Evicts the client that was quiet longest; its count moves to the event's budget.
 void LogThrottle::make_room_for_client(TimePoint now) {
-    if (of_clients_.size() <= kMostClients) return;
+    if (client_budgets_.size() <= kMostClients) return;
     const auto oldest = std::ranges::min_element(
-        of_clients_, {}, [](const auto& entry) { return entry.second.filled; });
+        client_budgets_, {}, [](const auto& entry) { return entry.second.filled; });
     const Budget& gone = oldest->second;
     if (gone.left_out > 0) {
-        Budget& all = budget(of_events_, now, gone.event, {}, kByEvent);
+        Budget& all = budget(event_budgets_, now, gone.event, {}, kByEvent);
         count(all.left_out, all.since, now, gone.left_out);
     }
-    of_clients_.erase(oldest);
+    client_budgets_.erase(oldest);
 }
 
 std::vector<LogThrottle::LeftOut> LogThrottle::take_left_out(TimePoint now) {
     std::vector<LeftOut> all;
-    for (Budgets* budgets : {&of_clients_, &of_events_}) {
+    for (Budgets* budgets : {&client_budgets_, &event_budgets_}) {
         for (auto& [key, one] : *budgets) {
             if (one.left_out == 0 || now - one.since < kLeftOutPause) continue;
             all.push_back({one.event, one.client, std::exchange(one.left_out, 0)});
@@ -166,7 +166,7 @@ void LogThrottle::hold(std::string_view event, std::string_view subject, LogLeve
     found->second.held = std::move(line);
 }
 
-std::vector<LogThrottle::Held> LogThrottle::take_held(TimePoint now) {
+std::vector<LogThrottle::Held> LogThrottle::take_kept(TimePoint now) {
     std::vector<Held> all;
     for (auto& [key, seen] : seen_) {
         if (!seen.held || now - seen.last < seen.interval) continue;
@@ -178,7 +178,7 @@ std::vector<LogThrottle::Held> LogThrottle::take_held(TimePoint now) {
     return all;
 }
 
-/// Whoever has been quiet for an interval is as good as new; if nobody has, the one quiet longest.
+/// Evicts the subjects that were quiet for an interval, or else the one quiet longest.
 void LogThrottle::make_room(TimePoint now) {
     if (seen_.size() < kMostSubjects) return;
     std::erase_if(

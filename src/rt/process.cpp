@@ -37,9 +37,8 @@ std::vector<std::size_t> share_descriptors(std::size_t available,
 
 namespace {
 
-/// Who says that it needs the processor for no longer than that at a time is let in before
-/// programs that compute (Linux 6.12 and later; earlier ones take no notice). Nobody has to grant
-/// it.
+/// A thread that asks for short slices runs before compute-bound programs (Linux 6.12 and later;
+/// earlier kernels ignore it). No privilege is needed.
 void ask_for_short_slices() {
     constexpr unsigned kSlice = 100'000;  // ns, the shortest that Linux takes
     SchedAttr attributes;
@@ -57,7 +56,7 @@ std::vector<std::string> be_punctual(const RealtimeSettings& settings) {
     ask_for_short_slices();
     if (settings.priority > 0) {
         const sched_param parameter{.sched_priority = settings.priority};
-        // Threads that it starts are not to compete with it.
+        // Its child threads must not compete with it.
         if (::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) != 0) {
             refused.push_back("realtime.priority " + std::to_string(settings.priority) + ": " +
                               std::strerror(errno) +

@@ -22,7 +22,7 @@ std::string variable(const char* name) {
     return text == nullptr ? "" : text;
 }
 
-/// A whole number above 0.
+/// Parses a whole number above 0.
 std::optional<std::int64_t> number_of(std::string_view text) {
     std::int64_t value = 0;
     const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -30,7 +30,7 @@ std::optional<std::int64_t> number_of(std::string_view text) {
     return whole && value > 0 ? std::optional(value) : std::nullopt;
 }
 
-/// The bytes of its sockaddr_un; empty when it is none that we know (unix(7)).
+/// Returns the bytes of the sockaddr_un; empty for an unsupported name (unix(7)).
 std::string address_of(std::string name) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
@@ -67,7 +67,7 @@ ServiceManager::ServiceManager(Clock& clock, const ServiceEnvironment& environme
       again_(clock.make_alarm()),
       look_(clock.make_alarm()),
       watchdog_(clock.make_alarm()),
-      feed_every_(watchdog_interval(environment, ::getpid())),
+      feed_interval_(watchdog_interval(environment, ::getpid())),
       address_(address_of(environment.notify_socket)) {
     if (environment.notify_socket.empty()) return;
     if (!address_.empty()) socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
@@ -76,7 +76,7 @@ ServiceManager::ServiceManager(Clock& clock, const ServiceEnvironment& environme
             {{"socket", environment.notify_socket}, {"why", "no socket that can be sent to"}});
         return;
     }
-    if (feed_every_) feed_watchdog();
+    if (feed_interval_) feed_watchdog();
 }
 
 ServiceManager::~ServiceManager() {
@@ -93,7 +93,7 @@ ServiceManager::Sent ServiceManager::send(std::string_view message) {
     return Sent::never;
 }
 
-/// What is late for too long is no news any more.
+/// Queues a message; the oldest is dropped from a full queue, as outdated.
 void ServiceManager::say(std::string message) {
     if (socket_ < 0) return;
     if (waiting_.size() == kWaiting) waiting_.pop_front();
@@ -149,7 +149,7 @@ void ServiceManager::look() {
 
 void ServiceManager::feed_watchdog() {
     const bool later = send("WATCHDOG=1") == Sent::not_now;
-    watchdog_->arm(clock_.now() + (later ? std::min(kAgain, *feed_every_) : *feed_every_),
+    watchdog_->arm(clock_.now() + (later ? std::min(kAgain, *feed_interval_) : *feed_interval_),
                    [this] { feed_watchdog(); });
 }
 

@@ -26,7 +26,7 @@ void Worker::run(std::function<void()> work, std::function<void()> done) {
     auto loop = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
     asio::post(pool_->threads, [loop, work = std::move(work), done = std::move(done)]() mutable {
         work();
-        work = nullptr;  // what it holds ends in this thread
+        work = nullptr;  // destroys its captures in this thread
         asio::post(loop, std::move(done));
     });
 }

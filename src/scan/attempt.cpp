@@ -25,8 +25,8 @@ struct Found {
     modbus::CrcOrder order = modbus::CrcOrder::low_first;
 };
 
-/// The good frame at the front.
-std::optional<Found> frame_in_front(ByteView bytes) {
+/// Returns the valid frame at the start of `bytes`.
+std::optional<Found> frame_at_front(ByteView bytes) {
     if (bytes.size() < modbus::kMinAdu || !is_plausible(bytes)) return std::nullopt;
     const modbus::ReplyLength reply = modbus::reply_length(bytes);
     const bool known = reply.kind == modbus::ReplyLength::Kind::known;
@@ -43,10 +43,10 @@ std::optional<Found> frame_in_front(ByteView bytes) {
 
 }  // namespace
 
-Heard take_apart(ByteView bytes) {
+Heard extract_frames(ByteView bytes) {
     Heard heard;
     while (!bytes.empty()) {
-        const auto found = frame_in_front(bytes);
+        const auto found = frame_at_front(bytes);
         if (!found) {
             ++heard.damaged;
             bytes = bytes.subspan(1);
@@ -61,23 +61,24 @@ Heard take_apart(ByteView bytes) {
 
 namespace {
 
-/// USB adapters hand over bytes up to 16 ms late (FTDI AN232B-04).
+/// USB adapters deliver bytes up to 16 ms late (FTDI AN232B-04).
 constexpr Duration kAdapterPause = 25ms;
 constexpr std::size_t kPauseCharacters = 5;
 constexpr Duration kBabble = 300ms;
-/// Fewer are what a transceiver makes of switching over, not a reply.
-constexpr std::size_t kDamage = 3;
+/// Fewer damaged bytes come from a transceiver switching over, not from a reply.
+constexpr std::size_t kMinDamage = 3;
 
 }  // namespace
 
-Attempt::Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent, Patience patience)
+Attempt::Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent,
+                 ReplyTimeouts timeouts)
     : request_(std::move(request)),
-      start_by_(sent + frame_time(format, request_.adu().size()) + patience.start),
+      start_by_(sent + frame_time(format, request_.adu().size()) + timeouts.start),
       latest_(start_by_ + kBabble + frame_time(format, modbus::kMaxLongRtuAdu)),
-      settle_(patience.settle),
+      settle_(timeouts.settle),
       gap_(std::max(kAdapterPause, wire_time(format, kPauseCharacters))) {}
 
-/// A part of an echo is taken out, too: the rest is still coming.
+/// Removes a partial echo, too: the rest is still coming.
 ByteView Attempt::without_echo() const {
     const Bytes& sent = request_.adu();
     const auto same = std::ranges::mismatch(heard_, sent);
@@ -85,7 +86,7 @@ ByteView Attempt::without_echo() const {
     return echo ? ByteView(heard_).subspan(std::min(heard_.size(), sent.size())) : ByteView(heard_);
 }
 
-bool Attempt::holds_beginning(ByteView bytes) const {
+bool Attempt::contains_header(ByteView bytes) const {
     for (std::size_t i = 0; i + 1 < bytes.size(); ++i) {
         const std::uint8_t function = modbus::plain_function(bytes[i + 1]);
         if (bytes[i] == request_.station() && function == request_.pdu()[0]) return true;
@@ -98,25 +99,25 @@ void Attempt::on_rx(TimePoint now, ByteView bytes) {
     append_up_to(kMaxHeard, heard_, bytes);
     const Outcome so_far = finish();
     replied_ = so_far.kind == Outcome::Kind::replied;
-    begun_ = so_far.begun;
+    header_seen_ = so_far.header_seen;
 }
 
 TimePoint Attempt::ends_at() const {
     if (without_echo().empty()) return start_by_;
     if (replied_) return std::min(latest_, last_rx_ + settle_);
-    if (begun_) return std::min(latest_, last_rx_ + std::max(gap_, settle_));
+    if (header_seen_) return std::min(latest_, last_rx_ + std::max(gap_, settle_));
     return std::min(latest_, std::max(start_by_, last_rx_ + gap_));
 }
 
 Outcome Attempt::finish() const {
     Outcome outcome;
-    Heard heard = take_apart(without_echo());
+    Heard heard = extract_frames(without_echo());
     for (Frame& frame : heard.frames) {
         const bool ours = frame.station == request_.station() &&
                           frame.crc_order == request_.crc_order() &&
                           modbus::answers(request_.pdu(), frame.pdu);
         if (!ours) {
-            outcome.strays.push_back(std::move(frame));
+            outcome.unsolicited.push_back(std::move(frame));
         } else if (outcome.kind == Outcome::Kind::replied) {
             ++outcome.more;
         } else {
@@ -124,11 +125,11 @@ Outcome Attempt::finish() const {
             outcome.reply = std::move(frame.pdu);
         }
     }
-    const bool damaged = heard.damaged >= kDamage;
-    outcome.torn = damaged && outcome.kind == Outcome::Kind::replied;
-    if (damaged && !outcome.torn) {
+    const bool damaged = heard.damaged >= kMinDamage;
+    outcome.with_damage = damaged && outcome.kind == Outcome::Kind::replied;
+    if (damaged && !outcome.with_damage) {
         outcome.kind = Outcome::Kind::damaged;
-        outcome.begun = holds_beginning(without_echo());
+        outcome.header_seen = contains_header(without_echo());
     }
     return outcome;
 }

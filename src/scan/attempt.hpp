@@ -11,7 +11,7 @@
 
 namespace panelgate::scan {
 
-/// What is kept of one listening at most; the rest is dropped.
+/// Maximum bytes kept while listening; the rest is dropped.
 inline constexpr std::size_t kMaxHeard = 4096;
 
 struct Frame {
@@ -22,54 +22,56 @@ struct Frame {
 
 struct Heard {
     std::vector<Frame> frames;
-    std::size_t damaged = 0;  ///< bytes in no frame
+    std::size_t damaged = 0;  ///< bytes outside of frames
 };
 
-/// Good frames, requests as well as replies, wherever they begin, in either order of the CRC. Only
-/// functions of the standard: chance makes a frame of noise in less than one of 50 000 places.
-Heard take_apart(ByteView bytes);
+/// Extracts valid frames, requests and replies, at any position and in either CRC order. Standard
+/// functions only: by chance noise forms a frame at less than one of 50 000 positions.
+Heard extract_frames(ByteView bytes);
 
-struct Patience {
+struct ReplyTimeouts {
     Duration start{};   ///< from the end of the request to the first byte of its reply
     Duration settle{};  ///< after a good reply
 };
 
-/// What one request brought.
+/// Result of one request.
 struct Outcome {
     enum class Kind : std::uint8_t { silent, replied, damaged };
     Kind kind = Kind::silent;
-    Bytes reply;         ///< PDU
-    unsigned more = 0;   ///< further replies to the same request
-    bool begun = false;  ///< the damage holds the address and the function: noise hardly does
-    bool torn = false;   ///< damaged bytes besides a good reply
-    std::vector<Frame> strays;  ///< good frames that answer something else
+    Bytes reply;        ///< PDU
+    unsigned more = 0;  ///< further replies to the same request
+    bool header_seen =
+        false;  ///< the damaged bytes contain address and function: unlikely for noise
+    bool with_damage = false;        ///< damaged bytes in addition to a good reply
+    std::vector<Frame> unsolicited;  ///< valid frames that do not answer the request
 };
 
-/// One request on the wire and everything that is heard until the next. The adapter's echo of the
-/// request is taken out.
+/// One request on the wire and everything heard until the next. Removes the adapter's echo of the
+/// request.
 class Attempt {
   public:
-    Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent, Patience patience);
+    Attempt(ReadRequest request, const SerialFormat& format, TimePoint sent,
+            ReplyTimeouts timeouts);
 
     const ReadRequest& request() const { return request_; }
     void on_rx(TimePoint now, ByteView bytes);
-    /// When no more is worth waiting for, as far as is known now.
+    /// Returns when to stop waiting, as far as is known now.
     TimePoint ends_at() const;
     Outcome finish() const;
 
   private:
     ByteView without_echo() const;
-    bool holds_beginning(ByteView bytes) const;
+    bool contains_header(ByteView bytes) const;
 
     ReadRequest request_;
     TimePoint start_by_;
-    TimePoint latest_;  ///< babble must not hold up the scan
+    TimePoint latest_;  ///< continuous noise must not delay the scan
     Duration settle_;
-    Duration gap_;  ///< silence that ends what is no whole reply
+    Duration gap_;  ///< silence that ends an incomplete reply
     TimePoint last_rx_{};
     Bytes heard_;
     bool replied_ = false;
-    bool begun_ = false;  ///< a damaged reply: no other is to be expected
+    bool header_seen_ = false;  ///< a damaged reply: no other is expected
 };
 
 }  // namespace panelgate::scan

@@ -21,14 +21,15 @@ bool Discovery::done() const { return gave_up() || (waiting_.empty() && recognis
 
 std::optional<ReadRequest> Discovery::question(TimePoint now) {
     if (done() || now < due_) return std::nullopt;
-    if (recogniser_ == nullptr) return ReadRequest::make(waiting_.front(), first_question());
-    return ReadRequest::make(looked_at_.station, *probe_);
+    if (recogniser_ == nullptr) return ReadRequest::make(waiting_.front(), first_request());
+    return ReadRequest::make(examined_.station, *probe_);
 }
 
 void Discovery::on_answer(TimePoint now, const Answer& answer) {
     if (done()) return;
-    pay(now, answer.cost);
-    const bool known = recogniser_ != nullptr;  // it has answered, and waits for its turn
+    charge(now, answer.cost);
+    const bool known =
+        recogniser_ != nullptr;  // the station answered before; its next probe stays due
     if (answer.reply == Reply::unsent || (answer.reply == Reply::refused && known)) {
         ++unsent_;
         due_ = std::max(due_, now + kUnsentPause);
@@ -43,8 +44,8 @@ void Discovery::on_answer(TimePoint now, const Answer& answer) {
     }
 }
 
-/// Each question is paid for in full, also where it began before its time had come.
-void Discovery::pay(TimePoint now, Duration cost) {
+/// Delays the next question by the full cost, also if this one was sent early.
+void Discovery::charge(TimePoint now, Duration cost) {
     const std::chrono::duration<double> whole(to_seconds(cost) / settings_.share);
     due_ = std::max(due_, now - cost) + std::chrono::round<Duration>(whole);
 }
@@ -53,34 +54,34 @@ void Discovery::on_first(const Answer& answer) {
     const std::uint8_t station = waiting_.front();
     if (answer.reply == Reply::damaged && ++damaged_ < kDamagedTries) return;
     waiting_.pop_front();
-    const bool again = asked_ + refused_ == of();  // who was late
+    const bool again = asked_ + refused_ == of();  // a station that was late
     if (!again) ++asked_;
     if (answer.reply == Reply::silent) {
-        damaged_ = 0;  // that was noise
+        damaged_ = 0;  // earlier damage was noise
         if (!again) silent_.insert(station);
         return;
     }
-    looked_at_ = {};
-    looked_at_.station = station;
-    looked_at_.evidence.asked = damaged_ + (answer.reply == Reply::answered ? 1 : 0);
-    looked_at_.evidence.damaged = std::exchange(damaged_, 0);
-    looked_at_.evidence.late = again ? 1 : 0;
+    examined_ = {};
+    examined_.station = station;
+    examined_.evidence.asked = damaged_ + (answer.reply == Reply::answered ? 1 : 0);
+    examined_.evidence.damaged = std::exchange(damaged_, 0);
+    examined_.evidence.late = again ? 1 : 0;
     if (answer.reply != Reply::answered) {
-        found_.push_back(std::exchange(looked_at_, {}));
+        found_.push_back(std::exchange(examined_, {}));
         return;
     }
-    looked_at_.evidence.good = 1;
+    examined_.evidence.good = 1;
     recogniser_ = std::make_unique<Recogniser>(profiles_, station, settings_.format);
     silent_probes_ = 0;
     take_probe();
 }
 
-/// It has to wait for its turn; the others need not.
+/// Puts the station behind the others, or gives it up.
 void Discovery::on_refused(TimePoint now) {
     due_ = std::max(due_, now + kUnsentPause);
     const std::uint8_t station = waiting_.front();
     waiting_.pop_front();
-    if (++refusals_[station] < kMostRefused) return waiting_.push_back(station);
+    if (++refusals_[station] < kMaxRefused) return waiting_.push_back(station);
     if (asked_ + refused_ < of()) ++refused_;
 }
 
@@ -93,20 +94,20 @@ std::optional<Duration> Discovery::remaining(TimePoint now) const {
 
 void Discovery::take_probe() {
     while ((probe_ = recogniser_->next_probe())) {
-        if (ReadRequest::make(looked_at_.station, *probe_)) return;
+        if (ReadRequest::make(examined_.station, *probe_)) return;
         recogniser_->skip(*probe_);
     }
     end_examination();
 }
 
 void Discovery::on_probe(const Answer& answer) {
-    ++looked_at_.evidence.asked;
+    ++examined_.evidence.asked;
     if (answer.reply == Reply::damaged) {
-        ++looked_at_.evidence.damaged;
+        ++examined_.evidence.damaged;
         if (++damaged_ < kDamagedTries) return;
         recogniser_->skip(*probe_);
     } else if (answer.reply == Reply::answered) {
-        ++looked_at_.evidence.good;
+        ++examined_.evidence.good;
         recogniser_->on_reply(*probe_, answer.pdu);
     } else {
         recogniser_->on_reply(*probe_, std::nullopt);
@@ -118,8 +119,8 @@ void Discovery::on_probe(const Answer& answer) {
 }
 
 void Discovery::end_examination() {
-    looked_at_.candidates = recogniser_->candidates();
-    found_.push_back(std::exchange(looked_at_, {}));
+    examined_.candidates = recogniser_->candidates();
+    found_.push_back(std::exchange(examined_, {}));
     recogniser_.reset();
 }
 
@@ -129,7 +130,7 @@ void Discovery::ask_late(std::uint8_t station) {
 
 std::vector<StationFinding> Discovery::findings() const {
     std::vector<StationFinding> all = found_;
-    if (recogniser_ != nullptr) all.push_back(looked_at_);
+    if (recogniser_ != nullptr) all.push_back(examined_);
     std::ranges::sort(all, {}, &StationFinding::station);
     return all;
 }

@@ -12,7 +12,7 @@
 namespace panelgate::scan {
 namespace {
 
-constexpr int kSlowest = 50;  // what a configuration takes, too
+constexpr int kSlowest = 50;  // the configuration accepts the same
 constexpr int kFastest = 4'000'000;
 constexpr std::size_t kMostRates = 32;
 
@@ -23,7 +23,7 @@ std::optional<int> parse_number(std::string_view text) {
     return value;
 }
 
-/// The parts between commas; "" has one, empty.
+/// Splits at commas; "" gives one empty part.
 std::vector<std::string_view> split(std::string_view text) {
     std::vector<std::string_view> parts;
     while (true) {

@@ -15,12 +15,12 @@ using profile::allows;
 namespace {
 
 constexpr int kUsualRates[] = {9600, 19200, 38400, 115200, 57600, 4800, 2400};
-constexpr int kAsciiRates[] = {9600, 19200, 38400, 115200};  // others where they are asked for
+constexpr int kAsciiRates[] = {9600, 19200, 38400, 115200};  // others only if requested
 constexpr Parity kParities[] = {Parity::none, Parity::even, Parity::odd};
-constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third has the rest
+constexpr std::size_t kRounds[] = {4, 8};  // stations in each format; the third round has the rest
 constexpr std::uint8_t kUsualLast = 31;    // of panels: their settings screens end there
 
-/// The profiles' defaults, the most frequent first, then by the names of their profiles.
+/// Returns the profiles' default formats, the most frequent first, then by profile name.
 std::vector<SerialFormat> profile_formats(const profile::Catalogue& profiles) {
     std::vector<SerialFormat> all;
     for (const auto& [name, profile] : profiles.all()) {

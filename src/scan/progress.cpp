@@ -34,11 +34,11 @@ std::string format_progress(const Progress& progress, std::size_t width) {
 
 namespace {
 
-constexpr int kProbes = 12;        // of a usual recognition
+constexpr int kProbes = 12;        // of a typical recognition
 constexpr Duration kProbe = 20ms;  // request, think time and reply
 
-/// What a remote line is set to cannot be asked; what the panels found can be set to is known.
-std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
+/// The far end's setting cannot be read: takes a format that all panels found support.
+std::optional<SerialFormat> probable_format(const profile::Catalogue& profiles,
                                             const Result& result) {
     std::vector<const profile::PanelProfile*> panels;
     for (const StationFinding& finding : result.stations) {
@@ -51,8 +51,8 @@ std::optional<SerialFormat> supposed_format(const profile::Catalogue& profiles,
 
 }  // namespace
 
-/// First pass, second pass and the other order of the CRC of who will be silent, examination of
-/// who has answered.
+/// Sums first pass, second pass and other CRC order for stations assumed silent, and the
+/// examination of stations that have answered.
 Duration Scanner::State::asking_cost() const {
     const Duration wire = frame_time(format, modbus::kReadRequestAdu);
     const auto first = static_cast<std::int64_t>(first_pass.size());
@@ -60,7 +60,7 @@ Duration Scanner::State::asking_cost() const {
     std::int64_t high_first = static_cast<std::int64_t>(high_first_pass.size());
     for (const auto* pass : {&first_pass, &second_pass}) {
         high_first += std::ranges::count_if(
-            *pass, [this](std::uint8_t station) { return may_be_old(station); });
+            *pass, [this](std::uint8_t station) { return station_may_be_high_first(station); });
     }
     const Duration examining = settings.repeats * (settings.settle + kProbe) + kProbes * kProbe;
     const auto open = static_cast<std::int64_t>(to_examine.size()) + (examination ? 1 : 0);
@@ -108,22 +108,22 @@ Result Scanner::result() const {
         result.stations.push_back(std::move(finding));
     }
     for (StationFinding& finding : result.stations) {
-        const auto seen = state.beforehand.find(finding.station);
-        if (seen == state.beforehand.end()) continue;
+        const auto seen = state.other_evidence.find(finding.station);
+        if (seen == state.other_evidence.end()) continue;
         finding.evidence.twice += seen->second.twice;
         finding.evidence.late += seen->second.late;
     }
     if (!result.stations.empty() || !result.talk.empty()) {
         result.format =
-            result.remote ? supposed_format(state.profiles, result) : state.known_format();
+            result.remote ? probable_format(state.profiles, result) : state.known_format();
         if (result.remote && result.format && state.format.mode == SerialMode::ascii) {
-            const int baud = result.format->baud;  // all that manuals tell of ASCII
+            const int baud = result.format->baud;  // manuals give nothing else for ASCII
             result.format = state.format;
             result.format->baud = baud;
         }
     }
     std::ranges::sort(result.stations, std::less(), &StationFinding::station);
-    tell_duplicates(result);
+    mark_duplicates(result);
     return result;
 }
 

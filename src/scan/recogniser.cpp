@@ -18,8 +18,8 @@ namespace {
 using profile::PanelProfile;
 
 constexpr const char* kGeneric = "generic";
-constexpr std::size_t kMostProbes = 256;  // to choose from
-constexpr std::size_t kMostAsked = 24;
+constexpr std::size_t kMaxProbes = 256;  // to choose from
+constexpr std::size_t kMaxAsked = 24;
 constexpr std::uint32_t kLastAddress = 0xFFFF;
 
 bool may_be(const PanelProfile& profile, std::uint8_t station,
@@ -35,7 +35,7 @@ bool is_read(const Bytes& pdu) {
 }
 
 void add_probe(std::vector<Bytes>& probes, const Bytes& pdu) {
-    if (probes.size() == kMostProbes || !is_read(pdu)) return;
+    if (probes.size() == kMaxProbes || !is_read(pdu)) return;
     append_new(probes, pdu);
 }
 
@@ -46,7 +46,7 @@ std::vector<Bytes> identifications(const PanelProfile& profile) {
     return reads;
 }
 
-/// The ends of each area and what is just beyond.
+/// Returns reads of the last item of each area and of the item after it.
 std::vector<Bytes> boundaries(const PanelProfile& profile) {
     std::vector<Bytes> reads;
     for (const profile::Area& area : profile.areas) {
@@ -62,7 +62,8 @@ std::vector<Bytes> boundaries(const PanelProfile& profile) {
     return reads;
 }
 
-/// Does the reply begin as the profile says for this read? Nothing: it is not one of its own.
+/// True if the reply begins as the profile says for this read; nullopt if it is not an
+/// identification of this profile.
 std::optional<bool> identifies(const PanelProfile& profile, const Bytes& probe,
                                const std::optional<Bytes>& reply) {
     std::optional<bool> fits;
@@ -87,14 +88,14 @@ Recogniser::Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
         if (name == kGeneric) {
             generic_ = true;
         } else if (may_be(profile, station, format, order)) {
-            suspects_.push_back({&profile});
+            matches_.push_back({&profile});
         }
     }
-    for (const Suspect& suspect : suspects_) {
-        for (const Bytes& probe : identifications(*suspect.profile)) add_probe(probes_, probe);
+    for (const ProfileMatch& match : matches_) {
+        for (const Bytes& probe : identifications(*match.profile)) add_probe(probes_, probe);
     }
-    for (const Suspect& suspect : suspects_) {
-        for (const Bytes& probe : boundaries(*suspect.profile)) add_probe(probes_, probe);
+    for (const ProfileMatch& match : matches_) {
+        for (const Bytes& probe : boundaries(*match.profile)) add_probe(probes_, probe);
     }
 }
 
@@ -112,8 +113,8 @@ Recogniser::Answer Recogniser::expected(const PanelProfile& profile, const Bytes
     std::abort();
 }
 
-/// Nothing where the answer tells nothing about what the station has: silence, busy, a failure.
-std::optional<Recogniser::Answer> Recogniser::told(const std::optional<Bytes>& reply) {
+/// Returns nullopt if the reply does not show what the station supports: silence, busy, a failure.
+std::optional<Recogniser::Answer> Recogniser::classify(const std::optional<Bytes>& reply) {
     if (!reply) return std::nullopt;
     const auto code = modbus::exception_of(*reply);
     if (!code) return Answer::granted;
@@ -131,14 +132,13 @@ std::optional<Recogniser::Answer> Recogniser::told(const std::optional<Bytes>& r
         case modbus::ExceptionCode::gateway_target_failed:
             return std::nullopt;
     }
-    return std::nullopt;  // a vendor's own
+    return std::nullopt;  // vendor-specific
 }
 
-/// What a panel says of itself weighs more than where its memory ends: models of one family differ
-/// there.
-bool Recogniser::is_viable(const Suspect& suspect) const {
-    if (!suspect.possible) return false;
-    return suspect.differed == 0 || (suspect.by_content && suspect.differed * 2 < suspect.agreed);
+/// A panel's identification weighs more than where its memory ends, which varies within a family.
+bool Recogniser::is_viable(const ProfileMatch& match) const {
+    if (!match.possible) return false;
+    return match.differed == 0 || (match.by_content && match.differed * 2 < match.agreed);
 }
 
 bool Recogniser::is_asked(const Bytes& probe) const {
@@ -146,23 +146,23 @@ bool Recogniser::is_asked(const Bytes& probe) const {
 }
 
 std::optional<Bytes> Recogniser::next_probe() const {
-    if (asked_.size() >= kMostAsked) return std::nullopt;
+    if (asked_.size() >= kMaxAsked) return std::nullopt;
     if (auto split = best_split()) return split;
     return confirmation();
 }
 
-/// The read that leaves the fewest possible in the worse of its two cases.
+/// Returns the read that leaves the fewest candidates in the worse of its two cases.
 std::optional<Bytes> Recogniser::best_split() const {
     const Bytes* best = nullptr;
     std::ptrdiff_t least = std::ranges::count_if(
-        suspects_, [this](const Suspect& suspect) { return is_viable(suspect); });
+        matches_, [this](const ProfileMatch& match) { return is_viable(match); });
     for (const Bytes& probe : probes_) {
         if (is_asked(probe)) continue;
         std::ptrdiff_t granted = 0;
         std::ptrdiff_t refused = 0;
-        for (const Suspect& suspect : suspects_) {
-            if (!is_viable(suspect)) continue;
-            ++(expected(*suspect.profile, probe) == Answer::granted ? granted : refused);
+        for (const ProfileMatch& match : matches_) {
+            if (!is_viable(match)) continue;
+            ++(expected(*match.profile, probe) == Answer::granted ? granted : refused);
         }
         if (std::max(granted, refused) >= least) continue;
         least = std::max(granted, refused);
@@ -172,10 +172,10 @@ std::optional<Bytes> Recogniser::best_split() const {
 }
 
 std::optional<Bytes> Recogniser::confirmation() const {
-    for (const Suspect& suspect : suspects_) {
-        if (!is_viable(suspect)) continue;
-        std::vector<Bytes> reads = identifications(*suspect.profile);
-        std::ranges::move(boundaries(*suspect.profile), std::back_inserter(reads));
+    for (const ProfileMatch& match : matches_) {
+        if (!is_viable(match)) continue;
+        std::vector<Bytes> reads = identifications(*match.profile);
+        std::ranges::move(boundaries(*match.profile), std::back_inserter(reads));
         for (const Bytes& read : reads) {
             if (is_read(read) && !is_asked(read)) return read;
         }
@@ -185,54 +185,54 @@ std::optional<Bytes> Recogniser::confirmation() const {
 
 void Recogniser::on_reply(const Bytes& probe, const std::optional<Bytes>& reply) {
     asked_.push_back(probe);
-    for (Suspect& suspect : suspects_) judge(suspect, probe, reply);
+    for (ProfileMatch& match : matches_) judge(match, probe, reply);
 }
 
 void Recogniser::skip(const Bytes& probe) { asked_.push_back(probe); }
 
-void Recogniser::judge(Suspect& suspect, const Bytes& probe,
+void Recogniser::judge(ProfileMatch& match, const Bytes& probe,
                        const std::optional<Bytes>& reply) const {
-    if (const auto fits = identifies(*suspect.profile, probe, reply)) {
-        suspect.possible = suspect.possible && *fits;
-        suspect.by_content = suspect.by_content || (*fits && reply && is_data(*reply));
+    if (const auto fits = identifies(*match.profile, probe, reply)) {
+        match.possible = match.possible && *fits;
+        match.by_content = match.by_content || (*fits && reply && is_data(*reply));
     }
-    const auto answer = told(reply);
+    const auto answer = classify(reply);
     if (!answer) return;
-    const Answer manual = expected(*suspect.profile, probe);
-    if (*answer == manual) ++suspect.to_the_letter;
+    const Answer manual = expected(*match.profile, probe);
+    if (*answer == manual) ++match.exact_matches;
     if ((*answer == Answer::granted) == (manual == Answer::granted)) {
-        ++suspect.agreed;
+        ++match.agreed;
         return;
     }
-    ++suspect.differed;
+    ++match.differed;
     const bool about_function = *answer == Answer::no_function || manual == Answer::no_function;
-    if (about_function) suspect.possible = false;
+    if (about_function) match.possible = false;
 }
 
 std::vector<Candidate> Recogniser::candidates() const {
-    std::vector<Suspect> order = suspects_;
-    std::ranges::sort(order, [](const Suspect& a, const Suspect& b) {
+    std::vector<ProfileMatch> order = matches_;
+    std::ranges::sort(order, [](const ProfileMatch& a, const ProfileMatch& b) {
         if (a.by_content != b.by_content) return a.by_content;
         if (a.differed != b.differed) return a.differed < b.differed;
-        if (a.to_the_letter != b.to_the_letter) return a.to_the_letter > b.to_the_letter;
+        if (a.exact_matches != b.exact_matches) return a.exact_matches > b.exact_matches;
         return a.profile->name < b.profile->name;
     });
     std::vector<Candidate> found;
-    for (const Suspect& suspect : order) {
-        if (!is_viable(suspect) || suspect.agreed == 0) continue;
+    for (const ProfileMatch& match : order) {
+        if (!is_viable(match) || match.agreed == 0) continue;
         std::string why;
-        for (const profile::Identification& how : suspect.profile->identification) {
+        for (const profile::Identification& how : match.profile->identification) {
             if (is_asked(how.request)) why += how.means + "; ";
         }
-        why += std::to_string(suspect.agreed) + " of " +
-               std::to_string(suspect.agreed + suspect.differed) + " reads as its manual says";
-        found.push_back({suspect.profile->name, std::move(why)});
+        why += std::to_string(match.agreed) + " of " +
+               std::to_string(match.agreed + match.differed) + " reads as its manual says";
+        found.push_back({match.profile->name, std::move(why)});
     }
     if (!found.empty() || !generic_) return found;
     std::string why = "no panel profile fits";
-    const auto nearest = std::ranges::min_element(order, std::less(), &Suspect::differed);
+    const auto nearest = std::ranges::min_element(order, std::less(), &ProfileMatch::differed);
     if (nearest != order.end() && nearest->agreed > nearest->differed) {
-        const Suspect& near = *nearest;
+        const ProfileMatch& near = *nearest;
         why += "; " + near.profile->name + " is nearest, " + std::to_string(near.agreed) + " of " +
                std::to_string(near.agreed + near.differed) + " reads as its manual says";
     }
@@ -246,7 +246,7 @@ constexpr unsigned kSilentProbes = 2;
 
 }  // namespace
 
-Bytes first_question() { return modbus::encode_read(modbus::Table::holding_registers, 0, 1); }
+Bytes first_request() { return modbus::encode_read(modbus::Table::holding_registers, 0, 1); }
 
 Examination::Examination(const profile::Catalogue& profiles, const Settings& settings,
                          std::uint8_t station, const std::optional<SerialFormat>& format,
@@ -256,7 +256,8 @@ Examination::Examination(const profile::Catalogue& profiles, const Settings& set
     finding_.crc_order = order;
 }
 
-/// Damage can be noise, or two panels that always speak together: more of the same tells.
+/// True while the first request is to be repeated. Damage can be noise, or two panels replying at
+/// once: more repetitions tell which.
 bool Examination::repeats() const {
     if (checks_ < settings_.repeats) return silent_ < kSilentChecks;
     const Evidence& seen = finding_.evidence;
@@ -266,7 +267,7 @@ bool Examination::repeats() const {
 std::optional<Ask> Examination::next() {
     if (!probe_ && repeats()) {
         ++checks_;
-        return make_ask(first_question(), settings_.settle);
+        return make_ask(first_request(), settings_.settle);
     }
     if (finding_.evidence.good == 0) return std::nullopt;
     while (true) {
@@ -282,7 +283,7 @@ std::optional<Ask> Examination::next() {
     }
 }
 
-/// Nothing when it is no read.
+/// Returns nullopt if the PDU is not a pure read.
 std::optional<Ask> Examination::make_ask(const Bytes& pdu, Duration settle) const {
     const auto request = ReadRequest::make(station(), pdu, finding_.crc_order);
     if (!request) return std::nullopt;
@@ -292,10 +293,10 @@ std::optional<Ask> Examination::make_ask(const Bytes& pdu, Duration settle) cons
 void Examination::count(const Outcome& outcome) {
     Evidence& seen = finding_.evidence;
     ++seen.asked;
-    if (outcome.torn) ++seen.damaged;
+    if (outcome.with_damage) ++seen.damaged;
     for (unsigned i = 0; i < outcome.more; ++i) {
-        if (owed_ > 0) {
-            --owed_;
+        if (outstanding_ > 0) {
+            --outstanding_;
             ++seen.late;
         } else {
             ++seen.twice;
@@ -304,7 +305,7 @@ void Examination::count(const Outcome& outcome) {
     switch (outcome.kind) {
         case Outcome::Kind::silent:
             ++silent_;
-            ++owed_;
+            ++outstanding_;
             return;
         case Outcome::Kind::replied:
             ++seen.good;
@@ -324,7 +325,7 @@ void Examination::compare(const Bytes& reply) {
 
 void Examination::on_outcome(const Outcome& outcome) {
     count(outcome);
-    before_last_ = std::exchange(last_, probe_.value_or(first_question()));
+    before_last_ = std::exchange(last_, probe_.value_or(first_request()));
     const bool replied = outcome.kind == Outcome::Kind::replied;
     if (!probe_) {
         if (replied) compare(outcome.reply);
@@ -341,12 +342,12 @@ void Examination::on_outcome(const Outcome& outcome) {
     }
 }
 
-bool Examination::on_stray(const Frame& frame) {
+bool Examination::on_unsolicited(const Frame& frame) {
     if (frame.crc_order != finding_.crc_order) return false;
-    const bool late = owed_ > 0;
+    const bool late = outstanding_ > 0;
     if (!late && !modbus::answers(last_, frame.pdu) && !modbus::answers(before_last_, frame.pdu))
         return false;
-    if (late) --owed_;
+    if (late) --outstanding_;
     ++(late ? finding_.evidence.late : finding_.evidence.twice);
     return true;
 }

@@ -14,63 +14,65 @@
 
 namespace panelgate::scan {
 
-/// Finds out which profile a station is, by reads that one profile grants and another refuses: what
-/// the profiles name as their identification, their functions and the ends of their areas. Asks
-/// what tells most of those that are still possible apart, then confirms what is left.
+/// Determines a station's profile by reads that one profile grants and another refuses: the
+/// profiles' identifications, their functions and the ends of their areas. First asks what best
+/// divides the remaining profiles, then confirms the rest.
 class Recogniser {
   public:
-    /// `profiles` outlive it. No `format`: a remote line. Profiles that do not have this address,
-    /// this format or this order of the CRC are not considered.
+    /// `profiles` outlives it. No `format`: a remote line. Ignores profiles without this address,
+    /// format or CRC order.
     Recogniser(const profile::Catalogue& profiles, std::uint8_t station,
                const std::optional<SerialFormat>& format,
                modbus::CrcOrder order = modbus::CrcOrder::low_first);
 
-    /// The PDU to ask next; nothing when there is nothing more to learn. May be asked repeatedly.
+    /// Returns the PDU to ask next; nullopt if nothing more can be learned. Without side effects.
     /// Only pure reads.
     std::optional<Bytes> next_probe() const;
-    /// The reply's PDU; nothing when the station was silent.
+    /// `reply`: its PDU; nullopt if the station was silent.
     void on_reply(const Bytes& probe, const std::optional<Bytes>& reply);
-    /// It could not be asked: tells nothing.
+    /// The probe could not be asked and shows nothing.
     void skip(const Bytes& probe);
 
-    /// The best first. Where no other profile fits: `generic`, and what comes nearest.
+    /// Returns the matching profiles, best first. If none but `generic` matches: that, naming the
+    /// nearest.
     std::vector<Candidate> candidates() const;
 
   private:
     enum class Answer : std::uint8_t { granted, no_function, refused };
-    struct Suspect {
+    struct ProfileMatch {
         const profile::PanelProfile* profile = nullptr;
-        bool possible = true;     ///< no identification and no function says otherwise
-        bool by_content = false;  ///< identified by data, not by a refusal
+        bool possible = true;     ///< not excluded by an identification or a function
+        bool by_content = false;  ///< identified by data, not by an exception
         unsigned agreed = 0;
         unsigned differed = 0;
-        unsigned to_the_letter = 0;  ///< the exception code was the manual's, too
+        unsigned exact_matches = 0;  ///< answers as expected including the exception code
     };
 
     static Answer expected(const profile::PanelProfile& profile, const Bytes& probe);
-    static std::optional<Answer> told(const std::optional<Bytes>& reply);
-    bool is_viable(const Suspect& suspect) const;
+    static std::optional<Answer> classify(const std::optional<Bytes>& reply);
+    bool is_viable(const ProfileMatch& match) const;
     std::optional<Bytes> best_split() const;
     std::optional<Bytes> confirmation() const;
     bool is_asked(const Bytes& probe) const;
-    void judge(Suspect& suspect, const Bytes& probe, const std::optional<Bytes>& reply) const;
+    void judge(ProfileMatch& match, const Bytes& probe, const std::optional<Bytes>& reply) const;
 
-    std::vector<Suspect> suspects_;
-    bool generic_ = false;       ///< there is such a profile
-    std::vector<Bytes> probes_;  ///< what there is to ask
+    std::vector<ProfileMatch> matches_;
+    bool generic_ = false;       ///< the catalogue has the profile `generic`
+    std::vector<Bytes> probes_;  ///< probes to choose from
     std::vector<Bytes> asked_;
 };
 
-/// What every station is asked first: one holding register; an exception is an answer, too.
-Bytes first_question();
+/// Returns the first request to every station: one holding register. An exception is an answer,
+/// too.
+Bytes first_request();
 
 struct Ask {
     ReadRequest request;
-    Patience patience;
+    ReplyTimeouts timeouts;
 };
 
-/// One station that has answered: the same read several times, to see whether one panel answers or
-/// two, then what tells which panel it is.
+/// Examines a station that has answered: repeats one read to see whether one panel answers or two,
+/// then recognises the panel.
 class Examination {
   public:
     /// `profiles` and `settings` outlive it. No `format`: a remote line.
@@ -78,12 +80,12 @@ class Examination {
                 const std::optional<SerialFormat>& format, modbus::CrcOrder order);
 
     std::uint8_t station() const { return finding_.station; }
-    /// Nothing when all is known.
+    /// Returns nullopt when everything is known.
     std::optional<Ask> next();
     void on_outcome(const Outcome& outcome);
-    /// A good frame of this station that answers something else than what was asked last. False:
-    /// nothing that was asked.
-    bool on_stray(const Frame& frame);
+    /// Handles a valid frame of this station that does not answer the last request. Returns false
+    /// if it answers no request of this examination.
+    bool on_unsolicited(const Frame& frame);
     StationFinding finding() const;
 
   private:
@@ -96,10 +98,10 @@ class Examination {
     StationFinding finding_;
     Recogniser recogniser_;
     unsigned checks_ = 0;
-    unsigned silent_ = 0;  ///< in a row
-    unsigned owed_ = 0;    ///< requests without a reply: one may still come
+    unsigned silent_ = 0;       ///< in a row
+    unsigned outstanding_ = 0;  ///< unanswered requests: late replies may follow
     std::optional<bool> refused_;
-    std::optional<Bytes> probe_;  ///< nothing: the first question
+    std::optional<Bytes> probe_;  ///< nullopt: the first request
     unsigned tries_ = 0;
     Bytes last_;
     Bytes before_last_;

@@ -34,8 +34,8 @@ std::string counted(const Evidence& seen) {
     return text;
 }
 
-/// Empty when there is nothing strange about the station.
-std::string oddities(const StationFinding& finding) {
+/// Returns "" for a station without anomalies.
+std::string anomalies(const StationFinding& finding) {
     const Evidence& seen = finding.evidence;
     const bool sure = seen.twice > 0 || seen.mixed;
     if (finding.duplicate) {
@@ -61,12 +61,13 @@ std::string profile_of(const StationFinding& finding) {
 }  // namespace
 
 std::string evidence_text(const StationFinding& finding) {
-    std::string odd = oddities(finding);
+    std::string anomaly = anomalies(finding);
     if (finding.crc_order == modbus::CrcOrder::high_first)
-        odd += std::string(odd.empty() ? "" : "; ") + "the CRC's high byte comes first";
-    if (finding.candidates.empty()) return odd.empty() ? "answers, not looked at closer" : odd;
+        anomaly += std::string(anomaly.empty() ? "" : "; ") + "the CRC's high byte comes first";
+    if (finding.candidates.empty())
+        return anomaly.empty() ? "answers, not looked at closer" : anomaly;
     const std::string& why = finding.candidates.front().why;
-    return odd.empty() ? why : odd + "; " + why;
+    return anomaly.empty() ? why : anomaly + "; " + why;
 }
 
 namespace {
@@ -95,7 +96,7 @@ std::string heading(const std::string& device, const Result& result) {
     return text;
 }
 
-/// Plain where YAML surely reads it as text, else in double quotes.
+/// Returns the text plain if YAML certainly reads it as text, else in double quotes.
 std::string yaml_text(const std::string& text) {
     static constexpr std::string_view kPlain = "/._-+@=";
     const bool plain = std::ranges::all_of(text, [](unsigned char c) {
@@ -122,10 +123,11 @@ std::string yaml_serial(const Result& result) {
            ", stop_bits: " + std::to_string(format.stop_bits) + "}\n";
 }
 
-/// `prefix`: of its name, before the address.
+/// `prefix`: of the name, before the address.
 std::string yaml_station(const StationFinding& finding, const std::string& prefix = "station") {
     std::string text;
-    if (const std::string odd = oddities(finding); !odd.empty()) text += "      # " + odd + "\n";
+    if (const std::string anomaly = anomalies(finding); !anomaly.empty())
+        text += "      # " + anomaly + "\n";
     if (finding.duplicate) text += "      # (give one of them another address)\n";
     const std::string profile =
         finding.candidates.empty() ? kUnknown : finding.candidates.front().profile;
@@ -195,7 +197,7 @@ std::string report_yaml(const std::string& device, const Result& result,
     text += "lines:\n  - name: line1\n    device: " + yaml_text(device) + '\n' +
             yaml_serial(result) + "    stations:\n";
     for (const StationFinding& finding : result.stations) text += yaml_station(finding);
-    return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // nothing runs without a server
+    return text + "modbus_tcp:\n  - listen: 127.0.0.1:1502\n";  // a configuration needs a server
 }
 
 std::string stations_yaml(const std::string& line, const std::vector<StationFinding>& stations) {

@@ -40,13 +40,13 @@ void Scanner::State::step(TimePoint now) {
     start_next(now);
 }
 
-/// The driver drops what it holds in the old format, and takes its time.
+/// The driver drops buffered bytes of the old format and needs time.
 void Scanner::State::set_format(TimePoint now, const SerialFormat& wanted) {
     if (wanted == format) return;
     format = wanted;
     asked.reset();
     transcript.cut();
-    if (settings.remote) return;  // only what is said changes
+    if (settings.remote) return;  // only the encoding changes
     actions.emplace_back(SetFormat{format});
     not_before = now + settings.after_format;
 }
@@ -71,11 +71,12 @@ void Scanner::State::start_search(TimePoint now) {
         phase = Phase::done;
         return;
     }
-    if (cell->format != format) return set_format(now, cell->format);  // asked when that is done
-    const Duration patience =
+    if (cell->format != format)
+        return set_format(now, cell->format);  // asked once the format is set
+    const Duration timeout =
         plan.is_last_of_format() ? settings.leave_timeout : settings.search_timeout;
     orders.set(cell->station, cell->crc_order);
-    ask(now, cell->station, patience, Purpose::search);
+    ask(now, cell->station, timeout, Purpose::search);
     cell.reset();
 }
 
@@ -112,16 +113,16 @@ void Scanner::State::start_asking(TimePoint now) {
 }
 
 void Scanner::State::ask(TimePoint now, std::uint8_t station, Duration timeout, Purpose why) {
-    const auto request = ReadRequest::make(station, first_question(), orders.of(station));
+    const auto request = ReadRequest::make(station, first_request(), orders.of(station));
     if (request) transmit(now, {*request, {timeout, settings.quiet}}, why);
 }
 
 void Scanner::State::transmit(TimePoint now, const Ask& wanted, Purpose why) {
-    Patience patience = wanted.patience;
-    patience.start += latency;
+    ReplyTimeouts timeouts = wanted.timeouts;
+    timeouts.start += latency;
     purpose = why;
     asked.set(wanted.request.station());
-    attempt = std::make_unique<Attempt>(wanted.request, format, now, patience);
+    attempt = std::make_unique<Attempt>(wanted.request, format, now, timeouts);
     transcript.cut();
     actions.emplace_back(Transmit{wanted.request, format.mode});
 }
@@ -135,67 +136,69 @@ void Scanner::State::finish_attempt() {
     } else {
         on_outcome(station, outcome);
     }
-    for (const Frame& frame : outcome.strays) on_stray(frame);
+    for (const Frame& frame : outcome.unsolicited) on_unsolicited(frame);
 }
 
 void Scanner::State::on_outcome(std::uint8_t station, const Outcome& outcome) {
     switch (outcome.kind) {
         case Outcome::Kind::replied:
-            beforehand[station].twice += outcome.more;
+            other_evidence[station].twice += outcome.more;
             found(station);
             break;
         case Outcome::Kind::damaged:
-            on_damaged(station, outcome.begun);
+            on_damaged(station, outcome.header_seen);
             break;
         case Outcome::Kind::silent:
-            if (retry && retry->late) found(station);  // it was heard
-            ask_again_later(station);
+            if (retry && retry->late) found(station);  // it was heard before
+            queue_second_pass(station);
             break;
     }
     retry.reset();
 }
 
-/// Once more with patience, when everybody else was asked.
-void Scanner::State::ask_again_later(std::uint8_t station) {
+/// Queues one more request with a longer timeout, after all other stations.
+void Scanner::State::queue_second_pass(std::uint8_t station) {
     if (phase != Phase::asking || answered.contains(station)) return;
-    if (waited_for[station]) return try_high_first(station);
+    if (waited_for[station]) return queue_high_first(station);
     waited_for.set(station);
     second_pass.push_back(station);
 }
 
-/// It is silent to what all others understand.
-void Scanner::State::try_high_first(std::uint8_t station) {
-    if (orders.of(station) == modbus::CrcOrder::high_first || !may_be_old(station)) return;
+/// Queues a request with the CRC's high byte first, for a station silent so far.
+void Scanner::State::queue_high_first(std::uint8_t station) {
+    if (orders.of(station) == modbus::CrcOrder::high_first || !station_may_be_high_first(station))
+        return;
     orders.set(station, modbus::CrcOrder::high_first);
     high_first_pass.push_back(station);
 }
 
-/// Something answers. Two at one address are understood now and then; a wrong parity never.
-void Scanner::State::on_damaged(std::uint8_t station, bool begun) {
+/// A station answers. Two at one address are readable now and then; a wrong parity never.
+void Scanner::State::on_damaged(std::uint8_t station, bool header_seen) {
     Again next = retry.value_or(Again{station, 0, false, false});
-    next.begun = next.begun || begun;
+    next.header_seen = next.header_seen || header_seen;
     if (++next.tries <= kSearchRetries) {
         again.push_back(next);
     } else if (phase == Phase::asking) {
-        if (next.begun || next.late) found(station);
-        ask_again_later(station);
+        if (next.header_seen || next.late) found(station);
+        queue_second_pass(station);
     } else {
         plan.hint({.format = format, .station = station});
         append_new(result.damaged_formats, format);
     }
 }
 
-/// A good frame that does not answer what was asked last: a late reply, a second one, or somebody
-/// else's.
-void Scanner::State::on_stray(const Frame& frame) {
-    if (examination && frame.station == examination->station() && examination->on_stray(frame))
+/// Handles a valid frame that does not answer the last request: a late reply, a duplicate, or
+/// another master's frame.
+void Scanner::State::on_unsolicited(const Frame& frame) {
+    if (examination && frame.station == examination->station() &&
+        examination->on_unsolicited(frame))
         return;
-    const bool ours = asked[frame.station] && modbus::answers(first_question(), frame.pdu);
+    const bool ours = asked[frame.station] && modbus::answers(first_request(), frame.pdu);
     if (!ours) {
-        note(result.talk, frame);
+        add_frame(result.talk, frame);
         return;
     }
-    Evidence& seen = beforehand[frame.station];
+    Evidence& seen = other_evidence[frame.station];
     if (answered.contains(frame.station)) {
         ++(seen.late > 0 ? seen.late : seen.twice);
         return;
@@ -204,11 +207,11 @@ void Scanner::State::on_stray(const Frame& frame) {
     orders.set(frame.station, frame.crc_order);
     const auto waits = [&](const Again& other) { return other.station == frame.station; };
     if (std::ranges::none_of(again, waits)) again.push_front({frame.station, 0, true, false});
-    if (phase == Phase::searching) settle();
+    if (phase == Phase::searching) accept_format();
 }
 
-/// This is the line's format: every station is asked in it.
-void Scanner::State::settle() {
+/// Accepts the current format as the line's and queues every station in it.
+void Scanner::State::accept_format() {
     phase = Phase::asking;
     for (const std::uint8_t station : stations) {
         const auto waits = [&](const Again& other) { return other.station == station; };
@@ -223,21 +226,21 @@ void Scanner::State::found(std::uint8_t station) {
     to_examine.push_back(station);
     std::erase(second_pass, station);
     std::erase(high_first_pass, station);
-    if (phase == Phase::searching) settle();
+    if (phase == Phase::searching) accept_format();
 }
 
 std::optional<SerialFormat> Scanner::State::known_format() const {
     return settings.remote ? std::nullopt : std::optional(format);
 }
 
-bool Scanner::State::may_be_old(std::uint8_t station) const {
+bool Scanner::State::station_may_be_high_first(std::uint8_t station) const {
     if (format.mode == SerialMode::ascii) return false;
     return may_be_high_first(profiles, station, known_format());
 }
 
-void Scanner::State::take_in(TimePoint now, ByteView bytes) {
+void Scanner::State::receive(TimePoint now, ByteView bytes) {
     if (attempt) return attempt->on_rx(now, bytes);
-    if (phase != Phase::listening) return;  // of the format before
+    if (phase != Phase::listening) return;  // in the previous format
     append_up_to(kMaxHeard, heard, bytes);
 }
 
@@ -251,9 +254,9 @@ Scanner::Scanner(const profile::Catalogue& profiles, Settings settings, TimePoin
 Scanner::~Scanner() = default;
 
 void Scanner::on_rx(TimePoint now, ByteView bytes) {
-    if (state_->format.mode == SerialMode::rtu) return state_->take_in(now, bytes);
+    if (state_->format.mode == SerialMode::rtu) return state_->receive(now, bytes);
     state_->transcript.feed(now, bytes);
-    while (const auto piece = state_->transcript.next()) state_->take_in(now, piece->bytes);
+    while (const auto piece = state_->transcript.next()) state_->receive(now, piece->bytes);
 }
 
 void Scanner::on_deadline(TimePoint now) {

@@ -17,8 +17,8 @@
 
 namespace panelgate::scan {
 
-/// A frame of somebody else's conversation.
-void note(Talk& talk, const Frame& frame);
+/// Adds a frame between another master and its stations.
+void add_frame(Talk& talk, const Frame& frame);
 
 struct Scanner::State {
     enum class Phase : std::uint8_t { listening, searching, asking, done };
@@ -35,7 +35,7 @@ struct Scanner::State {
         std::uint8_t station = 0;
         unsigned tries = 0;
         bool late = false;
-        bool begun = false;  ///< of its damaged replies, one surely was a reply
+        bool header_seen = false;  ///< one of the damaged replies contained address and function
     };
 
     State(const profile::Catalogue& catalogue, Settings s, TimePoint now);
@@ -43,7 +43,7 @@ struct Scanner::State {
     void step(TimePoint now);
     TimePoint due() const;
 
-    // listening.cpp
+    // state.cpp
     void listen(TimePoint now, Duration how_long);
     void end_listening(TimePoint now);
 
@@ -56,17 +56,17 @@ struct Scanner::State {
     void transmit(TimePoint now, const Ask& wanted, Purpose why);
     void finish_attempt();
     void on_outcome(std::uint8_t station, const Outcome& outcome);
-    void ask_again_later(std::uint8_t station);
-    void try_high_first(std::uint8_t station);
-    void on_damaged(std::uint8_t station, bool begun);
-    void on_stray(const Frame& frame);
-    void settle();
+    void queue_second_pass(std::uint8_t station);
+    void queue_high_first(std::uint8_t station);
+    void on_damaged(std::uint8_t station, bool header_seen);
+    void on_unsolicited(const Frame& frame);
+    void accept_format();
     void found(std::uint8_t station);
     std::optional<SerialFormat> known_format() const;
-    /// May have the CRC's high byte first, as far as is known of the format.
-    bool may_be_old(std::uint8_t station) const;
-    /// What is heard in this format, as RTU says it.
-    void take_in(TimePoint now, ByteView bytes);
+    /// True if the station may use the CRC's high byte first, given what is known of the format.
+    bool station_may_be_high_first(std::uint8_t station) const;
+    /// Processes bytes received in this format, converted to RTU.
+    void receive(TimePoint now, ByteView bytes);
     Duration asking_cost() const;
     std::string activity() const;
 
@@ -80,36 +80,36 @@ struct Scanner::State {
     std::deque<Action> actions;  ///< at most a SetFormat and a Transmit
 
     Phase phase = Phase::listening;
-    SerialFormat format;  ///< of the line, now
+    SerialFormat format;  ///< the line's current format
     TimePoint not_before;
-    /// Of what is heard since the format was set, or a request was sent.
+    /// Bytes heard since the format was set, or a request was sent.
     modbus::AsciiTranscript transcript{modbus::HexDigits::any_case};
 
-    std::size_t listening_at = 0;  ///< index of formats
+    std::size_t listening_at = 0;  ///< index into formats
     bool listened_again = false;
     Bytes heard;
 
-    std::optional<Cell> cell;  ///< to be asked when its format is set
+    std::optional<Cell> cell;  ///< to be asked once its format is set
     std::unique_ptr<Attempt> attempt;
     Purpose purpose = Purpose::search;
-    std::optional<Again> retry;  ///< what `attempt` is, when its purpose is `again`
+    std::optional<Again> retry;  ///< details of `attempt`, if its purpose is `again`
 
     std::bitset<256> asked;       ///< in this format
-    std::bitset<256> waited_for;  ///< were or are in second_pass
+    std::bitset<256> waited_for;  ///< stations that are or were in second_pass
     std::set<std::uint8_t> answered;
-    std::map<std::uint8_t, Evidence> beforehand;  ///< seen outside of the examination
+    std::map<std::uint8_t, Evidence> other_evidence;  ///< seen outside of the examination
     std::deque<Again> again;
     std::deque<std::uint8_t> first_pass;
     std::deque<std::uint8_t> second_pass;
-    std::deque<std::uint8_t> high_first_pass;  ///< silent otherwise, and a profile says how
-    modbus::CrcOrders orders;                  ///< in which each station is asked next
+    std::deque<std::uint8_t> high_first_pass;  ///< silent so far, and a profile uses this order
+    modbus::CrcOrders orders;                  ///< for the next request of each station
     std::deque<std::uint8_t> to_examine;
     std::unique_ptr<Examination> examination;
     Result result;
 };
 
-/// Decides, with all stations known, which addresses two stations share and whether the line is
-/// noisy instead: damage at one address among good ones is a collision, damage everywhere is not.
-void tell_duplicates(Result& result);
+/// Call when all stations are known: marks addresses shared by two stations, or the line as noisy.
+/// Damage at one address among good ones is a collision, damage everywhere is noise.
+void mark_duplicates(Result& result);
 
 }  // namespace panelgate::scan

@@ -11,7 +11,7 @@
 namespace panelgate::serial_server {
 namespace {
 
-/// An adapter hands over what came in a row (config's reply_hole counts alike).
+/// Bytes that an adapter delivers together (config's reply_hole uses the same).
 constexpr std::size_t kChunk = 32;
 
 EchoState first_state(EchoMode mode) {
@@ -34,7 +34,7 @@ Conversation::Conversation(const Settings& settings, const Units& served)
 void Conversation::reset() {
     hearing_ = make_hearing(settings_, served_);
     was_silent_ = true;
-    unexplained_ = 0;
+    unframed_bytes_ = 0;
     echo_ = {};
     echo_until_.reset();
     echo_state_ = first_state(settings_.echo);
@@ -48,21 +48,21 @@ void Conversation::on_line_down() {
     reset();
 }
 
-/// When bytes were looked at is known, and not when they came: a time that has passed before them
-/// counts for nothing, unless somebody looked and there were none.
+/// Bytes are timestamped when read, not when they arrived: a silence before them counts only if
+/// on_deadline() found it with no bytes pending.
 void Conversation::on_rx(TimePoint now, ByteView bytes) {
     const ByteView rest = echo_.feed(bytes);
     if (echo_until_ && echo_.complete()) {
-        if (echo_teaches_) echo_state_ = EchoState::present;
+        if (echo_is_distinct_) echo_state_ = EchoState::present;
         echo_until_.reset();
     }
     if (!rest.empty()) hear(now, rest);
 }
 
 void Conversation::hear(TimePoint now, ByteView bytes) {
-    heard_at_ = now;
+    last_rx_at_ = now;
     was_silent_ = false;
-    unexplained_ += bytes.size();
+    unframed_bytes_ += bytes.size();
     hearing_->feed(now, bytes);
     take_frames();
 }
@@ -73,7 +73,7 @@ void Conversation::take_frames() {
 }
 
 void Conversation::on_frame(modbus::SerialAdu adu) {
-    unexplained_ = hearing_->pending();
+    unframed_bytes_ = hearing_->pending();
     if (adu.station != 0 && served_[adu.station]) return ask(std::move(adu));
     supersede();
     if (adu.station != 0) {
@@ -81,7 +81,7 @@ void Conversation::on_frame(modbus::SerialAdu adu) {
     } else if (!finishing_) {
         ++counters_.requests;
         ++counters_.broadcasts;
-        actions_.emplace_back(Spread{std::move(adu)});
+        actions_.emplace_back(ForwardBroadcast{std::move(adu)});
     }
 }
 
@@ -89,13 +89,13 @@ void Conversation::ask(modbus::SerialAdu adu) {
     if (open_ && open_->request == adu) {
         ++counters_.requests;
         ++counters_.repeated;
-        open_->ended = heard_at_;
+        open_->ended = last_rx_at_;
         return;
     }
     supersede();
     if (finishing_) return;
     ++counters_.requests;
-    open_ = Open{next_ticket_++, adu, heard_at_};
+    open_ = Open{next_ticket_++, adu, last_rx_at_};
     actions_.emplace_back(Ask{open_->ticket, std::move(adu)});
 }
 
@@ -106,36 +106,36 @@ void Conversation::supersede() {
     actions_.emplace_back(Withdraw{});
 }
 
-/// Behind it, what is pending gets nothing more.
+/// Time after the last byte at which the pending bytes count as complete.
 Duration Conversation::pause() const {
     if (settings_.access.framing == modbus::Framing::ascii) return settings_.access.ascii_pause;
-    const bool begun = hearing_->pending() >= modbus::kMinAdu || hearing_->knows_rest();
+    const bool begun = hearing_->pending() >= modbus::kMinAdu || hearing_->knows_length();
     if (!begun) return settings_.glitch + silence_;
     return settings_.hole + wire_time(settings_.device.serial, kChunk);
 }
 
-void Conversation::look_at_silence(TimePoint now) {
-    if (now - heard_at_ >= silence_ && !std::exchange(was_silent_, true)) {
+void Conversation::check_silence(TimePoint now) {
+    if (now - last_rx_at_ >= silence_ && !std::exchange(was_silent_, true)) {
         hearing_->on_silence();
         take_frames();
         judge_noise();
     }
-    if (hearing_->pending() == 0 || now - heard_at_ < pause()) return;
+    if (hearing_->pending() == 0 || now - last_rx_at_ < pause()) return;
     hearing_->drop_pending();
     take_frames();
     judge_noise();
 }
 
-/// Damage that is long enough may have been the next request, and a reply that comes then would be
-/// taken for its answer. What is shorter is a glitch.
+/// Damage of at least a frame's length may have been the next request, whose answer a reply would
+/// be taken for. Shorter noise is a glitch.
 void Conversation::judge_noise() {
     if (hearing_->pending() > 0) return;
-    disturbed_ = disturbed_ || unexplained_ > 0;
-    if (std::exchange(unexplained_, 0) >= modbus::kMinAdu) supersede();
+    disturbed_ = disturbed_ || unframed_bytes_ > 0;
+    if (std::exchange(unframed_bytes_, 0) >= modbus::kMinAdu) supersede();
 }
 
 void Conversation::on_answer(TimePoint now, std::uint64_t ticket, const std::optional<Bytes>& pdu) {
-    look_at_silence(now);
+    check_silence(now);
     if (!open_ || open_->ticket != ticket) return;
     if (!pdu) {
         ++counters_.silent;
@@ -149,40 +149,40 @@ void Conversation::on_answer(TimePoint now, std::uint64_t ticket, const std::opt
 
 void Conversation::on_deadline(TimePoint now) {
     if (echo_until_ && now >= *echo_until_) end_echo(now);
-    look_at_silence(now);
+    check_silence(now);
     try_send(now);
 }
 
-/// What looked like the beginning of an echo was the master's. Damage may have been the echo, which
-/// met something that the master said.
+/// Bytes kept as a possible echo were the master's. Damage may have been the echo colliding with a
+/// transmission of the master.
 void Conversation::end_echo(TimePoint now) {
     const Bytes held = echo_.release();
-    const bool clear = held.empty() && unexplained_ == 0 && !disturbed_;
-    if (clear && echo_teaches_ && settings_.echo == EchoMode::automatic)
+    const bool clear = held.empty() && unframed_bytes_ == 0 && !disturbed_;
+    if (clear && echo_is_distinct_ && settings_.echo == EchoMode::automatic)
         echo_state_ = EchoState::absent;
     echo_ = {};
     echo_until_.reset();
     if (!held.empty()) hear(now, held);
 }
 
-/// Where a reply is the request word by word, its echo is as good as a retry: only known absence
-/// tells them apart.
+/// If a reply equals its request, its echo looks like a retry: only a line known to have no echo
+/// can distinguish them.
 void Conversation::watch_echo(TimePoint now, const Bytes& sent) {
     const modbus::SerialAdu& request = open_->request;
     const Bytes asked =
         modbus::encode_reply(settings_.access.framing, 0, request.station, request.pdu);
-    echo_teaches_ = sent != asked;
-    const bool watch = echo_teaches_ || echo_state_ != EchoState::absent;
+    echo_is_distinct_ = sent != asked;
+    const bool watch = echo_is_distinct_ || echo_state_ != EchoState::absent;
     if (!watch) return;
     echo_ = arbiter::EchoFilter(sent, arbiter::EchoFilter::Expect::perhaps);
-    echo_until_ = std::max(now, sent_by_) + settings_.hole;
+    echo_until_ = std::max(now, tx_done_at_) + settings_.hole;
     disturbed_ = false;
 }
 
-/// Bytes that may become a frame are waited for.
+/// Waits also for pending bytes that may become a frame.
 TimePoint Conversation::may_send_at() const {
     const Duration quiet = hearing_->pending() == 0 ? silence_ : std::max(silence_, pause());
-    return std::max(heard_at_ + quiet, sent_by_ + silence_);
+    return std::max(last_rx_at_ + quiet, tx_done_at_ + silence_);
 }
 
 void Conversation::try_send(TimePoint now) {
@@ -196,7 +196,7 @@ void Conversation::try_send(TimePoint now) {
     ++counters_.replies;
     if (open_->is_exception) ++counters_.exceptions;
     const Bytes bytes = *std::move(open_->reply);
-    sent_by_ = now + lead(settings_.device) + wire_time(settings_.device.serial, bytes.size());
+    tx_done_at_ = now + lead(settings_.device) + wire_time(settings_.device.serial, bytes.size());
     watch_echo(now, bytes);
     open_.reset();
     actions_.emplace_back(Send{bytes});
@@ -212,8 +212,8 @@ std::optional<Action> Conversation::poll_action() {
 std::optional<TimePoint> Conversation::next_deadline() const {
     std::optional<TimePoint> next = echo_until_;
     const auto add = [&](TimePoint when) { next = next ? std::min(*next, when) : when; };
-    if (!was_silent_) add(heard_at_ + silence_);
-    if (hearing_->pending() > 0) add(heard_at_ + pause());
+    if (!was_silent_) add(last_rx_at_ + silence_);
+    if (hearing_->pending() > 0) add(last_rx_at_ + pause());
     if (open_ && open_->reply && counters_.up) add(may_send_at());
     return next;
 }

@@ -18,55 +18,56 @@
 
 namespace panelgate::serial_server {
 
-/// A request that wants an answer: on_answer() with its ticket, unless it is withdrawn before.
+/// A request to be answered by on_answer() with its ticket, unless withdrawn before.
 struct Ask {
     std::uint64_t ticket = 0;
     modbus::SerialAdu adu;
 };
-/// A request to everybody, which nobody answers.
-struct Spread {
+/// A broadcast; it gets no answer.
+struct ForwardBroadcast {
     modbus::SerialAdu adu;
 };
-/// The request that was asked last is not wanted any more.
+/// Cancels the last Ask.
 struct Withdraw {};
-/// Bytes to be sent at once.
+/// Bytes to send at once.
 struct Send {
     Bytes bytes;
 };
-using Action = std::variant<Ask, Spread, Withdraw, Send>;
+using Action = std::variant<Ask, ForwardBroadcast, Withdraw, Send>;
 
-/// The slave's side of a serial line: what a master says becomes requests, one at a time, and the
-/// answers replies at the right moment. A reply leaves when the line has been silent for t3.5, and
-/// never once the master has said anything else: another frame, or bytes enough to be one that came
-/// damaged. The same frame again is a retry, and gets the answer of the first. Units that are not
-/// served are heard and not answered. Pure; a line::Drive machine.
+/// The slave side of a serial line: turns a master's frames into requests, one at a time, and
+/// answers into correctly timed replies. A reply is sent after t3.5 of silence, and never once the
+/// master has sent anything else: another frame, or enough bytes for a damaged one. An identical
+/// frame is a retry and gets the first one's answer. Frames of units not served are parsed but not
+/// answered. Pure; a line::Drive machine.
 class Conversation {
   public:
     Conversation(const Settings& settings, const Units& served);
 
-    /// The device is open, or is no more: what was going on is over.
+    /// The device was opened or lost; a loss discards the request in progress.
     void on_line_up();
     void on_line_down();
     void on_rx(TimePoint now, ByteView bytes);
-    /// `pdu` of 1 to 253 bytes; nothing: it is told by silence. What nobody waits for is dropped.
+    /// `pdu` has 1 to 253 bytes; nullopt: no reply is sent. An answer to an unknown ticket is
+    /// dropped.
     void on_answer(TimePoint now, std::uint64_t ticket, const std::optional<Bytes>& pdu);
     void on_deadline(TimePoint now);
-    /// From now on nothing is asked.
+    /// Accepts no further requests.
     void finish() { finishing_ = true; }
-    /// Somebody waits for an answer, or for it to be sent.
+    /// True while a request awaits its answer or its reply's transmission.
     bool busy() const { return open_.has_value(); }
 
     std::optional<Action> poll_action();
     std::optional<TimePoint> next_deadline() const;
 
-    /// What it counts; the rest is its user's.
+    /// Returns its own counters; SerialMaster sets the rest.
     const Counters& counters() const { return counters_; }
 
   private:
     struct Open {
         std::uint64_t ticket = 0;
         modbus::SerialAdu request;
-        TimePoint ended{};  ///< its last byte
+        TimePoint ended{};  ///< time of its last byte
         std::optional<Bytes> reply{};
         bool is_exception = false;
     };
@@ -75,7 +76,7 @@ class Conversation {
     void on_frame(modbus::SerialAdu adu);
     void ask(modbus::SerialAdu adu);
     void supersede();
-    void look_at_silence(TimePoint now);
+    void check_silence(TimePoint now);
     void judge_noise();
     void end_echo(TimePoint now);
     void watch_echo(TimePoint now, const Bytes& sent);
@@ -91,14 +92,14 @@ class Conversation {
     std::deque<Action> actions_;
     std::optional<Open> open_;
     std::uint64_t next_ticket_ = 1;
-    TimePoint heard_at_{};         ///< last byte of anybody else
-    bool was_silent_ = true;       ///< since, and that has been looked at
-    std::size_t unexplained_ = 0;  ///< bytes since the last good frame
-    TimePoint sent_by_{};          ///< what was sent last has left
-    arbiter::EchoFilter echo_;     ///< of it
+    TimePoint last_rx_at_{};          ///< last byte received, own echo excluded
+    bool was_silent_ = true;          ///< silence since then, already handled
+    std::size_t unframed_bytes_ = 0;  ///< bytes since the last good frame
+    TimePoint tx_done_at_{};          ///< end of the last transmission
+    arbiter::EchoFilter echo_;        ///< of the last transmission
     std::optional<TimePoint> echo_until_;
-    bool echo_teaches_ = false;  ///< its echo could be nothing else
-    bool disturbed_ = false;     ///< there was noise since it was sent
+    bool echo_is_distinct_ = false;  ///< its echo cannot be mistaken for a retry
+    bool disturbed_ = false;         ///< noise since the transmission
     EchoState echo_state_ = EchoState::unknown;
     bool finishing_ = false;
     Counters counters_;

@@ -13,7 +13,7 @@ namespace panelgate::serial_server {
 
 namespace {
 
-/// ASCII says by itself where a frame begins and ends, and whose it is.
+/// ASCII frames delimit themselves and carry the unit.
 class AsciiHearing final : public Hearing {
   public:
     explicit AsciiHearing(const tcp_server::Settings& access)
@@ -27,7 +27,7 @@ class AsciiHearing final : public Hearing {
         framer_ = fresh_;
     }
     std::size_t pending() const override { return framer_.partial() ? modbus::kMinAsciiAdu : 0; }
-    bool knows_rest() const override { return framer_.partial(); }
+    bool knows_length() const override { return framer_.partial(); }
     std::size_t take_faults() override {
         return framer_.take_faults() + std::exchange(dropped_, 0);
     }
@@ -64,8 +64,8 @@ std::optional<modbus::SerialAdu> RtuHearing::next() {
         std::size_t wrong = 1;
         if (judgement.kind == Judgement::Kind::frame) {
             const bool is_last = judgement.size == heard_.size();
-            const bool counts = aligned_ || !concerns_us(heard_.view()[0]) || (is_last && silent_);
-            if (counts && may_take(judgement.size)) return take(judgement.size);
+            const bool counts = aligned_ || !is_for_us(heard_.view()[0]) || (is_last && silent_);
+            if (counts && is_acceptable(judgement.size)) return take(judgement.size);
             if (is_last && !silent_) break;
             if (counts) wrong = judgement.size;
         }
@@ -75,20 +75,20 @@ std::optional<modbus::SerialAdu> RtuHearing::next() {
     return std::nullopt;
 }
 
-/// Of a good frame at the front.
-bool RtuHearing::may_take(std::size_t size) const {
+/// True if the good frame of `size` bytes at the front may be accepted.
+bool RtuHearing::is_acceptable(std::size_t size) const {
     const ByteView frame = heard_.view().first(size);
-    return sure() || !concerns_us(frame[0]) || modbus::is_pure_read(modbus::pdu_of(frame));
+    return sure() || !is_for_us(frame[0]) || modbus::is_pure_read(modbus::pdu_of(frame));
 }
 
 RtuHearing::Judgement RtuHearing::judge(ByteView start, bool aligned) const {
-    const Judgement request = weigh(modbus::usual_request_length(start), start, aligned);
-    if (request.kind == Judgement::Kind::frame || concerns_us(start[0])) return request;
-    const Judgement reply = weigh(modbus::reply_length(start), start, aligned);
+    const Judgement request = check_length(modbus::usual_request_length(start), start, aligned);
+    if (request.kind == Judgement::Kind::frame || is_for_us(start[0])) return request;
+    const Judgement reply = check_length(modbus::reply_length(start), start, aligned);
     return reply.kind == Judgement::Kind::nothing ? request : reply;
 }
 
-RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool aligned) const {
+RtuHearing::Judgement RtuHearing::check_length(Length length, ByteView start, bool aligned) const {
     using Kind = Judgement::Kind;
     if (length.kind == Length::Kind::need_more)
         return {silent_ && !aligned ? Kind::nothing : Kind::open};
@@ -106,11 +106,12 @@ RtuHearing::Judgement RtuHearing::weigh(Length length, ByteView start, bool alig
 void RtuHearing::on_silence() {
     if (heard_.empty()) trust();
     if (std::exchange(silent_, true) || heard_.empty()) return;
-    if (!knows_rest()) step_to_last();
+    if (!knows_length()) skip_to_last_frame();
 }
 
-/// By its header. An exception is too short to hide anything, and glitches look like one.
-bool RtuHearing::knows_rest() const {
+/// Judges by the header. Exceptions are excluded: they are too short to contain a request, and
+/// glitches look like them.
+bool RtuHearing::knows_length() const {
     const ByteView all = heard_.view();
     if (all.empty()) return false;
     const auto goes_on = [&](const Length& length) {
@@ -119,11 +120,11 @@ bool RtuHearing::knows_rest() const {
     };
     if (goes_on(modbus::request_length(all))) return true;
     const bool exception = all.size() > 1 && (all[1] & modbus::kExceptionBit) != 0;
-    return !exception && !concerns_us(all[0]) && goes_on(modbus::reply_length(all));
+    return !exception && !is_for_us(all[0]) && goes_on(modbus::reply_length(all));
 }
 
-/// What waits for more gives way to a good frame that ends with what was heard.
-bool RtuHearing::step_to_last() {
+/// Skips an incomplete start in favour of a good frame that ends with the last byte received.
+bool RtuHearing::skip_to_last_frame() {
     const ByteView all = heard_.view();
     if (all.empty() || judge(all, aligned_).kind == Judgement::Kind::frame) return true;
     for (std::size_t start = 1; start + modbus::kMinAdu <= all.size(); ++start) {
@@ -156,7 +157,7 @@ void RtuHearing::consume(std::size_t count) {
 
 void RtuHearing::drop_pending() {
     silent_ = true;
-    if (step_to_last()) return;
+    if (skip_to_last_frame()) return;
     step_over(heard_.size());
     trust();
 }

@@ -14,40 +14,40 @@
 
 namespace panelgate::serial_server {
 
-/// Ids that this gateway answers for.
+/// Unit ids the gateway answers for.
 using Units = std::bitset<256>;
 
-/// Finds what a master says on a line where others may answer it, too. Take with next() until it
-/// gives nothing before feeding more. Pure.
+/// Finds a master's requests on a line where other slaves may answer it, too. Call next() until it
+/// returns nothing before feeding more. Pure.
 class Hearing {
   public:
     virtual ~Hearing() = default;
 
     virtual void feed(TimePoint now, ByteView bytes) = 0;
-    /// A good frame, to or of anybody.
+    /// Returns the next good frame, to or from any unit.
     virtual std::optional<modbus::SerialAdu> next() = 0;
-    /// Nothing has come for t3.5: next() may give more.
+    /// The line was silent for t3.5: next() may return more.
     virtual void on_silence() = 0;
-    /// Nothing more will come of what is pending: next() may give its end, the rest is dropped.
+    /// The pending bytes will not be continued: next() may return a frame at their end, the rest is
+    /// dropped.
     virtual void drop_pending() = 0;
-    /// Bytes that may become a frame, or a part of one.
+    /// Returns the number of bytes that may belong to an incomplete frame.
     virtual std::size_t pending() const = 0;
-    /// What is pending tells that it goes on, and how far: a silence is only a hole in it.
-    virtual bool knows_rest() const = 0;
-    /// How often something was no good, since the last call.
+    /// True if the pending bytes announce a longer frame: a silence is then only a gap in it.
+    virtual bool knows_length() const = 0;
+    /// Returns the number of framing faults since the last call.
     virtual std::size_t take_faults() = 0;
 };
 
-/// As settings.access.framing says.
+/// Creates the parser for settings.access.framing.
 std::unique_ptr<Hearing> make_hearing(const Settings& settings, const Units& served);
 
-/// RTU on a line: the function and the header give the length, the CRC judges. What another unit
-/// says may be a request to it or its reply, whichever is good, so that nobody's data is searched
-/// for requests. Behind noise, a request that is served here, or a broadcast, counts only if a
-/// silence follows: its master waits for the reply, while what looks like one inside of other
-/// bytes is followed by more of them. What is no pure read counts there only behind up to three
-/// bytes, a glitch: it may end the data of a damaged write, and a master says it again. Holds 260
-/// bytes at most.
+/// RTU on a line: function and header give the length, the CRC validates. A frame of another unit
+/// may be a request or a reply, whichever is valid, so that its data is not searched for requests.
+/// After noise, a request to a served unit or a broadcast is valid only if a silence follows: its
+/// master waits for the reply, while a lookalike inside other data is followed by more bytes.
+/// Anything but a pure read is accepted there only after up to three bytes, a glitch: it may be the
+/// tail of a damaged write, and a master repeats a lost one. Buffers at most 260 bytes.
 class RtuHearing final : public Hearing {
   public:
     explicit RtuHearing(const Units& served) : served_(served) {}
@@ -57,33 +57,33 @@ class RtuHearing final : public Hearing {
     void on_silence() override;
     void drop_pending() override;
     std::size_t pending() const override { return heard_.size(); }
-    bool knows_rest() const override;
+    bool knows_length() const override;
     std::size_t take_faults() override;
 
   private:
     struct Judgement {
         enum class Kind : std::uint8_t { frame, open, nothing };
         Kind kind = Kind::nothing;
-        std::size_t size = 0;  ///< of a frame
+        std::size_t size = 0;  ///< of the frame
     };
-    bool concerns_us(std::uint8_t station) const { return station == 0 || served_[station]; }
+    bool is_for_us(std::uint8_t station) const { return station == 0 || served_[station]; }
     bool sure() const { return trusted_ || since_lost_ <= kGlitch; }
-    bool may_take(std::size_t size) const;
+    bool is_acceptable(std::size_t size) const;
     Judgement judge(ByteView start, bool aligned) const;
-    Judgement weigh(modbus::ReplyLength length, ByteView start, bool aligned) const;
-    bool step_to_last();
+    Judgement check_length(modbus::ReplyLength length, ByteView start, bool aligned) const;
+    bool skip_to_last_frame();
     modbus::SerialAdu take(std::size_t size);
     void step_over(std::size_t count);
     void consume(std::size_t count);
     void trust() { aligned_ = trusted_ = true; }
 
-    static constexpr std::size_t kGlitch = 3;  ///< shorter than any frame's head
+    static constexpr std::size_t kGlitch = 3;  ///< bytes; shorter than any frame's header
     Units served_;
     ByteQueue heard_;
-    bool aligned_ = true;         ///< a frame begins at the front, if it is one
-    bool trusted_ = true;         ///< ... and no damaged one can be around it
-    std::size_t since_lost_ = 0;  ///< bytes, since that is not so
-    bool silent_ = false;         ///< nothing has followed what was heard
+    bool aligned_ = true;         ///< the front is a frame boundary
+    bool trusted_ = true;         ///< ... and cannot be inside a damaged frame
+    std::size_t since_lost_ = 0;  ///< bytes since trust was lost
+    bool silent_ = false;         ///< a silence followed the last byte
     std::size_t faults_ = 0;
 };
 

@@ -24,7 +24,7 @@ Units served_by(const tcp_server::UnitMap& map) {
     return units;
 }
 
-/// The gateway has no answer of a panel: what a slave that is there would never say.
+/// True if the exception is the gateway's own: the panel did not answer.
 bool is_failure(modbus::ExceptionCode code) {
     using enum modbus::ExceptionCode;
     return code == server_device_busy || code == gateway_path_unavailable ||
@@ -42,28 +42,28 @@ class SerialMaster::Core final : public line::Line::Events,
           map_(std::move(units)),
           clock_(clock),
           line_(std::move(line)),
-          asks_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
-          spreads_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
-          talk_(settings_, served_by(map_)),
-          drive_(clock, *line_, talk_, *this) {}
+          request_caller_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
+          broadcast_caller_(settings_.name, bus::host_of(kProtocol + settings_.name), kProtocol),
+          conversation_(settings_, served_by(map_)),
+          drive_(clock, *line_, conversation_, *this) {}
 
     void start() { line_->start(*this); }
-    void finish() { talk_.finish(); }
-    bool idle() const { return !talk_.busy() && open_broadcasts_ == 0; }
+    void finish() { conversation_.finish(); }
+    bool idle() const { return !conversation_.busy() && open_broadcasts_ == 0; }
     void stop();
     Counters counters() const;
 
     void on_up() override;
     void on_down(const std::string& why) override;
     void on_bytes(ByteView bytes) override {
-        drive_.hear([&](TimePoint now) { talk_.on_rx(now, bytes); });
+        drive_.hear([&](TimePoint now) { conversation_.on_rx(now, bytes); });
     }
 
     void act(const Ask& ask);
-    void act(const Spread& spread);
-    void act(const Withdraw&) { asks_.withdraw(); }
+    void act(const ForwardBroadcast& spread);
+    void act(const Withdraw&) { request_caller_.withdraw(); }
     void act(const Send& send) { line_->write(send.bytes); }
-    void on_deadline(TimePoint now) { talk_.on_deadline(now); }
+    void on_deadline(TimePoint now) { conversation_.on_deadline(now); }
     void settled(TimePoint) {}
 
   private:
@@ -78,11 +78,11 @@ class SerialMaster::Core final : public line::Line::Events,
     tcp_server::UnitMap map_;
     rt::Clock& clock_;
     std::unique_ptr<line::Line> line_;
-    tcp_server::Caller asks_;
-    tcp_server::Caller spreads_;  ///< broadcasts, which nobody withdraws
-    Conversation talk_;
+    tcp_server::Caller request_caller_;
+    tcp_server::Caller broadcast_caller_;  ///< for broadcasts, which are not withdrawn
+    Conversation conversation_;
     line::Drive<Conversation, Core> drive_;
-    std::size_t open_broadcasts_ = 0;  ///< on all lines
+    std::size_t open_broadcasts_ = 0;  ///< outstanding, on all lines
     bool stopped_ = false;
 };
 
@@ -90,12 +90,12 @@ void SerialMaster::Core::stop() {
     if (std::exchange(stopped_, true)) return;
     drive_.rest();
     line_->stop();
-    asks_.withdraw();
-    spreads_.withdraw();
+    request_caller_.withdraw();
+    broadcast_caller_.withdraw();
 }
 
 Counters SerialMaster::Core::counters() const {
-    Counters counters = talk_.counters();
+    Counters counters = conversation_.counters();
     counters.master = settings_.name;
     counters.reopens = line_->counters().reopens;
     return counters;
@@ -104,12 +104,12 @@ Counters SerialMaster::Core::counters() const {
 void SerialMaster::Core::on_up() {
     rt::log(rt::LogLevel::info, "serial master up",
             {{"master", settings_.name}, {"device", settings_.device.device}});
-    drive_.hear([&](TimePoint) { talk_.on_line_up(); });
+    drive_.hear([&](TimePoint) { conversation_.on_line_up(); });
 }
 
 void SerialMaster::Core::on_down(const std::string& why) {
     rt::log(rt::LogLevel::warn, "serial master down", {{"master", settings_.name}, {"why", why}});
-    drive_.hear([&](TimePoint) { talk_.on_line_down(); });
+    drive_.hear([&](TimePoint) { conversation_.on_line_down(); });
 }
 
 void SerialMaster::Core::act(const Ask& ask) {
@@ -118,48 +118,50 @@ void SerialMaster::Core::act(const Ask& ask) {
         return forward(ask, std::move(*forwarding));
     if (const auto* refusal = std::get_if<tcp_server::Refuse>(&decision))
         return refuse(ask, *refusal);
-    // A unit that stands for everybody on a line: as unit 0.
+    // An alias for a broadcast: handled like unit 0.
     if (const auto* all = std::get_if<tcp_server::Broadcast>(&decision)) broadcast(*all);
-    talk_.on_answer(clock_.now(), ask.ticket, std::nullopt);
+    conversation_.on_answer(clock_.now(), ask.ticket, std::nullopt);
 }
 
-void SerialMaster::Core::act(const Spread& spread) {
+void SerialMaster::Core::act(const ForwardBroadcast& spread) {
     const auto decision =
         tcp_server::decide(spread.adu.station, spread.adu.pdu, settings_.access, map_);
     if (const auto* all = std::get_if<tcp_server::Broadcast>(&decision)) return broadcast(*all);
     const auto* refusal = std::get_if<tcp_server::Refuse>(&decision);
     if (refusal == nullptr) return;
     for (const tcp_server::Target& target : refusal->asked)
-        spreads_.tell_refused(target.bus, target.station, spread.adu.pdu);
+        broadcast_caller_.tell_refused(target.bus, target.station, spread.adu.pdu);
 }
 
 void SerialMaster::Core::broadcast(const tcp_server::Broadcast& all) {
     if (open_broadcasts_ + all.lines.size() > settings_.open_broadcasts) return;
     for (bus::BusClient* line : all.lines) {
         ++open_broadcasts_;
-        spreads_.transact(line, 0, all.request, [weak = weak_from_this()](const bus::Answer&) {
-            if (const auto self = weak.lock()) --self->open_broadcasts_;
-        });
+        broadcast_caller_.transact(line, 0, all.request,
+                                   [weak = weak_from_this()](const bus::Answer&) {
+                                       if (const auto self = weak.lock()) --self->open_broadcasts_;
+                                   });
     }
 }
 
 void SerialMaster::Core::refuse(const Ask& ask, const tcp_server::Refuse& refusal) {
     for (const tcp_server::Target& target : refusal.asked)
-        asks_.tell_refused(target.bus, target.station, ask.adu.pdu);
-    talk_.on_answer(clock_.now(), ask.ticket, told(ask.adu.pdu[0], refusal.code));
+        request_caller_.tell_refused(target.bus, target.station, ask.adu.pdu);
+    conversation_.on_answer(clock_.now(), ask.ticket, told(ask.adu.pdu[0], refusal.code));
 }
 
 void SerialMaster::Core::forward(const Ask& ask, tcp_server::Forward forwarding) {
-    asks_.transact(forwarding.target.bus, forwarding.target.station, std::move(forwarding.request),
-                   [weak = weak_from_this(), ticket = ask.ticket,
-                    function = ask.adu.pdu[0]](bus::Answer answer) {
-                       const auto self = weak.lock();
-                       if (!self || self->stopped_) return;
-                       self->drive_.tell([&](TimePoint now) {
-                           self->talk_.on_answer(now, ticket,
-                                                 self->told(function, std::move(answer.pdu)));
-                       });
-                   });
+    request_caller_.transact(forwarding.target.bus, forwarding.target.station,
+                             std::move(forwarding.request),
+                             [weak = weak_from_this(), ticket = ask.ticket,
+                              function = ask.adu.pdu[0]](bus::Answer answer) {
+                                 const auto self = weak.lock();
+                                 if (!self || self->stopped_) return;
+                                 self->drive_.tell([&](TimePoint now) {
+                                     self->conversation_.on_answer(
+                                         now, ticket, self->told(function, std::move(answer.pdu)));
+                                 });
+                             });
 }
 
 auto SerialMaster::Core::told(std::uint8_t function, modbus::ExceptionCode code) const -> Pdu {
@@ -167,7 +169,7 @@ auto SerialMaster::Core::told(std::uint8_t function, modbus::ExceptionCode code)
     return modbus::encode_exception(function, code);
 }
 
-/// What a panel says passes, its own exceptions too.
+/// Passes a panel's reply unchanged, including its exceptions.
 auto SerialMaster::Core::told(std::uint8_t function, Result<Bytes> pdu) const -> Pdu {
     if (!pdu) return told(function, modbus::to_exception(pdu.error()));
     if (pdu->empty() || pdu->size() > modbus::kMaxPdu)

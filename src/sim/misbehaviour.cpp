@@ -56,7 +56,7 @@ HeardBytes collide(ByteView first, ByteView second, std::size_t later, const Ser
             byte |= (line[at + 1 + i] ? 1u : 0u) << i;
         heard.bytes.push_back(static_cast<std::uint8_t>(byte));
         heard.ends.push_back(static_cast<std::uint32_t>(at + character));
-        // A stop bit of 0 starts one.
+        // A stop bit of 0 is taken for a start bit.
         at += 1 + data_bits(format) + (format.parity == Parity::none ? 0 : 1);
     }
     return heard;
@@ -141,8 +141,8 @@ std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviou
 
 namespace {
 
-/// The other panel of the same address says the same, up to one and a half replies later.
-void answer_twice(Spoken& spoken, std::mt19937& chance, const SerialFormat& format) {
+/// A second panel with the same address sends the same reply, up to one and a half replies later.
+void send_twice(Spoken& spoken, std::mt19937& chance, const SerialFormat& format) {
     const auto bits = spoken.adu.size() * static_cast<std::size_t>(format.bits_per_character());
     std::uniform_int_distribution<std::size_t> later(0, bits * 3 / 2);
     HeardBytes heard = collide(spoken.adu, spoken.adu, later(chance), format);
@@ -171,7 +171,7 @@ Spoken misbehave(const Misbehaviour& faults, Bytes adu, std::mt19937& chance,
         spoken.adu[place(chance)] ^= ascii ? 0x01 : 0x10;  // mostly another digit
     }
     if (happens(faults.truncate)) spoken.adu.resize((spoken.adu.size() + 1) / 2);
-    if (happens(faults.duplicate)) answer_twice(spoken, chance, format);
+    if (happens(faults.duplicate)) send_twice(spoken, chance, format);
     return spoken;
 }
 

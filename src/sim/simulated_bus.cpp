@@ -21,10 +21,10 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr std::size_t kMaxRequest = 520;  // the GT's 512 bytes, and what shows that it was more
+constexpr std::size_t kMaxRequest = 520;  // the GT's 512 bytes, and some to detect more
 constexpr std::size_t kMaxAsciiRequest = 2 * kMaxRequest + 1;
 constexpr Duration kAsciiPause = 1s;  // the longest between two characters (SL 2.5.2.1)
-constexpr Duration kTick = 1ms;  // reply bytes are handed over at this grain, the last one exactly
+constexpr Duration kTick = 1ms;       // granularity of reply bytes; the last one is exact
 
 }  // namespace
 
@@ -40,8 +40,8 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
         descriptor.assign(::dup(pty.master()));
     }
 
-    /// What one panel is about to say; it hears nothing until then.
-    struct Thought {
+    /// A reply that one panel will send; it hears nothing until then.
+    struct PendingReply {
         std::uint8_t station = 0;
         TimePoint start;  ///< of the first start bit
         Spoken spoken;
@@ -54,11 +54,11 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
     void on_alarm();
     TimePoint request_over() const;
     void request_ended();
-    Bytes heard_adu(Bytes wire) const;
-    bool thinks(std::uint8_t station) const;
+    Bytes received_adu(Bytes wire) const;
+    bool has_pending_reply(std::uint8_t station) const;
     Bytes reply_to(ByteView adu);
     void think(std::uint8_t station, Spoken spoken);
-    void begin(Thought thought);
+    void begin(PendingReply pending_reply);
     TimePoint end_of(std::size_t byte) const;
     TimePoint next_look() const;
     void play(TimePoint until);
@@ -66,23 +66,23 @@ struct SimulatedBus::State : std::enable_shared_from_this<SimulatedBus::State> {
 
     Settings settings;
     std::vector<Station> stations;
-    line::Pty pty;  ///< who opens it and sets nothing speaks as this line does
+    line::Pty pty;  ///< its default format is this line's
     asio::posix::stream_descriptor descriptor;
     rt::Clock& clock;
     std::unique_ptr<rt::Alarm> alarm;
     Bytes request;
-    TimePoint request_start;      ///< wire time of its first bit
-    TimePoint request_end;        ///< ... and of its last
-    Duration longest_pause{};     ///< inside it
-    bool foreign_format = false;  ///< part of it came at another rate
-    bool collided = false;        ///< a panel spoke meanwhile
+    TimePoint request_start;    ///< wire time of its first bit
+    TimePoint request_end;      ///< ... and of its last
+    Duration longest_pause{};   ///< longest gap inside it
+    bool wrong_format = false;  ///< part of it came at another rate
+    bool collided = false;      ///< a panel sent meanwhile
     std::mt19937 chance;
-    std::vector<Thought> thoughts;    ///< one a station at most
-    Bytes reply;                      ///< on the wire
-    std::vector<std::uint32_t> ends;  ///< of its bytes, in bit times
+    std::vector<PendingReply> pending_replies;  ///< at most one per station
+    Bytes reply;                                ///< on the wire
+    std::vector<std::uint32_t> ends;            ///< of its bytes, in bit times
     std::size_t sent = 0;
     TimePoint reply_start;
-    TimePoint looked;
+    TimePoint last_step;
     bool stopped = false;
 };
 
@@ -104,14 +104,14 @@ void SimulatedBus::State::read_all() {
 void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     play(now);
     const auto colon = std::find(bytes.rbegin(), bytes.rend(), ':');
-    if (settings.serial.mode == SerialMode::ascii && colon != bytes.rend()) {  // it begins anew
+    if (settings.serial.mode == SerialMode::ascii && colon != bytes.rend()) {  // a new frame
         request.clear();
         bytes = bytes.last(static_cast<std::size_t>(colon - bytes.rbegin()) + 1);
     }
     const bool first = request.empty();
     if (first) request_start = now;
     collided = (!first && collided) || !reply.empty();
-    foreign_format = (!first && foreign_format) || !line::tty_speaks(pty.master(), settings.serial);
+    wrong_format = (!first && wrong_format) || !line::tty_speaks(pty.master(), settings.serial);
     longest_pause = first ? Duration::zero() : std::max(longest_pause, now - request_end);
     request_end =
         (first ? now : std::max(now, request_end)) + wire_time(settings.serial, bytes.size());
@@ -120,12 +120,13 @@ void SimulatedBus::State::hear(TimePoint now, ByteView bytes) {
     arm();
 }
 
-/// For what is next on the wire: a request's end, a reply's beginning, its bytes.
+/// Arms the alarm for the next event on the wire: a request's end, a reply's beginning, its bytes.
 void SimulatedBus::State::arm() {
     TimePoint next = TimePoint::max();
     if (!request.empty()) next = std::min(next, request_over());
     if (!reply.empty()) next = std::min(next, next_look());
-    for (const Thought& thought : thoughts) next = std::min(next, thought.start);
+    for (const PendingReply& pending_reply : pending_replies)
+        next = std::min(next, pending_reply.start);
     if (next == TimePoint::max()) return alarm->cancel();
     alarm->arm(next, [this] { on_alarm(); });
 }
@@ -140,27 +141,27 @@ void SimulatedBus::State::on_alarm() {
     arm();
 }
 
-/// What the panels say until then.
+/// Plays the replies of the panels up to `until`.
 void SimulatedBus::State::play(TimePoint until) {
     for (;;) {
-        const auto first = std::ranges::min_element(thoughts, {}, &Thought::start);
-        if (first == thoughts.end() || first->start > until) break;
-        Thought thought = std::move(*first);
-        thoughts.erase(first);
-        send(thought.start);
-        begin(std::move(thought));
+        const auto first = std::ranges::min_element(pending_replies, {}, &PendingReply::start);
+        if (first == pending_replies.end() || first->start > until) break;
+        PendingReply pending_reply = std::move(*first);
+        pending_replies.erase(first);
+        send(pending_reply.start);
+        begin(std::move(pending_reply));
     }
     send(until);
 }
 
-/// Silence ends a frame of RTU, its last character one of ASCII.
+/// An RTU frame ends by silence, an ASCII frame with its last character.
 TimePoint SimulatedBus::State::request_over() const {
     const bool open = settings.serial.mode == SerialMode::ascii && request.back() != '\n';
     return request_end + (open ? kAsciiPause : silent_interval(settings.serial));
 }
 
-/// As RTU says it. In ASCII the last frame, if there is one.
-Bytes SimulatedBus::State::heard_adu(Bytes wire) const {
+/// Returns the request as an RTU frame; in ASCII the last frame, or empty.
+Bytes SimulatedBus::State::received_adu(Bytes wire) const {
     if (settings.serial.mode == SerialMode::rtu) return wire;
     modbus::AsciiTranscript transcript(modbus::HexDigits::upper_only);
     transcript.feed(request_end, wire);
@@ -177,18 +178,19 @@ Bytes SimulatedBus::State::heard_adu(Bytes wire) const {
 
 void SimulatedBus::State::request_ended() {
     Bytes wire = std::exchange(request, {});
-    if (collided) return;  // nobody understands it
+    if (collided) return;  // no panel understands it
     if (settings.echo && ::write(descriptor.native_handle(), wire.data(), wire.size()) < 0) return;
-    if (foreign_format) return;
-    const Bytes adu = heard_adu(std::move(wire));
+    if (wrong_format) return;
+    const Bytes adu = received_adu(std::move(wire));
     const std::uint8_t station = adu.empty() ? 0 : adu[0];
     const auto found = settings.faults.find(station);
     const Misbehaviour faults = found == settings.faults.end() ? Misbehaviour{} : found->second;
     think(station, misbehave(faults, reply_to(adu), chance, settings.serial));
 }
 
-bool SimulatedBus::State::thinks(std::uint8_t station) const {
-    return std::ranges::find(thoughts, station, &Thought::station) != thoughts.end();
+bool SimulatedBus::State::has_pending_reply(std::uint8_t station) const {
+    return std::ranges::find(pending_replies, station, &PendingReply::station) !=
+           pending_replies.end();
 }
 
 void SimulatedBus::State::think(std::uint8_t station, Spoken spoken) {
@@ -198,26 +200,26 @@ void SimulatedBus::State::think(std::uint8_t station, Spoken spoken) {
         spoken.ends.push_back((i + 1) * bits);
     const TimePoint start =
         request_end + silent_interval(settings.serial) + settings.think_time + spoken.delay;
-    thoughts.push_back({station, start, std::move(spoken)});
+    pending_replies.push_back({station, start, std::move(spoken)});
 }
 
-/// A panel speaks whether the wire is free or not: over another one that still does, both are
-/// damaged.
-void SimulatedBus::State::begin(Thought thought) {
-    if (!request.empty() && thought.start < request_end) collided = true;
+/// A panel sends whether the wire is free or not: over another reply, both are damaged.
+void SimulatedBus::State::begin(PendingReply pending_reply) {
+    if (!request.empty() && pending_reply.start < request_end) collided = true;
     if (!reply.empty()) {
         const auto bit = Duration(1s) / settings.serial.baud;
         const TimePoint rest = sent == 0 ? reply_start : end_of(sent - 1);
-        const auto later =
-            static_cast<std::size_t>(std::max<Duration::rep>((thought.start - rest) / bit, 0));
-        HeardBytes heard =
-            collide(ByteView(reply).subspan(sent), thought.spoken.adu, later, settings.serial);
-        thought = {thought.station, rest, {std::move(heard.bytes), {}, std::move(heard.ends)}};
+        const auto later = static_cast<std::size_t>(
+            std::max<Duration::rep>((pending_reply.start - rest) / bit, 0));
+        HeardBytes heard = collide(ByteView(reply).subspan(sent), pending_reply.spoken.adu, later,
+                                   settings.serial);
+        pending_reply = {
+            pending_reply.station, rest, {std::move(heard.bytes), {}, std::move(heard.ends)}};
     }
-    reply = std::move(thought.spoken.adu);
-    ends = std::move(thought.spoken.ends);
-    reply_start = thought.start;
-    looked = thought.start;
+    reply = std::move(pending_reply.spoken.adu);
+    ends = std::move(pending_reply.spoken.ends);
+    reply_start = pending_reply.start;
+    last_step = pending_reply.start;
     sent = 0;
 }
 
@@ -226,10 +228,10 @@ TimePoint SimulatedBus::State::end_of(std::size_t byte) const {
 }
 
 TimePoint SimulatedBus::State::next_look() const {
-    return std::min(end_of(reply.size() - 1), std::max(looked + kTick, end_of(sent)));
+    return std::min(end_of(reply.size() - 1), std::max(last_step + kTick, end_of(sent)));
 }
 
-/// Empty when nobody answers: damage, a broadcast, an address that nobody has.
+/// Returns an empty reply for damage, a broadcast, or an address without a panel.
 Bytes SimulatedBus::State::reply_to(ByteView adu) {
     if (adu.size() < modbus::kMinAdu) return {};
     const ByteView pdu = modbus::pdu_of(adu);
@@ -240,8 +242,8 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
         const auto faults = settings.faults.find(station.id());
         const bool dead = faults != settings.faults.end() && faults->second.dead;
         const modbus::CrcOrder order = settings.crc_orders.of(station.id());
-        if (dead || thinks(station.id()) || station.minds_pause(longest_pause, settings.serial) ||
-            !modbus::crc_ok(adu, order))
+        if (dead || has_pending_reply(station.id()) ||
+            station.rejects_gap(longest_pause, settings.serial) || !modbus::crc_ok(adu, order))
             continue;
         if (adu[0] == 0) station.broadcast(now, wall, pdu);
         if (adu[0] == station.id())
@@ -250,9 +252,9 @@ Bytes SimulatedBus::State::reply_to(ByteView adu) {
     return answer;
 }
 
-/// Hands over the bytes whose time has come, but for those that came while the master spoke.
+/// Delivers the bytes that are due, except those that came while the master was sending.
 void SimulatedBus::State::send(TimePoint until) {
-    looked = until;
+    last_step = until;
     Bytes due;
     for (; sent < reply.size() && end_of(sent) <= until; ++sent) {
         if (end_of(sent) > request_start && end_of(sent) <= request_end) {

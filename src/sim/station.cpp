@@ -21,7 +21,7 @@ using profile::Area;
 using profile::Simulation;
 using Motion = Simulation::Motion;
 
-/// What register `index` (0..6) of a clock shows: second, minute, hour, day, month, year, weekday.
+/// Value of clock register `index` (0..6): second, minute, hour, day, month, year, weekday.
 std::uint16_t clock_field(std::int64_t wall, std::uint32_t index) {
     const auto seconds = static_cast<std::time_t>(wall);  // 32 bits on armhf, until 2038
     std::tm t{};
@@ -73,7 +73,7 @@ struct Station::State {
     Memory memory;
     TimePoint started{};
     bool running = false;
-    std::uint16_t events = 0;  ///< what 0B counts (AP 6.9)
+    std::uint16_t events = 0;  ///< event counter of 0B (AP 6.9)
 };
 
 Station::Station(const profile::PanelProfile& profile, std::uint8_t id)
@@ -110,7 +110,7 @@ void Station::broadcast(TimePoint now, std::int64_t wall, ByteView pdu) {
     state_->execute(pdu);
 }
 
-bool Station::minds_pause(Duration pause, const SerialFormat& format) const {
+bool Station::rejects_gap(Duration pause, const SerialFormat& format) const {
     const unsigned bits = state_->profile->timing.max_gap_bits;
     return bits > 0 && pause > std::chrono::nanoseconds(1s) * bits / format.baud;
 }
@@ -171,7 +171,7 @@ Bytes Station::State::read(std::uint8_t function, const modbus::Span& range) con
     return reply.take();
 }
 
-/// The value that a write request carries for its `index`-th item.
+/// Returns the value that a write request carries for its `index`-th item.
 std::uint16_t Station::State::written(ByteView pdu, const Area& area, std::uint32_t address,
                                       std::uint16_t index) const {
     const auto word = [&](std::size_t at) {

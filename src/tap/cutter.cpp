@@ -14,13 +14,14 @@ namespace {
 
 using modbus::ReplyLength;
 
-/// The longest request that a panel takes: 0F with 255 data bytes.
+/// The longest request that a panel accepts: 0F with 255 data bytes.
 constexpr std::size_t kLongest = modbus::kMaxLongRequestPdu + modbus::kAduOverhead;
 
-/// Of a function without a length rule. The more sizes are tried, the sooner a CRC fits by chance.
+/// For a function without a length rule. The more sizes are tried, the more often a CRC fits by
+/// chance.
 constexpr std::size_t kLongestUnknown = 128;
 
-/// Behind the function, the reply begins as the request does.
+/// True if the reply repeats the request's bytes after the function.
 bool is_echoed(std::uint8_t function) {
     return modbus::is_broadcastable(function) || function == modbus::kMaskWriteRegister;
 }
@@ -32,20 +33,21 @@ bool begins_like(ByteView frame, ByteView pdu) {
                       pdu.begin());
 }
 
-/// Length of the answer that begins here; nothing when it cannot be one.
-std::optional<ReplyLength> answer_length(const Question& question, ByteView frame) {
-    if (frame[0] != question.station || modbus::plain_function(frame[1]) != question.pdu[0])
+/// Length of the answer that begins here; empty if it cannot be one.
+std::optional<ReplyLength> answer_length(const PendingRequest& pending, ByteView frame) {
+    if (frame[0] != pending.station || modbus::plain_function(frame[1]) != pending.pdu[0])
         return std::nullopt;
-    const ReplyLength told = modbus::reply_length(frame);
-    if (frame[1] != question.pdu[0]) return told;
-    if (is_echoed(frame[1]) && !begins_like(frame, question.pdu)) return std::nullopt;
-    const auto expected = modbus::reply_length_from_request(question.pdu);
-    if (!expected || told.kind == ReplyLength::Kind::need_more) return told;
-    if (told.kind == ReplyLength::Kind::known && told.length != *expected) return std::nullopt;
+    const ReplyLength by_header = modbus::reply_length(frame);
+    if (frame[1] != pending.pdu[0]) return by_header;
+    if (is_echoed(frame[1]) && !begins_like(frame, pending.pdu)) return std::nullopt;
+    const auto expected = modbus::reply_length_from_request(pending.pdu);
+    if (!expected || by_header.kind == ReplyLength::Kind::need_more) return by_header;
+    if (by_header.kind == ReplyLength::Kind::known && by_header.length != *expected)
+        return std::nullopt;
     return ReplyLength{ReplyLength::Kind::known, *expected};
 }
 
-/// Could a master mean it? Asked only behind damage, where a CRC may fit by chance.
+/// True if a master could send this. Checked only after damage, where a CRC may fit by chance.
 bool makes_sense(std::uint8_t station, ByteView pdu) {
     if (!modbus::is_known(pdu[0])) return false;
     if (station == 0 && !modbus::is_broadcastable(pdu[0])) return false;
@@ -77,10 +79,10 @@ void Cutter::hear(TimePoint now, ByteView bytes) {
     }
 }
 
-std::optional<Piece> Cutter::next(const Question* question, bool silence) {
+std::optional<Piece> Cutter::next(const PendingRequest* pending, bool silence) {
     std::size_t at = looked_;
     for (; at < std::min(heard_.size(), damaged_run_); ++at) {
-        const Verdict verdict = judge(at, question, silence);
+        const Verdict verdict = judge(at, pending, silence);
         if (verdict.kind == Verdict::Kind::nothing) continue;
         if (verdict.kind == Verdict::Kind::open) break;
         return at == 0 ? cut(verdict.size, verdict) : cut(at, {});
@@ -95,8 +97,9 @@ std::optional<Piece> Cutter::next(const Question* question, bool silence) {
     return std::nullopt;
 }
 
-/// With silence nothing is open.
-Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool silence) const {
+/// With `silence` the result is never open.
+Cutter::Verdict Cutter::judge(std::size_t start, const PendingRequest* pending,
+                              bool silence) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     const Verdict waits{silence ? Verdict::Kind::nothing : Verdict::Kind::open, 0};
     if (frame[0] > modbus::kMaxStation) return {};
@@ -104,10 +107,10 @@ Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool 
     if (modbus::plain_function(frame[1]) == 0) return {};
     const bool aligned = start == 0 && aligned_;
     bool open = false;
-    const auto answer = question != nullptr ? answer_length(*question, frame) : std::nullopt;
+    const auto answer = pending != nullptr ? answer_length(*pending, frame) : std::nullopt;
     if (answer) {
         const std::size_t size = size_of(start, *answer, silence, open);
-        if (size != 0 && modbus::answers(question->pdu, modbus::pdu_of(frame.first(size))))
+        if (size != 0 && modbus::answers(pending->pdu, modbus::pdu_of(frame.first(size))))
             return {Verdict::Kind::frame, size, Piece::Kind::answer, is_request(start, size)};
         if (open) return waits;
     }
@@ -115,7 +118,8 @@ Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool 
         const std::size_t size = size_of(start, modbus::usual_request_length(frame), silence, open);
         if (size != 0 && (aligned || makes_sense(frame[0], modbus::pdu_of(frame.first(size)))))
             return {Verdict::Kind::frame, size, Piece::Kind::request};
-        // A zero behind a good frame leaves it good: its first seven bytes may pass for a reply.
+        // A zero appended to a good frame leaves it good: its first seven bytes may pass for a
+        // reply.
         if (open) return waits;
     }
     const std::size_t size = size_of(start, modbus::reply_length(frame), silence, open);
@@ -124,7 +128,7 @@ Cutter::Verdict Cutter::judge(std::size_t start, const Question* question, bool 
     return open ? waits : Verdict{};
 }
 
-/// Of the good frame; 0: there is none. `open`: it may become one.
+/// Size of the good frame; 0: none. `open`: it may become one.
 std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool silence,
                             bool& open) const {
     const ByteView frame = ByteView(heard_).subspan(start);
@@ -145,13 +149,13 @@ std::size_t Cutter::size_of(std::size_t start, const ReplyLength& length, bool s
     return modbus::crc_ok(frame.first(length.length)) ? length.length : 0;
 }
 
-/// What nothing but a silence ends: with a gap behind it, or where a frame begins that can be
-/// nothing else; or all that has come before a silence. Only at the front, where a frame is due.
+/// Size of a frame of unknown length: it ends at a gap, at the beginning of a certain other frame,
+/// or at a silence. Only at the front, where a frame is due.
 std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
     const ByteView all(heard_);
     const std::vector<std::size_t> ends = good_ends(0);
     for (std::size_t i = 0; i < ends.size(); ++i) {
-        // A zero behind a good frame leaves it good.
+        // A zero appended to a good frame leaves it good.
         const bool last = i + 1 == ends.size() || ends[i + 1] != ends[i] + 1;
         if (last && is_gap_behind(ends[i] - 1)) return ends[i];
         if (goes_on_well(ends[i], true)) return ends[i];
@@ -167,7 +171,7 @@ std::size_t Cutter::size_by_gap(bool silence, bool& open) const {
     return ends[end];
 }
 
-/// Where a good frame that begins here could end.
+/// Possible ends of a good frame that begins here.
 std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     std::vector<std::size_t> ends;
@@ -179,7 +183,7 @@ std::vector<std::size_t> Cutter::good_ends(std::size_t start) const {
     return ends;
 }
 
-/// A frame of a known length begins here, or one that only such a frame ends.
+/// True if a frame of known length begins here, or one that is followed by such a frame.
 bool Cutter::goes_on_well(std::size_t start, bool through_another) const {
     const ByteView frame = ByteView(heard_).subspan(start);
     if (frame.size() < modbus::kMinAdu || frame[0] > modbus::kMaxStation) return false;
@@ -199,7 +203,7 @@ bool Cutter::is_gap_behind(std::size_t place) const {
            times_[place + 1] - times_[place] >= kCharacters * character_;
 }
 
-/// This good frame has the form of a request, too.
+/// True if this good frame has the form of a request, too.
 bool Cutter::is_request(std::size_t start, std::size_t size) const {
     const ByteView frame = ByteView(heard_).subspan(start, size);
     if (is_exception(frame)) return false;
@@ -212,7 +216,7 @@ Piece Cutter::cut(std::size_t size, const Verdict& verdict) {
     const auto end = heard_.begin() + static_cast<std::ptrdiff_t>(size);
     Piece piece;
     piece.kind = verdict.what;
-    piece.twofold = verdict.twofold;
+    piece.ambiguous = verdict.ambiguous;
     piece.bytes.assign(heard_.begin(), end);
     piece.begin = times_.front() - character_;
     piece.end = times_[size - 1];

@@ -27,7 +27,7 @@ namespace {
 
 using boost::asio::ip::udp;
 
-/// Room for the one message beside a datagram.
+/// Buffer for the one control message of a datagram.
 struct alignas(cmsghdr) Control {
     std::array<std::byte, CMSG_SPACE(sizeof(in6_pktinfo))> bytes{};
 };
@@ -43,7 +43,7 @@ OwnAddress own_address(msghdr& message) {
     for (cmsghdr* one = CMSG_FIRSTHDR(&message); one != nullptr; one = CMSG_NXTHDR(&message, one)) {
         if (one->cmsg_level == IPPROTO_IP && one->cmsg_type == IP_PKTINFO) {
             auto info = info_of<in_pktinfo>(*one);
-            info.ipi_ifindex = 0;  // the routes say by which interface
+            info.ipi_ifindex = 0;  // routing selects the interface
             info.ipi_spec_dst = info.ipi_addr;
             return info;
         }
@@ -70,7 +70,7 @@ void put(msghdr& message, Control& control, int level, int type, const Info& inf
 
 }  // namespace
 
-void ask_for_own_address(udp::socket& socket) {
+void enable_packet_info(udp::socket& socket) {
     boost::system::error_code error;
     const bool six = socket.local_endpoint(error).address().is_v6();
     const int on = 1;
@@ -126,9 +126,9 @@ namespace asio = boost::asio;
 using asio::ip::udp;
 using boost::system::error_code;
 
-constexpr int kDatagramsAtOnce = 64;  // then others have their turn
+constexpr int kDatagramsAtOnce = 64;  // per wake-up
 
-/// The one ADU that the datagram is.
+/// Returns the datagram's ADU; nullopt unless it is exactly one.
 std::optional<modbus::Adu> adu_of(ByteView datagram) {
     modbus::MbapFramer framer;
     framer.feed(datagram);
@@ -161,7 +161,7 @@ error_code Datagrams::open(const std::string& address, std::uint16_t port, bool 
         error_code ignored;
         socket_.close(ignored);
     } else {
-        ask_for_own_address(socket_);
+        enable_packet_info(socket_);
         receive();
     }
     return error;
@@ -213,25 +213,25 @@ void Datagrams::drop(const Received& received) {
                     std::string(modbus::label(*spoken)));
 }
 
-/// Paced like all that the gateway answers by itself.
+/// Paced like all replies the gateway generates itself.
 void Datagrams::refuse(const Busy& busy) {
-    if (shared_->own_answers->may_give()) {
-        tell_busy(busy);
+    if (shared_->own_answers->try_acquire()) {
+        send_busy(busy);
     } else if (busy_ < shared_->settings.udp_busy_answers) {
         ++busy_;
         shared_->own_answers->wait([weak = weak_from_this(), busy] {
             const auto self = weak.lock();
             if (!self) return false;
             --self->busy_;
-            return self->tell_busy(busy);
+            return self->send_busy(busy);
         });
     } else {
         log_refused(busy.to, rt::LogLevel::debug, "too many without room");
     }
 }
 
-/// False: it is too late.
-bool Datagrams::tell_busy(const Busy& busy) {
+/// False if the socket is already closed.
+bool Datagrams::send_busy(const Busy& busy) {
     if (!socket_.is_open()) return false;
     ++shared_->counters.requests;
     ++shared_->counters.exceptions;
@@ -262,21 +262,20 @@ Datagrams::Peer* Datagrams::peer(const Endpoint& from) {
     return &peers_.emplace(from, std::move(made)).first->second;
 }
 
-/// Addresses of senders prove nothing, so one of them has few places, and who waits for nothing
-/// gives its place up.
+/// Source addresses can be spoofed, so each has few slots, and an idle peer gives its slot up.
 bool Datagrams::make_room(const Endpoint& from) {
     const asio::ip::address address = from.address();
     const auto of_address = std::ranges::count_if(
         peers_, [&](const auto& peer) { return peer.first.address() == address; });
-    forget_idle(shared_->clock.now());
+    evict_idle(shared_->clock.now());
     const Settings& settings = shared_->settings;
     if (static_cast<std::size_t>(of_address) >= settings.udp_peers_per_address &&
-        !forget_longest_idle(&address))
+        !evict_longest_idle(&address))
         return false;
-    return peers_.size() < settings.max_connections || forget_longest_idle(nullptr);
+    return peers_.size() < settings.max_connections || evict_longest_idle(nullptr);
 }
 
-void Datagrams::forget_idle(TimePoint now) {
+void Datagrams::evict_idle(TimePoint now) {
     std::erase_if(peers_, [&](const auto& peer) {
         const bool gone =
             peer.second.pipeline->empty() && now - peer.second.heard >= shared_->settings.udp_idle;
@@ -285,8 +284,8 @@ void Datagrams::forget_idle(TimePoint now) {
     });
 }
 
-/// Of one address, or of all. Nobody was forgotten: all of them wait for answers.
-bool Datagrams::forget_longest_idle(const asio::ip::address* address) {
+/// Drops the longest-idle peer of one address, or of all if null. False if all await answers.
+bool Datagrams::evict_longest_idle(const asio::ip::address* address) {
     auto longest = peers_.end();
     for (auto peer = peers_.begin(); peer != peers_.end(); ++peer) {
         if (address != nullptr && peer->first.address() != *address) continue;
@@ -320,7 +319,7 @@ void Datagrams::finish() {
     finishing_ = true;
     const Peers peers = peers_;
     for (const auto& [endpoint, peer] : peers) {
-        peer.pipeline->turn_away();
+        peer.pipeline->refuse_waiting();
         answer(endpoint);
     }
     if (idle() && on_idle_) on_idle_();

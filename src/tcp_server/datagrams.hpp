@@ -24,46 +24,45 @@
 
 namespace panelgate::tcp_server {
 
-/// Which address of ours somebody has sent to: a socket that listens on all of them would answer
-/// from any, and who has asked another one does not take that.
+/// The local address a datagram was sent to: a wildcard socket could reply from any address, and
+/// the client would not accept that.
 using OwnAddress = std::variant<std::monostate, in_pktinfo, in6_pktinfo>;
 
-/// Has the system tell it of each datagram. What it does not tell is not known.
-void ask_for_own_address(boost::asio::ip::udp::socket& socket);
+/// Makes the system report it for each datagram. On failure it stays unknown.
+void enable_packet_info(boost::asio::ip::udp::socket& socket);
 
 struct Received {
-    std::size_t size = 0;  ///< at most what there was room for
+    std::size_t size = 0;  ///< at most the buffer's size
     boost::asio::ip::udp::endpoint from;
     OwnAddress to;
 };
-/// The next datagram that waits, if there is one. `failed`: something else was there, such as what
-/// the network says of an earlier answer.
+/// Receives the next datagram, if any. `failed`: something else was pending, such as an ICMP error
+/// about an earlier answer.
 std::optional<Received> receive_datagram(boost::asio::ip::udp::socket& socket,
                                          std::span<std::uint8_t> into, bool& failed);
-/// What the system does not take now is lost, as datagrams are.
+/// Sends without waiting; a datagram the system does not accept is lost.
 void send_datagram(boost::asio::ip::udp::socket& socket, ByteView datagram,
                    const boost::asio::ip::udp::endpoint& to, const OwnAddress& from);
 
-/// Modbus/TCP's ADUs in datagrams, one in each; answers go to the sender. Whoever sends (address
-/// and port) has a pipeline like a connection, until it has been idle for a while. What comes
-/// without room is answered 06, which keeps nothing but its place among the own answers. What is no
-/// ADU is dropped and counted; another framing is told in the log. One thread; held by a
-/// shared_ptr.
+/// Modbus/TCP over UDP, one ADU per datagram; replies go to the sender. Each sender (address and
+/// port) has a pipeline like a connection until it has been idle for a while. A request without
+/// room is answered 06, which takes only a slot among the own answers. Invalid ADUs are dropped and
+/// counted; another framing is logged. Single-threaded; owned by a shared_ptr.
 class Datagrams : public std::enable_shared_from_this<Datagrams> {
   public:
-    /// `on_idle`: after finish(), all that was taken has been answered; perhaps more than once.
-    /// Also by close(), and then never again.
+    /// `on_idle` is called after finish() once all requests are answered, perhaps repeatedly; also
+    /// by close(), for the last time.
     Datagrams(const boost::asio::any_io_executor& executor, std::shared_ptr<Shared> shared,
               std::function<void()> on_idle);
 
-    /// Binds and receives. What is wrong, or nothing; then it may be tried again.
+    /// Binds and starts to receive. Returns the error, if any; it may then be called again.
     boost::system::error_code open(const std::string& address, std::uint16_t port, bool ipv6_only);
     void allow(const rt::AccessList& allowed) { allowed_ = allowed; }
-    /// Takes no more, answers what is on the lines, turns away what waits.
+    /// Takes no more requests, answers those on the lines, refuses queued ones.
     void finish();
-    /// At once; requests that wait are taken back from their buses. May be called twice.
+    /// Closes at once and cancels queued requests on the buses. Idempotent.
     void close();
-    /// Nobody waits for an answer.
+    /// True if no request is outstanding.
     bool idle() const;
 
   private:
@@ -71,11 +70,11 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     struct Peer {
         std::shared_ptr<Pipeline> pipeline;
         TimePoint heard{};
-        OwnAddress asked{};  ///< which answers then
+        OwnAddress asked{};  ///< the address to reply from
     };
     using Peers = std::map<Endpoint, Peer>;
 
-    /// What is needed to answer 06.
+    /// What an exception 06 needs.
     struct Busy {
         Endpoint to;
         OwnAddress from;
@@ -89,12 +88,12 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     void take(const Received& received);
     Peer* peer(const Endpoint& from);
     bool make_room(const Endpoint& from);
-    void forget_idle(TimePoint now);
-    bool forget_longest_idle(const boost::asio::ip::address* address);
+    void evict_idle(TimePoint now);
+    bool evict_longest_idle(const boost::asio::ip::address* address);
     void answer(const Endpoint& to);
     void drop(const Received& received);
     void refuse(const Busy& busy);
-    bool tell_busy(const Busy& busy);
+    bool send_busy(const Busy& busy);
     void log_refused(const Endpoint& from, rt::LogLevel level, std::string reason) const;
 
     boost::asio::ip::udp::socket socket_;
@@ -102,8 +101,8 @@ class Datagrams : public std::enable_shared_from_this<Datagrams> {
     rt::AccessList allowed_;
     std::function<void()> on_idle_;
     Peers peers_;
-    std::array<std::uint8_t, modbus::kMaxTcpAdu + 1> input_{};  ///< one more: it is too long
-    std::size_t busy_ = 0;  ///< answers 06 that wait for their turn
+    std::array<std::uint8_t, modbus::kMaxTcpAdu + 1> input_{};  ///< one more detects oversize
+    std::size_t busy_ = 0;                                      ///< exceptions 06 queued
     bool finishing_ = false;
 };
 

@@ -46,7 +46,7 @@ UnitMap::UnitMap(const Settings& settings, const std::vector<LineInfo>& lines) {
 void UnitMap::add_stations(const LineInfo& line) {
     for (const std::uint8_t station : line.stations) {
         if (station == 0 || station > modbus::kMaxStation) continue;
-        // On two lines: nobody can say which one is meant, and a guess would be a wrong value.
+        // Listed on two lines: ambiguous, and guessing could return a wrong value.
         const bool ambiguous = listed_[station] && direct_[station].bus != line.bus;
         listed_[station] = true;
         direct_[station] = ambiguous ? Target{} : Target{line.bus, station};
@@ -84,13 +84,13 @@ void Caller::tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pd
     bus->tell_refused(station, pdu, client_);
 }
 
-/// It has a name there before it does anything.
+/// Names the client on the bus before its first request.
 void Caller::use(bus::BusClient* bus) {
     if (used_.insert(bus).second) bus->name_client(client_, protocol_ + ' ' + name_);
 }
 
 void Caller::withdraw() {
-    // An answer may end the connection meanwhile.
+    // A cancelled answer may close the connection.
     const std::set<bus::BusClient*> buses = std::exchange(used_, {});
     for (bus::BusClient* bus : buses) bus->cancel(client_);
 }
@@ -101,7 +101,7 @@ Refuse refuse(Fault fault, std::vector<Target> asked = {}) {
     return Refuse{modbus::to_exception(fault), std::move(asked)};
 }
 
-/// Whoever the unit stands for: all lines of a broadcast, one station, or nobody.
+/// Returns the unit's targets: all lines of a broadcast, one station, or none.
 std::vector<Target> targets_of(std::uint8_t unit, const UnitMap& units) {
     std::vector<Target> targets;
     for (bus::BusClient* line : units.broadcast_lines(unit)) targets.push_back({line, 0});
@@ -110,7 +110,7 @@ std::vector<Target> targets_of(std::uint8_t unit, const UnitMap& units) {
     return targets;
 }
 
-/// Those that refuse every write; the refusal of one is everybody's.
+/// Returns the targets that refuse every write; one refusal denies the whole broadcast.
 std::vector<Target> refusing(std::vector<Target> targets) {
     std::erase_if(targets, [](const Target& target) {
         return !target.bus->refusal_of_write(target.station);
@@ -121,7 +121,7 @@ std::vector<Target> refusing(std::vector<Target> targets) {
 Decision decide_broadcast(std::uint8_t function, Result<modbus::Request> request,
                           const Settings& settings, std::vector<Target> lines) {
     if (settings.broadcast == BroadcastMode::deny) return refuse(Fault::denied, std::move(lines));
-    // All of them before any is asked.
+    // Check all lines before sending to any.
     if (auto unwilling = refusing(lines); !unwilling.empty())
         return refuse(Fault::denied, std::move(unwilling));
     if (!modbus::is_broadcastable(function)) return refuse(Fault::denied, std::move(lines));
@@ -138,8 +138,8 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     auto request = modbus::Request::make(Bytes(pdu.begin(), pdu.end()), modbus::QuantityCheck::fit);
     if (!request && request.error() == Fault::denied) return refuse(Fault::denied);
     const bool itself = settings.diagnostics_unit == unit && !units.is_alias(unit);
-    const bool writes = !modbus::is_pure_read(pdu);  // also of one that is malformed
-    if (itself) return Diagnose{};                   // nothing of it can be written
+    const bool writes = !modbus::is_pure_read(pdu);  // also if malformed
+    if (itself) return Diagnose{};                   // nothing in it is writable
     if (writes && settings.read_only) return refuse(Fault::denied, targets_of(unit, units));
 
     const bool broadcast = !units.broadcast_lines(unit).empty();
@@ -149,7 +149,7 @@ Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const
     if (targets.empty()) return refuse(Fault::not_routed);
     if (broadcast)
         return decide_broadcast(pdu[0], std::move(request), settings, std::move(targets));
-    // What is a request the bus refuses itself.
+    // A valid request is refused by the bus itself.
     const bool denied = writes && !refusing(targets).empty();
     return refuse(denied ? Fault::denied : request.error(), std::move(targets));
 }

@@ -29,10 +29,10 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-// CON-07: a peer without power is gone after 60 s of silence and 3 probes 10 s apart.
+// CON-07: a dead peer is detected after 60 s of silence and 3 probes 10 s apart.
 constexpr rt::KeepAlive kKeepAlive{60s, 10s, 3};
-// What the kernel takes for a client that does not read: without a limit megabytes, and each reply
-// in there is older when it arrives than one that is asked for later.
+// Bounds what the kernel buffers for a client that does not read: by default megabytes, and each
+// buffered reply arrives older than one requested later.
 constexpr int kSendBuffer = 64 * 1024;
 constexpr int kUnsentBytes = 4 * 1024;  // 16 of the longest replies
 
@@ -40,7 +40,7 @@ void set_option(tcp::socket& socket, int level, int name, int value) {
     ::setsockopt(socket.native_handle(), level, name, &value, sizeof value);
 }
 
-/// What cannot be set is no reason to refuse a client.
+/// A failed option is no reason to refuse a client.
 void set_up(tcp::socket& socket) {
     rt::set_up_socket(socket.native_handle(), kKeepAlive);
     set_option(socket, SOL_SOCKET, SO_SNDBUF, kSendBuffer);
@@ -79,7 +79,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
               }) {
         shared_->counters.listener = shared_->settings.name();
         if (!shared_->settings.udp) return;
-        datagrams_ = std::make_shared<Datagrams>(executor, shared_, [this] { tell_when_empty(); });
+        datagrams_ =
+            std::make_shared<Datagrams>(executor, shared_, [this] { notify_when_empty(); });
     }
 
     void start();
@@ -96,7 +97,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     std::shared_ptr<Session> longest_idle(bus::Host host) const;
     void tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own);
     void on_closed(const std::shared_ptr<Session>& session);
-    void tell_when_empty();
+    void notify_when_empty();
 
     std::shared_ptr<Shared> shared_;
     rt::AccessList allowed_;
@@ -104,7 +105,7 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     std::shared_ptr<Datagrams> datagrams_;  ///< null without settings.udp
     std::set<std::shared_ptr<Session>> sessions_;
     std::function<void()> done_;
-    bool full_ = false;  ///< told in the log
+    bool full_ = false;  ///< already logged
 };
 
 void Listener::Core::start() {
@@ -149,8 +150,8 @@ void Listener::Core::on_accepted(tcp::socket socket) {
     }
 }
 
-/// P9: who has no place left of its share, or the most of a full house, loses its longest idle one.
-/// An address that leaks connections locks out nobody but itself.
+/// P9: an address at its limit, or with the most connections when the listener is full, loses its
+/// longest-idle one. An address that leaks connections locks out only itself.
 bool Listener::Core::make_room(const tcp::endpoint& peer) {
     const bus::Host host = bus::host_of(peer.address().to_string());
     std::map<bus::Host, std::size_t> counts;
@@ -187,7 +188,7 @@ std::shared_ptr<Session> Listener::Core::longest_idle(bus::Host host) const {
     return longest;
 }
 
-/// Once until one closes.
+/// Logs once until a connection closes.
 void Listener::Core::tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own) {
     if (std::exchange(full_, true)) return;
     shared_->log(rt::LogLevel::warn, "connections refused",
@@ -211,10 +212,10 @@ void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {
 void Listener::Core::on_closed(const std::shared_ptr<Session>& session) {
     sessions_.erase(session);
     if (std::exchange(full_, false)) shared_->log(rt::LogLevel::info, "connections accepted again");
-    tell_when_empty();
+    notify_when_empty();
 }
 
-void Listener::Core::tell_when_empty() {
+void Listener::Core::notify_when_empty() {
     if (!done_ || !sessions_.empty() || (datagrams_ && !datagrams_->idle())) return;
     asio::post(acceptor_.get_executor(), std::exchange(done_, nullptr));
 }
@@ -225,7 +226,7 @@ void Listener::Core::stop(std::function<void()> done) {
     const std::set<std::shared_ptr<Session>> sessions = sessions_;  // finish() may erase
     for (const auto& session : sessions) session->finish();
     if (datagrams_) datagrams_->finish();
-    tell_when_empty();
+    notify_when_empty();
 }
 
 void Listener::Core::close_now() {

@@ -15,18 +15,18 @@
 
 namespace panelgate::tcp_server {
 
-/// The reply to 2B/0E (AP 6.21), stream and individual access: basic (vendor, product code,
-/// version), regular (URL, product, model, machine) and extended objects (80 + i: the name of line
-/// i). `request` is a PDU of four bytes. What does not fit one reply follows in the next.
+/// Returns the reply to 2B/0E (AP 6.21), stream and individual access: basic (vendor, product code,
+/// version), regular (URL, product, model, host) and extended objects (80 + i: the name of line i).
+/// `request` is a PDU of four bytes. Objects that do not fit follow in the next reply.
 Bytes identify(ByteView request, const Diagnostics& state);
 
 namespace {
 
 using modbus::ExceptionCode;
 
-constexpr std::size_t kMostRegisters = 125;  // of one read, AP 6.3
+constexpr std::size_t kMostRegisters = 125;  // per read, AP 6.3
 constexpr std::size_t kMostInputs = 2000;    // AP 6.2
-constexpr std::uint8_t kServerId = 'P';      // AP 6.13: the device's own
+constexpr std::uint8_t kServerId = 'P';      // AP 6.13: device specific
 constexpr std::uint8_t kRunning = 0xFF;
 // Sub-functions of 08, AP 6.8.1.
 constexpr std::uint16_t kReturnQueryData = 0x00;
@@ -35,7 +35,8 @@ Bytes refuse(ByteView request, ExceptionCode code) {
     return modbus::encode_exception(request[0], code);
 }
 
-/// What a read of `most` items at once out of `items` is refused for, if it is.
+/// Returns the exception for a read of `count` items, at most `most` per request and `items` in
+/// all; nullopt if valid.
 std::optional<ExceptionCode> objection(std::size_t first, std::size_t count, std::size_t most,
                                        std::size_t items) {
     if (count == 0 || count > most) return ExceptionCode::illegal_data_value;
@@ -71,12 +72,12 @@ Bytes read_inputs(ByteView request, const Diagnostics& state) {
     return out.take();
 }
 
-/// The counter that a sub-function of 08 returns; nothing: it does something else.
+/// Returns the counter of a sub-function of 08; nullopt if it is not a counter.
 std::optional<std::uint64_t> counter_of(std::uint16_t sub_function, const Counters& counters) {
     switch (sub_function) {
         case 0x02:  // diagnostic register
         case 0x10:  // negative acknowledgements
-        case 0x12:  // overruns of characters
+        case 0x12:  // character overruns
             return 0;
         case 0x0B:
             return counters.requests + counters.protocol_errors;
@@ -108,7 +109,7 @@ Bytes diagnose(ByteView request, const Counters& counters) {
     return out.take();
 }
 
-/// AP 6.9: not busy, and how many requests were completed without an exception.
+/// AP 6.9: not busy, and the number of requests completed without an exception.
 Bytes count_events(ByteView request, const Counters& counters) {
     Writer out;
     out.u8(request[0]).u16(0);
@@ -124,7 +125,7 @@ Bytes report_id(ByteView request, const std::string& version) {
     return out.take();
 }
 
-/// Those of the functions that it has.
+/// True if the gateway's own unit supports this function.
 bool has(ByteView request) {
     switch (request[0]) {
         case modbus::kReadDiscreteInputs:
@@ -180,7 +181,7 @@ struct Object {
     std::string_view text;
 };
 
-/// Those of this access, in the order of their ids.
+/// Returns the objects of this access type, in the order of their ids.
 std::vector<Object> objects_of(std::uint8_t code, const Diagnostics& state) {
     std::vector<Object> objects = {{0, "panelgate"}, {1, "panelgate"}, {2, state.version},
                                    {3, state.url},   {4, "panelgate"}, {5, "Modbus gateway"},

@@ -15,7 +15,7 @@
 
 namespace panelgate::tcp_server {
 
-/// What the gateway tells about itself: all of it as one listener sees it.
+/// What the gateway reports about itself, from one listener's view.
 struct Diagnostics {
     struct Line {
         std::string name;
@@ -25,30 +25,30 @@ struct Diagnostics {
     };
     struct Station {
         Health state = Health::unknown;
-        std::optional<std::size_t> line;  ///< index in `lines`; nothing: not of this listener
+        std::optional<std::size_t> line;  ///< index in `lines`; nullopt: on another listener's line
         std::uint8_t id = 0;
         std::optional<Duration> last_answer;  ///< how long ago
-        OutcomeCounts outcomes;               ///< of all who ask
+        OutcomeCounts outcomes;               ///< of all clients
     };
 
     Duration uptime{};
     std::vector<Line> lines;  ///< of this listener, in the order of its settings
     Counters counters;
     std::string version;
-    std::string url;   ///< of its pages; may be empty
-    std::string host;  ///< name of the machine; may be empty
-    /// The listed station behind a unit; nothing: there is none. May be left out.
+    std::string url;   ///< of the web interface; may be empty
+    std::string host;  ///< host name; may be empty
+    /// Returns the configured station behind a unit, nullopt if there is none. May be null.
     std::function<std::optional<Station>(std::uint8_t unit)> station;
 };
 
-/// The reply of the diagnostics unit. Never touches a bus. Pure.
+/// Returns the diagnostics unit's reply. Never uses a bus. Pure.
 ///
-/// 02, 03 and 04 read the map of register_map.hpp; 08 gives its counters (AP 6.8), 11 and 17 answer
-/// for the gateway, 2B/0E has the objects of identification.hpp. Every other function is exception
-/// 01, also those that only a serial device has (SER-01); a malformed one of these 03.
+/// 02, 03 and 04 read the map of register_map.hpp; 08 returns its counters (AP 6.8), 11 and 17
+/// describe the gateway, 2B/0E returns the objects of identify(). Every other function, including
+/// those for serial lines only (SER-01), is exception 01; a malformed request of these 03.
 Bytes answer_diagnostics(ByteView request, const Diagnostics& state);
 
-/// What the gateway tells of itself now. `shared` outlives it.
+/// Returns the gateway's current state. `shared` must outlive the result.
 Diagnostics own_state(const Shared& shared);
 
 }  // namespace panelgate::tcp_server

@@ -37,26 +37,26 @@ void ReplyQueue::close(Slot& slot) {
     slot.settled = true;
     --unanswered_;
     while (ready_ < slots_.size() && slots_[ready_].settled) ++ready_;
-    step_over_silent();
+    skip_silent();
 }
 
-std::optional<bool> ReplyQueue::newest_is(std::uint16_t transaction, std::uint8_t unit,
-                                          ByteView pdu, MakesOld makes_old) const {
+std::optional<bool> ReplyQueue::matches_newest(std::uint16_t transaction, std::uint8_t unit,
+                                               ByteView pdu, Invalidates invalidates) const {
     for (std::size_t i = slots_.size(); i-- > 0;) {
         const Slot& slot = slots_[i];
         if (slot.transaction == transaction)
             return slot.unit == unit && std::ranges::equal(slot.request, pdu);
-        if (makes_old(slot.request, pdu)) return false;
+        if (invalidates(slot.request, pdu)) return false;
     }
     return std::nullopt;
 }
 
 void ReplyQueue::pop() {
     slots_.front().adu.clear();
-    step_over_silent();
+    skip_silent();
 }
 
-void ReplyQueue::step_over_silent() {
+void ReplyQueue::skip_silent() {
     for (; ready_ > 0 && slots_.front().adu.empty(); --ready_) {
         slots_.pop_front();
         ++first_;
@@ -74,8 +74,8 @@ Bytes exception_reply(std::uint8_t function, Fault fault) {
     return modbus::encode_exception(function, modbus::to_exception(fault));
 }
 
-/// What a client is sent for a bus's answer. A reply that no MBAP frame can carry is refused as one
-/// that is too large to answer.
+/// Converts a bus's answer to a reply PDU. One too long for an MBAP frame becomes the same
+/// exception as a malformed reply.
 Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
     if (!pdu) return exception_reply(function, pdu.error());
     if (pdu->empty() || pdu->size() > modbus::kMaxPdu) {
@@ -84,8 +84,9 @@ Bytes reply_pdu(std::uint8_t function, Result<Bytes> pdu) {
     return std::move(*pdu);
 }
 
-/// Could it change what the read gives? Units may be aliases, so they tell nothing.
-bool makes_old(ByteView request, ByteView read) {
+/// True if `request` could change what `read` returns. Units may be aliases, so they are not
+/// compared.
+bool invalidates(ByteView request, ByteView read) {
     if (request.empty() || !modbus::is_pure_read(read) || modbus::is_pure_read(request))
         return false;
     if (!modbus::check_request(request)) return false;  // refused
@@ -93,9 +94,9 @@ bool makes_old(ByteView request, ByteView read) {
     return !span || modbus::may_change(modbus::access_of(request).write, *span);
 }
 
-/// Gathers what the lines say of one broadcast.
+/// Collects the lines' answers to one broadcast.
 struct BroadcastOutcome {
-    std::size_t open = 0;  ///< lines that have not answered yet
+    std::size_t open = 0;  ///< lines still to answer
     std::optional<Bytes> sent;
     std::optional<bus::Answer> failed;
 
@@ -104,10 +105,10 @@ struct BroadcastOutcome {
         if (answer.pdu) {
             sent = *answer.pdu;
         } else if (!failed || (answer.transmitted && !failed->transmitted)) {
-            failed = std::move(answer);  // the one whose outcome is unknown is worth telling
+            failed = std::move(answer);  // prefer the one with unknown outcome
         }
     }
-    /// What the client is sent; nothing when the mode is silent and a frame may have left (TBC-06).
+    /// Returns the reply; nullopt if the mode is silent and a frame may have been sent (TBC-06).
     std::optional<Bytes> reply(std::uint8_t function, BroadcastMode mode) const {
         const bool silent = mode == BroadcastMode::silent;
         if (silent && (sent || failed->transmitted)) return std::nullopt;
@@ -125,14 +126,15 @@ Pipeline::Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<
       transport_(transport),
       replies_(shared_->settings.framing) {}
 
-/// A reply takes room until the client has taken it: who reads slowly is asked for slowly. So do
-/// repetitions, or whoever says one thing without end would be listened to without end.
+/// A reply occupies room until the client has taken it, so a slow reader is served slowly.
+/// Retransmissions occupy room too; otherwise a client repeating one request would never be
+/// throttled.
 bool Pipeline::has_room() const {
     const Settings& settings = shared_->settings;
     return replies_.size() + waiting_.size() + joined_ < settings.in_flight + settings.waiting;
 }
 
-/// May a repetition of this one get its answer?
+/// True if a retransmission of this request may share its answer.
 bool Pipeline::may_join(ByteView pdu) const {
     const Settings& settings = shared_->settings;
     if (!modbus::has_transactions(settings.framing)) return false;
@@ -147,21 +149,21 @@ bool Pipeline::may_join(ByteView pdu) const {
     std::abort();
 }
 
-/// Only with the last one of its transaction id: clients that give all the same id mean on, off,
-/// on. A read behind a write wants what is there then.
+/// Joins only the latest request of its transaction id: clients that use one id throughout may mean
+/// on, off, on. A read after a write must see its result.
 bool Pipeline::is_joined(const modbus::Adu& adu) const {
     if (!may_join(adu.pdu)) return false;
     for (std::size_t i = waiting_.size(); i-- > 0;) {
         if (waiting_[i].transaction == adu.transaction) return waiting_[i] == adu;
-        if (makes_old(waiting_[i].pdu, adu.pdu)) return false;
+        if (invalidates(waiting_[i].pdu, adu.pdu)) return false;
     }
-    return replies_.newest_is(adu.transaction, adu.unit, adu.pdu, makes_old).value_or(false);
+    return replies_.matches_newest(adu.transaction, adu.unit, adu.pdu, invalidates).value_or(false);
 }
 
-/// One that goes to the bus.
+/// Opens a slot for a request that goes to the bus.
 ReplyQueue::Ticket Pipeline::open(const modbus::Adu& adu) {
-    const bool known_again = may_join(adu.pdu);
-    return replies_.open(adu.transaction, adu.unit, known_again ? adu.pdu : Bytes());
+    const bool joinable = may_join(adu.pdu);
+    return replies_.open(adu.transaction, adu.unit, joinable ? adu.pdu : Bytes());
 }
 
 void Pipeline::take(modbus::Adu adu) {
@@ -189,11 +191,11 @@ void Pipeline::pop() {
     if (empty()) joined_ = 0;
 }
 
-/// Everything waits for a place on the buses, also what needs none: a refusal or the gateway's own
-/// registers are answered as things are when the requests before have started.
+/// Every request waits for an in-flight slot, even a refusal or a read of the gateway's own
+/// registers: those reflect the state after the preceding requests have started.
 void Pipeline::admit() {
     const std::size_t places = shared_->settings.in_flight;
-    while (!waiting_.empty() && (turning_away_ || replies_.in_flight() < places)) {
+    while (!waiting_.empty() && (refusing_waiting_ || replies_.in_flight() < places)) {
         const modbus::Adu adu = std::move(waiting_.front());
         waiting_.pop_front();
         serve(adu);
@@ -221,7 +223,7 @@ void Pipeline::serve(const modbus::Adu& adu) {
 }
 
 void Pipeline::answer(const modbus::Adu& adu, OwnPdu pdu) {
-    if (shared_->own_answers->may_give())
+    if (shared_->own_answers->try_acquire())
         return replies_.push(adu.transaction, adu.unit, counted(pdu()));
     const ReplyQueue::Ticket ticket = replies_.open(adu.transaction, adu.unit);
     shared_->own_answers->wait([weak = weak_from_this(), ticket, pdu = std::move(pdu)] {
@@ -237,7 +239,7 @@ void Pipeline::refuse(const modbus::Adu& adu, Fault fault) {
 }
 
 void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
-    if (turning_away_) return refuse(adu, Fault::cancelled);
+    if (refusing_waiting_) return refuse(adu, Fault::cancelled);
     const ReplyQueue::Ticket ticket = open(adu);
     caller_.transact(forwarding.target.bus, forwarding.target.station,
                      std::move(forwarding.request),
@@ -248,7 +250,7 @@ void Pipeline::forward(const modbus::Adu& adu, Forward forwarding) {
 }
 
 void Pipeline::broadcast(const modbus::Adu& adu, const Broadcast& broadcasting) {
-    if (turning_away_) return refuse(adu, Fault::cancelled);
+    if (refusing_waiting_) return refuse(adu, Fault::cancelled);
     const ReplyQueue::Ticket ticket = open(adu);
     const auto outcome = std::make_shared<BroadcastOutcome>();
     outcome->open = broadcasting.lines.size();
@@ -284,8 +286,8 @@ void Pipeline::settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu) {
     on_answer_();
 }
 
-void Pipeline::turn_away() {
-    turning_away_ = true;
+void Pipeline::refuse_waiting() {
+    refusing_waiting_ = true;
     admit();
 }
 

@@ -19,96 +19,94 @@
 
 namespace panelgate::tcp_server {
 
-/// The replies of one connection, in the order of the requests' arrival (PIP-02): one leaves only
-/// when all before it have left. Pure.
+/// The replies of one connection, in order of request arrival (PIP-02): a reply is sent only after
+/// all earlier ones. Pure.
 class ReplyQueue {
   public:
     explicit ReplyQueue(modbus::Framing framing = modbus::Framing::tcp) : framing_(framing) {}
 
-    /// Names one request for as long as the connection lives.
+    /// Identifies a request for the lifetime of the connection.
     using Ticket = std::uint64_t;
 
-    /// A request that will be answered later. `pdu`: kept for newest_is(), if it is to be known
-    /// again.
+    /// Adds a request to be answered later. `pdu` is kept for matches_newest(), if retransmissions
+    /// may join.
     Ticket open(std::uint16_t transaction, std::uint8_t unit, Bytes pdu = {});
-    /// A request whose reply is known at once; it only waits for its turn.
+    /// Adds a request whose reply is already known and only waits for its turn.
     void push(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu);
-    /// The reply PDU of an open request, 1..253 bytes. Once for each ticket. In the serial modes
-    /// nobody at unit 0 answers: that is a drop().
+    /// Sets the reply PDU (1..253 bytes) of an open request, once per ticket. In the serial modes
+    /// unit 0 gets no reply: the same as drop().
     void settle(Ticket ticket, const Bytes& pdu);
-    /// An open request that gets no reply (a silent broadcast).
+    /// Closes an open request without a reply (a silent broadcast).
     void drop(Ticket ticket);
 
-    /// The next reply ADU whose turn has come, null when there is none. It stays where it is until
-    /// pop(), whatever else happens.
+    /// Returns the next reply ADU to send, null if there is none. Remains valid until pop().
     const Bytes* front() const { return ready_ == 0 ? nullptr : &slots_.front().adu; }
-    /// front() has left.
+    /// Removes front() after it was sent.
     void pop();
 
-    /// Whether the last request with this transaction id, of those whose replies have not left, is
-    /// this one and was opened with its PDU, and none was opened since whose PDU makes its answer
-    /// old; nothing: there is none.
-    using MakesOld = bool (*)(ByteView since, ByteView pdu);
-    std::optional<bool> newest_is(std::uint16_t transaction, std::uint8_t unit, ByteView pdu,
-                                  MakesOld makes_old) const;
+    /// True if the latest request with this transaction id among those with unsent replies is this
+    /// one (opened with its PDU) and no later PDU invalidates its answer; nullopt if there is none.
+    using Invalidates = bool (*)(ByteView since, ByteView pdu);
+    std::optional<bool> matches_newest(std::uint16_t transaction, std::uint8_t unit, ByteView pdu,
+                                       Invalidates invalidates) const;
     bool empty() const { return slots_.empty(); }
-    /// Requests whose replies have not left.
+    /// Returns the number of requests with unsent replies.
     std::size_t size() const { return slots_.size(); }
-    /// Those of them that wait for an answer of their own or for the client to read, not those that
-    /// only wait behind an unanswered one.
+    /// Returns those waiting for an answer or for the client to read, not those ready but queued
+    /// behind an unanswered one.
     std::size_t in_flight() const { return unanswered_ + ready_; }
 
   private:
     struct Slot {
         std::uint16_t transaction = 0;
         std::uint8_t unit = 0;
-        Bytes request;  ///< PDU; empty: it is never known again
+        Bytes request;  ///< PDU; empty: retransmissions are not joined
         bool settled = false;
-        Bytes adu;  ///< empty when nothing is to be sent
+        Bytes adu;  ///< empty: nothing to send
     };
     Slot& at(Ticket ticket) { return slots_[static_cast<std::size_t>(ticket - first_)]; }
     void close(Slot& slot);
-    void step_over_silent();
+    void skip_silent();
 
     modbus::Framing framing_;
     PoolDeque<Slot> slots_;
-    Ticket first_ = 0;       ///< of slots_.front()
-    std::size_t ready_ = 0;  ///< slots at the front that are settled; the first has an ADU
+    Ticket first_ = 0;       ///< ticket of slots_.front()
+    std::size_t ready_ = 0;  ///< settled slots at the front; the first has an ADU
     std::size_t unanswered_ = 0;
 };
 
-/// The requests of one connection, from their arrival until the client has taken their replies: at
-/// most settings.in_flight are on the buses or on their way back, the others wait in order and are
-/// judged when their turn comes, so nothing overtakes. Answers that come after its end are dropped.
+/// The requests of one connection, from arrival until the client has taken their replies: at most
+/// settings.in_flight are on the buses or being returned, the rest wait in order and are decided on
+/// when their turn comes, so none overtakes. Answers after its end are dropped.
 class Pipeline : public std::enable_shared_from_this<Pipeline> {
   public:
-    /// The network may bring a datagram twice, so there all repetitions are joined by default.
+    /// The network may duplicate a datagram, so there all retransmissions join by default.
     enum class Transport : std::uint8_t { stream, datagrams };
 
-    /// `on_answer`: a bus has answered, so there may be a reply to send. Never called from inside
-    /// take() or pop(), and not after close().
+    /// `on_answer` is called when a bus has answered and a reply may be ready; never from inside
+    /// take() or pop(), nor after close().
     Pipeline(std::shared_ptr<Shared> shared, Caller caller, std::function<void()> on_answer,
              Transport transport = Transport::stream);
 
-    /// One more request can be kept. Who takes none without room bounds the memory.
+    /// True if one more request fits. Callers that respect it bound the memory.
     bool has_room() const;
-    /// A retransmission of one that is not answered yet has no answer of its own
+    /// Takes a request. A retransmission of an unanswered one gets no answer of its own
     /// (settings.retransmissions).
     void take(modbus::Adu adu);
-    /// Without room: whether it is such a retransmission, which needs none; it is counted then.
+    /// True if it is such a retransmission, which needs no room; counts it.
     bool joins(const modbus::Adu& adu);
-    /// The next reply ADU whose turn has come, null when there is none; valid until pop().
+    /// Returns the next reply ADU to send, null if there is none; valid until pop().
     const Bytes* front() const { return replies_.front(); }
-    /// front() has been taken: there is room for another request.
+    /// Removes front(), which makes room for another request.
     void pop();
 
-    /// Everything that was taken has been answered, and all replies were popped.
+    /// True if all requests were answered and all replies popped.
     bool empty() const { return waiting_.empty() && replies_.empty(); }
     const std::string& client() const { return caller_.name(); }
 
-    /// From now on no request starts: those that wait here are answered Fault::cancelled.
-    void turn_away();
-    /// And those that wait on the buses are taken back, and nobody is told. May be called twice.
+    /// Starts no further request: queued ones are answered Fault::cancelled.
+    void refuse_waiting();
+    /// Also cancels those queued on the buses, without calling on_answer. Idempotent.
     void close();
 
   private:
@@ -120,21 +118,21 @@ class Pipeline : public std::enable_shared_from_this<Pipeline> {
     void forward(const modbus::Adu& adu, Forward forwarding);
     void broadcast(const modbus::Adu& adu, const Broadcast& broadcasting);
     void refuse(const modbus::Adu& adu, Fault fault);
-    /// The gateway's own answer, now or when it is its turn (OwnAnswers).
+    /// Sends the gateway's own answer, at once or when its turn comes (OwnAnswers).
     using OwnPdu = InlineFunction<Bytes(), 48>;
     void answer(const modbus::Adu& adu, OwnPdu pdu);
     Bytes counted(Bytes reply);
-    /// The reply to an open request; nothing: it gets none.
+    /// Settles an open request; nullopt: no reply.
     void settle(ReplyQueue::Ticket ticket, std::optional<Bytes> pdu);
 
     std::shared_ptr<Shared> shared_;
     Caller caller_;
     std::function<void()> on_answer_;
     Transport transport_;
-    PoolDeque<modbus::Adu> waiting_;  ///< not judged yet
+    PoolDeque<modbus::Adu> waiting_;  ///< not decided on yet
     ReplyQueue replies_;
-    std::size_t joined_ = 0;  ///< repetitions, since it was empty
-    bool turning_away_ = false;
+    std::size_t joined_ = 0;  ///< retransmissions since it was last empty
+    bool refusing_waiting_ = false;
     bool closed_ = false;
 };
 

@@ -18,7 +18,7 @@ constexpr std::uint16_t kMapVersion = 2;
 constexpr std::size_t kLines = 4;
 constexpr std::size_t kRegistersPerLine = 3;
 constexpr std::size_t kMostLines = 32;
-constexpr std::size_t kGateway = 100;  // more about it
+constexpr std::size_t kGateway = 100;  // gateway registers
 constexpr std::size_t kStations = 1000;
 constexpr std::size_t kRegistersPerStation = 16;
 constexpr std::size_t kMostUnits = 248;  // 0..247
@@ -32,7 +32,7 @@ std::uint16_t clamp16(double value) {
 std::uint16_t high(std::uint64_t value) { return static_cast<std::uint16_t>(value >> 16); }
 std::uint16_t low(std::uint64_t value) { return static_cast<std::uint16_t>(value); }
 
-/// Number `index` (from 0) of "1.2.3".
+/// Returns part `index` (from 0) of "1.2.3".
 std::uint16_t part_of(std::string_view version, std::size_t index) {
     for (; index > 0; --index) {
         const std::size_t dot = version.find('.');
@@ -60,7 +60,7 @@ std::uint16_t word_of(Health state) {
     std::abort();
 }
 
-/// Milliseconds, at most what 32 bits hold; all of them: it has never answered.
+/// Returns the age in ms, capped to 32 bits; all ones: never answered.
 std::uint64_t age_of(const std::optional<Duration>& last_answer) {
     constexpr std::uint64_t kNever = std::numeric_limits<std::uint32_t>::max();
     if (!last_answer) return kNever;

@@ -8,19 +8,19 @@
 
 namespace panelgate::tcp_server {
 
-/// The gateway's own memory, the same for input and holding registers, and a discrete input for
-/// each unit. Every address below these can be read; what nothing stands at is 0.
-/// describe_register_map() (panelgate/tcp_server/register_map_text.hpp) says what stands where.
+/// The gateway's own register map, the same for input and holding registers, with a discrete input
+/// per unit. Every address below these is readable; unassigned ones are 0. describe_register_map()
+/// (panelgate/tcp_server/register_map_text.hpp) documents it.
 inline constexpr std::size_t kMapRegisters = 5000;
 inline constexpr std::size_t kMapInputs = 256;
 
-/// Register `address`; 0 where nothing stands.
+/// The registers and inputs, computed from `state`; unassigned addresses read 0.
 class RegisterMap {
   public:
-    /// `state` outlives it.
+    /// `state` must outlive it.
     explicit RegisterMap(const Diagnostics& state) : state_(state) {}
     std::uint16_t at(std::size_t address);
-    /// Does the station behind this unit answer?
+    /// True if the station behind this unit is online.
     bool input(std::size_t unit);
 
   private:
@@ -30,7 +30,7 @@ class RegisterMap {
     void look_at(std::size_t unit);
 
     const Diagnostics& state_;
-    std::optional<std::size_t> unit_;  ///< that `station_` is of
+    std::optional<std::size_t> unit_;  ///< unit of `station_`
     std::optional<Diagnostics::Station> station_;
 };
 

@@ -15,7 +15,7 @@
 
 namespace panelgate::tcp_server {
 
-/// Modbus/TCP: what is broken beyond repair closes the connection (MBAP-05 to MBAP-07).
+/// Modbus/TCP: unrecoverable framing errors close the connection (MBAP-05 to MBAP-07).
 class MbapReader : public RequestReader {
   public:
     explicit MbapReader(const Settings& settings);
@@ -34,33 +34,33 @@ class MbapReader : public RequestReader {
     int bad_protocol_ids_allowed_;
     FirstBytes first_{modbus::Framing::tcp};
     modbus::MbapFramer framer_;
-    int bad_protocol_ids_ = 0;        ///< in a row
-    std::optional<TimePoint> begun_;  ///< the ADU that is not whole
+    int bad_protocol_ids_ = 0;        ///< consecutive
+    std::optional<TimePoint> begun_;  ///< start of the incomplete ADU
     bool late_ = false;
 };
 
-/// What RTU and ASCII have in common: what is no frame is stepped over, and only a client that
-/// sends nothing else is closed.
+/// Common to RTU and ASCII: invalid bytes are skipped, and only a client that sends nothing else is
+/// closed.
 class SerialReader : public RequestReader {
   protected:
     explicit SerialReader(const Settings& settings)
         : first_(settings.framing), garbage_limit_(settings.garbage_limit) {}
     void look_at(ByteView bytes) { first_.feed(bytes); }
-    /// Of what the framer has given; it need not be asked for more.
-    bool has_more_to_tell() const { return untold_ > 0 || held_; }
-    /// What is to be told now. `discarded`: bytes since the last good frame; `faults`: new ones.
+    /// True if events are pending, so the framer need not be asked.
+    bool has_pending_event() const { return unreported_faults_ > 0 || pending_adu_; }
+    /// Returns the next event. `discarded`: bytes since the last good frame; `faults`: new ones.
     std::optional<ReaderEvent> tell(std::optional<modbus::SerialAdu> adu, std::size_t discarded,
                                     std::size_t faults);
 
   private:
     FirstBytes first_;
     std::size_t garbage_limit_;
-    std::size_t untold_ = 0;                 ///< faults
-    std::optional<modbus::SerialAdu> held_;  ///< until they are told
+    std::size_t unreported_faults_ = 0;             ///< faults not reported yet
+    std::optional<modbus::SerialAdu> pending_adu_;  ///< frame behind those faults
 };
 
-/// RTU frames in a stream. A silence ends what nothing else ends, and gives up a start that holds
-/// up a good frame; half a request is given up after partial_adu_timeout.
+/// RTU frames in a stream. A silence ends frames of unknown length and discards a false start in
+/// front of a good frame; an incomplete request is dropped after partial_adu_timeout.
 class RtuReader : public SerialReader {
   public:
     explicit RtuReader(const Settings& settings);
@@ -80,13 +80,13 @@ class RtuReader : public SerialReader {
     Duration silence_;
     Duration partial_timeout_;
     modbus::RtuRequestFramer framer_;
-    TimePoint heard_{};        ///< last byte
-    bool was_silent_ = false;  ///< since, and that has been looked at
-    bool unread_ = false;      ///< for a while: whether there was a silence nobody knows
+    TimePoint heard_{};        ///< time of the last byte
+    bool was_silent_ = false;  ///< silence since then, already handled
+    bool unread_ = false;      ///< not read for a while: silences were not observed
     std::optional<TimePoint> begun_;
 };
 
-/// ASCII frames in a stream. What is late is only looked at when more comes.
+/// ASCII frames in a stream. The character timeout is checked only when more bytes arrive.
 class AsciiReader : public SerialReader {
   public:
     explicit AsciiReader(const Settings& settings);
@@ -120,8 +120,8 @@ constexpr std::size_t kKept = modbus::kMaxAsciiAdu;
 
 std::string word(modbus::Framing framing) { return std::string(modbus::label(framing)); }
 
-/// The first line of a request (RFC 9112, 3), whatever its method is.
-bool speaks_http(ByteView first) {
+/// True for an HTTP request line (RFC 9112, 3) of any method.
+bool is_http_request_line(ByteView first) {
     const std::string text(first.begin(), first.end());
     const std::string line = text.substr(0, text.find('\r'));
     const std::size_t method = line.find(' ');
@@ -134,7 +134,7 @@ std::optional<std::string> foreign(modbus::Framing expected, ByteView first) {
     if (const auto spoken = modbus::other_framing(expected, first))
         return std::string(name_of(*spoken)) +
                " and needs a listener with framing: " + word(*spoken);
-    if (speaks_http(first)) return "HTTP and needs the listener of 'http'";
+    if (is_http_request_line(first)) return "HTTP and needs the listener of 'http'";
     return std::nullopt;
 }
 
@@ -202,8 +202,8 @@ ReaderEvent MbapReader::on_other_protocol() {
     return Discarded{};
 }
 
-/// An ADU has so long from its first byte to its last (MBAP-07): from when another one begins, or
-/// when the rest can be read again after a time without room.
+/// An ADU must be complete within partial_timeout_ (MBAP-07), counted from its start, or from when
+/// reading resumes after a time without room.
 std::optional<TimePoint> MbapReader::due() const {
     if (!begun_) return std::nullopt;
     return *begun_ + partial_timeout_;
@@ -216,15 +216,15 @@ void MbapReader::on_due(TimePoint now) {
 std::optional<ReaderEvent> SerialReader::tell(std::optional<modbus::SerialAdu> adu,
                                               std::size_t discarded, std::size_t faults) {
     if (auto objection = first_.take_objection()) return std::move(*objection);
-    untold_ += faults;
-    if (adu) held_ = std::move(adu);
-    if (untold_ > 0) {
-        --untold_;
+    unreported_faults_ += faults;
+    if (adu) pending_adu_ = std::move(adu);
+    if (unreported_faults_ > 0) {
+        --unreported_faults_;
         return Discarded{};
     }
-    if (held_) {
+    if (pending_adu_) {
         first_.on_request();
-        modbus::SerialAdu given = *std::exchange(held_, std::nullopt);
+        modbus::SerialAdu given = *std::exchange(pending_adu_, std::nullopt);
         return modbus::Adu{0, given.station, std::move(given.pdu)};
     }
     if (discarded <= garbage_limit_) return std::nullopt;
@@ -247,7 +247,7 @@ void RtuReader::feed(TimePoint now, ByteView bytes) {
 
 std::optional<ReaderEvent> RtuReader::next(TimePoint now) {
     std::optional<modbus::SerialAdu> adu;
-    if (!has_more_to_tell()) adu = framer_.next();
+    if (!has_pending_event()) adu = framer_.next();
     if (adu) begun_.reset();
     auto event = tell(std::move(adu), framer_.discarded(), framer_.take_faults());
     if (!event && framer_.partial() && !begun_) begun_ = now;
@@ -278,7 +278,7 @@ void AsciiReader::feed(TimePoint now, ByteView bytes) {
 
 std::optional<ReaderEvent> AsciiReader::next(TimePoint) {
     std::optional<modbus::SerialAdu> adu;
-    if (!has_more_to_tell()) adu = framer_.next();
+    if (!has_pending_event()) adu = framer_.next();
     return tell(std::move(adu), framer_.discarded(), framer_.take_faults());
 }
 

@@ -52,12 +52,12 @@ asio::ip::address Session::peer() const {
     return socket_.remote_endpoint(gone).address();
 }
 
-/// What waits is turned away, or the end would take as long as a client cares to pipeline.
+/// Refuses queued requests; otherwise a pipelining client could delay the end indefinitely.
 void Session::finish() {
     if (closed_) return;
     if (input_state_ == Input::served) input_state_ = Input::discarded;
-    forget_due();
-    pipeline_->turn_away();
+    cancel_due();
+    pipeline_->refuse_waiting();
     go_on();
 }
 
@@ -78,7 +78,7 @@ void Session::fail(std::string_view reason, rt::LogLevel level) {
     close();
 }
 
-/// After whatever has happened: takes what there is room for, sends what may leave, reads on.
+/// Runs after every event: takes requests as far as there is room, sends ready replies, reads on.
 void Session::go_on() {
     if (closed_) return;
     if (input_state_ == Input::served) take_requests();
@@ -86,8 +86,8 @@ void Session::go_on() {
     read();
 }
 
-// Input. Without room nobody reads, and TCP slows the client down. What comes while finishing is
-// read and thrown away: closing a socket with unread input would cut off replies under way.
+// Input. Without room the session stops reading and TCP slows the client down. Input received while
+// finishing is discarded: closing a socket with unread input would reset replies in transit.
 
 void Session::read() {
     if (closed_ || reading_ || input_state_ == Input::ended) return;
@@ -111,7 +111,7 @@ void Session::on_read(const error_code& error, std::size_t size) {
     go_on();
 }
 
-/// Serves the whole requests that are there, as far as there is room.
+/// Takes complete requests from the reader as far as there is room.
 void Session::take_requests() {
     const TimePoint now = shared_->clock.now();
     while (pipeline_->has_room()) {
@@ -127,18 +127,18 @@ void Session::take_requests() {
     watch_reader();
 }
 
-/// Time counts only while the client could send more.
+/// The reader's timeout runs only while the client can send more.
 void Session::watch_reader() {
     if (!pipeline_->has_room()) reader_->pause();
     const auto due = pipeline_->has_room() ? reader_->due() : std::nullopt;
     if (due == due_) return;
-    forget_due();
+    cancel_due();
     if (!due) return;
     due_ = due;
     due_alarm_->arm(*due, [self = shared_from_this()] { self->on_due(); });
 }
 
-/// What has come in time is no less in time because nobody has looked at it yet.
+/// Bytes already in the socket arrived in time even if not read yet.
 void Session::on_due() {
     due_.reset();
     error_code ignored;
@@ -147,12 +147,12 @@ void Session::on_due() {
     go_on();
 }
 
-void Session::forget_due() {
+void Session::cancel_due() {
     if (std::exchange(due_, std::nullopt)) due_alarm_->cancel();
 }
 
-/// Whoever has only closed its sending side still reads, and gets what it has asked for. One that
-/// has left looks the same until it answers the first reply with a reset (P2).
+/// A client that has only half-closed still reads and gets its replies. One that is gone looks the
+/// same until it answers the first reply with a reset (P2).
 void Session::on_end_of_input() {
     if (input_state_ == Input::served) {
         reader_->on_end();
@@ -162,13 +162,13 @@ void Session::on_end_of_input() {
     const bool cut_off = input_state_ == Input::served && reader_->partial();
     if (cut_off) ++shared_->counters.protocol_errors;
     input_state_ = Input::ended;
-    forget_due();
+    cancel_due();
     watch_for_reset();
     write();
 }
 
-/// Who does not read, for want of room or because the client has said all, would not notice it.
-/// Nobody waits for the others then.
+/// Detects a reset while the session does not read (no room, or end of input); outstanding replies
+/// are abandoned then.
 void Session::watch_for_reset() {
     if (std::exchange(watching_for_reset_, true)) return;
     socket_.async_wait(asio::ip::tcp::socket::wait_error,
@@ -177,7 +177,7 @@ void Session::watch_for_reset() {
 
 // Output.
 
-/// As a rule the kernel takes a reply at once; what it does not take waits.
+/// Usually the kernel accepts a reply at once; the rest is written asynchronously.
 void Session::write() {
     if (closed_ || writing_) return;
     while (const Bytes* adu = pipeline_->front()) {
@@ -211,23 +211,24 @@ void Session::on_written(const error_code& error) {
     go_on();
 }
 
-/// Closes a client that takes nothing for output_timeout, or up to twice that: one alarm a period,
-/// not one a reply. Slow is allowed: bytes that its system has acknowledged count as taken.
+/// Closes a client that takes nothing for output_timeout (up to twice that: one alarm per period,
+/// not per reply). A slow client may stay: bytes acknowledged by its TCP stack count as taken.
 void Session::watch_output() {
     if (std::exchange(watching_output_, true)) return;
-    output_alarm_->arm(shared_->clock.now() + shared_->settings.output_timeout,
-                       [self = shared_from_this(), written = written_, held = not_taken()] {
-                           self->watching_output_ = false;
-                           if (!self->writing_) return;
-                           if (self->written_ == written && self->not_taken() == held) {
-                               return self->fail("client does not read");
-                           }
-                           self->watch_output();
-                       });
+    output_alarm_->arm(
+        shared_->clock.now() + shared_->settings.output_timeout,
+        [self = shared_from_this(), written = written_, held = unacknowledged_bytes()] {
+            self->watching_output_ = false;
+            if (!self->writing_) return;
+            if (self->written_ == written && self->unacknowledged_bytes() == held) {
+                return self->fail("client does not read");
+            }
+            self->watch_output();
+        });
 }
 
-/// Bytes of replies that the client's system has not acknowledged.
-int Session::not_taken() {
+/// Returns the bytes of replies not acknowledged by the client's TCP stack.
+int Session::unacknowledged_bytes() {
     int bytes = 0;
     if (::ioctl(socket_.native_handle(), SIOCOUTQ, &bytes) != 0) return 0;
     return bytes;

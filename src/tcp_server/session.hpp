@@ -20,9 +20,9 @@
 
 namespace panelgate::tcp_server {
 
-/// One client connection. Its listener keeps it alive until `on_closed`; the operations under way
-/// keep it a little longer. One read and one write at a time. What it holds of a client is bounded:
-/// the requests of its pipeline with their replies, and one read behind them.
+/// One client connection. Its listener keeps it alive until `on_closed`, pending operations a
+/// little longer. At most one read and one write at a time. Its memory is bounded: the requests of
+/// its pipeline with their replies, and one read buffer.
 class Session : public std::enable_shared_from_this<Session> {
   public:
     using ClosedHandler = std::function<void(const std::shared_ptr<Session>&)>;
@@ -31,26 +31,26 @@ class Session : public std::enable_shared_from_this<Session> {
             ClosedHandler on_closed);
 
     void start(Caller caller);
-    /// The address of the other end; of a connection that is cut already, none that is allowed
-    /// anything.
+    /// Returns the peer's address; for a closed connection, the unspecified address, which no allow
+    /// list admits.
     boost::asio::ip::address peer() const;
-    /// Its name in logs.
+    /// Returns its name in logs.
     const std::string& client() const { return pipeline_->client(); }
-    /// Who shares places with it: bus::host_of() its address.
+    /// Returns the host it is counted under: bus::host_of() its address.
     bus::Host host() const { return host_; }
-    /// Since then it has neither asked nor been answered; nothing: it has something open.
+    /// Returns when it was last active; nullopt while requests or replies are outstanding.
     std::optional<TimePoint> idle_since() const;
-    /// Takes no more requests, answers what is in flight, turns away what waits, then closes.
+    /// Takes no more requests, answers those in flight, refuses queued ones, then closes.
     void finish();
-    /// Closes at once and takes its waiting requests back from the buses. May be called twice.
+    /// Closes at once and cancels its queued requests on the buses. Idempotent.
     void close();
 
   private:
-    /// What becomes of the client's bytes.
+    /// How input is handled.
     enum class Input : std::uint8_t {
         served,
-        discarded,  ///< the session closes when the last reply has left
-        ended,      ///< the same, and there are none any more
+        discarded,  ///< the session closes after the last reply
+        ended,      ///< the same, after end of input
     };
 
     void go_on();
@@ -61,12 +61,12 @@ class Session : public std::enable_shared_from_this<Session> {
     void take_requests();
     void watch_reader();
     void on_due();
-    void forget_due();
+    void cancel_due();
     void write();
     void write_later(ByteView rest);
     void on_written(const boost::system::error_code& error);
     void watch_output();
-    int not_taken();
+    int unacknowledged_bytes();
     void fail(std::string_view reason, rt::LogLevel level = rt::LogLevel::info);
 
     boost::asio::ip::tcp::socket socket_;
@@ -80,12 +80,12 @@ class Session : public std::enable_shared_from_this<Session> {
     std::array<std::uint8_t, 4096> input_{};
     bool reading_ = false;
     bool watching_for_reset_ = false;
-    /// Empty but for an unfinished request whenever a read starts.
+    /// Holds at most one incomplete request whenever a read starts.
     std::unique_ptr<RequestReader> reader_;
     std::unique_ptr<rt::Alarm> due_alarm_;
     std::optional<TimePoint> due_;  ///< the alarm is armed
 
-    bool writing_ = false;       ///< the rest of the pipeline's front()
+    bool writing_ = false;       ///< the rest of the pipeline's front() is being written
     std::uint64_t written_ = 0;  ///< replies
     std::unique_ptr<rt::Alarm> output_alarm_;
     bool watching_output_ = false;

@@ -7,7 +7,7 @@ namespace panelgate::tcp_server {
 OwnAnswers::OwnAnswers(rt::Clock& clock, std::size_t most, Duration period)
     : clock_(clock), most_(most), period_(period), next_(clock.make_alarm()) {}
 
-bool OwnAnswers::may_give() {
+bool OwnAnswers::try_acquire() {
     begin_period();
     if (!waiting_.empty() || given_ >= most_) return false;
     ++given_;
@@ -26,8 +26,8 @@ void OwnAnswers::begin_period() {
     given_ = 0;
 }
 
-/// Who has one may ask for the next from inside: that one waits behind the others.
-void OwnAnswers::give_waiting() {
+/// A give() may queue another answer; that one waits behind the others.
+void OwnAnswers::serve_waiting() {
     begin_period();
     while (!waiting_.empty() && given_ < most_) {
         const Give give = std::move(waiting_.front());
@@ -39,7 +39,7 @@ void OwnAnswers::give_waiting() {
 
 void OwnAnswers::arm() {
     next_->arm(end_, [weak = weak_from_this()] {
-        if (const auto self = weak.lock()) self->give_waiting();
+        if (const auto self = weak.lock()) self->serve_waiting();
     });
 }
 

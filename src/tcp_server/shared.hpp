@@ -17,47 +17,47 @@
 
 namespace panelgate::tcp_server {
 
-/// Paces what a listener answers by itself: refusals, and the registers of the gateway. No line
-/// slows that down, so whoever asks again at once would keep the loop from the lines. So many are
-/// given in a period, at once; the others wait for the next one, in their order. Those that wait
-/// are bounded by what their connections may have in flight. One thread.
+/// Rate-limits replies a listener generates itself: refusals and the gateway's registers. No line
+/// slows those down, so a client that repeats at once would starve the lines. Up to `most` are
+/// given per period; the others wait in order. The queue is bounded by the connections' in-flight
+/// limits. Single-threaded.
 class OwnAnswers : public std::enable_shared_from_this<OwnAnswers> {
   public:
-    /// Gives one; false: nobody wants it any more.
+    /// Sends one answer; false if it is no longer wanted.
     using Give = InlineFunction<bool(), 96>;
 
     OwnAnswers(rt::Clock& clock, std::size_t most, Duration period);
 
-    /// Whether one may be given now; it counts as given then.
-    bool may_give();
-    /// Later, from the loop. Never called after the end of this object.
+    /// True if an answer may be sent now; counts it.
+    bool try_acquire();
+    /// Queues an answer, sent from the loop; never called after this object's end.
     void wait(Give give);
 
   private:
     void begin_period();
-    void give_waiting();
+    void serve_waiting();
     void arm();
 
     rt::Clock& clock_;
     std::size_t most_;
     Duration period_;
-    TimePoint end_{};        ///< of the period
-    std::size_t given_ = 0;  ///< in it
+    TimePoint end_{};        ///< end of the period
+    std::size_t given_ = 0;  ///< answers sent in it
     PoolDeque<Give> waiting_;
     std::unique_ptr<rt::Alarm> next_;
 };
 
-/// What the connections of one listener share; held by the listener and by each of them.
+/// State shared by a listener and its connections; owned by all of them.
 struct Shared {
     Settings settings;
     UnitMap units;
-    std::string version;  ///< of the program, for the device identification
+    std::string version;  ///< program version, for the device identification
     rt::Clock& clock;
     Counters counters;
     TimePoint started;
     std::shared_ptr<OwnAnswers> own_answers;  ///< never null
 
-    /// One line of this listener.
+    /// Logs one line for this listener.
     void log(rt::LogLevel level, std::string_view event, std::vector<rt::LogField> more = {}) const;
 };
 

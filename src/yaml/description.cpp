@@ -48,7 +48,7 @@ void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
         if (std::ranges::find(known->words, word) == known->words.end())
             known->words.push_back(std::move(word));
     }
-    if (shape.kind == KeyShape::Kind::text) return;  // which any scalar is
+    if (shape.kind == KeyShape::Kind::text) return;  // any scalar is a text
     known->kind = shape.kind;
     known->min = shape.min;
     known->max = shape.max;
@@ -56,14 +56,14 @@ void Description::tell(const Node& map, std::string_view key, KeyShape shape) {
     known->longest = shape.longest;
 }
 
-void Description::tell_rule(const Node& map, KeyRule rule) {
+void Description::add_rule(const Node& map, KeyRule rule) {
     const std::string* path = path_of(map);
     if (path == nullptr) return;
     rule.map = *path;
     rules_.push_back(std::move(rule));
 }
 
-void Description::tell_below(const Node& map, std::string_view key, const Node& value) {
+void Description::add_nested(const Node& map, std::string_view key, const Node& value) {
     const std::string* path = path_of(map);
     if (path == nullptr) return;
     const std::string below = joined(*path, key);
@@ -123,7 +123,7 @@ void MapReader::entries(std::string_view key, std::size_t fewest, std::size_t mo
 
 bool MapReader::lacks(std::string_view key, std::string_view word, std::string_view other) {
     if (Description* description = problems_->description())
-        description->tell_rule(
+        description->add_rule(
             *node_, {{}, std::string(key), std::string(other), {std::string(word)}, true, false});
     const Node* node = find(key);
     return node != nullptr && node->scalar == word && !has(other);
@@ -132,12 +132,12 @@ bool MapReader::lacks(std::string_view key, std::string_view word, std::string_v
 void MapReader::belongs(std::string_view key, std::string_view other,
                         std::span<const std::string_view> words, bool absent) {
     if (Description* description = problems_->description())
-        description->tell_rule(*node_, {{},
-                                        std::string(key),
-                                        std::string(other),
-                                        {words.begin(), words.end()},
-                                        false,
-                                        absent});
+        description->add_rule(*node_, {{},
+                                       std::string(key),
+                                       std::string(other),
+                                       {words.begin(), words.end()},
+                                       false,
+                                       absent});
 }
 
 std::optional<double> MapReader::share(std::string_view key) {
@@ -174,10 +174,11 @@ bool MapReader::is_mistyped(std::string_view key) const {
     return false;
 }
 
-/// Of a key in the column of one that should have it: `serial:` and `baud: 9600` on the next line.
+/// Returns the parent of a key that is not indented below it: `serial:` and `baud: 9600` on the
+/// next line.
 const Entry* MapReader::shallow_parent(std::size_t entry) const {
     const Mark own = node_->entries[entry].mark;
-    constexpr std::size_t kFar = 20;  // keys; a file may be nothing but unknown ones
+    constexpr std::size_t kFar = 20;  // keys; a file may consist of unknown ones
     const std::size_t end = entry > kFar ? entry - kFar : 0;
     while (entry-- > end) {
         const Entry& above = node_->entries[entry];
@@ -250,11 +251,11 @@ void MapReader::finish() {
         const Entry& entry = node_->entries[i];
         if (std::ranges::find(refused_, entry.key) != refused_.end()) continue;
         if (std::ranges::find(known_, entry.key) != known_.end()) continue;
-        // Nobody reads more of them, and what was meant takes a while to find.
-        problems_->add(entry.mark, ++told > kMaxTold ? is_unknown(entry.key) : unknown(i));
+        // More hints would not be read, and each takes a while to find.
+        problems_->add(entry.mark, ++told > kMaxShown ? is_unknown(entry.key) : unknown(i));
     }
     for (const std::string& key : excused_) {
-        if (told == 0) problems_->add(node_->mark, needs(key));  // it was a key of its own
+        if (told == 0) problems_->add(node_->mark, needs(key));  // the similar key was a known one
     }
 }
 

@@ -24,7 +24,7 @@
 
 namespace panelgate::yaml {
 
-/// What a value takes, with all that is in it.
+/// Size of a value, with all that is in it.
 struct Size {
     std::size_t nodes = 1;
     std::size_t text = 0;   ///< bytes of scalars and keys
@@ -33,8 +33,8 @@ struct Size {
 
 Size size_of(const Node& node);
 
-/// What a refusal of yaml-cpp means to who wrote the text, for what the lints do not explain.
-std::string in_our_words(std::string_view refusal);
+/// Rewords a yaml-cpp error for the user, where no lint explains it.
+std::string reword_error(std::string_view refusal);
 
 std::string quote(std::string_view text) {
     constexpr std::size_t kMost = 80;
@@ -59,13 +59,13 @@ struct TooLarge {
     std::string message;
 };
 
-/// Text that belongs to nothing above it, though yaml-cpp takes it for another document.
+/// Text that belongs to nothing above it, which yaml-cpp takes for another document.
 struct Stray {
     Mark mark;
 };
 
-/// Builds our tree from the parser's events, where marks, duplicate keys and aliases are all at
-/// hand (yaml-cpp's own tree keeps the first of two equal keys silently).
+/// Builds our tree from the parser's events, which have marks, duplicate keys and aliases
+/// (yaml-cpp's own tree silently keeps the first of two equal keys).
 class Builder final : public YAML::EventHandler {
   public:
     Builder(const Source& source, Problems& problems) : source_(source), problems_(problems) {}
@@ -130,12 +130,12 @@ class Builder final : public YAML::EventHandler {
         YAML::anchor_t anchor = YAML::NullAnchor;
         bool has_key = false;  ///< `pending` has a key and waits for its value
         Entry pending;
-        bool refused = false;     ///< that key: its value is dropped
-        bool lacks_dash = false;  ///< its keys repeat: they are another item's, and told once
+        bool refused = false;     ///< that key was refused: its value is dropped
+        bool lacks_dash = false;  ///< its keys repeat, so they are another item's; reported once
         std::map<std::string, int> seen;  ///< key -> line
     };
 
-    /// "?" is a plain value, "!" a quoted one; anything else was written by hand.
+    /// "?" is a plain value, "!" a quoted one; anything else is a tag in the file.
     void check_tag(const YAML::Mark& mark, const std::string& tag) {
         if (tag.empty() || tag == "?" || tag == "!") return;
         const bool lookup = tag == "!secret" || tag == "!env_var" || tag == "!env" || tag == "!ENV";
@@ -161,7 +161,7 @@ class Builder final : public YAML::EventHandler {
         stack_.pop_back();
         put(std::move(level.node), level.anchor);
     }
-    /// Before the memory is used: a file of 1 MB may repeat itself into gigabytes.
+    /// Checks the limits before memory is used: a 1 MB file may expand to gigabytes.
     void charge(Mark mark, const Size& size) {
         nodes_ += size.nodes;
         text_ += size.text;
@@ -189,7 +189,7 @@ class Builder final : public YAML::EventHandler {
             put_value(level, std::move(node));
         }
     }
-    /// Nothing, between two commas of [a,, b] and {a: 1,, b: 2}: a problem, and nothing else.
+    /// Reports and skips an empty value between two commas of [a,, b] and {a: 1,, b: 2}.
     bool is_comma(const Node& node) {
         if (node.kind != Node::Kind::null || !node.comma) return false;
         problems_.add(node.mark, "a ',' too many; remove it");
@@ -201,7 +201,7 @@ class Builder final : public YAML::EventHandler {
         level.refused = true;
         if (is_comma(node)) return;
         if (node.kind != Node::Kind::scalar) {
-            const bool is_map = node.kind == Node::Kind::map;  // {{ NAME }}, most likely
+            const bool is_map = node.kind == Node::Kind::map;  // probably {{ NAME }}
             problems_.add(node.mark,
                           std::string("a key must be a word") +
                               (is_map ? ", not a map; a variable is written ${NAME}" : ""));
@@ -215,13 +215,13 @@ class Builder final : public YAML::EventHandler {
                                      std::to_string(first->second) +
                                      (level.lacks_dash ? "; is a '- ' missing before it?" : ""));
     }
-    /// The map is an item of a list, and this is the key that it began with.
+    /// True if the map is an item of a list and this is its first key.
     bool begins_item(const Open& level, const std::string& key) const {
         const bool is_item =
             stack_.size() > 1 && stack_[stack_.size() - 2].node.kind == Node::Kind::sequence;
         return is_item && !level.node.entries.empty() && level.node.entries.front().key == key;
     }
-    /// `scale: 0,1` inside brackets is a key with a value, and a key.
+    /// True for `scale: 0,1` inside brackets, which is parsed as `scale: 0` and a key 1.
     static bool is_decimal_comma(const Open& level, const Node& value) {
         if (value.kind != Node::Kind::null || level.node.entries.empty()) return false;
         constexpr std::string_view kNumber = "-0123456789,";
@@ -243,7 +243,7 @@ class Builder final : public YAML::EventHandler {
             return;
         }
         Entry entry = std::move(level.pending);
-        // An empty value is marked at the next token, maybe lines below.
+        // The parser marks an empty value at the next token, maybe lines below.
         if (node.kind == Node::Kind::null) {
             node.mark = entry.mark;
             node.comma = false;
@@ -262,7 +262,7 @@ class Builder final : public YAML::EventHandler {
     Node root_;
 };
 
-/// False when there is one. Text behind a document that nobody began as another is no YAML.
+/// Returns false if there is one. Text after a document without a marker is no YAML (Stray).
 bool refuse_second_document(YAML::Parser& parser, const Source& source, Problems& problems) {
     Problems unused("");
     Builder second(source, unused);
@@ -282,14 +282,14 @@ void add(const Source& source, const Findings& findings, Problems& problems) {
     }
 }
 
-/// The causes, or `otherwise` at the place where it showed.
+/// Adds the causes, or `otherwise` at the place of the error.
 void explain(const Source& source, Mark mark, std::string otherwise, Problems& problems) {
     const Findings causes = find_causes(Scanned(source));
     add(source, causes, problems);
     if (causes.empty()) problems.add(mark, std::move(otherwise), source.excerpt(mark));
 }
 
-/// Before yaml-cpp sees it: 8 MB of brackets would take it 2 GB.
+/// Checked before yaml-cpp, which would use 2 GB for 8 MB of brackets.
 const Token* too_deep(const Scanned& scanned) {
     const auto found = std::ranges::find_if(scanned.tokens, [](const Token& token) {
         return token.kind == Token::Kind::open && token.depth >= kMaxDepth;
@@ -297,11 +297,12 @@ const Token* too_deep(const Scanned& scanned) {
     return found == scanned.tokens.end() ? nullptr : &*found;
 }
 
-/// False when yaml-cpp refused the text: why is added to `problems`, what else is wrong to `found`.
+/// Returns false if yaml-cpp refused the text: the reason goes to `problems`, other faults to
+/// `found`.
 bool build(const Scanned& scanned, Builder& builder, Problems& problems, Problems& found) {
     const Source& source = scanned.source;
     try {
-        std::istringstream in{without_idle_tabs(scanned, mask_variables(source.text()))};
+        std::istringstream in{without_blank_tabs(scanned, mask_variables(source.text()))};
         YAML::Parser parser(in);
         return !parser.HandleNextDocument(builder) || refuse_second_document(parser, source, found);
     } catch (const TooLarge& reason) {
@@ -314,7 +315,7 @@ bool build(const Scanned& scanned, Builder& builder, Problems& problems, Problem
                 "keys, such as 'lines:'",
                 problems);
     } catch (const YAML::Exception& error) {
-        explain(source, builder.mark_of(error.mark), in_our_words(error.msg), problems);
+        explain(source, builder.mark_of(error.mark), reword_error(error.msg), problems);
     }
     return false;
 }
@@ -325,7 +326,7 @@ Node parse(std::string_view text, Problems& problems) {
     Decoded decoded = decode(text);
     const Source source(std::move(decoded.text));
     add(source, decoded.bad, problems);
-    if (!decoded.bad.empty()) return {};  // all that follows may suffer from it
+    if (!decoded.bad.empty()) return {};  // all later problems may follow from it
     const Scanned scanned(source);
     if (const Token* bracket = too_deep(scanned)) {
         problems.add(source.mark(bracket->begin), kTooDeep);
@@ -337,12 +338,12 @@ Node parse(std::string_view text, Problems& problems) {
     const bool built = build(scanned, builder, refusal, found);
     const Findings traps = built ? find_traps(scanned) : Findings();
     add(source, traps, problems);
-    if (!traps.empty()) return {};  // what could be read is not what was meant
+    if (!traps.empty()) return {};  // the parsed tree is not what the user meant
     problems.take(refusal);
     problems.take(found);
     if (!built) return {};
     Node root = builder.take();
-    // Lines of another form, all of them: `device = /dev/ttyUSB0`.
+    // A file of lines such as `device = /dev/ttyUSB0` is a single text.
     const bool is_text = root.kind == Node::Kind::scalar && !root.quoted;
     if (!is_text || root.scalar.find_first_of("=:") == root.scalar.npos) return root;
     const Findings causes = find_causes(scanned);
@@ -427,7 +428,7 @@ constexpr std::array<Words, 30> kWords{{
 
 }  // namespace
 
-std::string in_our_words(std::string_view refusal) {
+std::string reword_error(std::string_view refusal) {
     for (const Words& words : kWords) {
         if (refusal.starts_with(words.refusal)) return std::string(words.ours);
     }
@@ -448,7 +449,7 @@ std::string Problems::text() const {
                           problem->mark.line, problem->mark.column, problem);
     };
     std::ranges::sort(sorted, {}, place);  // at one place: in the order found
-    const std::size_t shown = sorted.size() > kMaxTold + 1 ? kMaxTold : sorted.size();
+    const std::size_t shown = sorted.size() > kMaxShown + 1 ? kMaxShown : sorted.size();
     std::string all;
     for (std::size_t i = 0; i < shown; ++i) all += format(*sorted[i]) + '\n' + sorted[i]->excerpt;
     if (shown == sorted.size()) return all;

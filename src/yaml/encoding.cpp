@@ -48,7 +48,7 @@ bool is_control(char32_t c) {
     return c < 0x20 || (c >= 0x7F && c < 0xA0) || (c & 0xFFFE) == 0xFFFE;
 }
 
-/// One character and what it takes; no character: these bytes are none.
+/// One character and its length in bytes; no character if the bytes are invalid.
 struct Step {
     std::optional<char32_t> character;
     std::size_t bytes = 1;
@@ -84,7 +84,7 @@ struct Encoding {
     bool big = false;
 };
 
-/// By a byte order mark, or by where the zeros of an ASCII character are.
+/// Detects it by a byte order mark, or by where the zeros of an ASCII character are.
 Encoding encoding_of(std::string_view bytes) {
     const auto begins = [bytes](std::string_view with) { return bytes.starts_with(with); };
     const auto zero = [bytes](std::size_t at) { return bytes.size() > at && bytes[at] == '\0'; };
@@ -105,7 +105,7 @@ std::string why_bad(const Step& step, std::string_view bytes, const Encoding& en
     return "byte " + std::string(hex.data()) + " is not " + what + "; save the file as UTF-8";
 }
 
-/// A CR alone ends a line, too (YAML 1.2, 5.4).
+/// A CR alone also ends a line (YAML 1.2, 5.4).
 void end_lines(std::string& text) {
     for (std::size_t at = text.find('\r'); at != text.npos; at = text.find('\r', at + 1)) {
         if (at + 1 == text.size() || text[at + 1] != '\n') text[at] = '\n';
@@ -124,7 +124,7 @@ Decoded decode(std::string_view bytes) {
             encoding.width == 1 ? step_utf8(bytes) : step_wide(bytes, encoding.width, encoding.big);
         const char32_t c = step.character.value_or(kReplacement);
         const bool bad = !step.character || is_control(c);
-        if (bad && !told && decoded.bad.size() < kMaxTold) {
+        if (bad && !told && decoded.bad.size() < kMaxShown) {
             decoded.bad.push_back({decoded.text.size(), why_bad(step, bytes, encoding)});
             told = true;
         }

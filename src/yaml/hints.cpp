@@ -46,7 +46,7 @@ std::string_view trim(std::string_view text) {
     return text.substr(begin);
 }
 
-/// "1.5 S" at the begin of `text`, which then begins behind it.
+/// Takes "1.5 S" from the start of `text`.
 std::optional<Duration> take_part(std::string_view& text) {
     const std::size_t number = std::min(text.find_first_not_of("0123456789.,"), text.size());
     std::string digits(text.substr(0, number));
@@ -62,7 +62,7 @@ std::optional<Duration> take_part(std::string_view& text) {
     if (word == kWords.end()) return std::nullopt;
     text = trim(text.substr(unit));
     const double exact = value * static_cast<double>(word->length.count());
-    constexpr double kMost = 1e18;  // of 9.2e18 nanoseconds that a duration has
+    constexpr double kMost = 1e18;  // of the 9.2e18 ns that a Duration holds
     if (!(exact < kMost)) return std::nullopt;
     return Duration(std::llround(exact));
 }
@@ -74,7 +74,7 @@ std::optional<std::string> plain_number(std::string_view text, bool whole) {
     if (error != std::errc() || stop != text.data() + text.size()) return std::nullopt;
     if (!std::isfinite(value)) return std::nullopt;
     if (!whole) return std::string(text);
-    constexpr double kMost = 1e15;  // whole numbers that a double has exactly
+    constexpr double kMost = 1e15;  // whole numbers that a double holds exactly
     if (value != std::floor(value) || std::fabs(value) > kMost) return std::nullopt;
     return std::to_string(static_cast<std::int64_t>(value));
 }
@@ -93,7 +93,7 @@ bool is_group(std::string_view text) {
     return text.size() == 3 && text.find_first_not_of(kDigits) == text.npos;
 }
 
-/// 9.6k, 38k4 and 9600 kBd; nothing of anything else.
+/// Expands 9.6k, 38k4 and 9600 kBd; returns nothing for anything else.
 std::optional<std::string> kilo(std::string_view text) {
     const std::size_t k = std::min(text.find_first_of("kK"), text.size());
     const std::string_view thousands = text.substr(0, text.find_last_not_of(' ', k - 1) + 1);
@@ -111,7 +111,7 @@ std::optional<std::string> kilo(std::string_view text) {
     return std::to_string(std::llround(all));
 }
 
-/// Without a plus, leading zeros, groups of three and a unit; with a decimal point.
+/// Removes a plus, leading zeros, group separators and a unit; uses a decimal point.
 std::string bare(std::string_view text, bool whole) {
     std::string all;
     const std::size_t unit = text.find_last_of(kDigits);
@@ -155,7 +155,7 @@ std::optional<std::string> calculated(std::string_view text) {
 
 std::string write(std::string_view text) { return "; write " + std::string(text); }
 
-/// 20,21 where one is wanted, and 1,234, which may be a fraction.
+/// Hint for 20,21 where one number is wanted, and 1,234, which may be a fraction.
 std::string comma_hint(std::string_view text, bool whole) {
     const std::size_t comma = text.find(',');
     if (comma == text.npos || comma == 0 || text.find_first_not_of("-0123456789,") != text.npos)
@@ -241,7 +241,7 @@ std::string origin_hint(const Node& node, std::string_view told) {
 
 std::string text_hint(const Node& node, char opening) {
     if (node.kind != Node::Kind::scalar || !node.scalar.starts_with(opening)) return "";
-    // Without quotes it would be no text, had it been typed.
+    // Unquoted, it can only come from a variable.
     const std::string each = std::string("write ") +
                              (opening == '[' ? "[${ONE}, ${TWO}]" : "{key: ${NAME}}") +
                              ", a variable for each";

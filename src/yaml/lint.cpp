@@ -19,7 +19,7 @@ namespace {
 
 using Find = void (*)(const Scanned&, Findings&);
 
-/// What is told first about a line is the nearest to its cause.
+/// Runs `finds` in order of precedence; the first finding on a line is the nearest to its cause.
 Findings run(const Scanned& text, std::span<const Find> finds) {
     Findings all;
     std::set<int> lines;
@@ -30,7 +30,7 @@ Findings run(const Scanned& text, std::span<const Find> finds) {
         for (Finding& finding : some) {
             const int line = text.source.mark(finding.offset).line;
             if (lines.contains(line) || !told.insert(line).second) continue;
-            if (all.size() < kMaxTold) all.push_back(std::move(finding));
+            if (all.size() < kMaxShown) all.push_back(std::move(finding));
         }
         lines.merge(told);
     }
@@ -38,7 +38,7 @@ Findings run(const Scanned& text, std::span<const Find> finds) {
     return all;
 }
 
-/// The signs of a patch disturb all that stands around them: they are told alone.
+/// Signs of a patch disturb the text around them: they are reported alone.
 constexpr std::array<Find, 1> kPatches{find_patches};
 
 }  // namespace
@@ -51,58 +51,59 @@ std::string_view Scanned::rest(std::size_t token) const {
 
 Findings find_traps(const Scanned& text) {
     if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
-    static constexpr std::array<Find, 6> kFinds{find_odd_blanks,  find_odd_dashes,
-                                                find_open_quotes, find_typeset_quotes,
-                                                find_directives,  find_placeholders};
+    static constexpr std::array<Find, 6> kFinds{find_wrong_blanks, find_wrong_dashes,
+                                                find_open_quotes,  find_typeset_quotes,
+                                                find_directives,   find_placeholders};
     return run(text, kFinds);
 }
 
 Findings find_causes(const Scanned& text) {
     if (Findings patches = run(text, kPatches); !patches.empty()) return patches;
     static constexpr std::array<Find, 10> kFinds{
-        find_odd_blanks,   find_odd_dashes, find_open_quotes, find_typeset_quotes, find_directives,
-        find_placeholders, find_quote_ends, find_brackets,    find_odd_starts,     find_columns};
+        find_wrong_blanks, find_wrong_dashes, find_open_quotes, find_typeset_quotes,
+        find_directives,   find_placeholders, find_quote_ends,  find_brackets,
+        find_wrong_starts, find_columns};
     return run(text, kFinds);
 }
 
 namespace {
 
-/// Looks like a blank, or like nothing at all, and is none for YAML.
-bool is_odd_blank(char32_t c) {
+/// True for characters that look like a blank, or are invisible, but are no blank to YAML.
+bool is_wrong_blank(char32_t c) {
     return c == 0xA0 || c == 0x3000 || c == 0xFEFF || c == 0x202F || (c >= 0x2000 && c <= 0x200B);
 }
 
-/// Has no width at all: where it came from, nobody knows.
-bool is_unseen(char32_t c) {
+/// True for characters without width, whose origin users cannot see.
+bool is_invisible(char32_t c) {
     return c == 0x200B || c == 0x200E || c == 0x200F || c == 0x2060 || c == 0xFEFF ||
            (c >= 0x202A && c <= 0x202E) || (c >= 0x2066 && c <= 0x2069);
 }
 
-std::size_t find_unseen(std::string_view word) {
+std::size_t find_invisible(std::string_view word) {
     for (std::size_t at = 0; at < word.size();) {
         const std::string_view character = character_at(word, at);
-        if (is_unseen(code_point(character))) return at;
+        if (is_invisible(code_point(character))) return at;
         at += character.size();
     }
     return word.npos;
 }
 
-std::string odd_blank(char32_t c, std::string_view where) {
+std::string wrong_blank(char32_t c, std::string_view where) {
     const bool is_no_break = c == 0xA0;
-    if (is_unseen(c) && !where.starts_with("behind '"))
+    if (is_invisible(c) && !where.starts_with("behind '"))
         return name_of(c) + " (which nobody sees) stands " + std::string(where) + "; remove it";
     return name_of(c) + (is_no_break ? " (a no-break space)" : " (an odd blank)") + " stands " +
            std::string(where) + "; type an ordinary blank in its place";
 }
 
-/// The first odd blank where a blank has a meaning: at the ends of a word, or, unless the word is a
-/// value, behind its first colon or dash. Inside a text it is a character like any other.
-std::size_t find_odd(std::string_view word, bool is_value) {
+/// Finds the first such blank where a blank is significant: at the ends of a word, or, unless the
+/// word is a value, after its first colon or dash. Inside a text it is an ordinary character.
+std::size_t find_wrong(std::string_view word, bool is_value) {
     bool meaning = true;
     std::size_t ending = word.npos;
     for (std::size_t at = 0; at < word.size();) {
         const std::string_view character = character_at(word, at);
-        const bool odd = is_odd_blank(code_point(character));
+        const bool odd = is_wrong_blank(code_point(character));
         if (odd && meaning) return at;
         if (!odd) ending = word.npos;
         if (odd && ending == word.npos) ending = at;
@@ -112,7 +113,7 @@ std::size_t find_odd(std::string_view word, bool is_value) {
     return ending;
 }
 
-/// Behind a real colon another one is part of the text.
+/// After a real colon another one is part of the text.
 bool is_value(const Scanned& text, std::size_t token) {
     return token > 0 && text.tokens[token - 1].kind == Token::Kind::colon && text.follows(token);
 }
@@ -129,8 +130,8 @@ void find_tab(const Scanned& text, const Token& token, Findings& findings) {
     findings.push_back({tab, "a tab in the indentation; type blanks in its place"});
 }
 
-/// Between a dash and a key a tab is no indentation.
-void find_tab_behind(const Scanned& text, std::size_t dash, Findings& findings) {
+/// A tab between a dash and a key is no indentation.
+void find_tab_after_dash(const Scanned& text, std::size_t dash, Findings& findings) {
     const std::size_t end = text.tokens[dash].end;
     const bool has_key = text.follows(dash + 1) && text.follows(dash + 2) &&
                          text.tokens[dash + 2].kind == Token::Kind::colon;
@@ -138,13 +139,13 @@ void find_tab_behind(const Scanned& text, std::size_t dash, Findings& findings) 
         findings.push_back({end, "a tab behind '-'; type a blank in its place"});
 }
 
-/// Inside quotes, or of a block of lines.
+/// True inside quotes or a block of lines.
 bool is_text(const Scanned& text, std::size_t offset) {
     const auto behind = std::ranges::upper_bound(text.tokens, offset, {}, &Token::begin);
     return behind != text.tokens.begin() && std::prev(behind)->end > offset;
 }
 
-/// `at` in `word`, the first token of its line or not.
+/// Describes the place `at` in `word`, which is the first token of its line or not.
 std::string_view place_of(std::string_view word, std::size_t at, bool first) {
     if (at == 0) return first ? "in the indentation" : "before this text";
     if (word[at - 1] == ':') return "behind ':'";
@@ -154,13 +155,13 @@ std::string_view place_of(std::string_view word, std::size_t at, bool first) {
 
 }  // namespace
 
-bool is_oddly_indented(const Scanned& text, const Token& first) {
+bool has_wrong_indent(const Scanned& text, const Token& first) {
     const std::string_view word = text.text(first);
     return tab_before(text, first) != std::string_view::npos ||
-           is_odd_blank(code_point(character_at(word, 0)));
+           is_wrong_blank(code_point(character_at(word, 0)));
 }
 
-std::string without_idle_tabs(const Scanned& text, std::string bytes) {
+std::string without_blank_tabs(const Scanned& text, std::string bytes) {
     for (std::size_t begin = 0; begin < bytes.size();) {
         const std::size_t content = std::min(bytes.find_first_not_of(" \t", begin), bytes.size());
         const bool idle = content == bytes.size() || bytes[content] == '#' ||
@@ -173,19 +174,19 @@ std::string without_idle_tabs(const Scanned& text, std::string bytes) {
     return bytes;
 }
 
-void find_odd_blanks(const Scanned& text, Findings& findings) {
+void find_wrong_blanks(const Scanned& text, Findings& findings) {
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
         if (token.first && token.depth == 0) find_tab(text, token, findings);
-        if (token.kind == Token::Kind::dash) find_tab_behind(text, i, findings);
+        if (token.kind == Token::Kind::dash) find_tab_after_dash(text, i, findings);
         if (token.kind != Token::Kind::plain) continue;
         const std::string_view word = text.text(token);
-        std::size_t at = find_odd(word, is_value(text, i));
-        if (at == word.npos) at = find_unseen(word);
+        std::size_t at = find_wrong(word, is_value(text, i));
+        if (at == word.npos) at = find_invisible(word);
         if (at == word.npos) continue;
         const std::string_view where = place_of(word, at, token.first);
         findings.push_back(
-            {token.begin + at, odd_blank(code_point(character_at(word, at)), where)});
+            {token.begin + at, wrong_blank(code_point(character_at(word, at)), where)});
     }
 }
 
@@ -195,20 +196,20 @@ using Kind = Token::Kind;
 
 constexpr std::size_t kLongest = 60;  ///< of a text that is shown whole
 
-/// The text as it should stand; `inside` the quotes.
+/// Suggests the corrected text; `inside` the quotes.
 std::string closed(char mark, std::string_view inside) {
     if (inside.empty() || inside.size() > kLongest) return std::string("a ") + mark + " is missing";
     return "write " + std::string(1, mark) + std::string(inside) + mark;
 }
 
-/// 3/4" and 6' are lengths; of a word, the quote is the end of a text.
+/// 3/4" and 6' are lengths; after a word, the quote ends a text.
 bool is_length(std::string_view word) {
     word = word.substr(word.find_last_of(' ') + 1);
     return word.find_first_not_of("0123456789.,/") == word.size() - 1;
 }
 
-/// `lines": []`: where a quote stands in a text that has none at its begin. An apostrophe may end
-/// a text of several words.
+/// Returns where a quote is that closes but was not opened: `lines": []`. An apostrophe may end a
+/// text of several words.
 std::size_t lone_quote(std::string_view word) {
     for (const char mark : {'"', '\''}) {
         if (std::ranges::count(word, mark) % 2 == 0) continue;
@@ -231,7 +232,7 @@ void find_unopened(const Scanned& text, const Token& token, Findings& findings) 
                                          closed(word[end], word.substr(0, end))});
 }
 
-/// What may stand behind a backslash (YAML 1.2, 5.7).
+/// What may follow a backslash (YAML 1.2, 5.7).
 constexpr std::string_view kEscapes = "0abt\tnvfre \"/\\N_LPxuU\n\r";
 
 void find_escapes(const Scanned& text, const Token& token, Findings& findings) {
@@ -246,8 +247,8 @@ void find_escapes(const Scanned& text, const Token& token, Findings& findings) {
     }
 }
 
-/// 'it's': the text ends where nobody meant it.
-void find_behind(const Scanned& text, std::size_t i, Findings& findings) {
+/// 'it's': the text ends too early.
+void find_text_after_quote(const Scanned& text, std::size_t i, Findings& findings) {
     if (!text.follows(i + 1)) return;
     const Token& next = text.tokens[i + 1];
     if (next.kind != Kind::plain && next.kind != Kind::quoted && next.kind != Kind::odd) return;
@@ -265,8 +266,9 @@ void find_behind(const Scanned& text, std::size_t i, Findings& findings) {
 void find_open_quotes(const Scanned& text, Findings& findings) {
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
-        const bool is_behind = i > 0 && text.tokens[i - 1].kind == Kind::quoted && !token.first;
-        if (token.kind == Kind::plain && !is_behind) find_unopened(text, token, findings);
+        const bool is_after_quote =
+            i > 0 && text.tokens[i - 1].kind == Kind::quoted && !token.first;
+        if (token.kind == Kind::plain && !is_after_quote) find_unopened(text, token, findings);
         if (token.kind != Kind::quoted || token.state != Token::State::unclosed) continue;
         const std::string_view word = text.text(token);
         findings.push_back({token.begin, "the quote " + std::string(1, word.front()) +
@@ -280,7 +282,7 @@ void find_quote_ends(const Scanned& text, Findings& findings) {
         const Token& token = text.tokens[i];
         if (token.kind != Kind::quoted || token.state != Token::State::fine) continue;
         find_escapes(text, token, findings);
-        find_behind(text, i, findings);
+        find_text_after_quote(text, i, findings);
     }
 }
 
@@ -309,8 +311,8 @@ void find_alias(const Token& token, std::string_view name, const std::set<std::s
     }
 }
 
-/// Of the line behind the token's begin, what a message shows: lines may be long, and many tokens
-/// stand on one.
+/// Returns what a message shows of the line from the token on: bounded, as long lines may have many
+/// tokens.
 std::string_view near(const Scanned& text, const Token& token) {
     constexpr std::size_t kShown = 100;
     const std::string_view all = text.source.text().substr(token.begin, kShown);
@@ -318,7 +320,7 @@ std::string_view near(const Scanned& text, const Token& token) {
 }
 
 /// `*a {parity: none}`
-void find_map_behind(const Scanned& text, std::size_t alias, Findings& findings) {
+void find_map_after_alias(const Scanned& text, std::size_t alias, Findings& findings) {
     if (!text.follows(alias + 1) || text.text(text.tokens[alias + 1]) != "{") return;
     std::string_view more = near(text, text.tokens[alias + 1]).substr(1);
     more = more.substr(0, more.find('}'));
@@ -337,7 +339,7 @@ void find_round(const Scanned& text, std::size_t i, Findings& findings) {
         {token.begin, "'(' begins no map; write {" + std::string(clip(inside, 60)) + '}'});
 }
 
-void find_odd(const Scanned& text, std::size_t i, Findings& findings) {
+void find_wrong(const Scanned& text, std::size_t i, Findings& findings) {
     const Token& token = text.tokens[i];
     const std::string_view word = text.text(token);
     if (word == ",") {
@@ -349,7 +351,7 @@ void find_odd(const Scanned& text, std::size_t i, Findings& findings) {
                                          std::string(clip(word, 60)) + '"'});
 }
 
-/// What surrounds a file on a page or on a screen: a prompt, a fence, a comment of JSON.
+/// Reports what surrounds a file on a page or a screen: a prompt, a fence, a JSON comment.
 bool find_copied(const Token& token, std::string_view word, Findings& findings) {
     const auto begins = [word](std::string_view with) { return word.starts_with(with); };
     if (token.kind == Kind::anchor && begins("&nbsp;")) {
@@ -377,12 +379,12 @@ bool find_copied(const Token& token, std::string_view word, Findings& findings) 
     return true;
 }
 
-/// As people call it.
+/// The name that users know.
 std::string sign_of(std::string_view sign) {
     return sign == "*" ? "'*'" : name_of(code_point(sign));
 }
 
-/// Quotes as a word processor types them.
+/// True for quotes as a word processor types them.
 bool is_typeset_quote(std::string_view character) {
     static constexpr std::array<std::string_view, 8> kQuotes{
         "\u201C", "\u201D", "\u201E", "\u2018", "\u2019", "\u201A", "\u00AB", "\u00BB"};
@@ -412,7 +414,7 @@ void find_typeset_quotes(const Scanned& text, Findings& findings) {
     }
 }
 
-void find_odd_dashes(const Scanned& text, Findings& findings) {
+void find_wrong_dashes(const Scanned& text, Findings& findings) {
     for (const Token& token : text.tokens) {
         if (token.kind != Kind::dash || token.state != Token::State::stray) continue;
         findings.push_back(
@@ -430,7 +432,7 @@ void find_directives(const Scanned& text, Findings& findings) {
                         "a '---' is missing below this directive; write it, or remove this line"});
 }
 
-void find_odd_starts(const Scanned& text, Findings& findings) {
+void find_wrong_starts(const Scanned& text, Findings& findings) {
     std::set<std::string_view> anchors;
     for (std::size_t i = 0; i < text.tokens.size(); ++i) {
         const Token& token = text.tokens[i];
@@ -439,9 +441,9 @@ void find_odd_starts(const Scanned& text, Findings& findings) {
         if (token.kind == Kind::anchor) anchors.insert(word.substr(1));
         if (token.kind == Kind::alias) {
             find_alias(token, word.substr(1), anchors, findings);
-            find_map_behind(text, i, findings);
+            find_map_after_alias(text, i, findings);
         }
-        if (token.kind == Kind::odd) find_odd(text, i, findings);
+        if (token.kind == Kind::odd) find_wrong(text, i, findings);
         find_round(text, i, findings);
     }
 }

@@ -18,7 +18,7 @@ using State = Token::State;
 
 std::string in_quotes(std::string_view text) { return '"' + std::string(text) + '"'; }
 
-/// [::1]:502 without quotes is a list with something behind it.
+/// [::1]:502 without quotes is a list followed by text.
 void find_address(const Scanned& text, std::size_t close, std::size_t open, Findings& findings) {
     if (!text.follows(close + 1)) return;
     const Token& next = text.tokens[close + 1];
@@ -35,9 +35,9 @@ void find_address(const Scanned& text, std::size_t close, std::size_t open, Find
     }
 }
 
-/// Where a `${` behind the bracket on its line lacks its own end.
+/// Returns where an unclosed `${` follows the bracket on its line.
 std::size_t open_variable(const Scanned& text, const Token& bracket) {
-    constexpr std::size_t kNear = 1'000;  // many brackets may stand on one line
+    constexpr std::size_t kNear = 1'000;  // one line may have many brackets
     std::string_view line = text.source.text().substr(bracket.begin, kNear);
     line = line.substr(0, line.find('\n'));
     const std::size_t dollar = line.find("${");
@@ -49,7 +49,7 @@ std::size_t open_variable(const Scanned& text, const Token& bracket) {
     return closed ? line.npos : bracket.begin + dollar;
 }
 
-/// A '#' on a line of the bracket that hides what would close it: its offset.
+/// Returns the offset of a '#' on a line of the bracket that hides its closing bracket.
 std::size_t hiding_comment(const Scanned& text, std::size_t open) {
     const char end = text.text(text.tokens[open]) == "[" ? ']' : '}';
     constexpr std::size_t kFar = 200;  // tokens
@@ -66,7 +66,7 @@ std::size_t hiding_comment(const Scanned& text, std::size_t open) {
     return std::string_view::npos;
 }
 
-/// {id: 5, name: press]: the bracket of another kind that stands where the right one should.
+/// {id: 5, name: press]: returns the closing bracket of the wrong kind.
 const Token* wrong_close(const Scanned& text, std::size_t open) {
     constexpr std::size_t kFar = 200;  // tokens
     for (std::size_t i = open + 1; i < open + kFar && text.follows(i); ++i) {
@@ -115,13 +115,13 @@ void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
     }
 }
 
-/// {a: 1 b: 2}: two colons and no comma between them.
+/// Detects {a: 1 b: 2}: two colons without a comma between them.
 struct Pair {
     std::size_t open = 0;  ///< token
     bool colon = false;    ///< since the last comma
 };
 
-/// The key stands on a line of its own: nothing ends the value before it.
+/// The key is on a line of its own: the value before it lacks a comma.
 bool find_comma_of_line(const Scanned& text, const Token& key, const Token& value,
                         Findings& findings) {
     const bool ends =
@@ -155,7 +155,7 @@ void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
     findings.push_back({before.begin + key, "a ',' is missing before " + quote(word.substr(key))});
 }
 
-/// {{ name }}: braces of other programs.
+/// True for {{ name }}, a placeholder of other programs.
 bool is_placeholder(const Scanned& text, const Token& token) {
     return token.kind == Kind::open && text.source.text().substr(token.begin).starts_with("{{");
 }
@@ -209,7 +209,7 @@ void find_brackets(const Scanned& text, Findings& findings) {
 
 namespace {
 
-bool stands_left(const Scanned& text, const Token& token) {
+bool is_at_margin(const Scanned& text, const Token& token) {
     return token.first && token.begin == line_begin(text.source.text(), token.begin);
 }
 
@@ -218,7 +218,7 @@ std::string_view line_of(const Scanned& text, const Token& token) {
     return rest.substr(0, rest.find('\n'));
 }
 
-/// A key at the left margin: then the file is whole, and no context of a diff.
+/// True for a key at the left margin: then the file is complete, not the context of a diff.
 bool is_ordinary(const Scanned& text, const Token& token) {
     const char c = text.text(token).front();
     return token.kind == Kind::plain && ((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'));
@@ -234,7 +234,7 @@ bool is_heading(std::string_view line) {
     return std::ranges::any_of(kHeadings, [line](auto begin) { return line.starts_with(begin); });
 }
 
-/// What one line of a diff says; nothing of its context.
+/// Returns the message for a line of a diff; empty for its context.
 std::string diff_line(const Scanned& text, const Token& token, bool is_whole) {
     if (is_heading(line_of(text, token))) return "this line is the head of a diff; remove it";
     if (is_added(text, token))
@@ -249,14 +249,14 @@ void find_diff(const Scanned& text, Findings& findings) {
     bool is_diff = false;
     bool is_whole = false;
     for (const Token& token : text.tokens) {
-        if (!stands_left(text, token)) continue;
+        if (!is_at_margin(text, token)) continue;
         const bool heading = is_heading(line_of(text, token));
         is_diff = is_diff || is_added(text, token);
         is_whole = is_whole || (!heading && is_ordinary(text, token));
     }
     if (!is_diff) return;
     for (const Token& token : text.tokens) {
-        if (!stands_left(text, token)) continue;
+        if (!is_at_margin(text, token)) continue;
         if (std::string message = diff_line(text, token, is_whole); !message.empty())
             findings.push_back({token.begin, std::move(message)});
     }
@@ -264,7 +264,7 @@ void find_diff(const Scanned& text, Findings& findings) {
 
 void find_conflicts(const Scanned& text, Findings& findings) {
     for (const Token& token : text.tokens) {
-        if (token.kind != Kind::plain || !stands_left(text, token)) continue;
+        if (token.kind != Kind::plain || !is_at_margin(text, token)) continue;
         const std::string_view line = text.text(token);
         if (line.starts_with("<<<<<<<")) {
             findings.push_back({token.begin,
@@ -277,7 +277,7 @@ void find_conflicts(const Scanned& text, Findings& findings) {
     }
 }
 
-/// The first lines that hold anything, as they are typed.
+/// Returns the first lines that are not blank, as typed.
 std::vector<std::string_view> first_lines(std::string_view text) {
     constexpr std::size_t kMost = 20;
     std::vector<std::string_view> lines;
@@ -290,7 +290,7 @@ std::vector<std::string_view> first_lines(std::string_view text) {
     return lines;
 }
 
-/// 12 of "12   - name: press" and of "12: lines:"; 0 of anything else.
+/// Returns 12 for "12   - name: press" and "12: lines:"; 0 for anything else.
 std::size_t line_number(std::string_view line) {
     constexpr std::string_view kDigits = "0123456789";
     line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
@@ -302,7 +302,7 @@ std::size_t line_number(std::string_view line) {
     return alone ? std::stoul(std::string(line.substr(0, end))) : 0;
 }
 
-/// What a mail, a table or a listing puts before each line.
+/// Finds what a mail, a table or a listing puts before each line.
 void find_margins(const Scanned& text, Findings& findings) {
     const std::vector<std::string_view> lines = first_lines(text.source.text());
     if (lines.size() < 2) return;

@@ -13,11 +13,11 @@
 
 namespace panelgate::yaml {
 
-/// A line outside of brackets and long texts, by what a person sees of it: `- - key: value`.
+/// A line outside of brackets and block texts, as a user sees it: `- - key: value`.
 struct BlockLine {
     std::vector<std::size_t> dashes;  ///< tokens
-    std::optional<std::size_t> key;   ///< token, in front of its colon
-    std::optional<std::size_t> text;  ///< token: the value, or what stands without a key
+    std::optional<std::size_t> key;   ///< token before its colon
+    std::optional<std::size_t> text;  ///< token: the value, or text without a key
     bool has_value() const { return text.has_value(); }
 };
 
@@ -31,7 +31,7 @@ bool can_be_key(Kind kind) {
     return kind == Kind::plain || kind == Kind::quoted || kind == Kind::alias || kind == Kind::odd;
 }
 
-/// The next token of the line that is no anchor or tag.
+/// Returns the next token of the line that is no anchor or tag.
 std::optional<std::size_t> content(const Scanned& text, std::size_t i, bool first) {
     for (; first ? i < text.tokens.size() : text.follows(i); ++i, first = false) {
         const Kind kind = text.tokens[i].kind;
@@ -76,19 +76,19 @@ namespace {
 /// A list or map that is open at this place.
 struct Level {
     std::size_t column = 0;
-    std::optional<std::size_t> meant;  ///< column, of what was told to be shifted
+    std::optional<std::size_t> meant;  ///< intended column, if a shift was reported
     bool list = false;
     bool waits = false;               ///< its last item or key has no value yet
     std::size_t first = 0;            ///< token of its first dash or key
     std::size_t last = 0;             ///< and of its last
-    std::optional<std::size_t> text;  ///< of its last, on its line
+    std::optional<std::size_t> text;  ///< of its last, on the same line
 };
 
 class Columns {
   public:
     Columns(const Scanned& text, Findings& findings) : text_(text), findings_(findings) {}
 
-    /// `behind`: the lines that follow.
+    /// `behind`: the following lines.
     void read(const BlockLine& line, std::span<const BlockLine> behind) {
         behind_ = behind;
         two_keys(line);
@@ -101,8 +101,8 @@ class Columns {
         }
         item.first = item.list ? line.dashes.front() : *line.key;
         item.column = text_.column(text_.tokens[item.first]);
-        if (is_oddly_indented(text_, text_.tokens[item.first])) {
-            if (!levels_.empty()) levels_.back().waits = true;  // where it belongs, nobody knows
+        if (has_wrong_indent(text_, text_.tokens[item.first])) {
+            if (!levels_.empty()) levels_.back().waits = true;  // its level is unknown
             return;
         }
         const bool glued_dash = !item.list && lacks_blank(*line.key);
@@ -112,7 +112,7 @@ class Columns {
         if (item.list && line.key) {
             levels_.back().waits = false;
             push(*line.key, false);
-            if (glued_dash) levels_.back().column += 2;  // where the key should have stood
+            if (glued_dash) levels_.back().column += 2;  // where the key should be
         }
         Level& last = levels_.back();
         last.waits = !line.has_value();
@@ -171,14 +171,14 @@ class Columns {
         tell(*line.text, second_colon(text_, *line.key, *line.text));
     }
 
-    /// Of a level that has just been left, or that is there, as "as 'name' on line 2".
+    /// Returns "'name' on line 2" for a level that ended or is open.
     std::string like(const Level& level) const {
         const std::string what =
             text_.tokens[level.first].kind == Kind::dash ? "the '-'" : name(level.first);
         return what + " on line " + std::to_string(line(level.first));
     }
 
-    /// A line without key and dash: a text goes on, or a colon was forgotten.
+    /// A line without key and dash: continues a text, or lacks a colon.
     void text_alone(std::size_t token) {
         const std::size_t column = text_.column(text_.tokens[token]);
         while (levels_.size() > 1 && levels_.back().column > column) levels_.pop_back();
@@ -187,7 +187,7 @@ class Columns {
             if (!finding) return;
             findings_.push_back(*finding);
             push(token, false);
-            levels_.back().waits = true;  // what follows is of this key
+            levels_.back().waits = true;  // the next lines belong to this key
             return;
         }
         Level& level = levels_.back();
@@ -205,19 +205,19 @@ class Columns {
             tell(token, "a key and ': ' are missing before " + quote(text_.rest(token)) +
                             "; a text of several lines must stand deeper than its key");
         }
-        level.waits = true;  // whatever follows deeper is of this line
+        level.waits = true;  // deeper lines belong to this one
     }
 
     void enter(Level item) {
         item.last = item.first;
-        go_where_it_was_meant(item);
+        use_intended_column(item);
         std::optional<Level> left;  // the outermost that ends here
         while (!levels_.empty() && levels_.back().column > item.column) {
             left = levels_.back();
             levels_.pop_back();
         }
         if (levels_.empty()) {
-            if (left) tell_shift(item, *left);
+            if (left) report_shift(item, *left);
             if (shift_ != 0) item.meant = item.column + shift_;
             levels_.push_back(item);
         } else if (levels_.back().column == item.column) {
@@ -227,8 +227,8 @@ class Columns {
         }
     }
 
-    /// What follows a line that was shifted may stand where that should have.
-    void go_where_it_was_meant(const Level& item) {
+    /// Lines after a shifted one may be in its intended column.
+    void use_intended_column(const Level& item) {
         for (std::size_t i = levels_.size(); i-- > 0;) {
             if (levels_[i].meant != item.column || levels_[i].list != item.list) continue;
             levels_.resize(i + 1);
@@ -243,7 +243,7 @@ class Columns {
         Level* level = &levels_.back();
         if (level->list && !item.list && levels_.size() > 1 &&
             levels_[levels_.size() - 2].column == item.column) {
-            levels_.pop_back();  // a list may stand in the column of its key
+            levels_.pop_back();  // a list may be in the column of its key
             level = &levels_.back();
         }
         if (level->list == item.list) {
@@ -267,13 +267,13 @@ class Columns {
     void deeper(Level item, const std::optional<Level>& left) {
         const Level level = levels_.back();
         if (left && is_dash_moved(item, level, *left)) {
-            tell_dash(level, *left, item);
+            report_dash(level, *left, item);
         } else if (left) {
             const bool nearer = item.column - level.column < left->column - item.column;
             const bool both = level.list == left->list;
-            tell_shift(item, (both ? nearer : level.list == item.list) ? level : *left);
+            report_shift(item, (both ? nearer : level.list == item.list) ? level : *left);
         } else if (!level.waits) {
-            tell_below_value(item, level);
+            report_below_value(item, level);
         }
         if (shift_ != 0) item.meant = item.column + shift_;
         if (item.meant == level.column && level.list == item.list) levels_.pop_back();
@@ -288,7 +288,7 @@ class Columns {
         return true;
     }
 
-    void tell_below_value(const Level& item, const Level& level) {
+    void report_below_value(const Level& item, const Level& level) {
         if (below_alias(item, level)) return;
         if (level.text && text_.tokens[level.last].kind == Kind::dash) {
             if (auto finding = missing_colon(text_, *level.text)) {
@@ -296,10 +296,10 @@ class Columns {
                 return;
             }
         }
-        if (level.list) return tell_shift(item, level);
+        if (level.list) return report_shift(item, level);
         const Level* list = levels_.size() > 1 ? &levels_[levels_.size() - 2] : nullptr;
         if (list != nullptr && is_dash_moved(item, *list, level)) {
-            tell_dash(*list, level, item);
+            report_dash(*list, level, item);
             levels_.pop_back();
             return;
         }
@@ -316,7 +316,7 @@ class Columns {
         if (!first) return std::nullopt;
         return text_.column(text_.tokens[*first]);
     }
-    bool is_list_behind(std::size_t column) const {
+    bool list_follows(std::size_t column) const {
         constexpr std::size_t kFar = 100;  // lines
         for (const BlockLine& line : behind_.first(std::min(kFar, behind_.size()))) {
             const auto begin = column_of(line);
@@ -325,19 +325,19 @@ class Columns {
         }
         return false;
     }
-    /// The first item's dash, with the key behind it, stands a blank beside where the next keys
-    /// stand: more of them than this one, or this one in an even column. No other line stands as
-    /// the dash does.
+    /// True if the first item's dash and key are one column off this key, and the next line has
+    /// this key's column (or this column is even and the next line has not the first key's). The
+    /// list has no other dash in its column.
     bool is_dash_moved(const Level& item, const Level& list, const Level& map) const {
         const std::size_t by =
             std::max(item.column, map.column) - std::min(item.column, map.column);
         const bool first = list.list && list.first == list.last && !map.list &&
                            map.first == map.last && line(list.first) == line(map.first);
-        if (by != 1 || item.list || !first || is_list_behind(list.column)) return false;
+        if (by != 1 || item.list || !first || list_follows(list.column)) return false;
         const auto next = behind_.empty() ? std::nullopt : column_of(behind_.front());
         return next == item.column || (item.column % 2 == 0 && next != map.column);
     }
-    void tell_dash(const Level& list, const Level& map, const Level& item) {
+    void report_dash(const Level& list, const Level& map, const Level& item) {
         const bool left = map.column < item.column;
         const bool wide = !left && map.column - list.column > 2;
         tell(list.first,
@@ -352,7 +352,7 @@ class Columns {
     static std::string blanks(std::size_t count) {
         return count == 1 ? "1 blank" : std::to_string(count) + " blanks";
     }
-    void tell_shift(const Level& item, const Level& sibling) {
+    void report_shift(const Level& item, const Level& sibling) {
         const bool left = item.column < sibling.column;
         shift_ = sibling.column - item.column;
         const std::size_t by = left ? sibling.column - item.column : item.column - sibling.column;
@@ -364,7 +364,7 @@ class Columns {
     const Scanned& text_;
     Findings& findings_;
     std::vector<Level> levels_;
-    /// Of the line in work, modulo 2^64: what was told to be added, for all that stands on it.
+    /// Reported correction of the current line, modulo 2^64, for all its levels.
     std::size_t shift_ = 0;
     std::span<const BlockLine> behind_;
 };

@@ -56,7 +56,7 @@ std::string two_values(const Node& node) {
     return quote(node.scalar) + " is two values in { }; put a text that holds a ',' in quotes";
 }
 
-/// Nobody counts 1440 minutes.
+/// Adds hours: 1440min (24 h).
 std::string limit(Duration duration) {
     const bool hours = duration > 1h && duration % 1h == Duration::zero();
     return format_duration(duration) +
@@ -105,7 +105,7 @@ bool MapReader::require(std::string_view key) {
         excused_.emplace_back(key);
         return false;
     }
-    // What is no map at all has been told already.
+    // A node that is no map has been reported already.
     if (node_->kind == Node::Kind::map) problems_->add(node_->mark, needs(key));
     return false;
 }
@@ -129,7 +129,7 @@ void MapReader::describe(std::string_view key, KeyShape shape) {
 
 const Node* MapReader::below(std::string_view key, const Node* node) {
     Description* description = problems_->description();
-    if (description != nullptr && node != nullptr) description->tell_below(*node_, key, *node);
+    if (description != nullptr && node != nullptr) description->add_nested(*node_, key, *node);
     return node;
 }
 
@@ -309,7 +309,7 @@ struct Unit {
 constexpr std::array<Unit, 4> kUnits{{{"min", 60s}, {"s", 1s}, {"ms", 1ms}, {"us", 1us}}};
 constexpr std::int64_t kMostOfUnit = 1'000'000'000;
 
-/// Of digits from `low` to `high`.
+/// Pattern of the digits from `low` to `high`.
 std::string digit(char low, char high) {
     if (low == high) return std::string(1, low);
     return std::string("[") + low + '-' + high + ']';
@@ -320,7 +320,7 @@ std::string any_digits(std::size_t count) {
     return count == 1 ? "[0-9]" : "[0-9]{" + std::to_string(count) + '}';
 }
 
-/// Of the numbers from `low` to `high`, which have as many digits.
+/// Pattern of the numbers from `low` to `high`, which have the same length.
 std::string same_length(std::string_view low, std::string_view high) {
     if (low.empty()) return "";
     const std::size_t rest = low.size() - 1;
@@ -340,7 +340,7 @@ std::string same_length(std::string_view low, std::string_view high) {
     return pattern;
 }
 
-/// Without anchors.
+/// Pattern without anchors.
 std::string integers(std::int64_t min, std::int64_t max) {
     std::string pattern;
     while (min <= max) {

@@ -17,7 +17,7 @@ bool is_blank(char c) { return c == ' ' || c == '\t'; }
 bool is_bracket(char c) { return c == ',' || c == '[' || c == ']' || c == '{' || c == '}'; }
 bool is_space(char c) { return is_blank(c) || c == '\n' || c == '\r'; }
 
-/// A value has a dash, a key, a colon and a comma at most.
+/// A value has at most a dash, a key, a colon and a comma.
 constexpr std::size_t kMaxTokens = 8 * kMaxNodes;
 
 class Scanner {
@@ -46,7 +46,7 @@ class Scanner {
         return std::min(text_.find('\n', from), text_.size());
     }
 
-    /// Blanks, line ends, comments and directives.
+    /// Skips blanks, line ends, comments and directives.
     void skip() {
         for (; at_ < text_.size(); ++at_) {
             const char c = text_[at_];
@@ -77,8 +77,8 @@ class Scanner {
         if (marker) return add(Kind::document, at_ + 3);
         if (is_conflict()) return add(Kind::plain, content_end());
         if (c == '-' && blank(1)) return add_parent(Kind::dash, 1);
-        if (const std::size_t dash = odd_dash()) return add_parent(Kind::dash, dash);
-        if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || behind_quote()))))
+        if (const std::size_t dash = wrong_dash()) return add_parent(Kind::dash, dash);
+        if (c == ':' && (blank(1) || (inside && (is_bracket(peek(1)) || follows_quote()))))
             return add(Kind::colon, at_ + 1);
         if (c == '[' || c == '{') return open();
         if (c == ']' || c == '}') return close(c);
@@ -88,14 +88,14 @@ class Scanner {
         word(c);
     }
 
-    /// <<<<<<<, |||||||, ======= or >>>>>>> of a merge.
+    /// True for <<<<<<<, |||||||, ======= or >>>>>>> of a merge.
     bool is_conflict() const {
         constexpr std::size_t kLength = 7;
         const char c = peek();
         return at_ == line_ && std::string_view("<|=>").find(c) != std::string_view::npos &&
                text_.substr(at_, kLength) == std::string(kLength, c) && blank(kLength);
     }
-    /// Of the line, without the blanks at its end.
+    /// Returns the end of the line without trailing blanks.
     std::size_t content_end() const {
         std::size_t end = line_end(at_);
         while (end > at_ && is_space(text_[end - 1])) --end;
@@ -117,8 +117,9 @@ class Scanner {
         add(kind, at_ + length, text_[at_] == '-' ? State::fine : State::stray);
     }
 
-    /// How many bytes begin an item as only other programs would: with a longer dash, or a dot.
-    std::size_t odd_dash() const {
+    /// Returns the length of a list mark that YAML does not know, such as a longer dash or a dot; 0
+    /// if none.
+    std::size_t wrong_dash() const {
         static constexpr std::array<std::string_view, 9> kDashes{
             "*", "\u2010", "\u2011", "\u2012", "\u2013", "\u2014", "\u2022", "\u2212", "\u00B7"};
         const bool begins = first_ || tokens_.empty() || tokens_.back().kind == Kind::dash;
@@ -129,7 +130,7 @@ class Scanner {
         return 0;
     }
 
-    bool behind_quote() const {
+    bool follows_quote() const {
         return !tokens_.empty() && tokens_.back().kind == Kind::quoted && tokens_.back().end == at_;
     }
 
@@ -138,8 +139,8 @@ class Scanner {
         return std::min(text_.find_first_of(end, at_), text_.size());
     }
 
-    /// To ": ", " #", a bracket or comma inside brackets, or the end of the line; without the
-    /// blanks before that.
+    /// Ends at ": ", " #", a bracket or comma inside brackets, or the end of the line; without
+    /// trailing blanks.
     std::size_t plain_end() const {
         std::size_t end = at_;
         for (std::size_t i = at_; i < text_.size(); ++i) {
@@ -179,8 +180,8 @@ class Scanner {
         open_.pop_back();
     }
 
-    /// A line that can only go on where the brackets should have ended: an item, or a key no deeper
-    /// than the line that opened them.
+    /// True for a line that cannot be inside the brackets: an item, or a key no deeper than the
+    /// line that opened them.
     bool ends_brackets() const {
         if ((peek() == '-' && blank(1)) || is_conflict()) return true;
         const std::size_t indent = at_ - line_;
@@ -199,7 +200,7 @@ class Scanner {
     void quoted(char quote) {
         if (first_ || tokens_.back().kind == Kind::dash) key_ = begin_;
         const std::size_t end = quote_end(quote);
-        if (end == std::string_view::npos || leaves_its_key(end) || ends_at_a_begin(end))
+        if (end == std::string_view::npos || leaves_its_key(end) || opens_next_text(end))
             return add(Kind::quoted, forgotten_end(), State::unclosed);
         add(Kind::quoted, end);
         const std::size_t last = text_.substr(begin_, end - begin_).rfind('\n');
@@ -216,24 +217,24 @@ class Scanner {
         }
         return std::string_view::npos;
     }
-    /// A text of several lines goes on deeper than its key (YAML 1.2, 7.4); otherwise its quote was
-    /// forgotten and this is the next one in the file.
+    /// True if a line of the text is not deeper than its key (YAML 1.2, 7.4): then its quote was
+    /// forgotten, and this one opens the next text.
     bool leaves_its_key(std::size_t end) const {
         const std::string_view text = text_.substr(0, end);
         const std::size_t parent = key_ - line_;
         std::size_t begin = text.find('\n', at_);
         while (begin < end) {
             const std::size_t content = text.find_first_not_of(" \t\r", ++begin);
-            const bool closes = content + 1 >= end;  // the quote alone is in nobody's way
+            const bool closes = content + 1 >= end;  // a closing quote alone may be in any column
             if (!closes && text[content] != '\n' && content - begin <= parent) return true;
             begin = text.find('\n', begin);
         }
         return false;
     }
 
-    /// A text goes on right behind the quote: it is where the next text begins, if this one cannot
-    /// end there because it holds a line end, or a sign that stands between two texts.
-    bool ends_at_a_begin(std::size_t end) const {
+    /// True if the quote opens the next text: text follows it, and this text cannot end there as it
+    /// has a line end, or ends with a separator.
+    bool opens_next_text(std::size_t end) const {
         if (end >= text_.size() || is_space(text_[end])) return false;
         if (std::string_view(",:]}").find(text_[end]) != std::string_view::npos) return false;
         const std::string_view inside = text_.substr(at_ + 1, end - at_ - 2);
@@ -242,8 +243,8 @@ class Scanner {
                (last != std::string_view::npos &&
                 std::string_view(",:[{").find(inside[last]) != std::string_view::npos);
     }
-    /// Where a person would have closed the quote: behind the key, the item in brackets, or at the
-    /// end of the line.
+    /// Returns where a user would have closed the quote: after the key, the item in brackets, or at
+    /// the end of the line.
     std::size_t forgotten_end() const {
         const bool is_value = !first_ && tokens_.back().kind == Kind::colon;
         std::size_t end = at_ + 1;
@@ -258,7 +259,7 @@ class Scanner {
         return end;
     }
 
-    /// All lines deeper than the key, or the dash, that they belong to.
+    /// Takes all lines deeper than the key, or the dash, that they belong to.
     void block() {
         const std::size_t parent = key_ - line_;
         std::size_t end = line_end(at_);
@@ -274,10 +275,10 @@ class Scanner {
     std::string_view text_;
     std::vector<Token> tokens_;
     std::vector<std::size_t> open_;  ///< tokens
-    std::size_t outermost_ = 0;      ///< column of the key, or the dash, of the first of them
+    std::size_t outermost_ = 0;      ///< column of the first one's key or dash
     std::size_t at_ = 0;
-    std::size_t begin_ = 0;  ///< of the token in work
-    std::size_t line_ = 0;   ///< where its line begins
+    std::size_t begin_ = 0;  ///< of the current token
+    std::size_t line_ = 0;   ///< start of its line
     std::size_t key_ = 0;    ///< the last key or dash in block style on that line
     bool first_ = true;
 };

@@ -7,7 +7,7 @@
 
 namespace panelgate::yaml {
 
-/// A piece of YAML as a person means it, told from the text alone: also where the text is broken.
+/// A YAML token as a user means it, found without a grammar: also in invalid text.
 struct Token {
     enum class Kind : std::uint8_t {
         dash,     ///< "- "
@@ -15,33 +15,33 @@ struct Token {
         comma,    ///< inside brackets
         open,     ///< [ or {
         close,    ///< ] or }
-        plain,    ///< a text without quotes, to the end of its line at most
+        plain,    ///< an unquoted text, at most to the end of its line
         quoted,   ///< with its quotes
         block,    ///< | or > with all its lines
         alias,    ///< *name
         anchor,   ///< &name
         tag,      ///< !name
-        odd,      ///< begins with a character that begins no text: % @ ` ,
+        odd,      ///< begins with a character that cannot begin a text: % @ ` ,
         document  ///< --- or ...
     };
-    /// unclosed: an `open` or a `quoted`; stray: a `close` of nothing, a `dash` that is another
+    /// unclosed: an `open` or a `quoted`; stray: an unmatched `close`, a `dash` that is another
     /// character.
     enum class State : std::uint8_t { fine, unclosed, stray };
 
     Kind kind = Kind::plain;
     State state = State::fine;
-    bool first = false;     ///< of its line, but for blanks
-    std::size_t depth = 0;  ///< brackets that are open; before one, at its end with itself
+    bool first = false;     ///< first of its line
+    std::size_t depth = 0;  ///< open brackets; an `open` does not count itself, a `close` does
     std::size_t begin = 0;  ///< offsets
     std::size_t end = 0;
 };
 
-/// The tokens of a text, at most so many that the limits of settings.hpp are reached before.
-/// Comments and directives are left out. What a forgotten bracket would swallow is read as if it
-/// had been closed at the end of its line; a forgotten quote, where a person would have closed it.
+/// Returns the tokens of a text, without comments and directives; their number is bounded above the
+/// limits of settings.hpp. An unclosed bracket ends before the line that cannot be inside it; an
+/// unclosed quote, where a user would have closed it.
 std::vector<Token> scan(std::string_view text);
 
-/// Where the line of an offset begins.
+/// Returns where the line of an offset begins.
 std::size_t line_begin(std::string_view text, std::size_t offset);
 
 }  // namespace panelgate::yaml

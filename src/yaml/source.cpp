@@ -9,8 +9,8 @@ namespace panelgate::yaml {
 
 namespace {
 
-/// What ends a plain value somewhere, and the bytes for it: F5 and above begin no character
-/// (RFC 3629, 3).
+/// Characters that may end a plain value, and the bytes that mask them: F5 and above begin no
+/// character (RFC 3629, 3).
 constexpr std::string_view kMeaning = "{}[],:# ";
 constexpr std::string_view kMasks = "\xF5\xF6\xF7\xF8\xF9\xFA\xFB\xFC";
 static_assert(kMeaning.size() == kMasks.size());
@@ -26,13 +26,13 @@ std::string mask_variables(std::string_view text) {
     std::string masked(text);
     std::size_t at = masked.find("${");
     while (at != std::string::npos) {
-        // A quote: the brace behind it belongs to something else.
+        // After a quote or a line end the brace belongs to something else.
         const std::size_t end = masked.find_first_of("}\"'\r\n", at);
         if (end == std::string::npos) break;
         if (masked[end] == '}') {
             for (std::size_t i = at + 1; i <= end; ++i) exchange(masked[i], kMeaning, kMasks);
         }
-        at = masked.find("${", end);  // what stands before it has the same end
+        at = masked.find("${", end);  // any `${` before it has the same end
     }
     return masked;
 }
@@ -52,14 +52,14 @@ std::size_t count_inside(std::string_view text) {
     return static_cast<std::size_t>(std::ranges::count_if(text, is_inside));
 }
 
-/// Takes two columns of a terminal (Unicode, UAX 11).
+/// True if it takes two columns of a terminal (Unicode, UAX 11).
 bool is_wide(char32_t c) {
     return (c >= 0x1100 && c < 0x1160) || (c >= 0x2E80 && c < 0xA4D0) ||
            (c >= 0xAC00 && c < 0xD7A4) || (c >= 0xF900 && c < 0xFB00) ||
            (c >= 0xFF01 && c < 0xFF61) || (c >= 0x20000 && c < 0x40000);
 }
 
-/// What stands before the caret, as blanks of the same width.
+/// Returns blanks of the width of what precedes the caret.
 std::string blanks_for(std::string_view before) {
     std::string blanks;
     for (std::size_t at = 0; at < before.size();) {

@@ -9,11 +9,11 @@
 
 namespace panelgate::yaml {
 
-/// Between { and } the braces of `${NAME:-default}` would end the list or map around it. Masked,
-/// it has bytes instead that mean nothing to a YAML parser and that no UTF-8 text has; the length
-/// is the same, so marks stay true.
+/// Replaces special characters of `${NAME:-default}` by bytes without a meaning to a YAML parser,
+/// which no UTF-8 text has: between { and } its braces would end the list or map. The length stays,
+/// so marks remain valid.
 std::string mask_variables(std::string_view text);
-/// What was written, of a text that came out of a masked one.
+/// Restores text that was masked.
 std::string unmask_variables(std::string text);
 
 /// A decoded text and its lines. Columns count characters, as editors do; yaml-cpp counts bytes.
@@ -22,15 +22,16 @@ class Source {
     explicit Source(std::string all);
 
     std::string_view text() const { return text_; }
-    /// The last place of the text when `offset` is behind it.
+    /// Returns the mark of an offset; the end of the text if it is beyond.
     Mark mark(std::size_t offset) const;
-    /// Of a place as yaml-cpp tells it: from 0, the column in bytes.
+    /// Converts a place of yaml-cpp: from 0, the column in bytes.
     Mark mark(int line, int column) const;
-    /// Without its end; empty when there is none of that number (from 1).
+    /// Returns a line (from 1) without its end; empty if there is none.
     std::string_view line(int number) const;
-    /// At a place as yaml-cpp tells it; '\n' behind the end.
+    /// Returns the byte at a place of yaml-cpp; '\n' beyond the end.
     char byte(int line, int column) const;
-    /// The line and a `^` below the column, each ended by '\n'; a long line is cut around it.
+    /// Returns the line and a `^` below the column, each ended by '\n'; a long line is cut around
+    /// it.
     std::string excerpt(Mark mark) const;
 
   private:
@@ -38,7 +39,7 @@ class Source {
 
     std::string text_;
     std::vector<std::size_t> lines_;   ///< where each begins
-    std::vector<std::size_t> inside_;  ///< bytes inside characters before each 64th byte
+    std::vector<std::size_t> inside_;  ///< continuation bytes before each 64th byte
 };
 
 }  // namespace panelgate::yaml

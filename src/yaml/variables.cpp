@@ -13,7 +13,7 @@ namespace panelgate::yaml {
 
 namespace {
 
-constexpr std::size_t kMost = std::size_t{1} << 20;  ///< bytes that variables bring, in all
+constexpr std::size_t kMost = std::size_t{1} << 20;  ///< total bytes of variables' values
 
 bool is_variable_name(std::string_view text) {
     constexpr std::string_view kDigits = "0123456789";
@@ -77,7 +77,7 @@ class Expansion {
         return to;
     }
 
-    /// $NAME and $(NAME), as shells and makefiles have them; a letter alone is a currency.
+    /// Reports $NAME and $(NAME), as in shells and makefiles; a single letter is a currency.
     void refuse_unbraced(const Node& node, std::string_view behind) {
         const bool bracket = behind.starts_with('(');
         if (bracket) behind.remove_prefix(1);
@@ -90,7 +90,7 @@ class Expansion {
                                      "}, or $" + typed + " for the text itself");
     }
 
-    /// `typed`: with dollar and braces. What it cannot be stays as it is.
+    /// `typed` includes dollar and braces. An invalid form is returned unchanged.
     std::string value_of(const Node& node, std::string_view typed) {
         const std::string text(typed);
         const bool closed = typed.ends_with('}');
@@ -121,9 +121,9 @@ class Expansion {
                           "what the environment has as " + variable->name + " is not UTF-8");
             return text;
         }
-        brought_ += value->size();
-        if (brought_ <= kMost) return *value;
-        if (brought_ - value->size() <= kMost)
+        expanded_size_ += value->size();
+        if (expanded_size_ <= kMost) return *value;
+        if (expanded_size_ - value->size() <= kMost)
             problems_.add(node.mark,
                           "variables bring more than " + std::to_string(kMost) + " bytes");
         return text;
@@ -131,8 +131,8 @@ class Expansion {
 
     const Environment& environment_;
     Problems& problems_;
-    std::size_t brought_ = 0;
-    std::string named_;  ///< the last variable of the scalar in work
+    std::size_t expanded_size_ = 0;
+    std::string named_;  ///< the last variable of the current scalar
 };
 
 }  // namespace

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """A plain Modbus/TCP to RTU bridge, as many are: one request after the other, the oldest first, 500
 ms for a reply, a read once more when none came, what is there thrown away behind an error, and the
-silence of the standard between two frames. It guards nothing.
+silence of the standard between two frames. It guards nothing. What has waited for a second is not
+asked any more: its client has given up, and a backlog must not outlive the fault that made it.
 
 plain_bridge.py TTY BAUD: prints its port, and serves until stdin ends.
 """
@@ -18,6 +19,7 @@ import tty
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "system"))
 from harness import crc  # noqa: E402
 
+PATIENCE = 1.0  # s that clients wait
 TIMEOUT = 0.5  # s, for the reply to begin, and between its pieces
 READS = (1, 2, 3, 4)
 
@@ -94,13 +96,15 @@ class Bridge:
             while True:
                 transaction, _, length = struct.unpack(">HHH", await reader.readexactly(6))
                 body = await reader.readexactly(length)
-                await self._queue.put((transaction, body, writer))
+                await self._queue.put((time.monotonic(), transaction, body, writer))
         except (asyncio.IncompleteReadError, ConnectionError):
             writer.close()
 
     async def run(self):
         while True:
-            transaction, body, writer = await self._queue.get()
+            arrived, transaction, body, writer = await self._queue.get()
+            if time.monotonic() > arrived + PATIENCE:
+                continue
             frame = body + crc(body)
             reply = await self._wire.transact(frame)
             if reply is None and body[1] in READS:

@@ -16,54 +16,54 @@
 
 namespace panelgate::arbiter {
 
-/// Why a frame is sent now. It becomes words only when somebody reads them.
+/// Why a frame is sent now. text_of() renders it only when a reader asks.
 struct Reason {
     enum class Kind : std::uint8_t {
-        none,         ///< nobody wants to know, or nobody here has sent it
-        learns_echo,  ///< a write is next, and this read finds out about the echo
+        none,         ///< explain is off, or the frame is not ours
+        learns_echo,  ///< a read that detects the line's echo before a write
         probe,
-        again,  ///< another attempt
-        turn,   ///< it was next
+        again,  ///< a retry
+        turn,   ///< next in turn
     };
     Kind kind = Kind::none;
     PriorityClass priority = PriorityClass::read;
     std::uint8_t station = 0;
-    std::uint8_t asked_function = 0;  ///< what it stands for; 0: its own
-    bool passed_over = false;         ///< ahead of a higher class, which had had its turns
+    std::uint8_t asked_function = 0;  ///< that the client asked for; 0: the request's own
+    bool passed_over = false;         ///< ahead of a higher class that had its turns
     int attempt = 1;
     Duration waited{};
-    std::size_t waiting = 0;  ///< behind it, on the whole line
-    std::size_t answers = 0;  ///< requests
-    ClientName client{};      ///< who wants it
+    std::size_t waiting = 0;  ///< requests still queued on the whole line
+    std::size_t answers = 0;  ///< number of requests it answers
+    ClientName client{};      ///< that it is sent for
 };
 
-/// One line, or "" for none.
+/// Returns the reason as one line, or "" for Kind::none.
 std::string text_of(const Reason& reason);
 
 /// Write these bytes in one piece, now: a frame in the line's mode.
 struct Transmit {
     Bytes adu;
 };
-/// A job is done: its one and only answer.
+/// A job is done: its only result.
 struct Finish {
     Ticket ticket = 0;
     Result<Bytes> pdu = Fault::cancelled;
-    bool transmitted = false;  ///< at least once, at least partly
-    bool shared = false;       ///< another job's transaction answered it too
-    /// Of a value that was read before and answers from memory (max_age).
+    bool transmitted = false;  ///< at least once, at least in part
+    bool shared = false;       ///< answered by another job's transaction
+    /// Age of a value answered from memory (max_age).
     std::optional<Duration> age;
-    TransactionNumbers transactions{};  ///< that were made for it
+    TransactionNumbers transactions{};  ///< that were made for the job
 };
-/// Something was seen on the wire, for the trace. Frames stand there as RTU says them.
+/// A frame seen on the wire, for the trace; always in RTU form.
 struct Note {
     TimePoint at;  ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
-    Reason why{};                 ///< of a sent frame, with Settings::explain: why this one now
-    Transaction transaction = 0;  ///< that a sent frame begins
+    Reason why{};                 ///< of a sent frame, with Settings::explain
+    Transaction transaction = 0;  ///< begun by this sent frame
 };
-/// With Settings::explain: a transaction is over. Said behind the frame that ends it, before the
-/// Finish of those that it answers.
+/// With Settings::explain: a transaction is over. Follows the frame that ends it and precedes the
+/// Finish of the jobs that it answers.
 struct Exchange : TransactionInstants {
     Transaction transaction = 0;
     TransactionEnd end = TransactionEnd::open;
@@ -74,7 +74,7 @@ struct Decision {
     TimePoint at;
     std::string text;
 };
-/// A station changed its health, or showed something that its owner should know.
+/// A station changed its health, or shows something that its operator should know.
 struct StationEvent {
     enum class Kind : std::uint8_t {
         offline,
@@ -83,25 +83,25 @@ struct StationEvent {
         drift,      ///< 95 of 100 replies take up to `by`: near the response timeout
         collision,  ///< the echo of a request to it differed from what was sent
         echo,       ///< a request to it came back: the line hears itself
-        trail,      ///< something stands behind its replies, up to `by`: the line waits for that
+        trail,      ///< bytes follow its replies for up to `by`: the line waits for that
     };
     Kind kind = Kind::online;
     std::uint8_t station = 0;
     Duration by{};
 };
 std::string_view label(StationEvent::Kind kind);
-/// A request that may change what a station holds is about to leave, or its attempt is over,
-/// answered or not. Said at each attempt, before its Finish.
+/// A write is about to be sent, or its attempt is over, answered or not. Emitted for each attempt,
+/// before its Finish.
 struct Written {
-    std::uint8_t station = 0;           ///< 0: all of them
-    std::optional<modbus::Span> items;  ///< nothing: the request names none
+    std::uint8_t station = 0;           ///< 0: all stations
+    std::optional<modbus::Span> items;  ///< empty: the request names no items
     bool ended = false;
-    Client client = 0;  ///< whose it is; 0: nobody waits for it any more
+    Client client = 0;  ///< 0: no client waits for it any more
 };
-/// Close the way to the wire and open it again, so that nothing that was sent on it is answered any
-/// more: then on_line_down and on_line_up.
+/// Close the transport and open it again, so that nothing that was sent on it is answered any more:
+/// then on_line_down and on_line_up.
 struct Reset {
-    std::string_view why;  ///< a literal, for people
+    std::string_view why;  ///< a string literal, for the log
 };
 using Action =
     std::variant<Transmit, Finish, Note, Decision, StationEvent, Written, Reset, Exchange>;

@@ -9,96 +9,96 @@
 
 namespace panelgate::arbiter {
 
-/// Watches for our own frame at the front of what is heard after it was sent. One frame, pure.
+/// Detects and removes our own frame at the front of what is heard after sending it. For one frame.
+/// Pure.
 class EchoFilter {
   public:
     enum class Expect : std::uint8_t {
         nothing,    ///< the line has no echo
-        perhaps,    ///< bytes that look like it are held back until they are it, or are not
+        perhaps,    ///< matching bytes are buffered until they are the echo, or not
         certainly,  ///< anything else at the front is a collision
     };
 
     EchoFilter() = default;
     EchoFilter(Bytes frame, Expect expect) : frame_(std::move(frame)), expect_(expect) {}
 
-    /// Takes what is heard and gives what is not echo: a part of `bytes`, or a copy that lives
-    /// until the next call.
+    /// Takes what is heard and returns what is not echo: a part of `bytes`, or a buffer that is
+    /// valid until the next call.
     ByteView feed(ByteView bytes);
-    /// The line is silent: what was held back and never became the echo.
+    /// The line is silent: returns the buffered bytes that did not become the echo.
     Bytes release();
 
-    /// Bytes are held back that may still turn out not to be the echo.
+    /// True if bytes are buffered that may still turn out not to be the echo.
     bool pending() const { return expect_ == Expect::perhaps && matched_ > 0; }
-    std::size_t held() const { return pending() ? matched_ : 0; }
-    /// The echo has begun, and so many bytes at least have to come until it shows that it is none,
-    /// or until it is over. 0: nothing has begun.
+    std::size_t pending_size() const { return pending() ? matched_ : 0; }
+    /// Bytes until a begun echo is complete or disproved, at least; 0: none has begun.
     std::size_t missing() const;
-    /// It watches for the echo, as long as nothing else has come.
+    /// True while it still looks for the echo.
     bool expected() const { return expect_ != Expect::nothing; }
-    /// The frame that it watches for: the one sent last.
+    /// The frame that it looks for: the one sent last.
     ByteView frame() const { return frame_; }
-    /// The whole frame came back.
+    /// True if the whole frame came back.
     bool complete() const { return complete_; }
-    /// An echo was certain and something else came.
+    /// True if an echo was certain and other bytes came.
     bool mismatch() const { return mismatch_; }
 
   private:
     Bytes frame_;
     Expect expect_ = Expect::nothing;
-    std::size_t matched_ = 0;  ///< of the frame, while it is being compared
+    std::size_t matched_ = 0;  ///< bytes of the frame that have matched so far
     bool complete_ = false;
     bool mismatch_ = false;
     Bytes released_;
 };
 
-/// The reply to this request can never be the request itself: it shows whether there is an echo.
+/// True if the reply to this request can never equal the request: it shows whether there is an
+/// echo.
 bool teaches_echo(const modbus::Request& request);
 
-/// Two bytes or more of `heard` stand like this in our own frame: a part of its echo.
+/// True if two or more consecutive bytes of `heard` also occur in `frame`: part of its echo.
 bool holds_fragment(ByteView heard, ByteView frame);
 
-/// What is known of a line's echo (P8): told by the configuration, or learned from reads, whose
-/// answer cannot be mistaken for their echo. Never from 05 or 06. Pure.
+/// What is known of a line's echo (P8): configured, or learned from reads, whose answers cannot be
+/// mistaken for their echo. Never learned from 05 or 06. Pure.
 class EchoMemory {
   public:
     explicit EchoMemory(EchoMode mode);
 
     EchoState state() const { return state_; }
-    /// What is sent comes back, as far as anybody knows: it has, and not just once has it not.
+    /// True if an echo is expected: one was heard, and has not been missing repeatedly since.
     bool expects_one() const {
         return state_ == EchoState::present || (heard_ && state_ != EchoState::absent);
     }
     bool known() const { return state_ == EchoState::present || state_ == EchoState::absent; }
-    /// The device was opened again: it may be another one.
+    /// The device was reopened: it may be another one.
     void forget();
     EchoFilter::Expect expect(const modbus::Request& request) const;
-    /// This request could be confirmed by its own echo, and nobody knows whether there is one.
-    /// `tried`: a read was sent for it already; where that did not tell, it goes all the same.
+    /// True if this request could be confirmed by its own echo while the echo is unknown. `tried`:
+    /// a read was already sent for it; if that was inconclusive, the request goes all the same.
     bool must_be_learned_before(const modbus::Request& request, bool tried) const;
 
-    /// The whole echo of this request came back. True when that is news.
+    /// The whole echo of this request came back. Returns true if that is new.
     bool on_echo(const modbus::Request& request);
-    /// A good reply to this request came; `fragment`: with a part of the request in front of it.
-    /// Other bytes in front, and whatever stands behind, tell nothing about an echo (FRM-07).
+    /// A good reply to this request came; `fragment`: preceded by a part of the request. Other
+    /// bytes in front or behind say nothing about an echo (FRM-07).
     void on_reply_without_echo(const modbus::Request& request, bool fragment);
-    /// The read that was to tell did not.
+    /// The read that was to detect the echo was inconclusive.
     void on_unclear();
-    /// Its own echo was heard and no answer: where it could be its own answer, that may be what it
-    /// was, because the line has no echo any more.
+    /// Its echo was heard, but no answer: where both are equal, it may have been the answer, and
+    /// the line has no echo any more.
     void on_unanswered(const modbus::Request& request);
-    /// What came back may have been an echo, where none was known: learn again, unless the
-    /// configuration knows.
+    /// A reply may have been an echo where none was known: learn again, unless configured.
     void on_suspected() {
         if (mode_ == EchoMode::automatic && state_ == EchoState::absent) begin();
     }
-    /// The echo differed: learn again, unless the configuration knows.
+    /// The echo differed: learn again, unless configured.
     void on_mismatch();
 
   private:
     void begin();
 
-    /// Replies one after another without any echo, until there is none, where one was heard: bytes
-    /// are lost now and then, and a write would be confirmed by the next echo.
+    /// Replies in a row without any echo until an echo heard before counts as gone: bytes get lost
+    /// now and then, and the next echo would confirm a write.
     static constexpr int kNoMore = 16;
 
     EchoMode mode_;

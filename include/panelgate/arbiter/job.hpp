@@ -15,11 +15,11 @@
 
 namespace panelgate::arbiter {
 
-/// A transaction is one request on the wire. A line counts them, from 1.
+/// A transaction is one request on the wire, numbered per line from 1.
 using Transaction = std::uint64_t;
 
-/// The transactions that were made for a job, the oldest first: one for each attempt. Nearly all
-/// have one, and then nothing is taken from any heap.
+/// The transactions made for a job, oldest first: one for each attempt. Most jobs have one, which
+/// needs no heap memory.
 class TransactionNumbers {
   public:
     void add(Transaction number) {
@@ -39,56 +39,54 @@ class TransactionNumbers {
     PoolVector<Transaction> before_;
 };
 
-/// Names one accepted job; never reused.
+/// Identifies one accepted job; never reused.
 using Ticket = std::uint64_t;
 using Client = std::uint64_t;
-/// Where a client comes from: all connections from one address have the same.
+/// Where a client comes from: the same for all connections from one address.
 using Host = std::uint64_t;
 
-/// One request on its way.
+/// One request and its state.
 struct Job {
     Ticket ticket = 0;         ///< given by the arbiter
     std::uint8_t station = 0;  ///< 0: broadcast
     modbus::Request request;
     Client client = 0;
-    Host host = 0;  ///< 0: the client is its own
+    Host host = 0;  ///< 0: the client counts as its own host
     PriorityClass priority = PriorityClass::read;
-    /// The function that was asked for, where the request has another one instead; 0: its own.
+    /// The function the client asked for, where the request uses another one instead; 0: the same.
     std::uint8_t asked_function = 0;
-    Duration within = Duration::max();  ///< its deadline, where the queue's is not sooner
-    /// Its reply is waited for at least so long (within the response timeout), also of a station
-    /// that nobody knows.
+    Duration within = Duration::max();  ///< its time limit, if sooner than the queue's
+    /// Minimum wait for its reply (within the response timeout), also from an unknown station.
     Duration patience{};
-    /// A search that keeps to a share of its own: silent strangers are asked without their budget,
-    /// and their silence tells nothing about the line.
+    /// A scan with its own budget: unheard stations are asked outside theirs, and their silence
+    /// says nothing about the line.
     bool search = false;
     TimePoint arrived{};
     TimePoint deadline{};
-    TimePoint start_by{};  ///< the last moment at which starting it makes sense
-    int attempts = 0;      ///< transmissions so far
-    bool alone = false;    ///< a shared transaction for it was refused: ask for just this
-    bool gone = false;     ///< its client has left while it was on the wire: no further attempt
+    TimePoint start_by{};               ///< the last moment at which starting it makes sense
+    int attempts = 0;                   ///< transmissions so far
+    bool alone = false;                 ///< a shared transaction for it was refused: send it alone
+    bool gone = false;                  ///< its client has left while it was on the wire: no retry
     TransactionNumbers transactions{};  ///< one for each attempt
 };
 using Jobs = PoolVector<Job>;
 
-/// Nothing: a client without a name.
+/// Null: a client without a name.
 using ClientName = std::shared_ptr<const std::string>;
 
-/// What clients are called in words for people: the one place that knows. Bounded; a client that
-/// has gone is forgotten. Pure.
+/// Names of clients for messages. Bounded; a client that has gone is forgotten. Pure.
 class ClientNames {
   public:
     static constexpr std::size_t kClients = 8192;
 
-    /// The last name counts.
+    /// Replaces an earlier name.
     void set(Client client, std::string name) {
         const auto known = names_.find(client);
         if (known == names_.end() && names_.size() >= kClients) return;
         names_.insert_or_assign(client, std::make_shared<const std::string>(std::move(name)));
     }
     void forget(Client client) { names_.erase(client); }
-    /// For later, when it may have gone.
+    /// Returns a name that stays valid after the client has gone.
     ClientName name(Client client) const {
         const auto known = names_.find(client);
         return known == names_.end() ? nullptr : known->second;
@@ -102,8 +100,8 @@ class ClientNames {
     std::map<Client, ClientName> names_;
 };
 
-/// How much of the line's time each client has used (P9). A transaction for several is shared out
-/// equally. Bounded; a client that has gone is forgotten. Pure.
+/// How much of the line's time each client has used (P9). A shared transaction is split equally.
+/// Bounded; a client that has gone is forgotten. Pure.
 class BusShares {
   public:
     static constexpr std::size_t kClients = 1024;
@@ -119,7 +117,7 @@ class BusShares {
         ++shares_[client].transactions;
     }
     void forget(Client client) { shares_.erase(client); }
-    /// Nothing used yet: all zero.
+    /// All zero if nothing was used yet.
     Share of(Client client) const {
         const auto known = shares_.find(client);
         return known == shares_.end() ? Share{} : known->second;

@@ -16,25 +16,25 @@
 
 namespace panelgate::arbiter {
 
-/// The requests that wait for one line: whose turn it is, and who has to go when it is full (P9).
+/// The requests that wait for one line: which is next, and which is dropped when it is full (P9).
 ///
-/// *Order.* What one client wants of one station is a lane and keeps its order. A client's
-/// broadcast runs behind all that is older of it and before all that is younger.
+/// *Order.* One client's requests to one station form a lane and keep their order. A client's
+/// broadcast runs after all its older requests and before all its younger ones.
 /// *Turns.* The first jobs of the lanes compete: writes, then reads, then polls. Within a class
 /// hosts take turns, within a host its clients, within a client its stations; each class has its
-/// own rounds, or who writes much would never read. A read that may run gets at least every fifth
-/// turn, a poll every tenth, whatever else waits; a write that is alone in its class starts within
-/// two.
-/// *Limits.* A read that another waiting read contains rides: it does not count. Whatever rides,
-/// kMost wait at most (put_back aside).
-/// *Full.* A newcomer takes the place of the newest request of the greediest client of the
-/// greediest host, if these have more that counts than its own host, or else its own client, would
-/// have: a poll, else a read; a write only for a write, or when its host holds more than half. A
-/// write may also take the place of a poll or read of somebody who has as much as its own, but for
-/// the last fifth of all places. What is taken away is the newest of its lane, but for reads behind
-/// it that would not make room.
+/// own rounds, so that a client with many writes still gets to read. A runnable read gets at least
+/// every fifth turn, a poll every tenth, whatever else waits; a write that is alone in its class
+/// starts within two.
+/// *Limits.* A read that another waiting read contains is carried by that and does not count.
+/// Including carried reads, kMost wait at most (put_back aside).
+/// *Full.* A newcomer replaces the newest request of the client with the most counted requests, of
+/// the host with the most, if these have more than its own host, or else its own client, would then
+/// have: a poll, else a read; a write only for a write, or if its host holds more than half. A
+/// write may also replace a poll or read of a client with as many requests as its own, except in
+/// the last fifth of all places. The newest of a lane is dropped, except reads behind it that would
+/// not free a place.
 ///
-/// Pure, and a value. Tickets are unique and rise with each push. The tests that are handed in must
+/// Pure, and a value. Tickets are unique and rise with each push. The test functions passed in must
 /// not call the queue.
 class JobQueue {
   public:
@@ -44,58 +44,60 @@ class JobQueue {
     static constexpr int kPollTurn = 10;  ///< a poll gets at least every tenth
 
     explicit JobQueue(const QueueSettings& settings) : settings_(settings) {}
-    /// For whoever comes from now on: what waits stays.
+    /// Applies to new jobs; queued ones stay.
     void apply(const QueueSettings& settings) { settings_ = settings; }
 
-    /// What came of push(): taken or refused; taken at the cost of others, which are to be answered
-    /// busy: one, or more where reads that others rode on count in their place.
-    struct Admission {
+    /// Result of push(): taken or refused. `shed` holds the jobs dropped for it, which must be
+    /// answered busy: one, or more if carried reads count in its place.
+    struct PushResult {
         bool taken = false;
         Jobs shed;
     };
-    Admission push(Job job);
-    /// A job that was taken before: ahead of its client's younger ones for that station; never
-    /// refused, never sheds.
+    PushResult push(Job job);
+    /// Returns a job that was taken before: ahead of its client's younger ones for that station;
+    /// never refused, never drops others.
     void put_back(Job job);
 
-    /// The next in turn of those that may run, nullptr when none may. Valid until the next change.
+    /// The next in turn of the runnable jobs, nullptr if there is none. Valid until the next
+    /// change.
     const Job* peek(const Test& may_run) const;
-    /// Takes the one that peek() shows; the turns move on.
+    /// Takes the job that peek() returns and advances the turns.
     std::optional<Job> pop(const Test& may_run);
-    /// Takes, of all lanes for this station, the first jobs that match, again and again until none
-    /// does. `wanted` may change its mind with each that it accepts. No turns move. Order of
-    /// tickets.
+    /// Takes the matching first jobs of all lanes for this station, repeatedly until none matches;
+    /// `wanted` may depend on what it accepted. Turns do not advance. In order of tickets.
     Jobs take_all(std::uint8_t station, const Test& wanted);
-    /// In order of tickets.
+    /// Removes and returns the matching jobs, in order of tickets.
     Jobs remove_if(const Test& match);
-    /// Each lane's first job that order allows to run, until one matches. False when none does.
+    /// Visits each lane's first job that order allows to run, until one matches. False if none
+    /// does.
     bool any_first(const Test& match) const;
 
-    /// Something of this client waits for this station; a broadcast of it is for every station.
+    /// True if a job of this client waits for this station; a broadcast is for every station.
     bool has(Client client, std::uint8_t station) const;
-    /// The one popped last went ahead of a higher class that could have run: it was its turn.
+    /// True if the job popped last went ahead of a runnable higher class: it was its turn.
     bool last_was_passed_over() const { return last_was_passed_over_; }
-    /// Those that count against the limit; more than it only by what was put back, or when those
-    /// that carried others went.
+    /// Jobs that count against the limit; above it only after put_back(), or when reads that
+    /// carried others were taken.
     std::size_t size() const { return size_; }
-    std::size_t waiting() const { return expiries_.size(); }  ///< all
+    std::size_t waiting() const { return expiries_.size(); }  ///< all of them
     bool empty() const { return expiries_.empty(); }
     /// The earliest start_by of all.
     std::optional<TimePoint> first_expiry() const;
-    /// Counts everything again, for tests.
+    /// Recounts everything. For tests.
     bool consistent() const;
 
   private:
     static constexpr std::size_t kRanks = 3;  ///< probes are not queued
-    /// Who is next, by turn.
+    /// Keys in order of their turns.
     template <class Key>
     using Rounds = std::array<PoolMap<std::uint64_t, Key>, kRanks>;
     using Turns = std::array<std::uint64_t, kRanks>;
-    using HostKey = std::pair<bool, std::uint64_t>;  ///< whether a client is its own, and its id
+    using HostKey =
+        std::pair<bool, std::uint64_t>;  ///< whether it is a client without a host, and the id
 
     struct Entry {
         Job job;
-        std::optional<ReadSpan> span;  ///< of a read that can share
+        std::optional<ReadSpan> span;  ///< of a shareable read
     };
     struct Lane {
         PoolDeque<Entry> jobs;
@@ -119,11 +121,11 @@ class JobQueue {
         std::uint8_t station = 0;
     };
     struct Choice {
-        std::array<std::optional<Place>, kRanks> first;  ///< of each class, that may run
-        std::size_t rank = kRanks;                       ///< kRanks: none may
+        std::array<std::optional<Place>, kRanks> first;  ///< first runnable one of each class
+        std::size_t rank = kRanks;                       ///< kRanks: none is runnable
         bool passed_over = false;
     };
-    /// The greatest goes first when somebody has to.
+    /// Drop order: the greatest is dropped first.
     struct Merit {
         bool is_write = false;
         bool makes_room = false;
@@ -155,7 +157,7 @@ class JobQueue {
     Choice choose(const Test& may_run) const;
     bool is_polls_turn(const Choice& choice, std::size_t top) const;
     void count_turn(const Choice& choice);
-    void to_the_end(const Place& place, std::size_t rank);
+    void move_to_back(const Place& place, std::size_t rank);
 
     static Entry entry_of(Job job);
     HostKey host_of(const Job& job) const;
@@ -164,7 +166,7 @@ class JobQueue {
     Job take(const Place& place, std::size_t index);
     void enlist(const Place& place);
     void delist(const Place& place);
-    void close(const Place& place);  ///< a lane that has become empty
+    void close(const Place& place);  ///< removes an empty lane
     void count(Client client, int by);
     void forget(const Entry& entry);
 
@@ -177,14 +179,14 @@ class JobQueue {
     bool source_consistent(Client client, const HostKey& host, const Source& source) const;
 
     QueueSettings settings_;
-    PoolMap<HostKey, Origin> hosts_;  ///< nothing empty in it
+    PoolMap<HostKey, Origin> hosts_;  ///< no empty entries
     Rounds<HostKey> rounds_;
-    PoolMap<Client, HostKey> home_;  ///< of those that wait
+    PoolMap<Client, HostKey> home_;  ///< of clients with waiting jobs
     WaitingReads reads_;
-    PoolMultiset<TimePoint> expiries_;  ///< of all that wait
+    PoolMultiset<TimePoint> expiries_;  ///< of all waiting jobs
     std::size_t size_ = 0;
     std::uint64_t turns_ = 0;
-    /// Turns that others had while one of this class could have run.
+    /// Turns of other classes while one of this class was runnable.
     std::array<int, kRanks> passed_{};
     bool last_was_passed_over_ = false;
 };

@@ -19,26 +19,26 @@
 
 namespace panelgate::arbiter {
 
-/// What the arbiter says: actions in their order, and counts. It listens to what the parts return;
-/// nothing depends on it. Symptoms are what the line doctor looks at.
-class Ledger {
+/// The arbiter's output: actions in their order, and counters. It observes the other parts; nothing
+/// depends on it. Symptoms are the input of the line diagnosis.
+class Outbox {
   public:
-    explicit Ledger(const Settings& settings);
-    /// What was counted of stations that are no longer listed is forgotten.
+    explicit Outbox(const Settings& settings);
+    /// Drops the counters of stations that are no longer listed.
     void apply(const Settings& settings);
 
     std::optional<Action> poll();
-    /// `wire`: the bytes that say `adu` on the line.
+    /// `wire`: the bytes that represent `adu` on the line.
     void transmit(TimePoint now, const Attempt& attempt, Bytes adu, Bytes wire, Reason why);
     void finish(const Job& job, Result<Bytes> pdu, bool shared = false);
     void finish_from_memory(Ticket ticket, Bytes pdu, Duration age);
-    /// With Settings::explain.
-    void tell(const Attempt& attempt, TransactionEnd end);
+    /// Adds the Exchange of this attempt, with Settings::explain.
+    void report(const Attempt& attempt, TransactionEnd end);
     void event(StationEvent::Kind kind, std::uint8_t station, Duration by = {});
-    /// Says so of a group that may change something.
+    /// Adds a Written if the group is a write.
     void written(const Group& group, bool ended);
     void reset(std::string_view why) { actions_.push_back(Reset{why}); }
-    /// One line, put into words only when Settings::explain wants it.
+    /// Adds one line; `text` is called only with Settings::explain.
     template <class Text>
     void decide(TimePoint now, const Text& text) {
         if (explain_) actions_.push_back(Decision{now, text()});
@@ -47,31 +47,32 @@ class Ledger {
 
     // What happened on the wire
     void on_started(TimePoint now, const Job& job);
-    /// An attempt is over; `gap`: the silence behind it, which nobody else can use.
+    /// An attempt is over; `gap`: the silence after it, which cannot be used otherwise.
     void on_ended(TimePoint now, const Attempt& attempt, Duration gap);
-    /// The whole line was left alone for so long: nobody could use that either.
+    /// The whole line rested for `rest`: that time could not be used either.
     void on_rested(Duration rest) { line_.busy += rest; }
     void on_client_gone(Client client) { shares_.forget(client); }
     void on_answered(TimePoint now, const Attempt& attempt, Duration think,
                      const Station::Replied& replied);
     void on_failed(const Attempt& attempt, Verdict verdict);
-    /// Told once in a while: each one would be a line in somebody's log.
+    /// Emits an event at most every 10 seconds: each would be a log line.
     void on_echo_mismatch(TimePoint now, std::uint8_t station);
 
-    /// What a good frame is that nobody waits for, or that some bytes are damaged.
+    /// Classification of an unsolicited good frame, or of damaged bytes.
     enum class Part : std::uint8_t {
         damaged,
         echo,
         request,
         late,
-        copy,
+        duplicate,
         broadcast_reply,
         unasked,
         unknown,
     };
-    /// Traces and counts it; `asked` is who was asked last. Damage inside an attempt is its own.
-    void on_stray(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
-                  Duration lateness = {});
+    /// Traces and counts it; `asked`: the station asked last. Damage inside an attempt is counted
+    /// there.
+    void on_unsolicited(TimePoint now, const modbus::Unused& part, Part what, std::uint8_t asked,
+                        Duration lateness = {});
     void inside_attempt(bool inside) { inside_attempt_ = inside; }
 
     const LineCounters& line() const { return line_; }
@@ -82,24 +83,25 @@ class Ledger {
     StationCounters& of(std::uint8_t station);
     Symptoms& symptoms_of(std::uint8_t station) { return of(station).symptoms; }
     void count_damaged(const Attempt& attempt);
-    void remember_unheard(const Attempt& attempt, std::uint64_t mute_before);
-    void credit_unheard(const Group& group);
-    void count_stray(const modbus::Unused& part, Part what, std::uint8_t asked, Duration lateness);
+    void remember_unanswered(const Attempt& attempt, std::uint64_t mute_before);
+    void credit_unanswered(const Group& group);
+    void count_unsolicited(const modbus::Unused& part, Part what, std::uint8_t asked,
+                           Duration lateness);
 
     bool explain_ = false;
     modbus::CrcOrders orders_;
     bool inside_attempt_ = false;
-    std::optional<TimePoint> told_collision_;
+    std::optional<TimePoint> reported_collision_;
     PoolDeque<Action> actions_;
     LineCounters line_;
     BusShares shares_;
-    /// The last read of a station that stayed without reply, and the pauses before its attempts.
-    struct Unheard {
+    /// The last unanswered read of a station, and the pauses before its attempts.
+    struct Unanswered {
         Bytes pdu;
         std::array<std::size_t, 2> pauses{};
         std::size_t count = 0;
     };
-    std::map<std::uint8_t, Unheard> unheard_;  ///< at most one a station
+    std::map<std::uint8_t, Unanswered> unanswered_;  ///< at most one per station
     std::map<std::uint8_t, StationCounters> stations_;
 };
 

@@ -13,66 +13,65 @@
 
 namespace panelgate::arbiter {
 
-/// The requests to one station whose replies may still come (P1), oldest first. As a rule they are
-/// one and the same; on a way that may stall there may be others among them, which were to prove
-/// it. Panels serve in turn: a reply that fits several is that of the oldest. Pure.
-class Debt {
+/// The requests to one station whose replies may still come (P1), oldest first. Normally they are
+/// identical; on a transport that may stall there may also be the requests that were to prove it.
+/// Panels serve in order: a reply that fits several belongs to the oldest. Pure.
+class OutstandingReplies {
   public:
     static constexpr std::size_t kMost = 16;  ///< the oldest is forgotten beyond that
 
-    struct Owed {
+    struct Entry {
         TimePoint sent{};
         Bytes pdu;
     };
 
-    bool empty() const { return owed_.empty(); }
-    std::size_t size() const { return owed_.size(); }
-    void clear() { owed_.clear(); }
+    bool empty() const { return entries_.empty(); }
+    std::size_t size() const { return entries_.size(); }
+    void clear() { entries_.clear(); }
     void add(TimePoint sent, const Bytes& pdu);
-    /// The oldest one is owed no more. Not of an empty one.
-    void pop() { owed_.pop_front(); }
-    /// The one that left first, and last. Not of an empty one.
-    TimePoint first_sent() const { return owed_.front().sent; }
-    TimePoint last_sent() const { return owed_.back().sent; }
-    /// It owes something, and nothing but replies to this very request.
+    /// Removes the oldest. Must not be empty.
+    void pop() { entries_.pop_front(); }
+    /// When the first and the last of them left. Must not be empty.
+    TimePoint first_sent() const { return entries_.front().sent; }
+    TimePoint last_sent() const { return entries_.back().sent; }
+    /// True if not empty and all are this very request.
     bool is_only(const Bytes& pdu) const;
-    /// This reply may be one of them.
+    /// True if this reply may answer one of them.
     bool fits(ByteView reply) const { return oldest(reply) != nullptr; }
-    /// A normal reply to one of them could be taken for that to this request: the same function,
-    /// and the same length or echoed fields. `again`: this request is repeated, so that a reply to
-    /// its own earlier attempts is an answer to it.
+    /// True if a normal reply to one of them could be taken for the reply to this request: same
+    /// function, and same length or echoed fields. `again`: this is a retry, so replies to its own
+    /// earlier attempts answer it.
     bool is_ambiguous(const modbus::Request& request, bool again) const;
-    /// The request of what this reply answers was served, and a station serves in turn: those of
-    /// the same connection (that left at `connected` or later) and before `sent` were served, too.
+    /// A request that left at `sent` was served, and a station serves in order: removes the earlier
+    /// ones of the same connection (that left at `connected` or later).
     void close_before(TimePoint sent, TimePoint connected);
-    /// This reply may be one of them, but not by being one to the very same request.
+    /// True if this reply may answer one of them that is another request.
     bool fits_other(ByteView reply, const Bytes& pdu) const;
-    /// A request of another function is among them.
+    /// True if a request of another function is among them.
     bool has_other_function(std::uint8_t function) const;
-    /// The oldest that this reply may answer, or nullptr.
-    const Owed* oldest(ByteView reply) const;
-    /// ... that left later than `open`: the last one where none did; nullptr where none fits.
-    const Owed* oldest(ByteView reply, TimePoint open) const;
-    /// This reply has come: the oldest that it may answer is owed no more. What that was; nothing
-    /// where none fits.
+    /// Returns the oldest that this reply may answer, or nullptr.
+    const Entry* oldest(ByteView reply) const;
+    /// ... that left later than `open`; else the last that fits, or nullptr.
+    const Entry* oldest(ByteView reply, TimePoint open) const;
+    /// Removes the oldest that this reply may answer and returns its PDU; empty if none fits.
     Bytes take(ByteView reply);
 
   private:
-    PoolDeque<Owed> owed_;
+    PoolDeque<Entry> entries_;
 };
 
-/// What is known of the way to the wire, where it may hold frames back and deliver them later (RTU
-/// over TCP). A connection proves nothing: the kernel of a device server that hangs takes it, and
-/// what was sent on the one before may be served, and answered, behind that. Pure.
-class Way {
+/// What is known of a transport that may delay frames and deliver them later (RTU over TCP). An
+/// accepted connection proves nothing: the kernel of a hung device server accepts it, and requests
+/// sent on the previous connection may be served, and answered, after that. Pure.
+class TransportEpoch {
   public:
     void on_opened(TimePoint now) { opened_ = now; }
     /// A request that was started then has been answered.
     void on_proved(TimePoint started) { proved_ = std::max(proved_, started); }
 
-    /// What was sent before then has passed.
+    /// Requests sent before this time have been delivered.
     TimePoint proved() const { return proved_; }
-    /// What was sent before then was sent on another connection.
+    /// Requests sent before this time used an earlier connection.
     TimePoint opened() const { return opened_; }
 
   private:
@@ -80,46 +79,45 @@ class Way {
     TimePoint proved_{};
 };
 
-/// What a station that owes replies has shown on the connection that was opened because of them.
+/// What a station with outstanding replies has done since the line was reopened because of them.
 /// Pure.
-class Return {
+class ReconnectState {
   public:
     void on_opened() {
         opened_ = true;
         answered_ = false;
     }
     /// A request to it has ended without its own reply.
-    void on_owed() { opened_ = answered_ = false; }
+    void on_outstanding() { opened_ = answered_ = false; }
     void on_replied() {
         answered_ = opened_;
-        in_vain_ = 0;
+        unanswered_ = 0;
     }
-    /// `told_apart`: a read that nobody would have asked for but to tell its reply apart.
-    void on_in_vain(bool told_apart) {
-        plainly_ = told_apart;
-        in_vain_ = std::min(in_vain_ + 1, kMost);
+    /// `distinct_length`: a read sent only because its reply's length is distinct.
+    void on_probe_unanswered(bool distinct_length) {
+        only_known_reads_ = distinct_length;
+        unanswered_ = std::min(unanswered_ + 1, kMost);
     }
 
-    /// It has answered each request since then, and one at least. That may have been the replies
-    /// that it owes, one behind another: then as many are still to come, at once.
+    /// True if it has answered each request since then, and at least one. These may have been the
+    /// outstanding replies in order: then as many are still to come, at once.
     bool answered() const { return answered_; }
-    /// It may not answer other reads than it is used to.
-    bool plainly() const { return plainly_; }
-    /// Neither did it answer those that it is used to: perhaps it answers writes alone.
-    bool reads_in_vain() const { return in_vain_ >= kMost; }
+    /// True if it may answer only the reads that it has answered before.
+    bool only_known_reads() const { return only_known_reads_; }
+    /// True if it did not answer those either: perhaps it answers only writes.
+    bool reads_unanswered() const { return unanswered_ >= kMost; }
 
   private:
     static constexpr int kMost = 3;
 
-    int in_vain_ = 0;  ///< one after another
+    int unanswered_ = 0;  ///< in a row
     bool opened_ = false;
     bool answered_ = false;
-    bool plainly_ = false;
+    bool only_known_reads_ = false;
 };
 
-/// What panels that answer broadcasts, as none should, may still say to the last ones: behind the
-/// turnaround it would pass for the reply to a write that is confirmed in the same words (P8).
-/// Pure.
+/// The replies that panels which wrongly answer broadcasts may still send: after the turnaround one
+/// would pass for the reply to a write that is confirmed by the same bytes (P8). Pure.
 class BroadcastReplies {
   public:
     static constexpr std::size_t kBroadcasts = 16;  ///< that are remembered
@@ -128,8 +126,8 @@ class BroadcastReplies {
         Sent& oldest = last_[next_++ % kBroadcasts];
         oldest = {sent, modbus::normal_write_reply(request)};
     }
-    /// From then on no reply to a broadcast can be taken for that to `request`. `window`: how long
-    /// after a broadcast has left its station may answer it.
+    /// Time from which no reply to a broadcast can be taken for the reply to `request`. `window`:
+    /// how long after a broadcast its station may answer it.
     TimePoint over(const modbus::Request& request, Duration window) const {
         TimePoint over{};
         if (request.is_read()) return over;
@@ -149,25 +147,24 @@ class BroadcastReplies {
     std::size_t next_ = 0;
 };
 
-/// What other masters of the line have asked, as far as it was heard: what answers one of these may
-/// be its reply. Pure.
-class Questions {
+/// Requests heard from other masters: a frame that answers one of them may be its reply. Pure.
+class ForeignRequests {
   public:
     static constexpr std::size_t kMost = 8;  ///< the oldest is forgotten beyond that
 
-    /// These bytes begin with another master's request. Nobody answers a broadcast.
+    /// The bytes begin with another master's request. Broadcasts, which have no reply, are ignored.
     void on_heard(TimePoint now, ByteView bytes);
-    bool empty() const { return asked_.empty(); }
-    void clear() { asked_.clear(); }
-    /// This frame answers one that was heard at `since` or later.
+    bool empty() const { return requests_.empty(); }
+    void clear() { requests_.clear(); }
+    /// True if this frame answers one heard at `since` or later.
     bool fit(ByteView adu, TimePoint since = TimePoint::min()) const;
 
   private:
-    struct Question {
+    struct Entry {
         TimePoint at{};
         Bytes adu;
     };
-    std::vector<Question> asked_;
+    std::vector<Entry> requests_;
 };
 
 }  // namespace panelgate::arbiter

@@ -8,12 +8,11 @@
 
 namespace panelgate::arbiter {
 
-/// When the line may be used: the last bit seen on it, the gap behind that, and whatever else it
-/// has to rest for. Pure.
+/// When the line may be used: the last bit seen, the gap after it, and any further rest. Pure.
 class Quiet {
   public:
-    /// `longest`: of a frame. Bytes without a pause, not even one as long as the standard's gap,
-    /// for longer than that are no frame but a line that floats, and nobody has to wait for their
+    /// `longest`: duration of the longest frame. Bytes that continue longer than that, without even
+    /// a pause of the standard gap, are no frame but a floating line, and nothing waits for their
     /// end (LAT-02).
     Quiet(Duration longest, Duration pause) : longest_(longest), pause_(pause) {}
 
@@ -23,7 +22,7 @@ class Quiet {
         since_ = now;
         until_ = now;
     }
-    /// Our frame leaves, its last bit at `end`; the gap of `station` follows it.
+    /// Our frame leaves, its last bit at `end`; the gap of `station` follows.
     void on_sent(TimePoint end, std::uint8_t station) {
         since_ = end;
         station_ = station;
@@ -31,47 +30,47 @@ class Quiet {
         noise_ = {};
         begun_until_ = {};
     }
-    /// A frame has begun by its first character (ASCII), and its next one may come until then; no
-    /// time: it has ended.
+    /// An ASCII frame has begun, and its next character may come until then; TimePoint{}: it has
+    /// ended.
     void on_begun(TimePoint until) { begun_until_ = until; }
-    /// Something is heard that belongs to a transaction.
+    /// Bytes of a transaction were heard.
     void on_heard(TimePoint now) {
         since_ = std::max(since_, now);
         noise_ = {};
     }
-    /// On a line that is not bound to its rate the reply came before our frame can have left.
+    /// On a line that does not keep its rate, the reply came before our frame can have left.
     void on_answered_early(TimePoint now) { since_ = now; }
-    /// Something is heard that nobody asked for.
+    /// Unsolicited bytes were heard.
     void on_noise(TimePoint now) {
         if (now >= since_ + pause_ || noise_ == TimePoint{}) noise_ = now;
         since_ = std::max(since_, now);
     }
     void rest_until(TimePoint until) { until_ = std::max(until_, until); }
-    /// What the line rested for has come.
+    /// The frame that the line rested for has come.
     void rest_is_over() { until_ = {}; }
 
-    /// When a frame may follow that wants `gap` of silence in front.
+    /// Earliest time for a frame that needs `gap` of silence before it.
     TimePoint free_at(Duration gap) const {
         const TimePoint silent = since_ + gap;
         const bool floats = noise_ != TimePoint{} && since_ - noise_ >= longest_;
         return std::max({floats ? noise_ + longest_ : silent, until_, begun_until_});
     }
     TimePoint since() const { return since_; }
-    /// Whose gap follows the last bit: who was asked last.
+    /// The station asked last, whose gap follows the last bit.
     std::uint8_t station() const { return station_; }
 
-    /// Nobody but `station` may be asked until then, and only for the same again (P1).
+    /// Until then only `station` may be asked, and only for the same again (P1).
     void quarantine(TimePoint now, std::uint8_t station, TimePoint until) {
         if (until <= quarantined_until_) return;
         if (now >= quarantined_until_) rested_until_ = now;
         quarantined_ = station;
         quarantined_until_ = until;
     }
-    /// What the station owed has come.
+    /// The station's outstanding replies have come.
     void lift(TimePoint now, std::uint8_t station) {
         if (quarantined_ == station) quarantined_until_ = std::min(quarantined_until_, now);
     }
-    /// So much of its quarantines has passed since it was asked last.
+    /// Quarantine time that has passed since the last call.
     Duration take_rested(TimePoint now) {
         const TimePoint until = std::min(now, quarantined_until_);
         return std::max(until - std::exchange(rested_until_, std::max(rested_until_, until)),
@@ -85,17 +84,17 @@ class Quiet {
     TimePoint since_{};
     TimePoint until_{};
     TimePoint begun_until_{};
-    TimePoint noise_{};  ///< the first of the bytes that came without a pause
+    TimePoint noise_{};  ///< first of the bytes that came without a pause
     TimePoint quarantined_until_{};
-    TimePoint rested_until_{};  ///< what take_rested() has told
+    TimePoint rested_until_{};  ///< accounted for by take_rested()
     std::uint8_t station_ = 0;
     std::uint8_t quarantined_ = 0;
 };
 
 /// Whether a line that is no real UART behaves like one: replies never begin before the request has
-/// left, and no bytes come faster than the line's rate. One early reply settles it, until the line
-/// is opened again; several early ones in a row, and the line is not bound to its rate at all.
-/// Haste may be a sender that was held up by its machine: it has to happen again, and is forgotten.
+/// left, and bytes come no faster than the line's rate. One early reply disproves it until the line
+/// is reopened; after several in a row the line does not keep its rate at all. Bytes that come too
+/// fast may have been delayed by a busy sender: that must happen repeatedly, and is forgotten.
 /// Pure.
 class Pace {
   public:
@@ -108,14 +107,15 @@ class Pace {
             early_ = 0;
         }
     }
-    /// Did bytes of a reply come sooner than the line's rate allows?
+    /// `hasty`: bytes of a reply came faster than the line's rate allows.
     void on_rate(bool hasty) {
         hasty_ = hasty ? std::min(hasty_ + kWeight, kHasty * kWeight) : std::max(hasty_ - 1, 0);
     }
-    /// Nothing comes sooner than the line's rate allows, but for the odd one in kWeight replies.
+    /// True if nothing comes faster than the line's rate, except in one of kWeight replies.
     bool kept() const { return kept_ && hasty_ <= (kHasty - 1) * kWeight; }
     bool believed() const { return kept_ && timely_ >= kEnough; }
-    /// One early reply may be a late one, to a request that was sent again.
+    /// True if the line does not keep its rate. A single early reply may be a late one to an
+    /// earlier attempt.
     bool unbound() const { return early_ >= kEnough; }
 
   private:
@@ -126,7 +126,7 @@ class Pace {
     int timely_ = 0;
     int early_ = 0;  // in a row
     bool kept_ = true;
-    int hasty_ = 0;  // a hasty one: kWeight; any other: 1 less
+    int hasty_ = 0;  // +kWeight for each hasty reply, -1 for any other
 };
 
 }  // namespace panelgate::arbiter

@@ -13,7 +13,7 @@
 
 namespace panelgate::arbiter {
 
-/// What a read of one table (01..04) asks one station for.
+/// The items of one table (01..04) that a read asks of one station.
 struct ReadSpan {
     std::uint8_t station = 0;
     modbus::Span items;
@@ -27,28 +27,28 @@ struct ReadSpan {
     friend bool operator==(const ReadSpan&, const ReadSpan&) = default;
 };
 
-/// The part of a reply to `whole` that answers `part`, as its own reply PDU. `whole` contains
-/// `part` and the reply matches it.
+/// Returns the part of a reply to `whole` that answers `part`, as a reply PDU. `whole` must contain
+/// `part` and the reply match it.
 Bytes slice_reply(const modbus::Span& whole, ByteView reply, const modbus::Span& part);
 
-/// What reads of one line have brought, for stations that allow a client an older value (max_age).
-/// Bounded: the oldest value goes first. Pure.
+/// Values read on one line, for stations that allow clients an older value (max_age). Bounded: the
+/// oldest is dropped first. Pure.
 class ReadCache {
   public:
     static constexpr std::size_t kEntries = 256;
 
     struct Hit {
-        Bytes pdu;  ///< the reply to the read that was asked for
+        Bytes pdu;  ///< reply to the read that was asked for
         Duration age{};
     };
 
-    /// The normal reply to `span`, read by a request that left at `sampled` or later. Not kept when
-    /// something was written since: nobody knows which came first.
+    /// Stores the normal reply to `span`, read by a request that left at `sampled` or later. Not if
+    /// a write came since: the order of the two is unknown.
     void store(const ReadSpan& span, Bytes reply, TimePoint sampled);
-    /// The youngest value of all these items that is not older than max_age.
+    /// Returns the newest value of all these items that is not older than max_age.
     std::optional<Hit> find(const ReadSpan& span, TimePoint now, Duration max_age) const;
-    /// This request may change what the station holds (0: all stations), answered or not: what
-    /// modbus::may_change() says is forgotten.
+    /// A write to the station (0: all stations), answered or not: drops the values that
+    /// modbus::may_change() names.
     void on_write(TimePoint now, std::uint8_t station, const modbus::Request& request);
     void clear() { entries_.clear(); }
     std::size_t size() const { return entries_.size(); }
@@ -59,8 +59,8 @@ class ReadCache {
         Bytes reply;
         TimePoint sampled;
     };
-    PoolList<Entry> entries_;                    ///< the youngest first
-    std::map<std::uint8_t, TimePoint> written_;  ///< when each station was last written to; 0: all
+    PoolList<Entry> entries_;                    ///< newest first
+    std::map<std::uint8_t, TimePoint> written_;  ///< last write to each station; 0: all stations
 };
 
 }  // namespace panelgate::arbiter

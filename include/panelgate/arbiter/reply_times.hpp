@@ -13,7 +13,7 @@ namespace panelgate::arbiter {
 
 /// How long after a timeout a reply of one station may still come. Auto starts at the response
 /// timeout, grows to one and a half times the lateness seen, at most to eight timeouts, and shrinks
-/// again while replies come in time: one that was late once is no reason to wait for ever. Pure.
+/// again while replies are in time. Pure.
 class LateWindow {
   public:
     static constexpr int kForget = 512;  ///< replies in time, after which it shrinks by a third
@@ -21,7 +21,7 @@ class LateWindow {
     LateWindow(std::optional<Duration> fixed, Duration response_timeout)
         : fixed_(fixed), timeout_(response_timeout), window_(response_timeout) {}
 
-    /// What has grown does not shrink by that.
+    /// The current window does not shrink.
     void apply(std::optional<Duration> fixed, Duration response_timeout) {
         fixed_ = fixed;
         timeout_ = response_timeout;
@@ -43,33 +43,33 @@ class LateWindow {
         timely_ = 0;
         window_ = std::max(timeout_, window_ * 2 / 3);
     }
-    /// The longest lateness seen lately; 0: to be late is no habit of this station.
+    /// Longest recent lateness; 0: the station is not late regularly.
     Duration worst() const { return late_ < 2 ? Duration::zero() : worst_; }
 
   private:
-    static constexpr int kHabit = 64;  ///< replies in time, after which half is forgiven
+    static constexpr int kHabit = 64;  ///< replies in time, after which half of late_ is forgotten
 
     std::optional<Duration> fixed_;
     Duration timeout_;
     Duration window_;
     Duration worst_{};
     int timely_ = 0;
-    int late_ = 0;  ///< replies, lately
+    int late_ = 0;  ///< recent late replies
 };
 
-// When replies are over, as looks at them have told. One look in kLooks is to come too early, and
-// then the last bytes tell: who never looks too early does not know how much the wire idles. Pure.
+// When replies end, learned from reading at the expected end. One read in kLooks is meant to come
+// too early, so that the idle time is known. Pure.
 
 inline constexpr int kLooks = 8;
 
-/// What a line's machine takes to notice that a reply has begun, and to wake up for its end.
-class Notice {
+/// Time that this machine takes to notice that a reply has begun, and to wake up at its end.
+class WakeLatency {
   public:
     static constexpr Duration kMost = 200us;
 
-    /// So much sooner than it seems a reply is over; less than nothing: later.
+    /// Time by which a reply ends sooner than computed; negative: later.
     Duration early() const { return early_; }
-    /// A reply was looked at so early. `whole`: it was all there.
+    /// A reply was read that early. `whole`: all of it was there.
     void on_look(bool whole) {
         early_ = std::clamp(early_ + (whole ? kStep : (1 - kLooks) * kStep), -kMost, kMost);
     }
@@ -83,11 +83,11 @@ class Notice {
 /// By which share a panel's clock is faster than ours.
 class Drift {
   public:
-    static constexpr int kMost = 40'000;  ///< ppm: two clocks that differ by 2 %, and some more
+    static constexpr int kMost = 40'000;  ///< ppm: clocks that differ by 2 %, and a margin
 
-    /// So much sooner a reply is over that takes so long at the line's rate.
+    /// Time by which a reply of this duration at the line's rate ends sooner.
     Duration early(Duration reply) const { return reply * ppm_ / 1'000'000; }
-    /// As Notice::on_look(); a long reply tells more.
+    /// As WakeLatency::on_look(); a long reply counts more.
     void on_look(Duration reply, bool whole) {
         const int length = static_cast<int>(std::clamp<Duration>(reply, 1ms, 32ms) / 1ms);
         const int step = kStep * length;
@@ -95,16 +95,16 @@ class Drift {
     }
 
   private:
-    static constexpr int kStep = 3;  ///< ppm a millisecond
+    static constexpr int kStep = 3;  ///< ppm per millisecond of reply
 
     int ppm_ = 0;
 };
 
-/// The longest of what was seen lately: what a network did once is no reason to wait for ever.
-/// Pure.
+/// The longest of recent values; older ones are forgotten. Pure.
 class Slowest {
   public:
-    static constexpr int kWindow = 256;  ///< of the last so many all count; of two windows at most
+    static constexpr int kWindow =
+        256;  ///< at least the last kWindow values count, at most twice as many
 
     void add(Duration seen) {
         newer_ = std::max(newer_, seen);
@@ -112,7 +112,7 @@ class Slowest {
         count_ = 0;
         older_ = std::exchange(newer_, Duration::min());
     }
-    /// Nothing: none was seen.
+    /// Empty if no value was seen.
     std::optional<Duration> value() const {
         const Duration longest = std::max(older_, newer_);
         return longest == Duration::min() ? std::nullopt : std::optional(longest);
@@ -124,16 +124,16 @@ class Slowest {
     int count_ = 0;
 };
 
-/// The shortest, likewise. Pure.
+/// The shortest of recent values. Pure.
 class Quickest {
   public:
-    static constexpr int kEnough = 16;  ///< fewer tell nothing of what is too quick
+    static constexpr int kEnough = 16;  ///< fewer are not significant
 
     void add(Duration seen) {
         slowest_.add(-seen);
         count_ = std::min(count_ + 1, kEnough);
     }
-    /// Nothing: none was seen.
+    /// Empty if no value was seen.
     std::optional<Duration> value() const {
         const auto longest = slowest_.value();
         return longest ? std::optional(-*longest) : std::nullopt;
@@ -145,37 +145,37 @@ class Quickest {
     int count_ = 0;
 };
 
-/// Learns what always stands behind the replies of one station (the glitches of a transceiver that
-/// lets go, a second copy) and how long it lasts: what is sent meanwhile is damaged by it. Looks at
-/// the last kReplies replies, so that it is unlearned as soon as it stops. Pure.
+/// Learns what regularly follows the replies of one station (glitches of a transceiver that
+/// releases the line, a duplicate) and how long it lasts: it would damage a request sent meanwhile.
+/// Considers the last kReplies replies, so that it is soon unlearned. Pure.
 class Trail {
   public:
     static constexpr std::size_t kReplies = 8;
-    static constexpr int kOften = 3;            ///< of them: no accident
-    static constexpr Duration kLongest = 60ms;  ///< later, it is something else
+    static constexpr int kOften = 3;            ///< of kReplies: regularly
+    static constexpr Duration kLongest = 60ms;  ///< later bytes do not count
 
-    /// `frame`: what a usual reply takes on this line; its copy ends that much later.
+    /// `frame`: duration of a usual reply on this line; a duplicate ends that much later.
     explicit Trail(Duration frame = {}) : longest_(kLongest + frame) {}
 
     Duration longest() const { return longest_; }
-    /// A reply ended. What was seen behind the one before is remembered.
+    /// A reply ended; records what followed the previous one.
     void on_reply(TimePoint now) {
         delays_[next_++ % kReplies] = last_;
         last_ = {};
         at_ = now;
         seen_ = false;
     }
-    /// Bytes that belong to nobody, their last one now.
-    void on_stray(TimePoint now) {
+    /// Unsolicited bytes were heard, the last one now.
+    void on_unsolicited(TimePoint now) {
         const Duration delay = now - at_;
         if (delay <= Duration::zero() || delay > longest_) return;
         last_ = std::max(last_, delay);
         seen_ = true;
     }
-    /// Until when the line had better be left alone; in the past when nothing is to be expected.
-    TimePoint until() const { return seen_ ? TimePoint{} : at_ + hold(); }
-    /// From the end of a reply to the end of what stands behind it; 0: nothing, as a rule.
-    Duration hold() const {
+    /// Time until which the line should rest; in the past if nothing is expected.
+    TimePoint until() const { return seen_ ? TimePoint{} : at_ + settle_time(); }
+    /// Time from the end of a reply to the end of what follows it; 0: usually nothing.
+    Duration settle_time() const {
         const auto often =
             std::ranges::count_if(delays_, [](Duration delay) { return delay > Duration::zero(); });
         return often < kOften ? Duration::zero() : *std::ranges::max_element(delays_) * 5 / 4;
@@ -191,7 +191,7 @@ class Trail {
     bool seen_ = false;
 };
 
-/// How long one station has needed to think, lately. Pure.
+/// Recent think times of one station. Pure.
 class Turnaround {
   public:
     static constexpr std::size_t kSamples = 64;
@@ -202,7 +202,7 @@ class Turnaround {
         count_ = std::min(count_ + 1, kSamples);
     }
     bool known() const { return count_ >= kEnough; }
-    /// Of the last kSamples replies: `share` of them took at most this long; 0 < share <= 1.
+    /// Of the last kSamples replies, `share` took at most this long; 0 < share <= 1.
     Duration quantile(double share) const {
         if (count_ == 0) return {};
         auto sorted = samples_;
@@ -213,7 +213,7 @@ class Turnaround {
         return *nth;
     }
 
-    /// quantile(share) >= bound; something is known.
+    /// True if quantile(share) >= bound. Requires at least one sample.
     bool reaches(double share, Duration bound) const {
         const auto rank = static_cast<std::size_t>(share * static_cast<double>(count_));
         const auto below = static_cast<std::size_t>(
@@ -228,9 +228,9 @@ class Turnaround {
     std::size_t count_ = 0;
 };
 
-/// A response timeout that follows the turnaround (`response_timeout: adaptive`): the floor and
-/// twice what 98 of 100 replies have needed, doubled after each timeout in a row; never above the
-/// ceiling, which it also is until enough is known. Pure.
+/// A response timeout that follows the turnaround (`response_timeout: adaptive`): the floor plus
+/// twice the time that 98 of 100 replies needed, doubled after each timeout in a row. Never above
+/// the ceiling, which also applies until enough is known. Pure.
 class AdaptiveTimeout {
   public:
     AdaptiveTimeout(Duration floor, Duration ceiling) : floor_(floor), ceiling_(ceiling) {}
@@ -253,22 +253,22 @@ class AdaptiveTimeout {
     int silent_ = 0;
 };
 
-/// Tells once that a station has come near its response timeout, and again after it had recovered.
-/// Pure.
+/// Reports once that a station has come near its response timeout, and again after it had
+/// recovered. Pure.
 class DriftAlarm {
   public:
-    /// True when it is to be told: 95 of 100 replies no longer keep below 80 % of the timeout.
+    /// True if it must be reported now: 95 of 100 replies no longer stay below 80 % of the timeout.
     bool check(const Turnaround& seen, Duration timeout) {
         if (!seen.known()) return false;
         constexpr double kMost = 0.95;
-        if (told_) told_ = seen.reaches(kMost, timeout * 6 / 10);
-        if (told_ || !seen.reaches(kMost, timeout * 8 / 10)) return false;
-        told_ = true;
+        if (reported_) reported_ = seen.reaches(kMost, timeout * 6 / 10);
+        if (reported_ || !seen.reaches(kMost, timeout * 8 / 10)) return false;
+        reported_ = true;
         return true;
     }
 
   private:
-    bool told_ = false;
+    bool reported_ = false;
 };
 
 }  // namespace panelgate::arbiter

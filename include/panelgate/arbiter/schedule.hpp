@@ -21,7 +21,7 @@
 
 namespace panelgate::arbiter {
 
-/// Which reads go together in one transaction (P6), and what came of it. Pure.
+/// Which reads share one transaction (P6), and which joins were refused. Pure.
 class Sharing {
   public:
     static constexpr std::size_t kRemembered = 64;
@@ -29,15 +29,15 @@ class Sharing {
     explicit Sharing(bool share) : share_(share) {}
     void apply(bool share) { share_ = share; }
 
-    /// The leader and what the same transaction can answer: contained reads always; touching ones
-    /// as far as the panel is known to take the length. One request saves a request, a reply header
-    /// and two gaps, so joining reads without a hole is always cheaper on the wire.
+    /// Returns the leader and the jobs that the same transaction can answer: contained reads
+    /// always; touching ones up to the length that the panel is known to answer. Joining adjacent
+    /// reads saves a request, a reply header and two gaps.
     Group gather(Job leader, const Station& station, JobQueue& queue) const;
-    /// The joined read did not come about: its parts go alone from now on. Gives them in the order
-    /// in which they are to be put back in front of the queue; what asked for the whole, and what
-    /// nobody waits for any more, stays in the group.
+    /// The joined read failed: its parts are sent alone from now on. Returns them in the order in
+    /// which to put them back; jobs that asked for the whole, and jobs of clients that have left,
+    /// stay in the group.
     Jobs split(Group& group);
-    /// What of `reply` answers this job of the group.
+    /// Returns the part of `reply` that answers this job of the group.
     static Bytes part_for(const Group& group, const Bytes& reply, const Job& job);
 
   private:
@@ -47,8 +47,8 @@ class Sharing {
     PoolDeque<ReadSpan> refused_;
 };
 
-/// All that has been accepted and is not on the wire: requests that wait for their turn, and those
-/// whose attempt failed and goes again. Pure.
+/// All accepted jobs that are not on the wire: requests that wait for their turn, and retries.
+/// Pure.
 class Backlog {
   public:
     explicit Backlog(const QueueSettings& settings) : queue_(settings) {}
@@ -56,10 +56,10 @@ class Backlog {
     JobQueue& queue() { return queue_; }
     const JobQueue& queue() const { return queue_; }
     bool empty() const { return queue_.empty() && retries_.empty(); }
-    /// Something of this client waits for this station.
+    /// True if a job of this client waits for this station.
     bool has(Client client, std::uint8_t station) const;
 
-    /// The same request goes again. At most one a station.
+    /// Queues a retry of the same request. At most one per station.
     void retry(Group group) { retries_.push_back(std::move(group)); }
     bool has_retries() const { return !retries_.empty(); }
     bool has_retry(std::uint8_t station) const {
@@ -69,17 +69,19 @@ class Backlog {
     std::optional<Group> take_retry(const InlineFunction<bool(const Group&), 48>& may_go);
     void each_retry(const InlineFunction<void(const Group&), 48>& show) const;
 
-    /// Retries that nobody waits for any more, without their jobs: what failed has failed.
+    /// Takes the retries that no client waits for any more, without their jobs: they count as
+    /// failed.
     std::vector<Group> take_dropped() { return std::exchange(dropped_, {}); }
 
-    /// What this client has waiting; it is gone then.
+    /// Removes and returns this client's jobs.
     Jobs cancel(Client client);
-    /// Those that can no longer be started, or, transmitted before, answered in time.
+    /// Removes and returns the jobs that can no longer be started in time, or, sent before,
+    /// answered in time.
     Jobs expire(TimePoint now);
     std::optional<TimePoint> first_expiry() const;
-    /// Those that match, waiting for their first turn.
+    /// Removes and returns the matching jobs that wait for their first turn.
     Jobs remove_if(const JobQueue::Test& match) { return queue_.remove_if(match); }
-    /// Everything.
+    /// Removes and returns all jobs.
     Jobs clear();
 
   private:
@@ -90,8 +92,8 @@ class Backlog {
     std::vector<Group> dropped_;
 };
 
-/// What goes next on a line that is free: a retry, a probe, or a request in turn, together with
-/// what else it answers. Decides; changes only what waits. Pure.
+/// Decides what is sent next on a free line: a retry, a probe, or a request in turn, with the jobs
+/// that it also answers. Changes only the backlog. Pure.
 class Schedule {
   public:
     explicit Schedule(const Settings& settings);
@@ -99,39 +101,41 @@ class Schedule {
     void apply(const Settings& settings);
 
     struct Next {
-        std::optional<Group> group;  ///< nothing: not now
-        bool new_way = false;        ///< the line is to be opened anew first
+        std::optional<Group> group;  ///< empty: nothing now
+        bool reopen = false;         ///< the line must be reopened first
     };
     Next next(TimePoint now, Stations& stations, Quiet& quiet, const EchoMemory& echo);
-    /// When that may say something else; nothing: when something happens.
+    /// When next() may decide otherwise; empty: only after an event.
     std::optional<TimePoint> next_start(const Stations& stations, const Quiet& quiet) const;
 
-    /// P1: where a late reply would collide with what others are told meanwhile, because such have
-    /// come before or the configuration says so, everybody rests until then. A probe lets the
-    /// others go on in any case; a timeout that was chosen short (adaptive) frees them early.
+    /// P1: time until which the whole line rests, because late replies occurred before or the
+    /// configuration says so: one would collide with requests to other stations. Probes never make
+    /// the line rest; with an adaptive timeout the rest is shorter.
     std::optional<TimePoint> line_rests_until(TimePoint now, const Group& failed, TimePoint sent,
                                               const Station& station) const;
 
-    /// Where the way to the wire may stall (Settings::may_stall): a connection was made, a request
-    /// that was started then was answered.
-    void on_way_opened(TimePoint now) { way_.on_opened(now); }
-    void on_way_proved(TimePoint started) { way_.on_proved(started); }
-    /// What this station owes may still be on its way, whatever the time.
-    bool held_back(const Station& station) const {
-        return may_stall_ && station.owes_since(way_.proved()) && !station.has_returned();
+    /// Where the transport may stall (Settings::may_stall): it was opened; a request that was
+    /// started then was answered.
+    void on_transport_opened(TimePoint now) { transport_.on_opened(now); }
+    void on_transport_proved(TimePoint started) { transport_.on_proved(started); }
+    /// True if the station's outstanding requests or replies may still be in transit, however long
+    /// ago.
+    bool in_transit(const Station& station) const {
+        return may_stall_ && station.has_outstanding_since(transport_.proved()) &&
+               !station.answered_since_reopen();
     }
 
-    /// The last bit of a broadcast has left, or the line was lost under it.
+    /// The last bit of a broadcast has left, or the line was lost meanwhile.
     void on_broadcast(TimePoint sent, ByteView request) { broadcasts_.on_sent(sent, request); }
 
     Backlog& backlog() { return backlog_; }
     const Backlog& backlog() const { return backlog_; }
-    /// The same request goes again and is waited for `patience` long. While only its station rests,
-    /// others go first, for no longer than it may take: one request, or, when the retry is dear,
-    /// one to each station that waits.
+    /// Queues a retry that will wait `patience` for its reply. While only its station rests, other
+    /// stations go first, for no longer than the retry may take: one request, or one per waiting
+    /// station if the retry may take long.
     void retry(TimePoint now, Group group, Duration patience);
-    /// The parts of a joined read go again, each by itself. Returns those whose client has left:
-    /// they do not.
+    /// Puts the parts of a joined read back, each alone. Returns the jobs whose client has left:
+    /// they are not sent again.
     Jobs give_back(Group& group);
 
   private:
@@ -149,15 +153,15 @@ class Schedule {
     Quarantine quarantine_;
     bool may_stall_;
     bool echo_known_ = false;
-    Way way_;
+    TransportEpoch transport_;
     Backlog backlog_;
     Sharing sharing_;
     BroadcastReplies broadcasts_;
-    Ticket learned_for_ = 0;        ///< a read was sent for it, to find out about the echo (P8)
+    Ticket learned_for_ = 0;        ///< a read was sent for it to detect the echo (P8)
     PoolSet<std::uint8_t> others_;  ///< stations that waited when a retry was due
-    std::size_t turns_ = 0;         ///< that it leaves to them, at most
-    Duration patience_{};           ///< that a retry may cost them
-    TimePoint others_until_{};      ///< it leaves them no more time than it may cost
+    std::size_t turns_ = 0;         ///< turns that the retry leaves to them, at most
+    Duration patience_{};           ///< time that a retry may cost them
+    TimePoint others_until_{};      ///< end of the time that the retry leaves to them
 };
 
 }  // namespace panelgate::arbiter

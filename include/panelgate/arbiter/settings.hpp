@@ -14,30 +14,30 @@
 
 namespace panelgate::arbiter {
 
-/// How one station is asked. The defaults are those of the line.
+/// Settings of one station. The defaults are those of the line.
 struct StationSettings {
     std::uint8_t id = 1;  ///< 1..247
     /// From the end of the request on the wire to the start of the reply.
     Duration response_timeout = 500ms;
-    /// Follow the turnaround that was seen, from timeout_floor up to response_timeout.
+    /// Follow the measured turnaround, from timeout_floor up to response_timeout.
     bool adaptive_timeout = false;
     Duration timeout_floor = 20ms;
-    /// Silence before a request to this station and after its reply; nothing: the standard's
+    /// Silence before a request to this station and after its reply; empty: the standard's
     /// (silent_interval()).
     std::optional<Duration> frame_gap;
     int retries = 1;  ///< of reads; 0..10
     bool retry_writes = false;
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;  ///< as it sends and expects it
-    /// How long after a timeout a reply may still come; nothing = auto: the response timeout at
-    /// first, then what lateness was seen.
+    /// How long after a timeout a reply may still come; empty = auto: the response timeout at
+    /// first, then by the lateness seen.
     std::optional<Duration> late_window;
-    /// How old a value that was read before may be when it answers a client; 0 = ask the panel.
+    /// Maximum age of a stored value that may answer a client; 0 = ask the panel.
     Duration max_age{};
     /// Items of one read, for joining: the profile's or the standard's limit.
     std::uint16_t max_registers = 125;
     std::uint16_t max_bits = 2000;
-    /// The profile vouches for these two. Else reads are joined only up to what the station has
-    /// answered before (P6).
+    /// The profile guarantees both limits. Otherwise reads are joined only up to a length that the
+    /// station has answered before (P6).
     bool vouched = false;
     friend bool operator==(const StationSettings&, const StationSettings&) = default;
 };
@@ -49,21 +49,22 @@ struct QueueSettings {
     friend bool operator==(const QueueSettings&, const QueueSettings&) = default;
 };
 
-/// Who has to be quiet after a timeout until a late reply can no longer come (P1).
+/// Which stations rest after a timeout until a late reply can no longer come (P1).
 enum class Quarantine : std::uint8_t {
-    automatic,  ///< the silent station; everybody where its replies have been late before
-    line,       ///< everybody
+    automatic,  ///< the silent station; all stations if its replies have been late before
+    line,       ///< all stations
     station,    ///< the silent station; others may be asked, at the risk of a collision
 };
 
 struct Settings {
     SerialFormat serial;
-    modbus::HexDigits ascii_digits = modbus::HexDigits::upper_only;  ///< that are heard
+    modbus::HexDigits ascii_digits =
+        modbus::HexDigits::upper_only;  ///< accepted in received frames
     /// For stations without an entry in `stations`; its id is not used.
     StationSettings unlisted;
     std::vector<StationSettings> stations;
     Duration broadcast_turnaround = 100ms;  ///< serial line V1.02, 2.4.1: 100..200 ms
-    /// Silence that ends a reply whose length nothing tells (FRM-11); counted from its last byte.
+    /// Silence that ends a reply of unknown length (FRM-11); counted from its last byte.
     Duration end_of_frame = 20ms;
     /// The longest silence inside a reply of known length; counted from its last byte. The default
     /// is for a tty: a USB latency timer (16 ms) and a busy machine. In ASCII also the longest
@@ -72,27 +73,28 @@ struct Settings {
     QueueSettings queue;
     OfflineSettings offline;
     Quarantine quarantine = Quarantine::automatic;
-    /// The line is a real UART: bytes cannot come before the request has left. Not so on a pty.
+    /// The line is a real UART: no reply byte can come before the request has left. Not so on a
+    /// pty.
     bool paced = false;
-    /// The way to the wire may hold frames back and deliver all of them later (RTU over TCP): what
-    /// is owed does not lapse by time alone.
+    /// The transport may delay frames and deliver all of them later (RTU over TCP): outstanding
+    /// replies do not lapse by time alone.
     bool may_stall = false;
     /// Identical, contained and adjacent reads share one transaction (P6).
     bool share_reads = true;
-    /// Without a word about it, a line is taken to have none.
+    /// By default a line is taken to have no echo.
     EchoMode echo = EchoMode::off;
-    /// Say why each request goes now and why one is refused.
+    /// Report why each request is sent now and why one is refused.
     bool explain = false;
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 
-/// What has to be right of a line before the first byte is the same: one that runs need not be
-/// opened anew to go on with the other settings.
+/// True if the settings that affect the wire itself are equal: a running line need not be reopened
+/// for the other settings.
 bool is_same_wire(const Settings& one, const Settings& other);
 
-/// Those of the stations. ASCII has no CRC: what it says is written down with the standard's. A
-/// broadcast has the standard's, but where all listed stations have the
-/// other one: no frame can be right for both.
+/// Returns the stations' CRC orders. ASCII has no CRC: its frames are recorded with the standard
+/// order. A broadcast has the standard order unless all listed stations have the other: no frame
+/// can be right for both.
 modbus::CrcOrders crc_orders(const Settings& settings);
 
 }  // namespace panelgate::arbiter

@@ -10,144 +10,148 @@
 
 namespace panelgate::arbiter {
 
-/// All stations of a line: made when they are first asked, strangers forgotten again. Knows what
-/// those that do not answer may cost together, and whose probe is due. Pure.
+/// All stations of a line: created when first asked; unheard ones are forgotten again. Knows what
+/// unanswered attempts may cost together, and which probe is due. Pure.
 class Stations {
   public:
     explicit Stations(const Settings& settings);
 
-    /// What is known of stations that both list stays.
+    /// Keeps what is known of stations that both settings list.
     void apply(const Settings& settings);
 
     Station& of(std::uint8_t id);
     const Station* find(std::uint8_t id) const;
-    /// The configured ones, or those for unlisted stations.
+    /// Returns the station's settings, or those for unlisted stations.
     const StationSettings& settings(std::uint8_t id) const;
-    /// The silence that this station wants in front of a request and behind its reply.
+    /// Silence required before a request to this station and after its reply.
     Duration gap(std::uint8_t id) const;
-    /// The longest that any station of the line has needed.
+    /// Longest recent time that any station of the line has needed.
     std::optional<Duration> slowest() const { return slowest_.value(); }
-    /// Bytes of nobody behind this station's reply.
+    /// Unsolicited bytes followed this station's reply.
     void on_trail(TimePoint now, std::uint8_t id) {
         const auto found = stations_.find(id);
-        if (found != stations_.end()) found->second.on_stray_bytes(now);
+        if (found != stations_.end()) found->second.on_unsolicited_bytes(now);
     }
-    /// A station has answered a broadcast, as none should.
+    /// A station has answered a broadcast, which is wrong.
     void on_broadcast_answered(std::uint8_t id) {
         const auto found = stations_.find(id);
         if (found != stations_.end()) found->second.on_broadcast_answered();
     }
-    /// Bytes that are no frame.
+    /// Damaged bytes were heard.
     void on_damaged(TimePoint now, ByteView bytes) {
         for (auto& [id, station] : stations_) station.on_damaged_bytes(now, id, bytes);
     }
     void on_line_down() {
         for (auto& [id, station] : stations_) station.on_line_down();
     }
-    /// A request that left at `sent` was answered now, on a line that may hold things back.
+    /// The line was opened, on a transport that may stall.
     void on_opened(TimePoint now) {
         for (auto& [id, station] : stations_) station.on_opened(now);
     }
+    /// A request that left at `sent` was answered now, on a line that may stall.
     void on_proved(TimePoint now, TimePoint sent) {
         for (auto& [id, station] : stations_) station.on_proved(now, sent);
     }
-    /// A station is back, or the line is open again: others may be back for the same reason and are
+    /// A station is back, or the line was reopened: others may be back for the same reason and are
     /// asked at once.
-    void on_back() { probes_.clear(); }
-    /// `waited` from request to first sign; nothing: that cannot be told.
+    void on_recovery() { probes_.clear(); }
+    /// `waited`: from request to first sign of the reply; empty: unknown.
     void on_reply(TimePoint now, std::optional<Duration> waited) {
         heard_ = now;
         if (!waited) return;
         slowest_.add(*waited);
         quickest_.add(*waited);
     }
-    /// The shortest that any station of the line has needed lately.
+    /// Shortest recent time that any station of the line has needed.
     const Quickest& quickest() const { return quickest_; }
 
-    /// From when on nothing is owed that could still come; `may_stall`: on a way that holds things
-    /// back, as from now on.
+    /// Time from which no outstanding reply can still come; `may_stall`: on a transport that may
+    /// stall, counted from now.
     TimePoint clear_at(TimePoint now, bool may_stall) const;
-    /// Behind a request: within its timeout, and so much later as it may be late.
+    /// How long after a request its reply may still come: its timeout and late window.
     Duration latest_reply(std::uint8_t id) const;
 
     StationHealth health(std::uint8_t id) const;
     Duration response_timeout(std::uint8_t id) const;
-    /// The station is offline, and this is not to be its probe. Of a stranger any request may be.
+    /// True if the station is offline and this job is not its probe. Any request may probe an
+    /// unheard station.
     bool refuses(TimePoint now, const Job& job);
-    /// How long the next attempt waits for its reply to begin.
+    /// Time that the next attempt waits for its reply to begin.
     Duration patience(TimePoint now, const Group& group);
-    /// It fails so often that its silence surprises nobody: others who want the line do not pay for
-    /// it.
-    bool spent(TimePoint now, const Station& station) const {
-        return station.flaky() && has_company(now, station);
+    /// True if it is flaky while others use the line: they do not pay for its silence.
+    bool flaky_beside_others(TimePoint now, const Station& station) const {
+        return station.flaky() && others_active(now, station);
     }
-    /// Before on_failed(): a retry is within what this station may cost the others.
+    /// Before on_failed(): true if a retry is within what this station may cost the others.
     bool affords_retry(TimePoint now, const Station& station) const {
-        return !spent(now, station) && (station.may_spend(now) || !has_company(now, station));
+        return !flaky_beside_others(now, station) &&
+               (station.may_spend(now) || !others_active(now, station));
     }
-    /// The budgets for stations that do not answer allow asking this one. One that has just fallen
-    /// silent, that keeps failing, or that nobody knows waits for them only while others want the
+    /// True if the budgets for unanswered attempts allow asking this station. One that has just
+    /// fallen silent, keeps failing or is unheard waits for its budget only while others want the
     /// line.
     bool may_spend(TimePoint now, const Job& job) const;
-    /// Until then a station that keeps failing waits for its share: others want the line, though
-    /// none of their requests may wait at this moment (a client that asks one by one).
-    TimePoint held_until(std::uint8_t id) const;
-    /// An attempt failed that kept the line for `cost`.
+    /// Time until which a failing station waits for its share because others use the line, even if
+    /// none of their requests waits now (a client that asks one by one).
+    TimePoint throttled_until(std::uint8_t id) const;
+    /// An attempt that occupied the line for `cost` failed.
     void on_failed(TimePoint now, const Group& group, Verdict verdict, Duration cost);
-    /// A read of this station that waits goes before its writes.
+    /// True if a waiting read of this station goes before its writes.
     bool has_read_turn(std::uint8_t id) const {
         const Station* station = find(id);
         return station != nullptr && station->has_read_turn();
     }
 
-    /// The listed station, offline or unanswering to writes, whose probe is due longest; nothing
-    /// when none is.
+    /// Returns the listed station, offline or not answering writes, whose probe is most overdue;
+    /// empty if none is due.
     std::optional<std::uint8_t> next_to_probe(TimePoint now) const;
-    /// When the next probe is due.
+    /// When the next probe is due; empty: none.
     std::optional<TimePoint> next_probe() const;
-    /// Drops the strangers that nobody has asked for lately.
-    void forget_strangers(TimePoint now);
+    /// Drops unheard stations that were not asked for lately.
+    void forget_unheard(TimePoint now);
 
   private:
-    bool anyone_online() const;
-    /// When it is asked though nobody wants anything of it; nothing: never.
+    bool any_online() const;
+    /// When it is probed; empty: never.
     std::optional<TimePoint> probe_at(const Station& station) const;
-    bool is_stranger(std::uint8_t id) const;
-    /// Another station has answered lately, and after this one failed: the line is well.
-    bool has_company(TimePoint now, const Station& station) const {
-        return now < company_until(station);
+    bool is_unheard_id(std::uint8_t id) const;
+    /// True if another station has answered lately, and after this one failed: the line works.
+    bool others_active(TimePoint now, const Station& station) const {
+        return now < others_active_until(station);
     }
-    /// Others have answered behind its last failure: so long they are taken to want the line.
-    TimePoint company_until(const Station& station) const;
-    /// How long a failing station's share of the bus has to add up to pay for one full silence.
-    Duration surprise() const {
+    /// End of the time in which others count as using the line, after answers later than its last
+    /// failure.
+    TimePoint others_active_until(const Station& station) const;
+    /// Time in which a failing station's share of the line covers one whole timeout.
+    Duration timeout_cost() const {
         return static_cast<int>(1 / ProbeBudget::kFailing) * unlisted_.response_timeout;
     }
-    /// What those that are offline may take: more while an outage of all has only just begun.
+    /// Budget of offline stations: more while an outage of all has only just begun.
     const ProbeBudget& probes() const {
-        const bool all_just_died = !anyone_online() && alone_.next() < heard_ + kOutage;
+        const bool all_just_died = !any_online() && alone_.next() < heard_ + kOutage;
         return all_just_died ? alone_ : probes_;
     }
 
     static constexpr Duration kOutage = 30s;
-    static constexpr Duration kHurry = 5s;    ///< at most
-    static constexpr Duration kCompany = 5s;  ///< who has answered since then wants the line
+    static constexpr Duration kUrgent = 5s;  ///< at most
+    static constexpr Duration kOthersActive =
+        5s;  ///< others that answered within this use the line
 
     OfflineSettings offline_;
     StationSettings unlisted_;
     Duration standard_gap_{};
-    Duration frame_{};  ///< what a usual reply takes on this line
+    Duration frame_{};  ///< duration of a usual reply on this line
     std::map<std::uint8_t, StationSettings> configured_;
     std::map<std::uint8_t, Station> stations_;
     ProbeBudget probes_{ProbeBudget::kOffline};
     ProbeBudget alone_{ProbeBudget::kAlone};
-    ProbeBudget suspects_{ProbeBudget::kFailing};
-    ProbeBudget strangers_{ProbeBudget::kFailing};          ///< all attempts at strangers
-    ProbeBudget known_strangers_{ProbeBudget::kStrangers};  ///< ... but the first at each
+    ProbeBudget newly_silent_{ProbeBudget::kFailing};
+    ProbeBudget unheard_{ProbeBudget::kFailing};        ///< all attempts at unheard stations
+    ProbeBudget asked_unheard_{ProbeBudget::kUnheard};  ///< except the first at each
     Slowest slowest_;
     Quickest quickest_;
-    TimePoint heard_{};        ///< any of them
-    TimePoint hurry_until_{};  ///< one has just been waited for in vain: the next ones are not
+    TimePoint heard_{};         ///< any of them
+    TimePoint urgent_until_{};  ///< one just timed out: shorter waits for others
 };
 
 }  // namespace panelgate::arbiter

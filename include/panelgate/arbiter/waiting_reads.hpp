@@ -11,29 +11,30 @@
 
 namespace panelgate::arbiter {
 
-/// The reads that wait and could share a transaction, by what they ask for. Of those that one
-/// transaction answers only one counts: the oldest of a span that no other waiting span contains;
-/// the others ride. Owned by the queue, which counts; every change of who counts is told.
+/// The waiting reads that could share a transaction, by span. Of the reads that one transaction
+/// answers only one counts: the oldest of a span that no other waiting span contains; the others
+/// are carried. Owned by the queue, which counts; every change is reported to it.
 class WaitingReads {
   public:
-    /// This client has so many more, or fewer, that count.
+    /// Adds to the number of this client's reads that count.
     using Count = InlineFunction<void(Client, int), 16>;
 
-    /// A read of this span would ride.
+    /// True if a waiting span contains this one.
     bool carries(const ReadSpan& span) const;
     void add(const Job& job, const ReadSpan& span, const Count& count);
     void remove(const Job& job, const ReadSpan& span, const Count& count);
-    /// Of one that waits: it counts.
+    /// True if this waiting read counts.
     bool counts(Ticket ticket, const ReadSpan& span) const;
-    /// It counts, and without it nobody else would count in its place.
+    /// True if removing this read lowers the count: it counts, and no carried read would take its
+    /// place.
     bool frees(Ticket ticket, const ReadSpan& span) const;
-    /// How many count.
+    /// Number of reads that count.
     std::size_t counting() const { return widest_.size(); }
-    /// Checks itself the slow way, for tests.
+    /// Checks consistency by recomputing. For tests.
     bool consistent() const;
 
   private:
-    /// All within one span come directly behind it, or behind another that begins inside it.
+    /// Spans within another come directly after it, or after others that begin inside it.
     struct WiderFirst {
         bool operator()(const ReadSpan& a, const ReadSpan& b) const;
     };
@@ -49,7 +50,7 @@ class WaitingReads {
     void drop_span(Spans::iterator it, const Count& count);
 
     Spans spans_;
-    /// Those that no other contains. None contains another, so their ends rise as they begin.
+    /// Spans that no other contains, so their ends rise as they begin.
     PoolMap<Place, ReadSpan> widest_;
 };
 

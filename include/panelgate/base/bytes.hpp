@@ -14,20 +14,20 @@ namespace panelgate {
 using Bytes = PoolVector<std::uint8_t>;
 using ByteView = std::span<const std::uint8_t>;
 
-/// Reads big-endian fields from bytes it does not own. Reading past the end yields 0 and makes the
-/// failure stick: ask once, at the end, with finished() or ok().
+/// Reads big-endian fields from bytes it does not own. A read past the end returns 0 and sets a
+/// sticky failure flag: check ok() or finished() once, at the end.
 class Reader {
   public:
     explicit Reader(ByteView bytes) : bytes_(bytes) {}
 
     std::uint8_t u8();
     std::uint16_t u16();
-    /// The next n bytes; empty on failure.
+    /// Returns the next n bytes; empty on failure.
     ByteView take(std::size_t n);
 
     std::size_t left() const { return bytes_.size() - at_; }
     bool ok() const { return ok_; }
-    /// Everything was read, and nothing more than there was.
+    /// True if every byte was read and no read went past the end.
     bool finished() const { return ok_ && left() == 0; }
 
   private:
@@ -39,7 +39,7 @@ class Reader {
 /// Appends big-endian fields.
 class Writer {
   public:
-    /// `expected`: bytes; more are taken, too.
+    /// `expected`: bytes to reserve; not a limit.
     explicit Writer(std::size_t expected = 16) { bytes_.reserve(expected); }
     Writer& u8(unsigned value);
     Writer& u16(unsigned value);
@@ -50,16 +50,16 @@ class Writer {
     Bytes bytes_;
 };
 
-/// Appends as much of `more` as fits into `limit` bytes in all; the rest is dropped.
+/// Appends as much of `more` as fits into a total of `limit` bytes; drops the rest.
 void append_up_to(std::size_t limit, Bytes& bytes, ByteView more);
 
-/// "1f 03 00"; an empty separator gives "1f0300".
+/// Returns lower-case hex: "1f 03 00"; with an empty separator "1f0300".
 std::string to_hex(ByteView bytes, std::string_view separator = " ");
-/// Pairs of hex digits, blanks between pairs allowed; nothing on anything else.
+/// Parses pairs of hex digits, blanks allowed between pairs; std::nullopt for anything else.
 std::optional<Bytes> from_hex(std::string_view text);
 
-/// Bytes of a stream that were fed and not yet taken. Each is moved a constant number of times.
-/// Whoever feeds it bounds it.
+/// Queue of stream bytes not yet taken. Each byte is moved a constant number of times. The caller
+/// bounds its size.
 class ByteQueue {
   public:
     void feed(ByteView bytes) { bytes_.insert(bytes_.end(), bytes.begin(), bytes.end()); }
@@ -67,7 +67,7 @@ class ByteQueue {
     ByteView view() const { return ByteView(bytes_).subspan(taken_); }
     std::size_t size() const { return bytes_.size() - taken_; }
     bool empty() const { return size() == 0; }
-    /// The first `count` bytes are done with; no more than there are.
+    /// Removes the first `count` bytes; `count` is at most size().
     void take(std::size_t count) {
         taken_ += count;
         if (taken_ < bytes_.size() - taken_) return;

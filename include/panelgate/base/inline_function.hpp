@@ -12,8 +12,8 @@ namespace panelgate {
 template <class Signature, std::size_t Size>
 class InlineFunction;
 
-/// As std::function, but what it holds lies within it and never on the heap: whatever is larger
-/// than Size bytes does not compile. To call an empty one breaks the caller's contract.
+/// Like std::function, but stores the callable inline, never on the heap: one larger than Size
+/// bytes does not compile. Calling an empty InlineFunction breaks the caller's contract.
 template <class R, class... Args, std::size_t Size>
 class InlineFunction<R(Args...), Size> {
   public:
@@ -26,31 +26,31 @@ class InlineFunction<R(Args...), Size> {
         using Held = std::decay_t<F>;
         static_assert(sizeof(Held) <= Size, "it captures more than fits");
         static_assert(alignof(Held) <= alignof(std::max_align_t));
-        ::new (static_cast<void*>(room_)) Held(std::forward<F>(what));
+        ::new (static_cast<void*>(storage_)) Held(std::forward<F>(what));
         verbs_ = &kVerbs<Held>;
     }
     InlineFunction(const InlineFunction& other) : verbs_(other.verbs_) {
-        if (verbs_ != nullptr) verbs_->copy(other.room_, room_);
+        if (verbs_ != nullptr) verbs_->copy(other.storage_, storage_);
     }
     InlineFunction(InlineFunction&& other) noexcept : verbs_(std::exchange(other.verbs_, nullptr)) {
-        if (verbs_ != nullptr) verbs_->move(other.room_, room_);
+        if (verbs_ != nullptr) verbs_->move(other.storage_, storage_);
     }
     InlineFunction& operator=(InlineFunction other) noexcept {
         clear();
         verbs_ = std::exchange(other.verbs_, nullptr);
-        if (verbs_ != nullptr) verbs_->move(other.room_, room_);
+        if (verbs_ != nullptr) verbs_->move(other.storage_, storage_);
         return *this;
     }
     ~InlineFunction() { clear(); }
 
-    R operator()(Args... args) const { return verbs_->call(room_, std::forward<Args>(args)...); }
+    R operator()(Args... args) const { return verbs_->call(storage_, std::forward<Args>(args)...); }
     explicit operator bool() const { return verbs_ != nullptr; }
 
   private:
     struct Verbs {
         R (*call)(std::byte* held, Args&&... args);
         void (*copy)(const std::byte* from, std::byte* to);
-        void (*move)(std::byte* from, std::byte* to) noexcept;  ///< nothing is left at `from`
+        void (*move)(std::byte* from, std::byte* to) noexcept;  ///< destroys the object at `from`
         void (*end)(std::byte* held) noexcept;
     };
     template <class Held>
@@ -73,10 +73,10 @@ class InlineFunction<R(Args...), Size> {
     };
 
     void clear() {
-        if (verbs_ != nullptr) std::exchange(verbs_, nullptr)->end(room_);
+        if (verbs_ != nullptr) std::exchange(verbs_, nullptr)->end(storage_);
     }
 
-    alignas(std::max_align_t) mutable std::byte room_[Size];
+    alignas(std::max_align_t) mutable std::byte storage_[Size];
     const Verbs* verbs_ = nullptr;
 };
 

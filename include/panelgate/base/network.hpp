@@ -14,20 +14,20 @@ struct Network {
     friend bool operator==(const Network&, const Network&) = default;
 };
 
-/// An IPv6 address; an IPv4 one as ::ffff:10.0.0.1 (RFC 4291, 2.5.5.2).
+/// An IPv6 address; IPv4 is stored as ::ffff:10.0.0.1 (RFC 4291, 2.5.5.2).
 using AddressBytes = std::array<std::uint8_t, 16>;
-/// The same in their first so many bits, 128 at most.
+/// True if the first `bits` bits are equal; `bits` is at most 128.
 bool same_prefix(const AddressBytes& left, const AddressBytes& right, unsigned bits);
 
-/// "127.0.0.1:502"; an IPv6 address stands in brackets: "[::1]:502".
+/// Formats "127.0.0.1:502"; an IPv6 address is put in brackets: "[::1]:502".
 inline std::string endpoint_text(const std::string& address, std::uint16_t port) {
     const bool six = address.find(':') != std::string::npos;
     return (six ? '[' + address + ']' : address) + ':' + std::to_string(port);
 }
 
-/// A client as the log names it, without the port of its connection, which is another one next
-/// time: "modbus_tcp [::1]:50000" -> "modbus_tcp [::1]". An address alone ("http ::1") and a token
-/// ("http ::1 token bob") belong to the client and stay.
+/// Returns a client's name for the log without its port, which differs for each connection:
+/// "modbus_tcp [::1]:50000" -> "modbus_tcp [::1]". A bare address ("http ::1") and a token ("http
+/// ::1 token bob") identify the client and are kept.
 inline std::string without_port(std::string_view client) {
     constexpr auto kNone = std::string_view::npos;
     const auto colon = client.rfind(':');

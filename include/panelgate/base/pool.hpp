@@ -12,25 +12,26 @@
 
 namespace panelgate {
 
-/// Memory for what comes and goes with every transaction: a block that is given back is kept for
-/// the next one of its size, so that a busy gateway asks the heap for nothing. Each thread has its
-/// own; a block may be given back by another thread than took it. What is kept is bounded. Larger
-/// blocks than kLargest are the heap's, and all of them where AddressSanitizer watches.
+/// Memory for objects that live for one transaction: a freed block is kept for the next request of
+/// its size, so that a busy gateway does not use the heap. Each thread has its own pool; a block
+/// may be freed by another thread than took it. The kept memory is bounded. Blocks larger than
+/// kLargest come from the heap; under AddressSanitizer all do.
 namespace pool {
 
 inline constexpr std::size_t kLargest = std::size_t{64} * 1024;  ///< bytes
-inline constexpr std::size_t kKept = std::size_t{256} * 1024;    ///< bytes of each size, at most
+inline constexpr std::size_t kKept = std::size_t{256} * 1024;    ///< bytes kept per size, at most
 
-/// Throws std::bad_alloc as `new` does. `size` > 0; aligned for anything but over-aligned types.
+/// Allocates `size` > 0 bytes, aligned for any type that is not over-aligned. Throws
+/// std::bad_alloc.
 void* take(std::size_t size);
-/// A block of take(), with the size that it was taken for.
+/// Frees a block from take(); `size` as passed to take().
 void give_back(void* block, std::size_t size) noexcept;
-/// False where each block is the heap's own: this build is AddressSanitizer's.
+/// False if every block comes from the heap (AddressSanitizer builds).
 bool keeps_blocks() noexcept;
 
 }  // namespace pool
 
-/// For containers whose elements come and go with every transaction.
+/// Allocator for containers whose elements live for one transaction.
 template <class T>
 struct PoolAllocator {
     static_assert(alignof(T) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);

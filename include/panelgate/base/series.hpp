@@ -30,21 +30,20 @@ struct Histogram {
     double sum = 0;
 };
 
-/// One number for each slot of time, the last of them: memory of a fixed size. What was never put,
-/// or long ago, is absent. Pure.
+/// Ring of one number per time slot, fixed in memory. Slots never set or too old are absent. Pure.
 class SlotRing {
   public:
-    static constexpr std::size_t kBytes = sizeof(double);  ///< of a slot
+    static constexpr std::size_t kBytes = sizeof(double);  ///< per slot
 
-    /// `width` of a slot and their number: both more than 0.
+    /// `width` of a slot and `slots` must be above 0.
     SlotRing(Duration width, std::size_t slots)
         : width_(width), values_(slots, std::numeric_limits<double>::quiet_NaN()) {}
 
-    /// The value of the slot that `at` is in; the last one counts. Not a NaN. What is older than
-    /// the oldest slot is not taken.
+    /// Sets the value of the slot that contains `at`; the last call wins. `value` is not NaN.
+    /// Ignored if older than the oldest slot.
     void put(TimePoint at, double value);
-    /// Calls `told(begin of the slot, value)`, the oldest first, for those that are not older than
-    /// the ring at `now`.
+    /// Calls `told(start of the slot, value)`, oldest first, for the slots that the ring covers at
+    /// `now`.
     template <class Told>
     void each(TimePoint now, Told told) const {
         if (!newest_) return;
@@ -54,7 +53,7 @@ class SlotRing {
             if (!std::isnan(value) && n > *newest_ - size) told(begin_of(n), value);
         }
     }
-    /// The value of the slot that `at` is in.
+    /// Returns the value of the slot that contains `at`.
     std::optional<double> at(TimePoint at) const;
 
   private:
@@ -71,12 +70,12 @@ class SlotRing {
     std::optional<std::int64_t> newest_;
 };
 
-/// Of how many slots of this width `span` consists.
+/// Number of slots of this width in `span`.
 inline std::size_t slots_of(Duration span, Duration width) {
     return static_cast<std::size_t>(span / width);
 }
-/// The narrowest slots, of `narrowest` or more, with which so many rings over `span` cost no more
-/// than `bytes`.
+/// Returns the narrowest slot width, at least `narrowest`, with which `rings` rings over `span` fit
+/// into `bytes`; 600 s if none does.
 Duration slot_width(std::size_t rings, Duration span, Duration narrowest, std::size_t bytes);
 
 }  // namespace panelgate

@@ -10,40 +10,40 @@
 
 namespace panelgate {
 
-/// Whether the adapter hears what it sends, as the configuration says it (P8).
+/// Whether the adapter echoes what it sends, as configured (P8).
 enum class EchoMode : std::uint8_t {
     automatic,  ///< learned from reads, before the first write
     on,
     off,
 };
 
-/// What is known of it.
+/// What is known about the echo.
 enum class EchoState : std::uint8_t {
     unknown,
     absent,
     present,
-    unclear,  ///< a part of a read came back in front of its answer: whole echoes may come
+    unclear,  ///< part of a read came back before its reply: whole echoes may follow
 };
 std::string_view label(EchoState state);
 
-/// What a frame on the wire is, for traces.
+/// Kind of a frame on the wire, for traces.
 enum class FrameKind : std::uint8_t {
     // Sent
     request,
     retry,
-    probe,       ///< is the station that was offline back?
-    learn_echo,  ///< a read that shows whether the line hears itself
+    probe,       ///< checks whether an offline station is back
+    learn_echo,  ///< a read that shows whether the line echoes
     broadcast,
-    // Received, and what was waited for
+    // Received and expected
     reply,
-    heard_request,  ///< of the line's master, where the gateway only listens
-    // Received and thrown away
+    heard_request,  ///< a request of the line's master, in listen-only mode
+    // Received and discarded
     damaged,
-    echo,             ///< of what was sent last
+    echo,             ///< of the frame sent last
     foreign_request,  ///< another master's
-    late,             ///< a reply whose request was given up
-    copy,             ///< a reply once more
-    foreign,          ///< a good frame that nobody asked for
+    late,             ///< a reply to a request that was given up
+    copy,             ///< a duplicate of a reply
+    foreign,          ///< an unsolicited valid frame
 };
 enum class FrameDirection : std::uint8_t { sent, received, discarded };
 
@@ -51,30 +51,30 @@ FrameDirection direction_of(FrameKind kind);
 std::string_view label(FrameKind kind);
 std::string_view label(FrameDirection direction);
 
-/// How a station does.
+/// Health of a station.
 enum class Health : std::uint8_t {
-    unknown,  ///< not asked yet
+    unknown,  ///< no request sent yet
     online,
-    suspect,  ///< its last transaction failed, and it is not offline for that
-    heard,    ///< answers its line's master, who is somebody else
-    offline,  ///< it stays silent: asked by probes only (P4)
+    suspect,  ///< its last transaction failed, but it is not offline
+    heard,    ///< replies to the line's master, which is not the gateway
+    offline,  ///< does not reply: only probes are sent (P4)
 };
 std::string_view label(Health health);
 
-/// Who goes first on a line (P9).
+/// Priority on a line, highest first (P9).
 enum class PriorityClass : std::uint8_t { write, read, poll, probe };
 inline constexpr std::size_t kPriorityClasses = 4;
 
-/// The word of the label `class` of panelgate_queue_wait_seconds, and of the reasons in a trace.
+/// Returns the value of label `class` of panelgate_queue_wait_seconds, also a reason in a trace.
 std::string_view label(PriorityClass priority);
 
-/// What came of reading the configuration again.
+/// Result of reloading the configuration.
 enum class ReloadOutcome : std::uint8_t {
     applied,
-    unchanged,  ///< it says what is running
-    invalid,    ///< it has faults, or cannot be read
-    failed,     ///< it is valid, and a listener or a simulated line could not be opened
-    refused,    ///< it is a way back that would weaken what protects, and nobody said so
+    unchanged,  ///< same as the running configuration
+    invalid,    ///< it has errors, or cannot be read
+    failed,     ///< valid, but a listener or a simulated line could not be opened
+    refused,    ///< a rollback that would weaken protection, without the user's consent
 };
 inline constexpr std::array kReloadOutcomes{ReloadOutcome::applied, ReloadOutcome::unchanged,
                                             ReloadOutcome::invalid, ReloadOutcome::failed,
@@ -88,24 +88,24 @@ inline std::string_view label(ReloadOutcome outcome) {
 /// How a request ended, as its client sees it.
 enum class Outcome : std::uint8_t {
     ok,
-    exception,  ///< the panel's own
+    exception,  ///< from the panel
     timeout,
     damaged,
-    refused,  ///< it never had a way to a panel
+    refused,  ///< denied, malformed or not routed
     busy,
     expired,
     cancelled,
     offline,
     line_down,
-    cached,  ///< a value that was read before
-    shared,  ///< by another request's transaction
+    cached,  ///< answered from the cache
+    shared,  ///< answered by another request's transaction
 };
 inline constexpr std::array kAllOutcomes{Outcome::ok,        Outcome::exception, Outcome::timeout,
                                          Outcome::damaged,   Outcome::refused,   Outcome::busy,
                                          Outcome::expired,   Outcome::cancelled, Outcome::offline,
                                          Outcome::line_down, Outcome::cached,    Outcome::shared};
 
-/// The word of panelgate_requests_total{outcome} and of a transaction's event.
+/// Returns the value of panelgate_requests_total{outcome} and of a transaction's event.
 std::string_view label(Outcome outcome);
 
 /// One count for each outcome.
@@ -122,36 +122,35 @@ class OutcomeCounts {
     std::array<std::uint64_t, kAllOutcomes.size()> counts_{};
 };
 
-/// What a request on the wire came to, for traces: of one attempt, not of what a client asked.
+/// Result of one attempt on the wire, for traces; not of the client's request.
 enum class TransactionEnd : std::uint8_t {
-    open,  ///< it is still on the wire
-    ok,    ///< its reply has come; a broadcast has left
+    open,  ///< still on the wire
+    ok,    ///< reply received, or broadcast sent
     exception,
     timeout,
     damaged,
-    wrong,      ///< a good frame of its station that does not answer it
-    doubtful,   ///< what came may be a copy of an earlier reply: it is asked for once more
-    line_down,  ///< the line was lost meanwhile
+    wrong,      ///< a valid frame of its station that does not match the request
+    doubtful,   ///< may be a duplicate of an earlier reply: the request is sent again
+    line_down,  ///< the line was lost
 };
 
 std::string_view label(TransactionEnd end);
-/// It ended without its reply.
+/// True if it ended without its reply.
 bool is_error(TransactionEnd end);
 
-/// When what of a request on the wire happened: by the line's rate, from the first bit on.
+/// Timestamps of one attempt: on the wire computed from the line's rate, from the first bit on.
 struct TransactionInstants {
-    std::optional<TimePoint> arrived{};  ///< the request that it answers; nothing: nobody's
-    TimePoint granted;                   ///< it was its turn
+    std::optional<TimePoint> arrived{};  ///< the client's request, if any
+    TimePoint granted;                   ///< its turn came
     TimePoint first_bit_out;
     TimePoint last_bit_out;
-    std::optional<TimePoint> first_byte_in{};  ///< of what was taken for its reply
+    std::optional<TimePoint> first_byte_in{};  ///< of what was taken as its reply
     std::optional<TimePoint> last_byte_in{};
 };
 
-// What metrics and the log call stations by that have no name of their own: no station may be
-// called so.
+// Labels in metrics and logs for stations without a name: no station may have these names.
 
-inline constexpr std::string_view kAllStations = "all";      ///< of a finding about a whole line
-inline constexpr std::string_view kOtherStations = "other";  ///< those that nobody has listed
+inline constexpr std::string_view kAllStations = "all";      ///< a finding about a whole line
+inline constexpr std::string_view kOtherStations = "other";  ///< stations that are not configured
 
 }  // namespace panelgate

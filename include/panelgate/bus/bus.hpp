@@ -20,19 +20,19 @@
 
 namespace panelgate::bus {
 
-/// The line came or went, or has a finding or lost one.
+/// The line went up or down, or a finding appeared or disappeared.
 struct LineEvent {
     bool up = false;
-    std::string why;  ///< of a line that is down; or the finding
+    std::string why;  ///< cause, when the line is down; or the finding
 };
 /// A request was answered.
 struct TransactionEvent {
     std::uint8_t station = 0;
     std::uint8_t function = 0;
     Outcome outcome = Outcome::ok;
-    Duration took{};  ///< arrival to answer
+    Duration took{};  ///< from arrival to answer
 };
-/// Something happened that others may want to know.
+/// What a bus reports to its observer.
 using BusEvent =
     std::variant<LineEvent, arbiter::StationEvent, TransactionEvent, WriteEvent, tap::Transaction>;
 
@@ -40,7 +40,7 @@ struct Settings {
     std::string name;    ///< of the line
     std::string device;  ///< as configured
     arbiter::Settings arbiter;
-    Stations stations;                             ///< those that the configuration lists
+    Stations stations;                             ///< stations listed in the configuration
     std::function<void(const BusEvent&)> observe;  ///< may be empty; called from inside the bus
     TraceSettings trace;
     IncidentSettings incidents;
@@ -48,17 +48,17 @@ struct Settings {
     ClientSettings clients{};
 };
 
-/// Drives one line with one arbiter. Everything happens on the executor's one thread.
+/// Drives one line with one arbiter. Not thread-safe: use it only on the executor's thread.
 class Bus final : public LineBus {
   public:
-    /// Answers come from the executor's loop; it and the clock outlive the bus.
+    /// Answers are delivered from the executor's loop. The executor and `clock` outlive the bus.
     Bus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
         std::unique_ptr<line::Line> line);
-    /// Answers what is still open with Fault::cancelled.
+    /// Answers open requests with Fault::cancelled.
     ~Bus() override;
 
     void start() override;
-    /// Closes the line; what waits is answered at once (line_down, line_lost).
+    /// Closes the line and answers waiting requests at once (line_down, line_lost).
     void stop() override;
     void apply(Settings settings, std::unique_ptr<line::Line> line,
                std::shared_ptr<void> far_end) override;
@@ -80,7 +80,7 @@ class Bus final : public LineBus {
     TimePoint clear_at() const override;
     void rest_until(TimePoint until) override;
     LineReport report() const override;
-    /// Nothing waits, nothing is on the wire.
+    /// True if no request waits and none is on the wire.
     bool idle() const;
 
   private:

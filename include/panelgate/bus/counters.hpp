@@ -16,28 +16,28 @@ namespace panelgate::bus {
 
 inline constexpr std::uint8_t kOtherFunctions = 0;
 
-/// Counters of one station as clients see it.
+/// Request counters of one station.
 struct StationReport {
-    std::string station;  ///< its name; "other" for all that the configuration does not list
-    /// By function code; kOtherFunctions: all that modbus::is_known() does not know. Those that
-    /// were used, and those that the settings expect.
+    std::string station;  ///< its name; "other" for all unlisted stations
+    /// By function code; kOtherFunctions: all that modbus::is_known() does not know. Contains the
+    /// functions that were used or that the settings expect.
     std::map<std::uint8_t, OutcomeCounts> requests;
-    /// Of these, those that went out with another function: by function asked and function sent.
+    /// Requests sent as another function: by function requested and function sent.
     std::map<std::pair<std::uint8_t, std::uint8_t>, std::uint64_t> translated;
     Histogram request_duration;
     arbiter::StationCounters wire;
     bool configured = false;
-    std::optional<bool> up;        ///< whether it answers; none while nobody has asked it
-    double last_success_unix = 0;  ///< seconds since 1970; 0 = never
+    std::optional<bool> up;        ///< whether it answers; nullopt if not asked yet
+    double last_success_unix = 0;  ///< seconds since 1970; 0: never
 };
 
-/// Everything metrics/ copies from one line at a scrape.
-/// What the line doctor finds.
+/// A finding of the line doctor.
 struct FindingReport {
-    std::string cause;    ///< a stable word
-    std::string station;  ///< its name; "all" of the whole line
+    std::string cause;    ///< a stable identifier
+    std::string station;  ///< its name; "all": the whole line
 };
 
+/// Everything that metrics/ copies from one line at a scrape.
 struct LineReport {
     std::string line;
     bool up = false;

@@ -12,15 +12,15 @@
 
 namespace panelgate::bus {
 
-/// The busy share of a line over the last ten whole seconds, or since the start when that is less:
-/// one figure, whoever asks, and however often. Pure.
+/// Busy share of a line over the last ten whole seconds, or since the start if that is less.
+/// Independent of how often it is read. Pure.
 class LoadMeter {
   public:
     explicit LoadMeter(TimePoint start) : start_(start) {}
 
-    /// `busy` only grows. What is new of it is taken to have ended now, in one piece.
+    /// `busy`: total busy time, never decreasing. The increase counts as one interval ending now.
     void record(TimePoint now, Duration busy);
-    /// 0..100.
+    /// Returns 0..100.
     double percent(TimePoint now) const;
 
   private:
@@ -34,23 +34,24 @@ class LoadMeter {
 
     TimePoint start_;
     Duration known_{};
-    std::int64_t newest_ = 0;  ///< the last second since the start that the ring holds
-    std::array<Duration, kSeconds + 1> seconds_{};  ///< the busy time of each
+    std::int64_t newest_ = 0;                       ///< newest second in the ring, since the start
+    std::array<Duration, kSeconds + 1> seconds_{};  ///< busy time per second
 };
 
-/// The figures of a line over one slot of time.
+/// A line's figures for one time slot.
 struct LineSample {
-    TimePoint at;                        ///< the slot begins
-    std::optional<double> load_percent;  ///< 0..100; nothing while the line was down
-    std::uint64_t requests = 0;          ///< that were answered
-    std::uint64_t errors = 0;            ///< of these: panels' exceptions, faults, refusals
-    std::optional<double> latency_ms;    ///< arrival to answer, mean; nothing without a request
-    std::optional<double> wire_ms;       ///< first bit out to last bit in, mean of the answered
-    std::size_t queue_depth = 0;         ///< at its end
+    TimePoint at;                        ///< start of the slot
+    std::optional<double> load_percent;  ///< 0..100; nullopt while the line was down
+    std::uint64_t requests = 0;          ///< answered requests
+    std::uint64_t errors = 0;            ///< of these: exceptions, faults, refusals
+    std::optional<double>
+        latency_ms;                 ///< mean time from arrival to answer; nullopt without a request
+    std::optional<double> wire_ms;  ///< mean time from first bit out to last bit in
+    std::size_t queue_depth = 0;    ///< at the end of the slot
 };
 
-/// The last hour of a line's figures. Memory is fixed: kColumns slots of eight bytes for each slot
-/// of time, 34 kB with those of 5 s. Pure.
+/// A line's figures for the last hour. Memory is fixed: kColumns values of eight bytes per time
+/// slot, 34 kB with slots of 5 s. Pure.
 class LineHistory {
   public:
     static constexpr Duration kSpan = 1h;
@@ -59,14 +60,15 @@ class LineHistory {
 
     explicit LineHistory(Duration width);
 
-    /// Once a slot: what has happened since the last call. The first only begins.
+    /// Call once per slot: records what happened since the last call. The first call only sets the
+    /// start.
     void record(TimePoint now, const LineReport& report);
-    /// The oldest first.
+    /// Returns the slots, oldest first.
     std::vector<LineSample> samples(TimePoint now) const;
     Duration width() const { return width_; }
 
   private:
-    /// What only grows.
+    /// Cumulative counters.
     struct Totals {
         TimePoint at;
         Duration busy{};

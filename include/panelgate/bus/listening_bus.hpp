@@ -15,13 +15,13 @@
 
 namespace panelgate::bus {
 
-/// A line whose master is somebody else (`mode: listen`): what passes by is matched, counted,
-/// recorded and told to the observer; nothing is ever sent. Every request is refused
-/// (Rule::listening). Everything happens on the executor's one thread.
+/// A line with another master (`mode: listen`): matches, counts and records what it hears and
+/// reports it to the observer; sends nothing. Refuses every request (Rule::listening). Not
+/// thread-safe: use it only on the executor's thread.
 class ListeningBus final : public LineBus {
   public:
-    /// Of `settings.arbiter` only the serial format, the hole and `offline.after` mean something
-    /// here. The executor's loop and the clock outlive the bus.
+    /// Of `settings.arbiter` only the serial format, the reply hole and `offline.after` are used.
+    /// The executor's loop and the clock outlive the bus.
     ListeningBus(boost::asio::any_io_executor executor, rt::Clock& clock, Settings settings,
                  std::unique_ptr<line::Line> line);
     ~ListeningBus() override;

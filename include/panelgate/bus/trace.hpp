@@ -16,96 +16,98 @@
 
 namespace panelgate::bus {
 
-/// How much of what happens on a line is remembered. All of it is set aside at once, touched when
-/// it is first used, and never grows: with these figures 667 KiB a line, and the names of
-/// clients that have gone, as long as something is known of them.
+/// Sizes of a line's trace. The memory is reserved at once, touched when first used, and never
+/// grows: 667 KiB a line with these figures, plus the names of departed clients while records refer
+/// to them.
 struct TraceSettings {
     std::size_t transactions = 1000;
     std::size_t frames = 2000;
     std::size_t decisions = 500;
-    std::size_t bytes = 256 * 1024;  ///< of all frames; the oldest give way
+    std::size_t bytes = 256 * 1024;  ///< of all frames; the oldest are dropped
     std::size_t text = 64 * 1024;    ///< of all decisions
 };
-/// What is kept of what goes wrong: with these figures some 36 KiB each, taken when one happens for
-/// the first time and then used again.
+/// Sizes of the incident records: about 36 KiB each with these figures, allocated at the first
+/// incident and then reused.
 struct IncidentSettings {
     std::size_t incidents = 16;
-    std::size_t before = 16;  ///< transactions in front of the first error
-    std::size_t after = 16;   ///< behind the last one: nearer errors are of the same incident
-    Duration near = 10s;      ///< … and not later than this
+    std::size_t before = 16;  ///< transactions before the first error
+    std::size_t after =
+        16;  ///< transactions after the last error: an error among them is of the same incident
+    Duration near = 10s;  ///< … and not later than this
     TraceSettings each{48, 128, 32, 12 * 1024, 4 * 1024};
 };
 
 /// A frame on the wire, for traces.
 struct TraceFrame {
-    std::uint64_t sequence = 0;  ///< counts a line's frames, decisions and ends, from 1
-    TimePoint at;                ///< first bit out; last byte in
+    std::uint64_t sequence = 0;  ///< numbers a line's frames, decisions and transaction ends from 1
+    TimePoint at;                ///< first bit out, or last byte in
     FrameKind kind = FrameKind::request;
     Bytes bytes;
-    std::string why;                ///< of a sent frame: why this one at this time
-    WallTime time{};                ///< `at`, by the clock on the wall
-    std::uint64_t transaction = 0;  ///< that it is of, or came behind; 0: there was none
+    std::string why;                ///< why a sent frame was sent at this time
+    WallTime time{};                ///< `at` as wall-clock time
+    std::uint64_t transaction = 0;  ///< that it belongs to, or followed; 0: none
 };
 
-/// Why something was not done, or not at once; one line.
+/// Why something was not done, or not at once; one line of text.
 struct TraceDecision {
-    std::uint64_t sequence = 0;  ///< one count with the frames
+    std::uint64_t sequence = 0;  ///< same numbering as the frames
     TimePoint at;
     std::string text;
-    WallTime time{};  ///< `at`, by the clock on the wall
+    WallTime time{};  ///< `at` as wall-clock time
 };
 
-/// What one request on the wire was, without its frames.
+/// A request on the wire, without its frames.
 struct TransactionFacts : TransactionInstants {
-    std::uint64_t id = 0;                 ///< counts a line's transactions, from 1
-    std::uint64_t first = 0;              ///< sequence of its request
-    std::uint64_t sequence = 0;           ///< of its end: one count with frames and decisions
-    WallTime time{};                      ///< of first_bit_out
-    std::optional<TimePoint> answered{};  ///< whoever had asked; nothing: it was not, by this one
+    std::uint64_t id = 0;        ///< numbers a line's transactions from 1
+    std::uint64_t first = 0;     ///< sequence of its request
+    std::uint64_t sequence = 0;  ///< of its end; same numbering as frames and decisions
+    WallTime time{};             ///< of first_bit_out
+    std::optional<TimePoint>
+        answered{};  ///< when it first answered a request; nullopt: it answered none
     TransactionEnd end = TransactionEnd::ok;
-    std::uint8_t station = 0;  ///< 0: a broadcast
+    std::uint8_t station = 0;  ///< 0: broadcast
 };
 
-/// One that is over, and what came of it.
+/// A finished transaction with its frames.
 struct TraceTransaction : TransactionFacts {
     FrameKind kind = FrameKind::request;
-    std::string reason;  ///< "read", "write", "poll", "retry", "probe"…: what it was sent for
-    std::string client;  ///< who wanted it; "": nobody, or one without a name
+    std::string reason;  ///< why it was sent: "read", "write", "poll", "retry", "probe"…
+    std::string client;  ///< its client's name; "": no client, or one without a name
     Bytes request;
-    Bytes reply;  ///< empty: none
+    Bytes reply;  ///< empty: no reply
     std::vector<TraceFrame> discarded;
 };
 
-/// A part of a line's trace, oldest first.
+/// Part of a line's trace, oldest first.
 struct TracePart {
     std::vector<TraceFrame> frames;
     std::vector<TraceDecision> decisions;
     std::vector<TraceTransaction> transactions;
 };
 
-/// Something went wrong, and what happened around it is kept.
+/// Summary of an incident: errors and the records around them.
 struct IncidentHead {
-    std::uint64_t id = 0;                 ///< counts a line's incidents, from 1
+    std::uint64_t id = 0;                 ///< numbers a line's incidents from 1
     WallTime time{};                      ///< of its first error
-    std::optional<std::uint8_t> station;  ///< of that; nothing: the whole line
+    std::optional<std::uint8_t> station;  ///< of the first error; nullopt: the whole line
     std::string cause;                    ///< "timeout", "damaged", "wrong", "late", "line_down"
     std::uint64_t errors = 0;
-    bool complete = false;  ///< false: what follows is still being added
-    bool read = false;      ///< somebody has fetched it: it gives way before others do
+    bool complete = false;  ///< false: records are still being added
+    bool read = false;      ///< already fetched: overwritten before unread incidents
 };
 struct Incident {
     IncidentHead head;
     TracePart part;
 };
 
-/// Keeps the last of what happens on a line, in memory that is set aside at once. Entry has a
-/// `sequence`, which only grows.
+/// Ring buffer of the last entries, in memory reserved at construction. Entry has an increasing
+/// `sequence`.
 template <class Entry>
 class Recorder {
   public:
     explicit Recorder(std::size_t limit) : limit_(limit) { entries_.reserve(limit); }
 
-    /// Forgets the oldest when full.
+    /// Drops the oldest entry when full.
     void add(Entry entry) {
         if (limit_ == 0) return;
         if (size_ == limit_) drop_oldest();
@@ -128,24 +130,24 @@ class Recorder {
 
     std::size_t size() const { return size_; }
     bool empty() const { return size_ == 0; }
-    /// The oldest is 0. `place` < size().
+    /// Index 0 is the oldest entry. `place` < size().
     const Entry& at(std::size_t place) const { return entries_[(oldest_ + place) % limit_]; }
     Entry& at(std::size_t place) { return entries_[(oldest_ + place) % limit_]; }
-    /// Of the first one behind this number; size() when there is none.
-    std::size_t place_behind(std::uint64_t sequence) const {
+    /// Returns the index of the first entry after this sequence number; size() if there is none.
+    std::size_t index_after(std::uint64_t sequence) const {
         const auto places = std::views::iota(std::size_t{0}, size_);
         const auto first = std::ranges::upper_bound(
             places, sequence, {}, [this](std::size_t place) { return at(place).sequence; });
         return static_cast<std::size_t>(first - places.begin());
     }
 
-    /// The last ones, oldest first.
+    /// Returns the last entries, oldest first.
     std::vector<Entry> last(std::size_t count) const {
         return some(size_ - std::min(count, size_), count);
     }
-    /// The first ones behind this number, oldest first.
+    /// Returns the first entries after this sequence number, oldest first.
     std::vector<Entry> since(std::uint64_t sequence, std::size_t most) const {
-        return some(place_behind(sequence), most);
+        return some(index_after(sequence), most);
     }
 
   private:
@@ -158,25 +160,25 @@ class Recorder {
     }
 
     std::size_t limit_;
-    std::vector<Entry> entries_;  ///< a ring when it is full
+    std::vector<Entry> entries_;  ///< a ring once full
     std::size_t oldest_ = 0;
     std::size_t size_ = 0;
 };
 
-/// Bytes of many entries in a ring of a fixed size: the newest overwrite the oldest.
+/// Byte storage for many entries in a fixed-size ring: the newest overwrite the oldest.
 class ByteRing {
   public:
     /// `size` > 0, bytes.
     explicit ByteRing(std::size_t size);
 
-    /// Where they stand: a number that only grows. Of more than the ring holds, the first.
+    /// Appends bytes and returns their position, which only grows. Truncates to the ring's size.
     std::uint64_t add(ByteView bytes);
-    /// Nothing of what stands there has been overwritten.
+    /// True if nothing from this position on has been overwritten.
     bool has(std::uint64_t place) const { return place + size_ >= end_; }
-    /// `length` bytes that add() has put there. has(place).
+    /// Returns `length` bytes stored by add(). Requires has(place).
     Bytes at(std::uint64_t place, std::size_t length) const;
     std::size_t size() const { return size_; }
-    /// Bytes that were added since those at `place`.
+    /// Returns the number of bytes added since `place`.
     std::size_t used_since(std::uint64_t place) const {
         return static_cast<std::size_t>(end_ - place);
     }
@@ -184,7 +186,7 @@ class ByteRing {
   private:
     std::size_t size_;
     std::unique_ptr<std::uint8_t[]> bytes_;
-    std::uint64_t end_ = 0;  ///< how many were ever added
+    std::uint64_t end_ = 0;  ///< total bytes added
 };
 
 }  // namespace panelgate::bus

@@ -7,11 +7,11 @@
 
 namespace panelgate::config {
 
-/// Of a gateway that may read its file again.
+/// Counters of configuration reloads.
 struct ReloadCounters {
     std::array<std::uint64_t, kReloadOutcomes.size()> reloads{};  ///< by outcome
-    double last_success_unix = 0;                                 ///< seconds; the start counts
-    bool last_succeeded = true;  ///< what runs is what the file said when it was read last
+    double last_success_unix = 0;  ///< seconds; the start counts as one
+    bool last_succeeded = true;    ///< the running configuration is that of the last read
 };
 
 }  // namespace panelgate::config

@@ -8,24 +8,24 @@
 
 namespace panelgate::config {
 
-/// For whose sake every broadcast through this listener is refused (01): a read-only station that
-/// it would reach. Nullptr: nobody's, or there are none.
+/// Returns the read-only station because of which this listener refuses every broadcast (01);
+/// nullptr if there is none.
 const Station* forbids_broadcasts(const Config& config, const tcp_server::Settings& listener);
 
-/// Many clients have this timeout, and some cannot be told another one.
+/// A common client timeout, which some clients cannot change.
 inline constexpr Duration kQuickClient = 500ms;
 
-/// What would make a line answer quick clients in time.
+/// Settings with which a line answers clients with a short timeout in time.
 struct QuickSettings {
     Duration deadline{};          ///< of the queue
-    Duration response_timeout{};  ///< of all stations: all attempts of a read fit
+    Duration response_timeout{};  ///< of all stations, so that all attempts of a read fit
     int retries = 0;
-    /// Longer reads take too long on this wire; nothing: every read fits.
+    /// Longer reads take too long on this wire; empty: every read fits.
     std::optional<std::size_t> most_registers;
 };
 struct ClientTimeout {
-    Duration worst{};  ///< every request is answered by then (P3): a client has to wait for longer
-    /// Nothing where it is quick enough, or where no setting makes it so.
+    Duration worst{};  ///< every request is answered by then (P3): clients need a longer timeout
+    /// Empty if it is quick enough, or if no setting makes it so.
     std::optional<QuickSettings> quick;
 };
 

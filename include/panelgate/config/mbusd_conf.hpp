@@ -9,15 +9,16 @@
 
 namespace panelgate::config {
 
-/// What a configuration of mbusd (0.5.3, its conf/mbusd.conf.example and cfg.c) means here.
+/// An mbusd configuration (0.5.3, its conf/mbusd.conf.example and cfg.c) in this program's terms.
 struct Imported {
-    std::string yaml;  ///< load() takes it; its comments say what is not taken over as it is
-    /// The same, a sentence each: "FILE:LINE: pause = 100: ...".
+    std::string yaml;  ///< for load(); its comments list what is not taken over unchanged
+    /// The same as one sentence each: "FILE:LINE: pause = 100: ...".
     std::vector<std::string> notes;
 };
 
-/// Nothing is returned when `problems` got any entry: lines that are no NAME = VALUE, unknown
-/// names, values that mbusd would not take either. What a file leaves out has mbusd's defaults.
+/// Converts an mbusd configuration. Returns nothing if it adds anything to `problems`: lines other
+/// than NAME = VALUE, unknown names, values that mbusd would reject too. Missing settings get
+/// mbusd's defaults.
 std::optional<Imported> import_mbusd(std::string_view text, yaml::Problems& problems);
 
 }  // namespace panelgate::config

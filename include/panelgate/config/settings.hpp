@@ -4,11 +4,11 @@
 
 namespace panelgate::config {
 
-/// What templates may give to all stations together: a short file must not become a large memory.
+/// Limits for what templates add to all stations together: a short file must not use much memory.
 inline constexpr std::size_t kMaxTemplateValues = 500'000;
 inline constexpr std::size_t kMaxTemplateText = 16 * 1024 * 1024;  ///< bytes of keys and scalars
 
-/// A token of fewer characters is warned of: 16 hexadecimal digits are 64 bits.
+/// Shorter tokens cause a warning: 16 hexadecimal digits are 64 bits.
 inline constexpr std::size_t kShortToken = 16;
 
 }  // namespace panelgate::config

@@ -7,10 +7,10 @@
 
 namespace panelgate::config {
 
-/// In what `next` protects less than `running` does, a line for people each ("station press: access
-/// read_only -> read_write"): who may write, who may connect and from where, what a guard refuses,
-/// roles and tokens. Empty: in nothing. In doubt it is weaker: two networks that together hold a
-/// third are not taken for it. Pure.
+/// Lists where `next` protects less than `running`, one line each ("station press: access read_only
+/// -> read_write"): who may write, who may connect and from where, what a guard refuses, roles and
+/// tokens. Empty if nowhere. Doubtful cases are listed: two networks that together cover a third do
+/// not count as covering it. Pure.
 std::vector<std::string> weaker(const Config& running, const Config& next);
 
 }  // namespace panelgate::config

@@ -18,43 +18,43 @@
 
 namespace panelgate::doctor {
 
-/// What the configuration says, as far as advice depends on it.
+/// The configuration, as far as advice depends on it.
 struct LineFacts {
     SerialFormat serial;
     EchoMode echo = EchoMode::automatic;
-    /// RTU over TCP: the wire is behind a server, which nobody here can see or set.
+    /// RTU over TCP: the wire is behind a device server and cannot be inspected from here.
     bool over_tcp = false;
-    Duration deadline = 2s;  ///< of a request: no reply later than this is ever waited for
+    Duration deadline = 2s;             ///< of a request: no reply is awaited longer than this
     Duration response_timeout = 500ms;  ///< of stations without an entry below
     std::map<std::uint8_t, Duration> response_timeouts;
-    std::map<std::uint8_t, std::string> names;  ///< of the stations that are listed
-    std::set<std::uint8_t> crc_high_first;      ///< stations that are set so
+    std::map<std::uint8_t, std::string> names;  ///< of the listed stations
+    std::set<std::uint8_t> crc_high_first;      ///< stations configured so
 };
 
-/// The counts of one line: at an instant, or (as a difference of two) of a window.
+/// Counters of one line: at one time, or (as a difference) of a window.
 struct Sample {
     /// Entry 0: all stations that the configuration does not list.
     std::map<std::uint8_t, arbiter::Symptoms> stations;
     std::optional<line::UartErrors> uart;
-    std::uint64_t broadcasts = 0;  ///< sent: a panel should not answer these
+    std::uint64_t broadcasts = 0;  ///< sent; no panel should answer them
 
-    /// Of all stations together; mute_in_a_row and worst_lateness are the largest of them.
+    /// Sum of all stations; mute_in_a_row and worst_lateness are the maximum.
     arbiter::Symptoms total() const;
     std::uint64_t attempts() const;
 };
 
-/// What was counted between two instants of one line. What does not only grow (mute_in_a_row,
-/// worst_lateness) is that of `later`.
+/// Returns what was counted between two times on one line. Values that are no counters
+/// (mute_in_a_row, worst_lateness) are those of `later`.
 Sample difference(const Sample& later, const Sample& earlier);
 
-/// What the counts of a window tell, the likeliest cause first: in the order of Cause, and by
-/// station. A healthy line, or one that was not used, gives nothing. A finding that is `standing`
-/// stays by about half of the evidence that a new one needs. Pure.
+/// Returns the findings of a window, the likeliest cause first: in the order of Cause, and by
+/// station. Empty for a healthy or unused line. A finding in `standing` remains with about half of
+/// the evidence that a new one needs. Pure.
 std::vector<Finding> diagnose(const LineFacts& facts, const Sample& window,
                               const std::vector<Finding>& standing = {});
 
-/// Watches the counts of one line over a moving window and tells when a finding appears and when it
-/// goes. Pure: the owner says what time it is and what was counted. Bounded.
+/// Watches the counters of one line over a moving window and reports when a finding appears and
+/// when it goes. Pure: the caller passes time and counters. Bounded.
 class Doctor {
   public:
     struct Change {
@@ -64,19 +64,19 @@ class Doctor {
 
     Doctor(Settings settings, LineFacts facts);
 
-    /// They are others now; what was found stands until the next look.
+    /// Applies new facts; findings stay until the next look.
     void apply(LineFacts facts) { facts_ = std::move(facts); }
-    /// The line was opened: what was counted before tells nothing about it, unless nothing but
-    /// damage has come since the window began. Findings stay until there is something to judge by.
+    /// The line was opened: earlier counts say nothing about it, unless only damage has come since
+    /// the window began. Findings stay until there is new evidence.
     void begin(TimePoint now, Sample counted);
-    /// A step has passed since the window moved last.
+    /// True if a step has passed since the window last moved.
     bool due(TimePoint now) const { return !marks_.empty() && now >= marks_.back().at + step(); }
-    /// The last look was long enough ago for another one between two steps.
+    /// True if another look between two steps is allowed.
     bool rested(TimePoint now) const { return !marks_.empty() && now >= looked_ + settings_.rest; }
-    /// Judges the window that ends now. `counted` holds the counts since the start.
+    /// Evaluates the window that ends now. `counted`: totals since the start.
     Change look(TimePoint now, const Sample& counted);
 
-    /// As of the last look, the likeliest first.
+    /// Findings of the last look, the likeliest first.
     const std::vector<Finding>& findings() const { return findings_; }
 
   private:

@@ -8,13 +8,13 @@
 namespace panelgate::doctor {
 
 struct Settings {
-    Duration window = 60s;  ///< what is looked at
+    Duration window = 60s;  ///< length of the window
     Duration step = 5s;     ///< the window moves on by this
-    /// No new look before; a look costs a comparison of all stations' counts.
+    /// Minimum time between looks; a look compares the counters of all stations.
     Duration rest = 500ms;
-    /// The window is longer when fewer attempts than this were in it.
+    /// The window is extended while it has fewer attempts than this.
     std::uint64_t attempts = 20;
-    std::size_t marks = 64;  ///< instants that are remembered at most
+    std::size_t marks = 64;  ///< remembered samples at most
 };
 
 }  // namespace panelgate::doctor

@@ -5,9 +5,9 @@
 
 namespace panelgate::line {
 
-/// What the UART's driver has counted since this program opened it first (TIOCGICOUNT).
+/// Counters of the UART's driver since this program first opened it (TIOCGICOUNT).
 struct UartErrors {
-    std::uint64_t framing = 0;   ///< no stop bit where one belongs: wrong baud, noise
+    std::uint64_t framing = 0;   ///< missing stop bit: wrong baud, noise
     std::uint64_t parity = 0;    ///< wrong parity bit
     std::uint64_t overruns = 0;  ///< bytes lost in the UART or in the driver's buffer
     std::uint64_t breaks = 0;    ///< the line was low for longer than a character
@@ -18,7 +18,7 @@ struct Counters {
     std::uint64_t reopens = 0;  ///< successful opens after the first
     std::uint64_t bytes_sent = 0;
     std::uint64_t bytes_received = 0;
-    std::optional<UartErrors> uart;  ///< of drivers that count them
+    std::optional<UartErrors> uart;  ///< if the driver counts them
 };
 
 }  // namespace panelgate::line

@@ -15,17 +15,17 @@
 
 namespace panelgate::line {
 
-/// A stream of bytes to a serial line: the byte seam. It opens by itself after start(), says when
-/// it is up or down, and keeps trying to open while it is down. One thread. Events may come from
-/// inside poll_input() and write(); after stop() none come.
+/// A byte stream to a serial line; tests replace it. Opens itself after start(), reports up and
+/// down, and retries while down. Single-threaded. Events may come from inside poll_input() and
+/// write(); none come after stop().
 class Line {
   public:
-    /// Who listens; it outlives the line.
+    /// Receives the line's events; outlives the line.
     class Events {
       public:
         virtual ~Events() = default;
         virtual void on_up() = 0;
-        /// `why` is for people: "cannot open /dev/ttyUSB0: No such file or directory".
+        /// `why` is human-readable: "cannot open /dev/ttyUSB0: No such file or directory".
         virtual void on_down(const std::string& why) = 0;
         virtual void on_bytes(ByteView bytes) = 0;
     };
@@ -33,68 +33,70 @@ class Line {
     virtual ~Line() = default;
     virtual void start(Events& events) = 0;
     virtual void stop() = 0;
-    /// Hands all bytes that have arrived already to on_bytes, now.
+    /// Passes all bytes received so far to on_bytes(), now.
     virtual void poll_input() = 0;
-    /// Input waits for poll_input(), which somebody will call, until this is taken back: it need
-    /// not wake anybody. A line that cannot keep it hands it over all the same.
+    /// Defers input until poll_input() or hold_input(false): it causes no wake-up. A line that
+    /// cannot defer its input delivers it as usual.
     virtual void hold_input(bool hold) { static_cast<void>(hold); }
-    /// Sends in one piece; nothing blocks. On failure the line goes down (on_down).
+    /// Sends in one piece, without blocking. On failure the line goes down (on_down).
     virtual void write(ByteView bytes) = 0;
     virtual const Counters& counters() = 0;
-    /// Other characters from now on, while it is up and nothing is being sent. False when this end
-    /// does not decide that (RTU over TCP), or the device refuses (then it is down).
+    /// Changes the character format, while the line is up and idle. False if this end does not set
+    /// it (RTU over TCP), or the device refuses (then it is down).
     virtual bool set_format(const SerialFormat& format) {
         static_cast<void>(format);
         return false;
     }
-    /// Between write() and the first bit: what switching to sending takes.
+    /// Time from write() to the first bit: the switch to sending.
     virtual Duration lead() const { return {}; }
-    /// How long the wire still needs for what was written, as far as the driver tells. Nothing from
-    /// a line that cannot tell at all: who writes has to go by its own arithmetic.
+    /// Time until all written bytes have left, as far as the driver reports it. std::nullopt if it
+    /// cannot report it at all: the caller must compute it.
     virtual std::optional<Duration> unsent() { return std::nullopt; }
-    /// The far end has not taken what was written, although its time is over: it is not to be left
-    /// there, to be executed whenever the way is free again.
+    /// True if the far end has not taken written bytes in time: they must not stay there, to be
+    /// executed whenever the transport recovers.
     virtual bool undelivered() { return false; }
-    /// Throws away what has not left yet, closes, and opens again with back-off. The line goes down
-    /// (on_down, from inside). `why` is for people.
+    /// Discards unsent bytes, closes, and reopens with back-off. The line goes down (on_down, from
+    /// inside). `why` is human-readable.
     virtual void reset(const std::string& why) { static_cast<void>(why); }
-    /// What the way to the wire and back adds to every answer, now: nothing for a device here.
+    /// Time that the transport to the wire and back adds to every reply, now; zero for a local
+    /// device.
     virtual Duration latency() { return {}; }
 };
 
-/// Drives a pure machine over a line, always in this order: all that the device holds, then the
-/// clock, then the verbs, then the actions, then the alarm. So bytes that came before something was
-/// due or asked are never taken for what came behind it.
+/// Drives a pure state machine over a line, always in this order: all input of the device, the
+/// clock, the call, the actions, the alarm. So bytes received before an event are never taken for
+/// bytes after it.
 ///
-/// Machine: `poll_action()` gives an optional variant, `next_deadline()` an optional TimePoint.
-/// `busy_until()`, where it has one, too: input that comes before then changes nothing and wakes
-/// nobody. It is looked at then, or as late as the machine wakes up.
-/// Host acts for it: `act(action)` for each alternative, `on_deadline(now)` when the machine's
-/// deadline has come, `settled(now)` when it wants nothing more for now.
+/// Machine: `poll_action()` returns an optional variant, `next_deadline()` an optional TimePoint,
+/// and so does `busy_until()`, if present: input before then changes nothing and is deferred until
+/// then, or until the machine wakes up.
+/// Host: `act(action)` executes each alternative, `on_deadline(now)` is called when the machine's
+/// deadline has come, `settled(now)` when no action is left.
 ///
-/// All of them outlive it. Verbs and acting may lead to further verbs (a write that fails takes the
-/// line down): the outermost loop then drains, nothing recurses (HR-14).
+/// All of them outlive it. Calls and actions may lead to further calls (a failed write takes the
+/// line down): the outermost loop drains, nothing recurses (HR-14).
 template <class Machine, class Host>
 class Drive {
   public:
     Drive(rt::Clock& clock, Line& line, Machine& machine, Host& host)
         : clock_(clock), line_(&line), machine_(machine), host_(host), alarm_(clock.make_alarm()) {}
 
-    /// Another one from now on; the one before says nothing any more.
+    /// Replaces the line; the previous one must send no more events.
     void use(Line& line) { line_ = &line; }
-    /// What the line itself says: `verb(now)`. It may be in the midst of handing over its input.
+    /// Handles an event of the line: calls `verb(now)`. The line may be in the midst of passing on
+    /// input.
     template <class Verb>
     void hear(Verb verb) {
         verb(clock_.now());
         drain();
     }
-    /// What anybody else wants: `verb(now)`.
+    /// Handles any other call: polls the input, then calls `verb(now)`.
     template <class Verb>
     void tell(Verb verb) {
         line_->poll_input();
         hear(std::move(verb));
     }
-    /// The alarm rings no more, until the next verb.
+    /// Cancels the alarm, until the next call.
     void rest() {
         line_->hold_input(false);
         silence();

@@ -6,13 +6,12 @@
 
 namespace panelgate::line {
 
-/// A pseudo-terminal pair: programs open path() as if it were a serial device, the simulated bus
-/// reads and writes master(). No parity, no pacing, no echo of its own. Both ends are closed with
-/// it.
+/// A pseudo-terminal pair: programs open path() like a serial device, the simulated bus uses
+/// master(). No parity, no pacing, no echo. Owns both ends.
 class Pty {
   public:
-    /// Its users speak this format until they set another. Throws std::system_error when the system
-    /// has none left.
+    /// Users have this format until they set another. Throws std::system_error if no
+    /// pseudo-terminal is left.
     explicit Pty(const SerialFormat& format = {});
     ~Pty();
     Pty(const Pty&) = delete;
@@ -23,7 +22,7 @@ class Pty {
 
   private:
     int master_ = -1;
-    int slave_ = -1;  ///< held open, so that the master does not hang up between two users
+    int slave_ = -1;  ///< kept open, so that the master sees no hang-up between two users
     std::string path_;
 };
 

@@ -6,17 +6,17 @@
 
 namespace panelgate::line {
 
-/// The pauses between attempts to open a device: doubled from min to max. Pure.
+/// Back-off between attempts to open a device: doubles from min to max. Pure.
 class Reopen {
   public:
     Reopen(Duration min, Duration max) : min_(min), max_(max), next_(min) {}
-    /// The pause before the next attempt.
+    /// Returns the pause before the next attempt.
     Duration next_pause() {
         const Duration pause = next_;
         next_ = std::min(max_, next_ * 2);
         return pause;
     }
-    /// It worked: the next failure starts small again.
+    /// Resets the back-off to min.
     void succeeded() { next_ = min_; }
 
   private:

@@ -10,11 +10,11 @@
 
 namespace panelgate::line {
 
-/// A serial device (or pty) through termios on a non-blocking descriptor. Read 0, EIO, ENODEV,
-/// ENXIO and a hang-up all mean the device has gone: it is closed at once and opened again with
-/// back-off, every setting applied anew. undelivered(): it did not take what was written, or its
-/// driver still holds it long after its time; bytes that an adapter has taken and keeps to itself
-/// are not seen. `clock` and `ops` outlive the line.
+/// Creates a line on a serial device (or pty): termios on a non-blocking descriptor. Read 0, EIO,
+/// ENODEV, ENXIO and a hang-up all mean that the device is gone: it is closed at once and reopened
+/// with back-off, with all settings applied again. undelivered(): the device did not take written
+/// bytes, or its driver still has them long after their time; bytes kept inside an adapter are not
+/// seen. `clock` and `ops` outlive the line.
 std::unique_ptr<Line> make_tty_line(boost::asio::any_io_executor executor, rt::Clock& clock,
                                     Settings settings, PortOps& ops = kernel_ops());
 

@@ -19,35 +19,35 @@
 
 namespace panelgate::metrics {
 
-/// Everything that one scrape shows, copied after it was asked for. Each line is of one instant.
+/// The data of one scrape, copied when it was requested. Each line's data is consistent.
 struct Snapshot {
     std::vector<bus::LineReport> lines;
     std::vector<tcp_server::Counters> listeners;
     std::vector<serial_server::Counters> serial_masters;
-    std::deque<points::PointSample> points;  ///< many: growing moves none of them
+    std::deque<points::PointSample> points;  ///< deque: many points, never moved
     std::vector<points::RelaySample> relays;
     std::optional<web::Counters> http;
-    std::optional<mqtt::Counters> mqtt;             ///< nothing: there is no broker
-    std::optional<config::ReloadCounters> reloads;  ///< nothing: of a built-in configuration
+    std::optional<mqtt::Counters> mqtt;             ///< nullopt: no broker
+    std::optional<config::ReloadCounters> reloads;  ///< nullopt: built-in configuration
     std::string version;
-    std::string commit;    ///< empty: not told
+    std::string commit;    ///< empty: unknown
     std::string compiler;  ///< the same
     ProcessFacts process;
     rt::Counters runtime;
 };
 
-/// The Content-Type that goes with exposition().
+/// The Content-Type of exposition().
 inline constexpr std::string_view kContentType = "text/plain; version=0.0.4; charset=utf-8";
 
-/// A piece of the text; false: no more of it is wanted.
-using TakeText = std::function<bool(std::string_view)>;
+/// Receives a piece of the text; returns false if no more is wanted.
+using TextSink = std::function<bool(std::string_view)>;
 
-/// The text of /metrics (README, Metrics), a family at a time. What a station's panel is expected
-/// to be asked exists with 0, so that a rate() sees the first event: for requests the outcome ok of
-/// the functions that the bus lists before they are used, and ok, exception and timeout of those
-/// that were; for exceptions codes 1-4. Other outcomes are there once they happened. A station's
-/// last success is absent while there was none. Touches nothing but the snapshot.
-void exposition(const Snapshot& snapshot, const TakeText& take);
+/// Writes the text of /metrics (README, Metrics), one family at a time. Expected series exist with
+/// 0, so that a rate() sees the first event: requests with outcome ok for the functions the bus
+/// lists before their first use, and with ok, exception and timeout for those used; exceptions with
+/// codes 1-4. Other outcomes appear once they occur. A station's last success is absent until the
+/// first. Reads only the snapshot.
+void exposition(const Snapshot& snapshot, const TextSink& take);
 std::string exposition(const Snapshot& snapshot);
 
 }  // namespace panelgate::metrics

@@ -11,7 +11,7 @@
 
 namespace panelgate::modbus {
 
-/// Modbus ASCII (serial line V1.02, 2.5.2): ':', two hex digits a byte, LRC, CR LF.
+/// Modbus ASCII (serial line V1.02, 2.5.2): ':', two hex digits per byte, LRC, CR LF.
 inline constexpr std::size_t kMaxAsciiAdu = 513;  ///< characters, with the longest PDU
 inline constexpr std::size_t kMinAsciiAdu = 9;    ///< ':', station, function, LRC, CR LF
 
@@ -19,38 +19,38 @@ inline constexpr std::size_t kMinAsciiAdu = 9;    ///< ':', station, function, L
 /// message with its LRC it is 0.
 std::uint8_t lrc(ByteView bytes);
 
-/// A whole frame in upper-case digits, to be written at once. `pdu` has 1 to 253 bytes.
+/// Encodes a whole frame in upper-case digits, to be sent in one write. `pdu` has 1 to 253 bytes.
 Bytes encode_ascii(std::uint8_t station, ByteView pdu);
 
-/// The standard has upper-case digits only (V1.02, 2.5.2).
+/// The standard allows upper-case digits only (V1.02, 2.5.2).
 enum class HexDigits : std::uint8_t { upper_only, any_case };
 
-/// The end of what is damaged is a line of hex digits with lower-case ones among them, which is
-/// what a frame leaves where only upper case is taken.
+/// True if the damaged bytes end with a line of hex digits that has lower-case ones: a frame that
+/// was rejected because only upper case is taken.
 bool ends_in_lower_case(ByteView damaged);
 
-/// Tells frames by their characters, one by one. A ':' always begins a frame. Pure; knows no time.
+/// Parses frames character by character. A ':' always begins a frame. Pure; ignores time.
 class AsciiReader {
   public:
-    /// `longest`: bytes of a frame with its LRC.
+    /// `longest`: maximum bytes of a frame with its LRC.
     explicit AsciiReader(HexDigits digits, std::size_t longest = kMaxPdu + 2)
         : digits_(digits), longest_(longest) {}
 
-    /// What a character is.
+    /// Meaning of a character.
     enum class Step : std::uint8_t {
-        outside,  ///< of no frame
-        begun,    ///< its ':'; a frame that was not whole is given up
+        outside,  ///< not part of a frame
+        begun,    ///< ':'; an unfinished frame is dropped
         inside,   ///< half a byte, or CR
         byte,     ///< bytes() has one more
-        whole,    ///< the frame is good
-        broken,   ///< what had begun can be no frame
+        whole,    ///< the frame is complete and valid
+        broken,   ///< the frame that had begun is invalid
     };
     Step take(std::uint8_t character);
-    /// A frame has begun and is not whole.
+    /// True if a frame has begun and is not complete.
     bool partial() const { return state_ != State::between; }
-    /// Only its LF is missing.
+    /// True if only the LF is missing.
     bool at_end() const { return state_ == State::at_end; }
-    /// Of the frame, so far: station, PDU, LRC. Until the next ':'.
+    /// Returns the bytes of the frame so far: station, PDU, LRC. Valid until the next ':'.
     const Bytes& bytes() const { return bytes_; }
     void give_up() { end(Step::broken); }
 
@@ -63,28 +63,27 @@ class AsciiReader {
     std::size_t longest_;
     State state_ = State::between;
     Bytes bytes_;
-    bool half_ = false;  ///< the last byte misses its second digit
+    bool has_half_byte_ = false;  ///< the last byte lacks its second digit
 };
 
-/// Finds frames in a stream of characters, requests and replies alike. What does not become a good
-/// one is dropped and counted, and nobody is told more: a slave does not answer it. Take with
-/// next() until it gives nothing before feeding more; then it holds one unfinished frame at most.
-/// Work is linear in the characters.
+/// Finds frames in a stream of characters, requests and replies alike. Invalid frames are dropped
+/// and counted without a reply, as a slave does. Call next() until it returns std::nullopt before
+/// feeding more; then at most one unfinished frame is buffered. Linear time.
 class AsciiFramer {
   public:
-    /// `pause`: the longest between two characters of a frame (V1.02, 2.5.2.1).
+    /// `pause`: maximum time between two characters of a frame (V1.02, 2.5.2.1).
     explicit AsciiFramer(HexDigits digits = HexDigits::upper_only, Duration pause = 1s)
         : reader_(digits), pause_(pause) {}
 
-    /// Characters that have come at `now`; it never goes back.
+    /// Feeds characters received at `now`, which must not decrease.
     void feed(TimePoint now, ByteView characters);
     std::optional<SerialAdu> next();
 
-    /// A frame has begun and is not whole.
+    /// True if a frame has begun and is not complete.
     bool partial() const { return reader_.partial(); }
-    /// Characters since the last good frame that belong to none.
+    /// Returns the characters since the last valid frame that belong to none.
     std::size_t discarded() const { return discarded_; }
-    /// Frames that have begun and were no good, since the last call.
+    /// Returns the number of invalid frames since the last call.
     std::size_t take_faults();
 
   private:
@@ -94,46 +93,46 @@ class AsciiFramer {
     AsciiReader reader_;
     Duration pause_;
     ByteQueue text_;
-    TimePoint last_{};       ///< character
+    TimePoint last_{};       ///< of the last character
     std::size_t begun_ = 0;  ///< characters of the frame, so far
     std::size_t discarded_ = 0;
     std::size_t faults_ = 0;
 };
 
-/// The frame in ASCII that says what this one says in RTU (address, PDU, CRC of any order).
+/// Converts an RTU frame (address, PDU, CRC of any order) to ASCII.
 Bytes to_ascii(ByteView adu);
 
-/// What is heard on an ASCII line, written down as RTU would say it, so that one set of judges
-/// serves both: a good frame comes with a right CRC, and what had begun like one and was none (LRC,
-/// digits, a pause) with none. Bytes come as they are heard, that a frame has begun is known at
-/// once; where it ends, the characters say, and neither silence nor lengths have to. Characters of
-/// no frame come as they are, up to the end of their line or the next ':'. Work is linear.
+/// Transcribes an ASCII line to RTU, so that the RTU framers serve both: a valid frame gets a
+/// correct CRC, an invalid one (LRC, digits, a pause) does not. Bytes are passed on as they arrive,
+/// so the start of a frame is known at once; characters mark its end, so neither silence nor
+/// lengths are needed. Characters outside frames are passed on unchanged, up to the end of their
+/// line or the next ':'. Linear time.
 class AsciiTranscript {
   public:
-    /// Bytes that follow those before. With an `end` they are the last of what has begun.
+    /// The next bytes. With an `end` they are the last of the current frame.
     struct Piece {
         enum class End : std::uint8_t {
             none,
-            frame,   ///< good: LRC, CR LF
-            damage,  ///< no frame
+            frame,   ///< valid: LRC, CR LF
+            damage,  ///< not a valid frame
         };
         Bytes bytes;
         End end = End::none;
     };
 
-    /// `pause`: the longest between two characters of a frame (V1.02, 2.5.2.1).
+    /// `pause`: maximum time between two characters of a frame (V1.02, 2.5.2.1).
     explicit AsciiTranscript(HexDigits digits, Duration pause = 1s);
 
-    /// Characters that have come at `now`; it never goes back.
+    /// Feeds characters received at `now`, which must not decrease.
     void feed(TimePoint now, ByteView characters);
-    /// The next piece of what was fed; to be asked until there is none.
+    /// Returns the next piece; call it until it returns std::nullopt.
     std::optional<Piece> next();
 
-    /// What has begun was judged without its end, or nobody wants it any more: its rest is noise.
+    /// Abandons the current frame, judged early or not needed any more: its rest is noise.
     void cut();
-    /// A frame has begun and is not whole.
+    /// True if a frame has begun and is not complete.
     bool inside() const { return reader_.partial(); }
-    /// Something of what has begun was given already.
+    /// True if a part of the current frame was already returned.
     bool has_given() const { return given_ > 0; }
 
   private:
@@ -142,15 +141,15 @@ class AsciiTranscript {
     void write_byte(Piece& piece);
     void write_rest(Piece& piece);
     void write_check(Piece& piece, bool good);
-    void break_off(std::uint8_t character, Piece& piece);
+    void abort_frame(std::uint8_t character, Piece& piece);
 
     AsciiReader reader_;
     Duration pause_;
     ByteQueue text_;
-    TimePoint last_{};       ///< character
-    bool paused_ = false;    ///< for too long, before what is in text_
-    bool noise_ = false;     ///< characters of no frame, whose line is not over
-    std::size_t given_ = 0;  ///< bytes of what has begun
+    TimePoint last_{};       ///< of the last character
+    bool paused_ = false;    ///< too long a pause before text_
+    bool noise_ = false;     ///< inside a line of noise
+    std::size_t given_ = 0;  ///< bytes of the current frame already returned
 };
 
 }  // namespace panelgate::modbus

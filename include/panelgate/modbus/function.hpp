@@ -36,7 +36,7 @@ enum Function : std::uint8_t {
     kEncapsulatedInterface = 0x2B,
 };
 inline constexpr std::uint8_t kExceptionBit = 0x80;
-/// Of a request or reply, the exception bit left out.
+/// Returns the function code without the exception bit.
 constexpr std::uint8_t plain_function(std::uint8_t function) {
     return static_cast<std::uint8_t>(function & ~kExceptionBit);
 }
@@ -44,10 +44,10 @@ inline constexpr std::uint8_t kMeiDeviceIdentification = 0x0E;
 
 inline constexpr std::size_t kMaxPdu = 253;     ///< AP 4.1
 inline constexpr std::size_t kMaxRtuAdu = 256;  ///< AP 4.1: address + PDU + CRC
-/// What the Panasonic GT may answer: one byte of byte count, so 255 data bytes (ARCT1F501E, 1.3.1).
+/// Longest reply of the Panasonic GT: one byte of byte count, so 255 data bytes (ARCT1F501E,
+/// 1.3.1).
 inline constexpr std::size_t kMaxLongRtuAdu = 260;
-/// What may be written to it (ARCT1F501E gives no limit, the byte count does): 0F with 255 data
-/// bytes.
+/// Longest write to it (ARCT1F501E gives no limit, the byte count does): 0F with 255 data bytes.
 inline constexpr std::size_t kMaxLongRequestPdu = 261;
 inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 
@@ -55,24 +55,24 @@ inline constexpr std::uint8_t kMaxStation = 247;  ///< serial line V1.02, 2.2
 enum class Table : std::uint8_t { coils, discrete_inputs, input_registers, holding_registers };
 inline constexpr std::array kTables = {Table::coils, Table::discrete_inputs, Table::input_registers,
                                        Table::holding_registers};
-/// "holding-registers", the word of the REST path.
+/// Returns the word of the REST path: "holding-registers".
 std::string_view label(Table table);
 inline constexpr bool is_bit_table(Table table) {
     return table == Table::coils || table == Table::discrete_inputs;
 }
 Function read_function(Table table);
 
-/// Only reads, surely: may be asked again without harm (RTY-02: 01..04, 07, 0B, 0C, 11, 14, 18).
-/// 2B is one only with MEI type 0E; see is_pure_read(pdu) in request.hpp.
+/// True for pure reads, which may be repeated without harm (RTY-02: 01..04, 07, 0B, 0C, 11, 14,
+/// 18). 2B is one only with MEI type 0E; see is_pure_read(pdu) in request.hpp.
 bool is_read(std::uint8_t function);
-/// 05, 06, 0F, 10: what may be broadcast (BC-02).
+/// True for 05, 06, 0F, 10: functions that may be broadcast (BC-02).
 bool is_broadcastable(std::uint8_t function);
-/// "read coils"; "" for a function that the standard does not define.
+/// Returns the name, "read coils"; "" if the standard does not define the function.
 std::string_view function_name(std::uint8_t function);
-/// Defined by the standard (AP section 6): keeps vendors' own codes out of metric labels.
+/// True if the standard defines it (AP section 6): keeps vendors' codes out of metric labels.
 bool is_known(std::uint8_t function);
 
-/// Exception codes of AP section 7. Any other byte is a vendor's own and passes through unchanged.
+/// Exception codes of AP section 7. Any other byte is vendor-specific and passes through unchanged.
 enum class ExceptionCode : std::uint8_t {
     illegal_function = 0x01,
     illegal_data_address = 0x02,
@@ -85,22 +85,23 @@ enum class ExceptionCode : std::uint8_t {
     gateway_target_failed = 0x0B,
 };
 
-/// "illegal data address"; "exception 9" for codes without a name.
+/// Returns "illegal data address"; "exception 9" for codes without a name.
 std::string describe_exception(std::uint8_t code);
 
-/// What a client is told: 01 denied; 03 malformed; 06 busy, expired; 0A not routed, line down,
-/// cancelled (the gateway is stopping); 0B for all that may have happened or a silent station.
+/// Exception code for the client: 01 denied; 03 malformed; 06 busy, expired; 0A not routed, line
+/// down, cancelled (the gateway is stopping); 0B if the request may have been executed, or the
+/// station is offline.
 ExceptionCode to_exception(Fault fault);
 
-/// {function | 80h, code}
+/// Encodes {function | 80h, code}.
 Bytes encode_exception(std::uint8_t function, ExceptionCode code);
-/// The code, when `pdu` is an exception reply (two bytes, high bit set).
+/// Returns the code if `pdu` is an exception reply (two bytes, high bit set).
 std::optional<std::uint8_t> exception_of(ByteView pdu);
 
 inline constexpr std::uint32_t kTableItems = 65536;  ///< of each table (AP 4.3)
 
-/// Items [first, end()) of one table, 0-based as on the wire. Whether they are there, end() within
-/// kTableItems, is asked where it matters.
+/// Items [first, end()) of one table, 0-based as on the wire. Callers that need it check that end()
+/// is within kTableItems.
 struct Span {
     Table table = Table::holding_registers;
     std::uint32_t first = 0;
@@ -113,14 +114,14 @@ struct Span {
     bool overlaps(const Span& other) const {
         return table == other.table && first < other.end() && other.first < end();
     }
-    /// They overlap or lie side by side: together they are one span without a hole.
+    /// True if they overlap or are adjacent: together they are one span without a gap.
     bool touches(const Span& other) const {
         return table == other.table && other.first <= end() && first <= other.end();
     }
     friend bool operator==(const Span&, const Span&) = default;
 };
 
-/// The least span that contains both, which are of one table.
+/// Returns the smallest span that contains both, which must be of one table.
 inline Span join(const Span& a, const Span& b) {
     const std::uint32_t first = std::min(a.first, b.first);
     return {a.table, first, std::max(a.end(), b.end()) - first};

@@ -15,15 +15,15 @@ namespace panelgate::modbus {
 /// CRC-16 of the serial line (V1.02, 2.5.1.2): generator 8005h reflected, preset FFFFh, no final
 /// XOR. Sent low byte first; over a whole good frame, its CRC included, it is 0.
 std::uint16_t crc16(ByteView bytes);
-/// ... of bytes that go on where `before` is that of all before them.
+/// Continues a CRC: `before` is the CRC of all preceding bytes.
 std::uint16_t crc16(std::uint16_t before, ByteView bytes);
 
-/// How the two bytes of the CRC stand at the end of a frame.
+/// Order of the two CRC bytes at the end of a frame.
 enum class CrcOrder : std::uint8_t {
     low_first,   ///< the standard's (serial line V1.02, 2.5.1.2)
     high_first,  ///< Autonics GP of before June 2005 (its manual's revision history)
 };
-/// As the configuration and the profiles write them.
+/// The words of configuration and profiles.
 inline constexpr std::array<std::pair<std::string_view, CrcOrder>, 2> kCrcOrders{
     {{"low_first", CrcOrder::low_first}, {"high_first", CrcOrder::high_first}}};
 inline std::string_view label(CrcOrder order) {
@@ -33,8 +33,8 @@ inline CrcOrder other(CrcOrder order) {
     return order == CrcOrder::low_first ? CrcOrder::high_first : CrcOrder::low_first;
 }
 
-/// Which order each address of a line sends and expects; the standard's unless set. Address 0 is
-/// the broadcast.
+/// CRC order of each address on a line, for sending and receiving; the standard's unless set.
+/// Address 0 is the broadcast.
 class CrcOrders {
   public:
     void set(std::uint8_t address, CrcOrder order) {
@@ -50,7 +50,7 @@ class CrcOrders {
     std::bitset<256> high_first_;
 };
 
-/// What a good frame of the serial modes (RTU, ASCII) says.
+/// Content of a valid frame of the serial modes (RTU, ASCII).
 struct SerialAdu {
     std::uint8_t station = 0;  ///< 0..255; 0 is a broadcast
     Bytes pdu;                 ///< 1 to 253 bytes
@@ -64,23 +64,23 @@ inline constexpr std::size_t kExceptionAdu = kMinAdu + 1;    ///< ... and code: 
 inline constexpr std::size_t kReadRequestAdu = kMinAdu + 4;  ///< 01 to 06: ... and two words
 inline constexpr std::size_t kReadReplyOverhead = kMinAdu + 1;  ///< 01 to 04: ... and byte count
 
-/// What stands between the address and the CRC. At least kMinAdu bytes.
+/// Returns the PDU, between address and CRC. `adu` has at least kMinAdu bytes.
 inline ByteView pdu_of(ByteView adu) { return adu.subspan(1, adu.size() - kAduOverhead); }
 
-/// Address, PDU, CRC: what goes out in one write (TIM-02).
+/// Encodes address, PDU and CRC, to be sent in one write (TIM-02).
 Bytes encode_adu(std::uint8_t station, ByteView pdu, CrcOrder order = CrcOrder::low_first);
 
-/// At least address, function and CRC (4 bytes), and the CRC is right. Knows no upper limit.
+/// True for at least address, function and CRC (4 bytes) with a correct CRC. No upper limit.
 bool crc_ok(ByteView adu, CrcOrder order = CrcOrder::low_first);
-/// ... in the order of the frame's own address.
+/// Uses the CRC order of the frame's own address.
 bool crc_ok(ByteView adu, const CrcOrders& orders);
 
-/// A good frame taken apart. `pdu` looks into the bytes it was made from.
+/// A decoded valid frame. `pdu` points into the bytes it was decoded from.
 struct RtuFrame {
     std::uint8_t station = 0;
     ByteView pdu;
 };
-/// Nothing unless crc_ok(adu).
+/// std::nullopt unless crc_ok(adu).
 std::optional<RtuFrame> decode_adu(ByteView adu);
 
 }  // namespace panelgate::modbus

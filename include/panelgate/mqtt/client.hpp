@@ -15,13 +15,12 @@ namespace panelgate::mqtt {
 
 class Connection;
 
-/// The end of a connection that has said its last word: what is still to be sent goes out, and the
-/// socket stays until the broker has closed it. To close one into which the broker still writes
-/// would reset the connection, and what the broker has not read yet, the last word with it, would
-/// be lost.
+/// Closes a connection gracefully: sends what is queued, then keeps the socket until the broker has
+/// closed it. Closing a socket the broker still writes to would reset the connection and lose what
+/// the broker has not read yet, including the farewell.
 class Leaving {
   public:
-    /// Owns the socket. `within`: then it is closed all the same. The clock outlives this.
+    /// Owns the socket; closes it after `within` at the latest. The clock must outlive this.
     Leaving(boost::asio::any_io_executor executor, int socket, rt::Clock& clock,
             std::shared_ptr<Connection> connection, Duration within);
     /// Closes it.
@@ -36,9 +35,9 @@ class Leaving {
     std::shared_ptr<State> state_;
 };
 
-/// Says at the broker what the publisher has to say, and connects again and again. What the broker
-/// has not acknowledged when a connection is lost is said again, in its order. One thread, nothing
-/// waits; clock and publisher outlive it.
+/// Publishes the publisher's messages and reconnects forever. Unacknowledged messages of a lost
+/// connection are sent again in order. Single-threaded and non-blocking; clock and publisher must
+/// outlive it.
 class Client {
   public:
     /// Called from the loop, never from inside the calls below.
@@ -51,13 +50,13 @@ class Client {
     Client& operator=(const Client&) = delete;
 
     void start();
-    /// Takes leave of the broker; what is given keeps the connection for that long. Null: there is
-    /// none.
+    /// Disconnects from the broker; the returned object keeps the connection until that is done.
+    /// Null if not connected.
     std::unique_ptr<Leaving> stop();
-    /// The publisher has something new.
+    /// Must be called when the publisher has new messages.
     void wake();
 
-    /// All but what comes of writes.
+    /// Returns all counters except those of write outcomes.
     Counters counters() const;
 
   private:

@@ -15,25 +15,26 @@
 
 namespace panelgate::mqtt {
 
-/// Messages that are sent until the broker has them, in order, by numbers of their own. Pure.
+/// A queue of messages, each resent until the broker acknowledges it, in order, with a number range
+/// of its own. Pure.
 class Kept {
   public:
     using Numbered = std::map<std::uint64_t, Message>;
 
-    /// `first`: the lowest number; nobody else's.
+    /// `first`: the lowest number of its exclusive range.
     explicit Kept(std::uint64_t first) : first_(first), free_(first), next_(first) {}
 
     void add(Message message) { messages_.emplace(free_++, std::move(message)); }
-    /// The next one, which is on its way now.
+    /// Returns the next message and marks it as in flight.
     std::optional<Numbered::value_type> next() {
         const auto found = messages_.lower_bound(next_);
         if (found == messages_.end()) return std::nullopt;
         next_ = found->first + 1;
         return *found;
     }
-    /// Of a number that is none of these: nothing.
+    /// Unknown numbers are ignored.
     void delivered(std::uint64_t number) { messages_.erase(number); }
-    /// What was on its way goes again.
+    /// Messages in flight must be sent again.
     void lost() { next_ = first_; }
 
     std::size_t size() const { return messages_.size(); }
@@ -42,13 +43,13 @@ class Kept {
   private:
     std::uint64_t first_;
     std::uint64_t free_;
-    std::uint64_t next_;  ///< those below are on their way
+    std::uint64_t next_;  ///< lower ones are in flight
     Numbered messages_;
 };
 
-/// What is to be said next to the broker. Births first, then what has changed while the broker was
-/// away, in its order, then what is; nothing that is sent is older than what was sent before of the
-/// same subject. Pure: time is an argument, a connection is a word.
+/// Decides what to send to the broker next: births, then the changes made while the broker was
+/// unreachable, in order, then current states; never a state older than one already sent for the
+/// same subject. Pure: time and connection events are arguments.
 class Publisher {
   public:
     Publisher(const Settings& settings, Subjects subjects);
@@ -57,44 +58,45 @@ class Publisher {
     Publisher& operator=(const Publisher&) = delete;
 
     const Subjects& subjects() const { return *subjects_; }
-    /// Before anything is offered: what another one knows, and has not told, of what is here too.
-    /// At the same broker also the answers that it may not have, and what it has retained there and
-    /// is none of this one's is cleared.
+    /// Takes over, before the first offer(), the previous publisher's states and unsent changes of
+    /// subjects that exist here too. At the same broker, also its unacknowledged write results, and
+    /// clears its retained topics that this one does not have.
     void take_over(const Publisher& before);
-    /// What is known of a subject before there is a connection, if nothing was: births tell it, and
-    /// it takes no room.
+    /// Sets a subject's state before there is a connection, if it has none: births publish it, and
+    /// it takes no room in the store.
     void know(std::size_t subject, State state);
-    /// What is known of a subject now. Nothing new: nothing is sent. True: it was.
+    /// Updates a subject's state. True if it changed and will be published.
     bool offer(std::size_t subject, State state);
-    /// Its state is sent once more.
+    /// Publishes its current state again.
     void repeat(std::size_t subject);
-    /// Told after what waits, until the broker has it; beyond Settings::results it is lost, and
-    /// counted. Of writes that were refused less find room, so that they take none from those that
-    /// were carried out.
+    /// Queues a write result after pending changes until the broker has it; beyond
+    /// Settings::results it is lost and counted. Results of refused writes have a lower limit, so
+    /// that they cannot displace those of executed writes.
     void answer(const WriteResult& result, bool refused);
-    /// Whether the answer to one more write, besides so many that are under way, has a place (P2).
+    /// True if the result of one more write, besides those under way, has room (P2).
     bool has_room_for_answer(std::size_t under_way) const {
         return results_.size() + under_way < settings_.results;
     }
     std::uint64_t results_dropped() const { return results_dropped_; }
 
-    /// A connection is to be made; its will.
+    /// Returns the will for a new connection.
     Message will() { return wording_->will(); }
     std::vector<std::string> subscriptions() const { return wording_->subscriptions(); }
-    /// It stands: everything is told.
+    /// The connection is up: everything is published.
     void connected();
-    /// It has gone: what the broker has not acknowledged is sent again.
+    /// The connection is lost: unacknowledged messages are sent again.
     void disconnected();
-    /// A host has asked for it: everything is told; if that is under way, once more behind it.
+    /// A host requested a rebirth: everything is published again; if a birth is under way, after
+    /// it.
     void rebirth();
     Message farewell(WallTime now) { return wording_->farewell(now); }
 
     struct Outgoing {
         Message message;
-        std::uint64_t change = 0;  ///< for delivered(); 0: of no change
+        std::uint64_t change = 0;  ///< for delivered(); 0: not a change
     };
-    /// Nothing: nothing is to be said. Whoever sends sees to it that at most Settings::in_flight
-    /// are not acknowledged.
+    /// Returns the next message, nullopt if there is none. The caller must keep at most
+    /// Settings::in_flight unacknowledged.
     std::optional<Outgoing> next(WallTime now);
     void delivered(std::uint64_t change);
 
@@ -109,19 +111,19 @@ class Publisher {
   private:
     std::optional<Message> next_before(WallTime now);
     std::optional<Message> next_behind();
-    void clear_what_went(const Publisher& before);
+    void clear_stale_topics(const Publisher& before);
 
     Settings settings_;
-    std::unique_ptr<const Subjects> subjects_;  ///< the wording refers to it
+    std::unique_ptr<const Subjects> subjects_;  ///< referenced by wording_
     std::unique_ptr<Wording> wording_;
     States states_;
     Store store_;
     Kept results_;
     std::uint64_t results_dropped_ = 0;
-    Kept cleared_;  ///< topics
+    Kept cleared_;  ///< topics to clear
     bool connected_ = false;
-    bool again_ = false;      ///< a rebirth behind this one
-    std::size_t before_ = 0;  ///< steps that are done
+    bool again_ = false;      ///< a rebirth follows this one
+    std::size_t before_ = 0;  ///< birth steps done
     std::size_t behind_ = 0;
 };
 

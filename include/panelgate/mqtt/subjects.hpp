@@ -16,7 +16,7 @@
 
 namespace panelgate::mqtt {
 
-/// What one PUBLISH carries.
+/// The content of one PUBLISH.
 struct Message {
     std::string topic;
     std::string payload;
@@ -31,31 +31,31 @@ struct Subject {
     enum class Kind : std::uint8_t { line, station, point };
     Kind kind = Kind::point;
     std::string name;
-    std::size_t station = 0;  ///< of a point: the number of its station's subject
-    std::string unit{};       ///< of a point, as the rest
+    std::size_t station = 0;  ///< of a point: its station's subject number
+    std::string unit{};       ///< of a point, like the rest
     points::Type type = points::Type::u16;
-    bool scaled = false;  ///< its value is no raw number
+    bool scaled = false;  ///< the value is not the raw number
 
     friend bool operator==(const Subject&, const Subject&) = default;
 };
 
-/// What is published, in one order: lines; then each station with its points behind it. A subject's
-/// number is its place, and stays what it is.
+/// The published subjects in a fixed order: lines; then each station followed by its points. A
+/// subject's number is its index, and never changes.
 class Subjects {
   public:
     void add_line(std::string name);
-    /// Of the points that follow.
+    /// Adds a station; the points added next belong to it.
     void add_station(std::string name);
     void add_point(const points::Point& point);
 
     std::size_t size() const { return all_.size(); }
     const Subject& operator[](std::size_t subject) const { return all_[subject]; }
-    /// Where the points of a station end; they begin behind it.
+    /// Returns the end of a station's points, which start after the station.
     std::size_t end_of(std::size_t station) const;
     const std::string& station_of(std::size_t point) const {
         return all_[all_[point].station].name;
     }
-    /// Which one has the names of this of others.
+    /// Returns the subject with the same names as `subject` of `others`.
     std::optional<std::size_t> find_same(const Subjects& others, std::size_t subject) const;
     friend bool operator==(const Subjects&, const Subjects&) = default;
     std::optional<std::size_t> find_line(std::string_view name) const;
@@ -69,53 +69,53 @@ class Subjects {
     std::vector<Subject> all_;
 };
 
-/// What is known of a subject.
+/// The state of a subject.
 struct State {
-    /// Of a point: nothing where there is none. Of a line: it is up. Of a station: it may answer.
+    /// Of a point: nullopt if it has none. Of a line: it is up. Of a station: it may answer.
     std::optional<points::Value> value;
-    std::string text;  ///< of a point: its label; else the word for its state
+    std::string text;  ///< of a point: its label; otherwise the name of its state
     points::Quality quality = points::Quality::good;
     WallTime time;  ///< since when; of a point's value: when it was read
 
-    /// Whatever their times are.
+    /// Compares all but the times.
     bool same_as(const State& other) const {
         return value == other.value && text == other.text && quality == other.quality;
     }
 };
 
-/// The last state of each subject; nothing before it has one.
+/// The last state of each subject; nullopt before the first.
 using States = std::vector<std::optional<State>>;
 
-/// A subject's state has become another.
+/// A change of a subject's state.
 struct Change {
-    std::uint64_t number = 0;  ///< grows
+    std::uint64_t number = 0;  ///< increasing
     std::size_t subject = 0;
     State state{};
 };
 
-/// The changes that the broker has not acknowledged, in their order: those that were sent first,
-/// then those that wait. When it is full, the oldest that waits goes and is counted. Pure.
+/// The changes not acknowledged by the broker, in order: first those sent, then those waiting. When
+/// full, the oldest waiting one is dropped and counted. Pure.
 class Store {
   public:
-    /// `limit`: changes; more than are ever sent and not acknowledged.
+    /// `limit`: in changes; more than the in-flight limit.
     explicit Store(std::size_t limit) : limit_(limit) {}
 
     void add(std::size_t subject, State state);
-    /// The next to be sent; null: nothing waits. Stays until sent() or skip().
+    /// Returns the next change to send, null if none waits. Valid until sent() or skip().
     const Change* next() const;
     void sent();
-    /// Nothing is to be said of it.
+    /// Drops next() without sending it.
     void skip();
-    /// The broker has it; numbers that are not there any more mean nothing.
+    /// The broker has acknowledged it; unknown numbers are ignored.
     void delivered(std::uint64_t number);
-    /// Whatever was sent and not acknowledged has to be sent again.
+    /// Unacknowledged changes must be sent again.
     void lost() { sent_ = 0; }
 
     const std::deque<Change>& changes() const { return changes_; }
     std::size_t size() const { return changes_.size(); }
     std::size_t in_flight() const { return sent_; }
     std::uint64_t dropped() const { return dropped_; }
-    /// Of the change that is added next.
+    /// Returns the number of the next change added.
     std::uint64_t next_number() const { return next_number_; }
 
   private:
@@ -128,63 +128,63 @@ class Store {
     std::uint64_t next_number_ = 1;
 };
 
-/// Somebody who publishes at the broker wants a point written.
+/// A point write requested through the broker.
 struct WriteCommand {
     std::size_t point = 0;  ///< its subject
     points::Value value;
-    std::string id{};  ///< JSON, to be told with what has become of it; empty: none
+    std::string id{};  ///< JSON, returned with the result; empty: none
 };
-/// ... but what came is no write of a point.
+/// An invalid write request.
 struct BadCommand {
-    std::string topic;  ///< that it came by
-    std::string why;    ///< for people
+    std::string topic;  ///< it was received on
+    std::string why;    ///< human-readable
     std::string id{};
 };
-/// Everything is to be told anew.
+/// A request to publish everything again.
 struct Rebirth {};
 using Command = std::variant<WriteCommand, BadCommand, Rebirth>;
 
-/// What became of a write.
+/// The result of a write.
 struct WriteResult {
-    std::string topic;  ///< that the write came by
+    std::string topic;  ///< the write was received on
     std::string id;     ///< of the write
-    std::string body;   ///< a JSON object: what is told of it
+    std::string body;   ///< a JSON object with the outcome
 };
 
-/// How subjects and their states are told: the format. Pure but for what has been told: births,
-/// sequence numbers. Calls stand in the order of what they make.
+/// The message format of subjects and states. Pure except for its record of births and sequence
+/// numbers. Messages must be sent in the order in which they were made.
 class Wording {
   public:
     virtual ~Wording() = default;
 
-    /// A connection is to be made: what the broker says when it is lost.
+    /// Returns the last will for a new connection.
     virtual Message will() = 0;
-    /// What the gateway says before it goes.
+    /// Returns the message sent before disconnecting.
     virtual Message farewell(WallTime now) = 0;
-    /// What is subscribed to, all with quality of service 0: nothing comes twice, or late.
+    /// Returns the topic filters, all subscribed with QoS 0: no duplicates, no stale messages.
     virtual std::vector<std::string> subscriptions() const = 0;
 
-    /// The topics that the broker keeps the last message of, told or not.
+    /// Returns all retained topics, published yet or not.
     virtual std::vector<std::string> retained() const = 0;
 
-    /// How many steps a birth has, before the changes that are kept, and behind them.
+    /// Number of birth steps before the stored changes, and after them.
     virtual std::size_t steps_before() const = 0;
     virtual std::size_t steps_behind() const = 0;
-    /// A step of the birth; nothing: there is nothing to be said at it. `next_change`: the number
-    /// that no change has yet.
+    /// Returns the message of a birth step, nullopt if it has none. `next_change`: the number of
+    /// the next change.
     virtual std::optional<Message> before(std::size_t step, const States& states,
                                           std::uint64_t next_change, WallTime now) = 0;
     virtual std::optional<Message> behind(std::size_t step, const States& states) = 0;
-    /// Nothing: it is told by a birth.
+    /// Returns the message of a change; nullopt if a birth covers it.
     virtual std::optional<Message> change(const Change& change, const States& states,
                                           std::uint64_t next_change, WallTime now) = 0;
 
-    /// What somebody has published. `retained`: some time ago.
+    /// Parses a message received from the broker. `retained`: it is of unknown age.
     virtual std::vector<Command> commands(std::string_view topic, std::string_view payload,
                                           bool retained) const = 0;
-    /// Where a write of this point comes by.
+    /// Returns the topic on which writes of this point are received.
     virtual std::string topic_of(std::size_t point) const = 0;
-    /// Nothing: the format has no words for it.
+    /// Returns the message of a write result; nullopt if the format has none.
     virtual std::optional<Message> result(const WriteResult& result) const = 0;
 };
 

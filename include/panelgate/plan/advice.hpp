@@ -7,21 +7,21 @@
 
 namespace panelgate::plan {
 
-inline constexpr double kWorthwhile = 0.01;  ///< what brings less is no advice
+inline constexpr double kMinGain = 0.01;  ///< smallest reduction of load worth an advice
 
 struct Advice {
     std::string what;  ///< "serial: {baud: 38400}"
-    double load = 0;   ///< of the line, then
-    double most = 0;   ///< … while all values change that relays wait for
+    double load = 0;   ///< the line's load after the change
+    double most = 0;   ///< … with all values changing that relays wait for
 };
 
-/// What to change on a line whose load is not fine, each by itself, what brings the most first:
-/// of the load that is certain, or of `most` where only that is too much. `plan` is the line's.
+/// Returns single changes for a line whose load is not fine, the most effective first: by `load`,
+/// or by `most` if only that is too high. `plan` is the line's plan.
 std::vector<Advice> advise(const Line& line, const LinePlan& plan);
 
-/// What cannot do however idle the line is, and what to change: panels that are planned to answer
-/// after their timeout, and a request that is so long that with one other before it the queue's
-/// deadline passes. `plan` is the line's.
+/// Returns warnings of what fails even on an idle line, with the remedy: panels whose planned reply
+/// comes after their timeout, and a request so long that, with one other before it, it misses the
+/// queue's deadline. `plan` is the line's plan.
 std::vector<std::string> warnings(const Line& line, const LinePlan& plan);
 
 }  // namespace panelgate::plan

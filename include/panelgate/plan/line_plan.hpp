@@ -17,10 +17,10 @@
 
 namespace panelgate::plan {
 
-/// A point or a poll block, as the configuration has it.
-struct Asked {
+/// A point or a poll block from the configuration.
+struct PolledItem {
     points::Want want;
-    std::string notation;  ///< as typed
+    std::string notation;  ///< as configured
 };
 
 struct Station {
@@ -28,95 +28,95 @@ struct Station {
     const profile::PanelProfile* profile = nullptr;  ///< never null; outlives this
     Duration response_timeout = 500ms;
     Duration think_time = 1ms;
-    /// Of the whole line behind its first timeout (`quarantine: line`); then its request is
-    /// repeated before anybody else's, if it is.
+    /// How long the whole line is suspended after the station's first timeout (`quarantine: line`);
+    /// the request is then repeated before any other, if `repeats`.
     Duration line_rest{};
     bool repeats = true;
-    /// Silence behind its replies, where it is set; nothing: what its rate and its profile ask for.
+    /// Silence after its replies, if configured; nullopt: from the serial format and the profile.
     std::optional<Duration> frame_gap;
-    std::vector<Asked> asked;
-    points::SharedMemory memory{};  ///< what is read again behind a write
+    std::vector<PolledItem> asked;
+    points::SharedMemory memory{};  ///< decides what is read again after a write
 };
 
-/// What a relay does on one line. `from` and `to`: its ends that are on this line, one at least.
+/// A relay's part on one line. `from` and `to`: its endpoints on this line, at least one.
 struct Relay {
     struct End {
         std::size_t station = 0;  ///< index into Line::stations
         modbus::Span span;
     };
     std::string name;
-    Duration every = 1s;  ///< it reads, and writes; above 0
-    /// It writes only what has changed, and all of it once so often; nothing: it always writes.
+    Duration every = 1s;  ///< interval of reads and writes; above 0
+    /// Writes only changes, and everything once per `refresh`; nullopt: writes at each turn.
     std::optional<Duration> refresh;
     std::optional<End> from;
     std::optional<End> to;
-    bool single = false;  ///< it writes by 05 or 06
+    bool single = false;  ///< writes by 05 or 06
 
-    /// It writes so often at least, changed or not.
+    /// Returns the longest interval between writes.
     Duration writes_every() const { return refresh ? std::max(every, *refresh) : every; }
-    /// On this line it can be told whether `other` goes on where this one ends.
+    /// True if `other` is known, on this line, to continue where this relay ends.
     bool continues_in(const Relay& other) const;
 };
 
-/// What is known of a line before anything runs.
+/// The static data of a line.
 struct Line {
     std::string name;
     SerialFormat serial;
     std::vector<Station> stations;
     std::vector<Relay> relays;
-    Duration deadline = 2s;  ///< of a request, from its arrival to its answer
-    bool listens = false;    ///< nothing is ever sent there
+    Duration deadline = 2s;  ///< of a request, from arrival to answer
+    bool listens = false;    ///< listen mode: nothing is sent
 };
 
-/// Silence behind the replies of one of its stations.
+/// Returns the silence after the station's replies.
 Duration gap_of(const Line& line, const Station& station);
-/// What bounds a station's reads, and what they cost, on this line.
+/// Returns the limits and costs of the station's reads on this line.
 points::PlanLimits limits_of(const Line& line, const Station& station);
-/// The same line at another rate. Gaps that are set stay.
+/// Returns the line at another rate. Configured gaps stay.
 Line at_rate(const Line& line, int baud);
-/// The same line with every interval so many times as long (above 0), up to points::kSlowest;
-/// `refresh` is none.
+/// Returns the line with every interval multiplied by `times` (above 0), up to points::kSlowest;
+/// `refresh` stays.
 Line at_intervals(const Line& line, double times);
 
-// Loads are shares of the wire's time: 0.8 is 80 %; more than 1 is more than there is.
+// Loads are shares of the wire's time: 0.8 is 80 %; more than 1 is an overload.
 
-inline constexpr double kHigh = 0.8;         ///< above: clients wait long, and a fault is felt
-inline constexpr double kFull = 1;           ///< above: polls are late for ever
-inline constexpr double kProbes = 0.05;      ///< what all dead stations together may cost (P4)
-inline constexpr unsigned kClientRead = 10;  ///< registers of the read that headroom is counted in
+inline constexpr double kHigh = 0.8;     ///< above: clients wait long, and faults are noticeable
+inline constexpr double kFull = 1;       ///< above: polls are permanently late
+inline constexpr double kProbes = 0.05;  ///< limit of all probes of offline stations together (P4)
+inline constexpr unsigned kClientRead = 10;  ///< registers per read in which headroom is given
 
-/// A request that goes out again and again.
+/// A periodic read.
 struct Poll {
     std::string station;
-    std::string read;  ///< the first item in the panel's notation
+    std::string read;  ///< first item in the panel's notation
     std::uint32_t count = 1;
-    std::vector<std::size_t> asked;  ///< what it serves: indices into its Station::asked
+    std::vector<std::size_t> asked;  ///< indices into Station::asked of what it serves
     Duration every{};
     Duration wire{};  ///< request, both gaps, think time, reply
     double load = 0;
 };
 
-/// What a relay asks on this line.
+/// A relay's requests on this line.
 struct RelayLoad {
     enum class Request : std::uint8_t {
         read,
         write,
-        reread  ///< polls of the target that each write makes old: all of them in one figure
+        reread  ///< all polls of the target that each write makes outdated, summed
     };
     std::string relay;
     std::string station;
     Request request = Request::read;
-    Duration every{};  ///< of a write that waits for changes: its refresh
+    Duration every{};  ///< for on_change writes: the refresh
     Duration wire{};
     double load = 0;
-    double most = 0;  ///< when the values change at every turn
+    double most = 0;  ///< load if the values change at every turn
 };
 
-/// The station whose silence leaves the others least.
+/// The station whose failure leaves the others the least time.
 struct OneDead {
     std::string station;
-    double load = 0;   ///< of the others, and of all probes
-    Duration holds{};  ///< the others wait so long, once, whoever falls silent
+    double load = 0;   ///< of the others, with all probes
+    Duration holds{};  ///< longest single delay of the others when any station fails
 };
 
 struct LinePlan {
@@ -124,37 +124,37 @@ struct LinePlan {
     std::vector<Poll> polls;
     std::vector<RelayLoad> relays;
     double load = 0;
-    double most = 0;              ///< when all values change that relays wait for
-    std::optional<OneDead> dead;  ///< nothing without stations that are asked
-    bool listens = false;         ///< nothing is ever sent, for nobody
-    Duration once{};              ///< everything, one after the other
-    Duration client_read = 1ms;   ///< of kClientRead registers, of the slowest station
+    double most = 0;              ///< load if all values change that relays wait for
+    std::optional<OneDead> dead;  ///< nullopt without stations that are asked
+    bool listens = false;         ///< listen mode: nothing is sent
+    Duration once{};              ///< all requests, one after the other
+    Duration client_read = 1ms;   ///< of kClientRead registers, from the slowest station
 
-    /// Of the time, for whoever asks besides.
+    /// Returns the share of time left for clients.
     double free_share() const;
-    /// Reads of kClientRead registers a second that the wire has time for besides.
+    /// Returns the reads of kClientRead registers per second that fit into the time left.
     double free_reads() const;
 };
 
 enum class Verdict : std::uint8_t { fine, high, overload };
 std::string_view label(RelayLoad::Request request);
-/// Of the load that is certain; what relays may add makes it `high` at most, above kFull.
+/// Judges `load`; `most` above kFull makes it `high` only.
 Verdict verdict(const LinePlan& plan);
-/// The verdict is not `fine` for what relays may add alone: `most` is what is too much.
+/// True if `load` is fine and only `most` is too high.
 bool is_high_by_changes(const LinePlan& plan);
 
 LinePlan make_plan(const Line& line);
 
 struct HighestRate {
-    double times = 1;       ///< as often as now everything could be asked
-    bool changing = false;  ///< beyond, the values that change are too many; else what is certain
+    double times = 1;       ///< factor on all request rates
+    bool changing = false;  ///< the limit is `most`, not `load`
 };
 
-/// Up to which all that a line has to carry is fine, found by planning it at other intervals; a
-/// refresh of a relay stays. Nothing of an idle line. `plan` is the line's.
+/// Returns the highest rate at which the line is still fine, found by planning it at other
+/// intervals; a relay's refresh stays. nullopt for an idle line. `plan` is the line's plan.
 std::optional<HighestRate> highest_rate(const Line& line, const LinePlan& plan);
 
-/// To whole milliseconds of up to two digits, which people would choose.
+/// Rounds up to a round number of milliseconds with at most two significant digits.
 inline Duration rounded_up(Duration duration) {
     Duration unit = 1ms;
     while (duration > 20 * unit) unit *= 10;

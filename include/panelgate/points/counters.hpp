@@ -6,23 +6,23 @@
 
 namespace panelgate::points {
 
-/// One point at a scrape.
+/// One point as exported at a scrape.
 struct PointSample {
     std::string line;
     std::string station;
     std::string point;
     std::string unit;
-    std::optional<double> value;  ///< nothing when the last attempt to read it failed
-    std::optional<double> age;    ///< s; nothing when it was never read
+    std::optional<double> value;  ///< nullopt if the last read failed
+    std::optional<double> age;    ///< seconds; nullopt if never read
 };
 
-/// One relay at a scrape.
+/// One relay as exported at a scrape.
 struct RelaySample {
     std::string relay;
     bool ok = false;  ///< the last transfer succeeded
     std::uint64_t reads = 0;
     std::uint64_t writes = 0;
-    std::uint64_t repairs = 0;  ///< of these: after somebody else had written there
+    std::uint64_t repairs = 0;  ///< of these: after another client had written there
     std::uint64_t read_failures = 0;
     std::uint64_t write_failures = 0;
 };

@@ -14,18 +14,18 @@
 
 namespace panelgate::points {
 
-/// What passes by on a line whose master is somebody else, as far as it is wanted of one station: a
-/// want is known by a read that covers all of it, or a write that was confirmed. What is in doubt,
-/// and a write that nobody confirmed, makes old what it may have changed. Pure.
+/// Values of one station's wants, heard on a line with another master. A read that covers a want
+/// completely sets its value, and so does a confirmed write. A doubtful or unconfirmed write makes
+/// stale what it may have changed. Pure.
 class HeardValues {
   public:
     explicit HeardValues(const std::vector<Want>& wants, SharedMemory memory = {});
 
-    /// A request to this station, or a broadcast, and what came of it. Gives the wants that are
-    /// another now: read, failed, or old.
+    /// Processes a request to this station, or a broadcast, with its result. Returns the changed
+    /// wants: read, failed, or outdated.
     std::vector<std::size_t> on_heard(const tap::Transaction& heard);
 
-    /// What the one before knew of the same items is known here, too.
+    /// Takes over the readings of the same items from `before`.
     void adopt(const HeardValues& before) {
         adopt_readings(wants_, readings_, before.wants_, before.readings_);
     }
@@ -33,9 +33,9 @@ class HeardValues {
     const std::vector<Reading>& readings() const { return readings_; }
 
   private:
-    bool read(const modbus::Span& span, const tap::Transaction& heard);
-    void wrote(const std::optional<modbus::Span>& span, const tap::Transaction& heard);
-    void failed(const modbus::Span& span, std::optional<std::uint8_t> exception);
+    bool apply_read(const modbus::Span& span, const tap::Transaction& heard);
+    void apply_write(const std::optional<modbus::Span>& span, const tap::Transaction& heard);
+    void apply_failure(const modbus::Span& span, std::optional<std::uint8_t> exception);
     void set(std::size_t want, const modbus::Span& span, const std::vector<std::uint16_t>& items,
              TimePoint sampled);
 

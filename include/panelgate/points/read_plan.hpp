@@ -15,28 +15,28 @@
 
 namespace panelgate::points {
 
-/// Items that somebody wants together (all registers of a 32-bit value) this often.
+/// Items to be read together (all registers of a 32-bit value) at this interval.
 struct Want {
-    modbus::Span span;    ///< at least one item, none beyond the end of the table
-    Duration every = 1s;  ///< above 0
+    modbus::Span span;    ///< at least one item, within the table
+    Duration every = 1s;  ///< greater than 0
     friend bool operator==(const Want&, const Want&) = default;
 };
 
-/// What the panel can do with one table.
+/// A panel's read limits for one table.
 struct TableLimits {
-    std::uint32_t max_items = 0;                  ///< of one read; 0 = this table cannot be read
-    std::vector<profile::AddressRange> readable;  ///< what a read may cross without being asked to
+    std::uint32_t max_items = 0;                  ///< items per read; 0: the table cannot be read
+    std::vector<profile::AddressRange> readable;  ///< a read may include unwanted items here
     friend bool operator==(const TableLimits&, const TableLimits&) = default;
 };
 
-/// What bounds the reads of one station, and what they cost.
+/// Limits and costs of one station's reads.
 struct PlanLimits {
     SerialFormat serial;
     Duration gap = 1750us;      ///< silence after the reply
-    Duration think_time = 1ms;  ///< of the panel, after the silence that ends the request
+    Duration think_time = 1ms;  ///< the panel's, after the silence that ends the request
     std::array<TableLimits, modbus::kTables.size()> tables;  ///< by modbus::Table
-    /// Learned from exceptions 02 and 03: no read may contain one of these whole. The caller bounds
-    /// how many there are.
+    /// Learned from exceptions 02 and 03: no read may contain one of these spans whole. The caller
+    /// limits their number.
     std::vector<modbus::Span> refused;
 
     TableLimits& of(modbus::Table table) { return tables[static_cast<std::size_t>(table)]; }
@@ -46,61 +46,60 @@ struct PlanLimits {
     friend bool operator==(const PlanLimits&, const PlanLimits&) = default;
 };
 
-/// The profile's limits within the standard's (AP 6.1 to 6.4: 2000 bits, 125 registers) and its
-/// readable areas. A function that the profile does not list makes a table unreadable; a profile
-/// without functions has the standard's.
+/// Returns the profile's limits and readable areas, within the standard's limits (AP 6.1 to 6.4:
+/// 2000 bits, 125 registers). A table is unreadable if the profile does not list its function; a
+/// profile without functions has the standard's.
 PlanLimits make_plan_limits(const profile::PanelProfile& profile, const SerialFormat& serial,
                             Duration gap);
 
 /// One request of the plan.
 struct PlannedRead {
     modbus::Span span;
-    Duration every{};                ///< the shortest interval of its wants
-    std::vector<std::size_t> wants;  ///< indices of what it serves, ascending
-    /// It contains a refused span, because what is wanted does: expect an exception.
+    Duration every{};                ///< shortest interval of its wants
+    std::vector<std::size_t> wants;  ///< indices of the wants it serves, ascending
+    /// One of its wants contains a refused span: expect an exception.
     bool refused = false;
 };
 
-/// How long a read of `count` items keeps the line from everybody else: request, the silence that
-/// ends it, think time, reply, gap.
+/// Returns how long a read of `count` items occupies the line: request, the silence that ends it,
+/// think time, reply, gap.
 Duration read_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count);
-/// The same of a write by 15 or 16; `single`: by 05 or 06.
+/// The same for a write by 15 or 16; `single`: by 05 or 06.
 Duration write_cost(const PlanLimits& limits, modbus::Table table, std::uint32_t count,
                     bool single);
 
-/// Few reads that serve every want, sorted by table and address. Where all intervals are the same
-/// this is the least wire time that is possible; where they differ it is the better of two plans
-/// (interval after interval, then joined where that is not dearer per second; or all at once),
-/// which is seldom more than the least. A want lies in one read, whole; one that is larger than a
-/// read may be is cut, and several reads name it. Every item of a read is in a want or readable by
-/// the profile. A read contains a refused span only if it is exactly one want (or a piece of a cut
-/// one), with `refused` set: nothing else is read with it. A want may be served by a read of a
-/// shorter interval that contains it. Wants that break their contract, or whose table cannot be
-/// read, are not planned. Work: O(n log n + n * max_items), some milliseconds for thousands of
-/// points.
+/// Returns few reads that serve every want, sorted by table and address. If all intervals are
+/// equal, the wire time is minimal. Otherwise it is the better of two plans (one interval after
+/// another, then joined if that costs no more per second; or all at once), which is rarely above
+/// the minimum. A want lies whole in one read; a want larger than the maximum read is cut into
+/// several. Every item of a read is in a want or readable by the profile. A read contains a refused
+/// span only if it is exactly one want (or a piece of a cut one), with `refused` set. A want may be
+/// served by a read with a shorter interval that contains it. Invalid wants, and wants in
+/// unreadable tables, are not planned. Complexity: O(n log n + n * max_items), a few milliseconds
+/// for thousands of points.
 std::vector<PlannedRead> plan_reads(std::span<const Want> wants, const PlanLimits& limits);
 
-/// After exception 02 or 03: two reads that share the wants of this one, cut at its widest hole, or
-/// in the middle when there is none. Nothing when all its wants are the same items: then this span
-/// itself is what the panel refuses. `wants` are those that the plan was made of.
+/// Splits a read after exception 02 or 03 into two that share its wants, cut at the widest hole, or
+/// in the middle if there is none. nullopt if all its wants are the same items: the panel refuses
+/// this span itself. `wants`: those that the plan was made from.
 std::optional<std::pair<PlannedRead, PlannedRead>> bisect(const PlannedRead& read,
                                                           std::span<const Want> wants);
 
-/// When both halves of a bisected read succeed, what the panel refuses lies between them: the
-/// smallest span that no read may contain then. Nothing when the halves overlap: then only the read
-/// that was bisected is known to be refused.
-std::optional<modbus::Span> seam(const PlannedRead& left, const PlannedRead& right);
+/// If both halves of a split read succeed, the panel refuses something between them: returns the
+/// smallest span that no read may contain then. nullopt if the halves overlap: then only the split
+/// read itself is known to be refused.
+std::optional<modbus::Span> refused_between(const PlannedRead& left, const PlannedRead& right);
 
-/// Keeps the contract of Want.
+/// True if the want is valid, as Want requires.
 bool is_plannable(const Want& want);
 
-/// How far a read of one table may go, from what is readable, what is wanted and what was refused.
+/// How far reads of one table may extend, given readable areas, wants and refused spans.
 class TableMap {
   public:
     TableMap(std::span<const Want> wants, const PlanLimits& limits, modbus::Table table);
 
-    /// The furthest end (one past the last item) that a read from `first` may have. `first` itself
-    /// must be wanted or readable. Less than a want's end when the want contains a refused span.
+    /// Returns the maximum end (one past the last item) of a read from `first`, which must be
+    /// wanted or readable. Less than a want's end if the want contains a refused span.
     std::uint32_t reach(std::uint32_t first) const;
 
   private:
@@ -110,7 +109,7 @@ class TableMap {
     };
     std::uint32_t max_items_;
     std::vector<Piece> open_;     ///< disjoint, ascending, never adjacent
-    std::vector<Piece> refused_;  ///< ascending; `end` is the least of it and all that follow
+    std::vector<Piece> refused_;  ///< ascending; `end` is the minimum of its own and all following
 };
 
 }  // namespace panelgate::points

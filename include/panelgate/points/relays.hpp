@@ -21,35 +21,35 @@ std::string_view label(RelayState state);
 
 struct RelayStatus {
     std::string name;
-    RelayState state = RelayState::waiting;  ///< before the first transfer
-    std::string why;                         ///< it fails: an outcome, or "exception 2"
+    RelayState state = RelayState::waiting;  ///< `waiting` before the first transfer
+    std::string why;                         ///< cause of a failure: an outcome, or "exception 2"
     std::uint64_t reads = 0;
     std::uint64_t writes = 0;
-    std::uint64_t repairs = 0;  ///< of these: after somebody else had written there
+    std::uint64_t repairs = 0;  ///< of these: after another client had written there
     std::uint64_t read_failures = 0;
     std::uint64_t write_failures = 0;
     std::optional<TimePoint> last_write;
 };
-/// "ok", "source failing: timeout"
+/// Returns "ok", "source failing: timeout" and the like.
 std::string text_of(const RelayStatus& relay);
 
-/// A relay with its ends found.
+/// A relay with its endpoints resolved.
 struct RelayRoute {
     Relay relay;
-    bus::BusClient* from = nullptr;  ///< outlive the relays
+    bus::BusClient* from = nullptr;  ///< both buses outlive the relays
     bus::BusClient* to = nullptr;
-    std::string to_line{};  ///< the name of the target's line
+    std::string to_line{};  ///< name of the target's line
     SharedMemory to_memory{};
     std::uint8_t from_station = 0;
     std::uint8_t to_station = 0;
-    bool to_has_multiple = true;  ///< the target takes functions 15 and 16
+    bool to_has_multiple = true;  ///< the target supports functions 15 and 16
 };
 
-/// Copies blocks between stations, over lines too. One request of each relay is open at a time, of
-/// the class `poll`: a relay whose panel is silent keeps nobody waiting. It writes only what it has
-/// read just before; with on_change what is new, and all again after a while and whenever the
-/// target may have been restarted. What somebody else has written to the target is written over at
-/// once, but once a second at most: nobody wins a fight. One thread; the clock outlives it.
+/// Copies blocks between stations, also across lines. Each relay has one open request of class
+/// `poll`, so a silent panel delays only its own relays. Writes only what was just read; with
+/// on_change only changes, and everything after `refresh` and whenever the target may have
+/// restarted. Writes by other clients to the target are overwritten, at most once a second.
+/// Single-threaded; the clock outlives it.
 class Relays {
   public:
     using Changed = std::function<void(const RelayStatus&)>;
@@ -59,16 +59,16 @@ class Relays {
     Relays(const Relays&) = delete;
     Relays& operator=(const Relays&) = delete;
 
-    /// From now on these; those that are the same go on as if nothing had happened.
+    /// Replaces the relays. Unchanged relays continue.
     void apply(std::vector<RelayRoute> routes);
 
-    /// Called when the state of a relay becomes another one.
+    /// Sets the function called when a relay's state changes.
     void on_state(Changed changed);
     void start();
     void stop();
     std::vector<RelayStatus> status() const;
-    /// To be told what is written on a line (its name), from inside its bus; may outlive the
-    /// relays.
+    /// Returns the function to call from inside a bus with each write on a line (by its name); it
+    /// may outlive the relays.
     std::function<void(const std::string&, const bus::WriteEvent&)> write_listener() const;
 
   private:

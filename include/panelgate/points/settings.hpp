@@ -10,16 +10,16 @@
 
 namespace panelgate::points {
 
-inline constexpr Duration kSlowest = 24h;        ///< any interval
-inline constexpr std::size_t kMaxPoints = 4096;  ///< of one station
-inline constexpr std::size_t kMaxPolls = 256;    ///< of one station
+inline constexpr Duration kSlowest = 24h;        ///< maximum of any interval
+inline constexpr std::size_t kMaxPoints = 4096;  ///< per station
+inline constexpr std::size_t kMaxPolls = 256;    ///< per station
 inline constexpr std::size_t kMaxRelays = 256;
-inline constexpr std::size_t kMaxLabels = 256;   ///< of a point
-inline constexpr std::size_t kMaxNoValues = 16;  ///< of a point
+inline constexpr std::size_t kMaxLabels = 256;   ///< per point
+inline constexpr std::size_t kMaxNoValues = 16;  ///< per point
 
-/// A block that is read without being named point by point: it feeds the memory of `max_age`.
+/// A block that is polled without naming its points, to fill the `max_age` cache.
 struct Poll {
-    std::string read;  ///< the notation it was configured with
+    std::string read;  ///< the configured notation
     modbus::Table table = modbus::Table::holding_registers;
     std::uint16_t address = 0;
     std::uint32_t count = 1;
@@ -27,7 +27,7 @@ struct Poll {
     friend bool operator==(const Poll&, const Poll&) = default;
 };
 
-/// One end of a relay.
+/// One endpoint of a relay.
 struct RelayEnd {
     std::string station;  ///< its name
     std::string at;       ///< the notation
@@ -42,11 +42,11 @@ struct Relay {
     RelayEnd to;
     std::uint32_t count = 1;
     Duration every = 1s;
-    bool on_change = false;  ///< write only when what was read differs from what was written
+    bool on_change = false;  ///< write only if the values read differ from the last values written
     /// … and again this long after the last write: the target may have lost its memory.
     Duration refresh = 60s;
 
-    /// "press/UW100 to oven/GDT200"
+    /// Returns "press/UW100 to oven/GDT200".
     std::string name() const {
         return from.station + '/' + from.at + " to " + to.station + '/' + to.at;
     }

@@ -10,17 +10,17 @@
 
 namespace panelgate::profile {
 
-/// Reads a profile file. `name` is the file's name without ending. Every fault is added to
-/// `problems`; nothing is returned then.
+/// Reads a profile file. `name` is the file's name without extension. Adds every error to
+/// `problems` and then returns nullopt.
 std::optional<PanelProfile> load_profile(std::string_view text, std::string name,
                                          yaml::Problems& problems);
 
 /// The known profiles by name. Profiles live as long as the catalogue and do not move.
 class Catalogue {
   public:
-    /// The profiles compiled into the program. They are valid, a test says so.
+    /// Returns the profiles compiled into the program. A test checks that they are valid.
     static Catalogue shipped();
-    /// Adds or replaces.
+    /// Adds or replaces a profile.
     void add(PanelProfile profile);
     const PanelProfile* find(std::string_view name) const;
     const std::map<std::string, PanelProfile, std::less<>>& all() const { return profiles_; }

@@ -11,7 +11,7 @@ namespace panelgate::profile {
 
 /// An item of a panel's memory.
 struct Item {
-    const Area* area = nullptr;  ///< of the profile it was found with
+    const Area* area = nullptr;  ///< of the profile in which it was found
     std::uint16_t address = 0;   ///< 0-based, in area->table
 };
 
@@ -24,14 +24,15 @@ struct NotationError {
 [[noreturn]] void throw_exception_from_error(const NotationError& error,
                                              const boost::source_location& where);
 
-/// "UB180" -> area UB, address 288. Letters in any case; UB00180 = UB180. A text no area
-/// understands says which notations the panel has; a number outside says what the range is.
+/// Parses a notation: "UB180" -> area UB, address 288. Case-insensitive; UB00180 = UB180. The error
+/// for unknown text lists the panel's notations; for a number out of range it gives the range.
 boost::system::result<Item, NotationError> parse_notation(const PanelProfile& profile,
                                                           std::string_view text);
 
-/// The canonical notation of an item of this area: 288 -> "UB180". The address must be readable.
+/// Returns the canonical notation of an item of this area: 288 -> "UB180". The address must be
+/// readable.
 std::string format_notation(const Area& area, std::uint16_t address);
-/// In the first area that reaches the item; "" when none does.
+/// The same for the first area that contains the item; "" if none does.
 std::string format_notation(const PanelProfile& profile, modbus::Table table,
                             std::uint16_t address);
 

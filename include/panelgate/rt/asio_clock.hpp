@@ -9,18 +9,18 @@
 
 namespace panelgate::rt {
 
-/// A system's timer rings late: the machine has to wake up, some 30 us where it idles. How much
-/// earlier it is to be set, so that who must be on time can watch the clock for the rest. As much
-/// as two of three are late; watching takes at most a thirtieth of the time. Pure.
+/// Compensates for the wake-up latency of the system's timer, some 30 us on an idle machine: how
+/// much earlier to set it, so that a sharp alarm can busy-wait for the rest. Adapts to a lead that
+/// covers two of three wake-ups; busy-waiting takes at most a thirtieth of the time. Pure.
 class LeadTime {
   public:
     static constexpr Duration kMost = 80us;
 
-    /// None while the share is used up.
+    /// Zero while the budget for busy-waiting is used up.
     Duration lead() const { return allowance_ > Duration::zero() ? lead_ : Duration::zero(); }
-    /// The timer rang so late, and for so long the clock was watched.
+    /// Reports a wake-up that was `late`, after which the clock was busy-polled for `watched`.
     void on_rung(TimePoint now, Duration late, Duration watched) {
-        constexpr Duration kUp = 200ns;  // twice the way down: two of three are below
+        constexpr Duration kUp = 200ns;  // twice kDown: two of three wake-ups are below
         constexpr Duration kDown = 100ns;
         lead_ = std::clamp(late > lead_ ? lead_ + kUp : lead_ - kDown, Duration::zero(), kMost);
         const Duration passed = std::min(now - last_, kShare * kSaved);
@@ -30,18 +30,18 @@ class LeadTime {
 
   private:
     static constexpr int kShare = 30;
-    static constexpr Duration kSaved = 10ms;  ///< of watching, after a rest
+    static constexpr Duration kSaved = 10ms;  ///< of busy-waiting, saved up at most
 
     Duration lead_ = 40us;
     Duration allowance_ = kSaved;
     TimePoint last_{};
 };
 
-/// The machine's monotonic clock; its alarms ring from the executor's loop. With wall_seconds() the
-/// only place that asks the machine for the time.
+/// The system's monotonic clock; its alarms fire from the executor's loop. Apart from
+/// wall_seconds() the only code that reads the system's time.
 class AsioClock final : public Clock {
   public:
-    /// Throws std::system_error when the system has no timer left.
+    /// Throws std::system_error if no timerfd can be created.
     explicit AsioClock(const boost::asio::any_io_executor& executor);
 
     TimePoint now() const override;

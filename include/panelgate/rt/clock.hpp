@@ -9,22 +9,22 @@
 
 namespace panelgate::rt {
 
-/// Rings once, at a time. Belongs to whom it wakes: what was armed rings neither after cancel() nor
-/// after arm() anew nor after the end of the alarm, and never from inside these calls. The handler
-/// is kept by the clock until then, so it may hold its owner.
+/// One-shot timer, owned by the object it wakes. The handler does not run after cancel(), a new
+/// arm() or the alarm's end, and never from inside these calls. The clock keeps the handler until
+/// then, so it may own its owner.
 class Alarm {
   public:
     using Handler = std::function<void()>;
 
     virtual ~Alarm() = default;
-    /// A time that has passed rings as soon as the loop runs.
+    /// A time in the past fires as soon as the loop runs.
     virtual void arm(TimePoint when, Handler ring) = 0;
-    /// As arm(), and not late by what waking up takes: for what is due on the wire.
+    /// Like arm(), but compensates for the wake-up latency: for what is due on the wire.
     virtual void arm_sharp(TimePoint when, Handler ring) { arm(when, std::move(ring)); }
     virtual void cancel() = 0;
 };
 
-/// Monotonic time and alarms: the time seam. One thread; it outlives whoever takes it.
+/// Monotonic time and alarms; tests replace it. Single-threaded; outlives its users.
 class Clock {
   public:
     virtual ~Clock() = default;
@@ -32,11 +32,12 @@ class Clock {
     virtual std::unique_ptr<Alarm> make_alarm() = 0;
 };
 
-/// Wall clock, for traces.
+/// Returns the wall-clock time, for traces.
 WallTime wall_now();
-/// Wall clock: seconds since 1970, for log lines, metrics and panels' clocks; never for timing.
+/// Returns wall-clock seconds since 1970, for log lines, metrics and panels' clocks; never for
+/// timing.
 double wall_seconds();
-/// The same as local time, as if it were UTC: what a clock on the wall shows.
+/// The same in local time, as if it were UTC: what a clock on the wall shows.
 std::int64_t local_wall_seconds();
 
 }  // namespace panelgate::rt

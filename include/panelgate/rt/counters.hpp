@@ -6,10 +6,10 @@
 
 namespace panelgate::rt {
 
-/// What the shells' common ground counts.
+/// Counters of the runtime.
 struct Counters {
-    std::uint64_t log_lines_dropped = 0;  ///< because stderr's reader stood still
-    Histogram loop_lag;                   ///< how late the loop rang its timers (LoopLag)
+    std::uint64_t log_lines_dropped = 0;  ///< because stderr was not read
+    Histogram loop_lag;                   ///< how late the loop fired its timers (LoopLag)
 };
 
 }  // namespace panelgate::rt

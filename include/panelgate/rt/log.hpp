@@ -16,15 +16,15 @@ namespace panelgate::rt {
 
 class Clock;
 
-/// To stderr, whose reader may be slow, stopped or gone: nobody waits for it. Lines that it does
-/// not take wait (LogOutput); then they are lost and counted. Where stderr is systemd's journal,
-/// journald is told each line with its priority and fields (journal.hpp), or by <N> before it.
+/// Logs to stderr without ever blocking: lines that its reader does not take are queued
+/// (LogOutput), beyond a limit dropped and counted. If stderr is systemd's journal, journald gets
+/// each line with its priority and fields (log_output.hpp), or with <N> before it.
 void set_up_log(const LogSettings& settings);
 bool log_enabled(LogLevel level);
-/// Lines that nobody will see, because stderr's reader stood still.
+/// Returns the number of lines dropped because stderr was not read.
 std::uint64_t log_lines_dropped();
 
-/// Hands over what waits, now and then, for as long as it lives; in the end what was left out last.
+/// Flushes queued and throttled lines periodically while it lives, and at its end.
 class LogDrain {
   public:
     explicit LogDrain(Clock& clock);
@@ -35,26 +35,27 @@ class LogDrain {
     std::shared_ptr<State> state_;
 };
 
-/// One line an event: `2026-11-21T10:00:00.123Z info line up line=floor1 device=/dev/x`. Values
-/// with blanks or quotes are quoted; control characters are escaped. The first two fields say whom
-/// it is about: from error to info, the same event of the same subject is soon left out
-/// (LogThrottle), and what follows tells how often in the field `left_out`. A field `client` has a
-/// budget besides, whatever the subjects; its port does not count.
+/// Logs one line: `2026-11-21T10:00:00.123Z info line up line=floor1 device=/dev/x`. Values with
+/// blanks or quotes are quoted; control characters are escaped. The first two fields name the
+/// subject: from error to info, repeats of an event of one subject are throttled (LogThrottle), and
+/// the next line gives their number in the field `left_out`. A field `client`, without its port,
+/// has a budget besides, across all subjects.
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
-/// The same of a subject by name: however its fields differ, its lines are of one kind.
+/// Like log(), but throttled by an explicit subject, however the fields differ.
 void log_about(std::string_view subject, LogLevel level, std::string_view event,
                std::initializer_list<LogField> fields);
-/// The same at info for what is to stand in the log nearly each time it happens: of one subject 30
-/// times at once, then once a minute; the last one always.
+/// Logs at info what should be in the log nearly every time: 30 lines of one subject at once, then
+/// one a minute; the last one always.
 void log_deed(std::string_view event, std::string_view subject, std::span<const LogField> fields);
-/// The same for what must be in the log every time (LogRepeats): a line each, but where the last
-/// one at this place was `what` too, one line tells how often, with its first and its last time.
+/// Logs at info what must be in the log every time (LogRepeats): a line each, except that
+/// consecutive lines at `place` with the same `what` become one line with their number, first and
+/// last time.
 void log_each(std::string_view event, std::string_view place, std::string_view what,
               std::span<const LogField> fields);
 
-/// For tests: while it lives, lines go to it, without their time, instead of to stderr, and nothing
-/// that was said before makes it leave one out. One at a time.
+/// For tests: while it lives, captures lines, without their time, instead of writing to stderr.
+/// Throttling starts afresh. One at a time.
 class LogTap {
   public:
     LogTap();
@@ -64,7 +65,7 @@ class LogTap {
 
     /// "warn cannot accept listener=127.0.0.1:502 reason=..."
     const std::vector<std::string>& lines() const { return *lines_; }
-    /// How many of them hold this.
+    /// Number of lines that contain `part`.
     std::size_t count(std::string_view part) const;
 
   private:

@@ -13,22 +13,20 @@
 
 namespace panelgate::rt {
 
-/// Lets this process open as many files as it may: the soft limit becomes the hard one. What the
-/// limit is then.
+/// Raises the soft limit of open files to the hard limit. Returns the resulting limit.
 std::size_t raise_descriptor_limit();
 
-/// `available` descriptors for those who ask for so many each: all that they ask for, or the same
-/// part of it for everybody, but never less than one.
+/// Divides `available` descriptors: all get what they ask for, or all the same part of it, but
+/// never less than one.
 std::vector<std::size_t> share_descriptors(std::size_t available,
                                            const std::vector<std::size_t>& asked);
 
-/// Asks the system for what `settings` want, for the calling thread (and all memory), and for
-/// sleeps that end on time beside programs that compute, which is free. A line for each wish that
-/// was not granted: which, why, and what would grant it.
+/// Applies `settings` to the calling thread (and all memory), and asks for punctual sleeps, which
+/// need no privilege. Returns a line per refused setting: which, why, and what would grant it.
 std::vector<std::string> be_punctual(const RealtimeSettings& settings);
 
-/// How late the loop comes to its timers: a steady alarm that notes how long after its time it
-/// rang. A loop that is held for long misses turns, and is late once for all of them.
+/// Measures loop lag: a periodic alarm records how late it fires. A blocked loop misses ticks and
+/// records one late tick for them.
 class LoopLag {
   public:
     static constexpr Duration kEvery = 100ms;
@@ -40,7 +38,7 @@ class LoopLag {
 
     void start();
     void stop() { alarm_->cancel(); }
-    /// In seconds, one sample each 100 ms.
+    /// Lag in seconds, one sample per 100 ms.
     const Histogram& seconds() const { return seconds_; }
 
   private:
@@ -51,15 +49,15 @@ class LoopLag {
     Histogram seconds_;
 };
 
-/// What sched_getattr(2) and sched_setattr(2) exchange, as Linux has laid it out at first: glibc
-/// has no declaration, and <linux/sched/types.h> clashes with <sched.h>.
+/// Argument of sched_getattr(2) and sched_setattr(2), first version: glibc has no declaration, and
+/// <linux/sched/types.h> clashes with <sched.h>.
 struct SchedAttr {
     std::uint32_t size = sizeof(SchedAttr);
     std::uint32_t policy = 0;
     std::uint64_t flags = 0;
     std::int32_t nice = 0;
     std::uint32_t priority = 0;
-    std::uint64_t runtime = 0;  ///< ns; of SCHED_OTHER: the slice
+    std::uint64_t runtime = 0;  ///< ns; for SCHED_OTHER the time slice
     std::uint64_t deadline = 0;
     std::uint64_t period = 0;
 };

@@ -13,28 +13,28 @@
 
 namespace panelgate::rt {
 
-/// What systemd tells a program that it starts, as it stands in the environment; empty: not told.
+/// Environment that systemd passes to a service; empty: not set.
 struct ServiceEnvironment {
-    std::string notify_socket{};  ///< NOTIFY_SOCKET: a path, or an abstract name behind '@'
+    std::string notify_socket{};  ///< NOTIFY_SOCKET: a path, or an abstract name after '@'
     std::string watchdog_usec{};  ///< WATCHDOG_USEC
-    std::string watchdog_pid{};   ///< WATCHDOG_PID: for whom the watchdog is meant
+    std::string watchdog_pid{};   ///< WATCHDOG_PID: process that the watchdog is for
 };
 
 ServiceEnvironment service_environment();
 
-/// How often the watchdog is told: half of what it waits (sd_watchdog_enabled(3)). Nothing where
-/// there is none, or where it is meant for another process.
+/// Interval of watchdog notifications: half its timeout (sd_watchdog_enabled(3)). std::nullopt if
+/// there is no watchdog, or it is for another process.
 std::optional<Duration> watchdog_interval(const ServiceEnvironment& environment,
                                           std::int64_t own_pid);
 
-/// Tells systemd how the service does, by the datagrams of sd_notify(3): nobody waits for it, and
-/// without NOTIFY_SOCKET nothing is told and no alarm is armed. The watchdog is told from the loop,
-/// so that a loop that hangs ends the service. One thread; the clock outlives it.
+/// Reports the service's state to systemd with sd_notify(3) datagrams, without ever blocking;
+/// without NOTIFY_SOCKET it sends nothing and arms no alarm. The watchdog is fed from the loop, so
+/// that a hung loop ends the service. Single-threaded; the clock outlives it.
 class ServiceManager {
   public:
-    static constexpr Duration kLook = 2s;       ///< how often the status is looked at
-    static constexpr Duration kAgain = 100ms;   ///< when what it did not take is sent again
-    static constexpr std::size_t kWaiting = 8;  ///< changes of state that wait for that, at most
+    static constexpr Duration kLook = 2s;       ///< how often the status is checked
+    static constexpr Duration kAgain = 100ms;   ///< pause before an untaken message is sent again
+    static constexpr std::size_t kWaiting = 8;  ///< state changes queued for that, at most
 
     explicit ServiceManager(Clock& clock,
                             const ServiceEnvironment& environment = service_environment());
@@ -42,13 +42,13 @@ class ServiceManager {
     ServiceManager(const ServiceManager&) = delete;
     ServiceManager& operator=(const ServiceManager&) = delete;
 
-    /// It serves, from the start on or after a reload, good or bad. `status` is asked for one line
-    /// for people (`systemctl status`), now and from time to time, for as long as this lives.
+    /// Reports READY, after the start or after a reload, good or bad. `status` returns one line for
+    /// users (`systemctl status`), now and periodically, for as long as this lives.
     void ready(std::function<std::string()> status);
-    void ready();  ///< the same with the status of before
-    /// It takes another configuration; ready() follows, whatever comes of it.
+    void ready();  ///< with the previous `status`
+    /// Reports RELOADING; ready() must follow, whatever the result.
     void reloading();
-    /// It ends, and needs so long at most.
+    /// Reports STOPPING, which takes at most `patience`.
     void stopping(Duration patience);
 
   private:
@@ -65,12 +65,12 @@ class ServiceManager {
     std::unique_ptr<Alarm> again_;
     std::unique_ptr<Alarm> look_;
     std::unique_ptr<Alarm> watchdog_;
-    std::optional<Duration> feed_every_;
-    int socket_ = -1;      ///< -1: nobody is told
-    std::string address_;  ///< its bytes
+    std::optional<Duration> feed_interval_;
+    int socket_ = -1;      ///< -1: no notifications
+    std::string address_;  ///< bytes of its sockaddr_un
     std::deque<std::string> waiting_;
     std::function<std::string()> status_;
-    std::string told_;  ///< the status that systemd knows
+    std::string told_;  ///< the status last sent
 };
 
 }  // namespace panelgate::rt

@@ -4,7 +4,7 @@
 
 namespace panelgate::rt {
 
-/// error: someone must act. warn: it healed, or will. info: life cycle. trace: bytes.
+/// error: a user must act. warn: it recovered, or will. info: life cycle. trace: bytes.
 enum class LogLevel : std::uint8_t { error, warn, info, debug, trace };
 enum class LogFormat : std::uint8_t { text, json };
 
@@ -14,10 +14,10 @@ struct LogSettings {
     friend bool operator==(const LogSettings&, const LogSettings&) = default;
 };
 
-/// What the machine is asked to do for punctual frames.
+/// Realtime options for punctual frames.
 struct RealtimeSettings {
-    int priority = 0;          ///< 1..99: first in, first out (SCHED_FIFO); 0: as all programs
-    bool lock_memory = false;  ///< nothing is ever read back from a disk (mlockall)
+    int priority = 0;          ///< 1..99: SCHED_FIFO priority; 0: normal scheduling
+    bool lock_memory = false;  ///< memory is never paged out (mlockall)
     friend bool operator==(const RealtimeSettings&, const RealtimeSettings&) = default;
 };
 

@@ -6,18 +6,18 @@
 
 namespace panelgate::rt {
 
-/// A thread beside the loop for work that would hold it: what is pure and long, on values that
-/// nobody else has. Jobs run one after the other. Belongs to the loop's thread.
+/// A thread for long, pure computations that would block the loop, on values no other thread uses.
+/// Jobs run one after the other. Owned by the loop's thread.
 class Worker {
   public:
     explicit Worker(boost::asio::any_io_executor executor);
-    /// Waits for the job that runs; those that wait are forgotten.
+    /// Waits for the running job; drops queued ones.
     ~Worker();
     Worker(const Worker&) = delete;
     Worker& operator=(const Worker&) = delete;
 
-    /// `work` runs in the thread and does not throw; then `done` from the loop, which goes on while
-    /// it is owed. After the end of the worker `done` may still be called.
+    /// Runs `work` in the thread (it must not throw), then `done` from the loop, which keeps
+    /// running until then. `done` may still be called after the worker's end.
     void run(std::function<void()> work, std::function<void()> done);
 
   private:

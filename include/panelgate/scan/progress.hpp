@@ -9,12 +9,12 @@ namespace panelgate::scan {
 
 struct Progress {
     double share = 0;      ///< 0 to 1
-    Duration remaining{};  ///< an estimate; while nothing has answered, at most this
+    Duration remaining{};  ///< an estimate; an upper bound until a station has answered
     std::string what;      ///< "38400 8N1, station 17"
     std::size_t found = 0;
 };
 
-/// One line without its end, at most `width` characters wide.
+/// Returns one line without line end, at most `width` characters.
 std::string format_progress(const Progress& progress, std::size_t width);
 
 }  // namespace panelgate::scan

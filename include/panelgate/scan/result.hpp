@@ -13,57 +13,57 @@
 
 namespace panelgate::scan {
 
-/// A profile that explains what a station answered.
+/// A profile that matches a station's answers.
 struct Candidate {
     std::string profile;
     std::string why;
 };
 
-/// What came of the requests to one station.
+/// Results of the requests to one station.
 struct Evidence {
     unsigned asked = 0;
     unsigned good = 0;
-    unsigned damaged = 0;  ///< bytes, and no whole reply
-    unsigned twice = 0;    ///< a second good reply, unasked
-    unsigned late = 0;     ///< replies after the time was up
-    bool mixed = false;    ///< the same read was refused and granted
+    unsigned damaged = 0;  ///< bytes without a complete reply
+    unsigned twice = 0;    ///< a second good reply, duplicated
+    unsigned late = 0;     ///< replies after the timeout
+    bool mixed = false;    ///< the same read was both refused and granted
 };
 
 struct StationFinding {
     std::uint8_t station = 0;
-    std::vector<Candidate> candidates;  ///< the best first; empty when no reply could be read
+    std::vector<Candidate> candidates;  ///< best first; empty if no reply was readable
     Evidence evidence;
-    bool duplicate = false;  ///< two stations seem to have this address
+    bool duplicate = false;  ///< two stations seem to share this address
     modbus::CrcOrder crc_order = modbus::CrcOrder::low_first;
 };
 
-/// Frames that answer nothing this scan has asked: function codes by station.
+/// Frames that answer no request of this scan: function codes by station.
 using Talk = std::map<std::uint8_t, std::set<std::uint8_t>>;
 
 struct Result {
     enum class Ending : std::uint8_t {
         running,         ///< so far
         finished,        ///< everything was asked
-        another_master,  ///< heard before the first word, and nothing was said
+        another_master,  ///< heard before the first request; nothing was sent
     };
     Ending ending = Ending::running;
-    /// Where stations answered, or where another master was understood. Of a remote device what its
-    /// panels can be set to.
+    /// Format in which stations answered or another master was heard. For a remote device: a format
+    /// that its panels support.
     std::optional<SerialFormat> format;
     bool remote = false;
     std::vector<StationFinding> stations;  ///< by address
     Talk talk;
-    unsigned noise = 0;  ///< bytes heard before the first word that made no sense in any format
-    bool noisy = false;  ///< damage is all over the line, not at one address
-    /// Formats in which a station gave damaged replies only, while nothing was readable.
+    unsigned noise = 0;  ///< bytes heard before the first request, unreadable in every format
+    bool noisy = false;  ///< damage on the whole line, not at one address
+    /// Formats in which a station gave only damaged replies, while nothing was readable.
     std::vector<SerialFormat> damaged_formats;
 };
 
-/// A request that changes nothing. There is no other way to make one than make(), and a scan has
-/// nothing else to send: it is read-only by construction, whatever a profile asks for.
+/// A request that changes nothing. make() is the only way to create one, and a scan can send
+/// nothing else: it is read-only by construction, whatever a profile asks for.
 class ReadRequest {
   public:
-    /// Nothing unless the station is 1 to 247 and the PDU is well-formed and a pure read.
+    /// Returns nullopt unless the station is 1 to 247 and the PDU is well-formed and a pure read.
     static std::optional<ReadRequest> make(std::uint8_t station, ByteView pdu,
                                            modbus::CrcOrder order = modbus::CrcOrder::low_first);
 

@@ -22,17 +22,17 @@ struct Transmit {
     ReadRequest request;
     SerialMode mode = SerialMode::rtu;  ///< that of the format
 };
-/// What is to be written, in one piece.
+/// Returns the bytes to write at once.
 Bytes on_wire(const Transmit& transmit);
 using Action = std::variant<SetFormat, Transmit>;
 
-/// Looks for stations on one line: listens, finds the serial format, asks every station, tells
-/// panels and doubled addresses by what they answer. Pure: time and bytes in, actions out; the line
-/// is its alone and open. Calling on_deadline() early or twice is harmless. Memory is bounded by
-/// the number of stations and profiles.
+/// Looks for stations on one line: listens, finds the serial format, asks every station, recognises
+/// panels and duplicate addresses by their answers. Pure: time and bytes in, actions out. The line
+/// must be open and used by this scanner only. Early or repeated calls of on_deadline() are
+/// harmless. Memory is bounded by the number of stations and profiles.
 class Scanner {
   public:
-    /// `profiles` outlive it.
+    /// `profiles` outlives it.
     Scanner(const profile::Catalogue& profiles, Settings settings, TimePoint now);
     ~Scanner();
     Scanner(const Scanner&) = delete;
@@ -40,7 +40,7 @@ class Scanner {
 
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now);
-    /// What the way to the line and back adds to every answer.
+    /// Sets the latency that the transport adds to every answer.
     void set_latency(Duration latency);
 
     std::optional<Action> poll_action();
@@ -48,7 +48,7 @@ class Scanner {
 
     bool done() const;
     Progress progress(TimePoint now) const;
-    /// Also before it is done: what is known so far.
+    /// Returns what is known so far, also before it is done.
     Result result() const;
 
   private:

@@ -10,12 +10,12 @@
 
 namespace panelgate::serial_server {
 
-/// A serial port on which somebody else is master: his requests go to the lines like those of any
-/// other client, and the answers back to him as a slave's. One thread.
+/// A serial port with an external master: its requests are forwarded to the lines like any other
+/// client's, and it gets the answers as from a slave. Single-threaded.
 class SerialMaster {
   public:
-    /// Units that no alias and no listed station has are not served. The clock and the buses in the
-    /// map outlive it.
+    /// Serves only units with an alias or a configured station. The clock and the buses in the map
+    /// must outlive it.
     SerialMaster(rt::Clock& clock, Settings settings, tcp_server::UnitMap units,
                  std::unique_ptr<line::Line> line);
     ~SerialMaster();  ///< as stop()
@@ -23,11 +23,11 @@ class SerialMaster {
     SerialMaster& operator=(const SerialMaster&) = delete;
 
     void start();
-    /// Takes nothing more; what was taken is answered.
+    /// Accepts no further requests; accepted ones are still answered.
     void finish();
-    /// Nothing that was taken is without its answer.
+    /// True if no accepted request is outstanding.
     bool idle() const;
-    /// Closes the device; what waits is taken back from the lines.
+    /// Closes the device and cancels queued requests on the lines.
     void stop();
     Counters counters() const;
 

@@ -12,30 +12,30 @@
 
 namespace panelgate::serial_server {
 
-/// What a master is told when the gateway has no answer of a panel (06, 0A, 0B).
+/// What a master receives when a panel has not answered (06, 0A, 0B).
 enum class OnFailure : std::uint8_t {
     exception,
-    silence  ///< as of a slave that is not there: the one failure that every master knows
+    silence  ///< like an absent slave: the one failure every master handles
 };
 
-/// A master on a serial port of its own, as a client.
+/// Settings of a serial port with an external master.
 struct Settings {
     std::string name;
     line::Settings device;
-    /// Whom it may ask, and what: lines, units, framing, read_only, broadcast (silent or deny). The
+    /// What it may access: lines, units, framing, read_only, broadcast (silent or deny). The
     /// gateway has no unit of its own here: 248..255 are reserved (SL 2.2).
     tcp_server::Settings access;
     OnFailure on_failure = OnFailure::silence;
-    EchoMode echo = EchoMode::automatic;  ///< of what is sent to the master
-    /// The master's own, from the end of its request to the start of the reply: what would begin
-    /// later is not sent. Nothing: only its next words tell that it has given up.
+    EchoMode echo = EchoMode::automatic;  ///< whether transmissions to the master are echoed
+    /// The master's timeout, from the end of its request to the start of the reply; a later reply
+    /// is not sent. Unset: only its next transmission shows that it has given up.
     std::optional<Duration> response_timeout;
-    /// The longest pause within a frame, besides the time of a chunk: as on lines.
+    /// Longest gap within a frame, in addition to the time of a chunk: as on lines.
     Duration hole = 60ms;
-    /// Behind fewer bytes than the shortest frame has: a transceiver that was switched off makes
-    /// them. Longer than an adapter's latency timer.
+    /// The same after fewer bytes than the shortest frame has: a transceiver that switches off
+    /// produces them. Longer than an adapter's latency timer.
     Duration glitch = 20ms;
-    std::size_t open_broadcasts = 8;  ///< on the lines; more are dropped
+    std::size_t open_broadcasts = 8;  ///< outstanding on the lines; more are dropped
     friend bool operator==(const Settings&, const Settings&) = default;
 };
 

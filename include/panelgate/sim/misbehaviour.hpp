@@ -15,28 +15,27 @@
 
 namespace panelgate::sim {
 
-/// What a receiver makes of a line.
+/// Bytes that a receiver hears on a line.
 struct HeardBytes {
     Bytes bytes;
     /// Bit times from the first start bit to the end of each byte.
     std::vector<std::uint32_t> ends;
 };
 
-/// Two senders on one wire, the second `later` bit times after the first: where both speak a 0 of
-/// either wins, and the receiver takes its characters from what that gives. Apart they come clean.
+/// Two senders on one wire, the second starting `later` bit times after the first: a 0 of either
+/// wins, and the receiver decodes the result. Without overlap both arrive intact.
 HeardBytes collide(ByteView first, ByteView second, std::size_t later, const SerialFormat& format);
 
 /// The faults as numbers by name, times in milliseconds: {"dead": 1, "slow_ms": 20, "drop": 0.1}.
 using FaultNumbers = std::map<std::string, double>;
 FaultNumbers to_numbers(const Misbehaviour& faults);
-/// What is not named is off. Nothing, or what is wrong and would be right.
+/// Faults not named are off. Returns an error text with what would be right, or std::nullopt.
 std::optional<std::string> from_numbers(const FaultNumbers& numbers, Misbehaviour& faults);
 
-/// What a misbehaving panel makes of a good reply ADU, in the format's mode. Pure, but for the
-/// chance it is given.
+/// Applies the faults to a valid reply ADU, in the format's mode. Pure, apart from `chance`.
 struct Spoken {
-    Bytes adu;         ///< as it stands on the wire; empty: silence
-    Duration delay{};  ///< more than its think time
+    Bytes adu;         ///< as sent on the wire; empty: silence
+    Duration delay{};  ///< in addition to the think time
     /// Bit times from the first start bit to the end of each byte; empty: without pauses.
     std::vector<std::uint32_t> ends;
 };

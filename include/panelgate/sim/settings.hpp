@@ -9,13 +9,13 @@
 
 namespace panelgate::sim {
 
-/// Faults of one simulated panel. Shares are of its answers, 0 (never) to 1 (always).
+/// Faults of one simulated panel. Shares are of its replies, 0 (never) to 1 (always).
 struct Misbehaviour {
-    bool dead = false;   ///< neither executes nor answers
+    bool dead = false;   ///< neither executes nor replies
     Duration slow{};     ///< more think time, always
     Duration late_by{};  ///< more think time, for the share `late`
     double late = 0;
-    double drop = 0;        ///< executes and does not answer
+    double drop = 0;        ///< executes and does not reply
     double damage = 0;      ///< one bit of the reply is wrong
     double truncate = 0;    ///< half of the reply
     double foreign_id = 0;  ///< the reply carries another address
@@ -27,9 +27,9 @@ struct Settings {
     SerialFormat serial;
     Duration think_time = 1ms;     ///< of a panel, after the silence that ends the request
     modbus::CrcOrders crc_orders;  ///< by station
-    bool echo = false;             ///< the adapter hears what the gateway sends
+    bool echo = false;             ///< the adapter echoes what the gateway sends
     std::map<std::uint8_t, Misbehaviour> faults;  ///< by station
-    std::uint32_t seed = 1;                       ///< of the faults' chance
+    std::uint32_t seed = 1;                       ///< of the random faults
 };
 
 }  // namespace panelgate::sim

@@ -15,11 +15,11 @@
 
 namespace panelgate::sim {
 
-/// Panels on one RS-485 line behind a pseudo-terminal, paced at the line's baud: a request is whole
-/// after its wire time and t3.5 of silence, the reply's bytes arrive when a real line would bring
-/// them. A pause inside a request is noticed by panels that mind it (GT: 24 bit times). Each panel
-/// thinks on its own, and hears nothing meanwhile; who speaks at the same time as another damages
-/// both, as on a real line.
+/// Panels on one RS-485 line behind a pseudo-terminal, paced at the line's baud: a request ends
+/// after its wire time and t3.5 of silence, reply bytes arrive when a real line would deliver them.
+/// Some panels ignore a request with a gap (GT: 24 bit times). Each panel thinks on its own and
+/// hears nothing meanwhile; panels that send at the same time damage both replies, as on a real
+/// line.
 class SimulatedBus {
   public:
     /// Throws std::system_error when there is no pty left. The clock and the stations' profiles
@@ -28,13 +28,13 @@ class SimulatedBus {
                  std::vector<Station> stations);
     ~SimulatedBus();
 
-    /// What a gateway opens: the path of the pty.
+    /// Returns the path of the pty, which a gateway opens.
     const std::string& device() const;
     void start();
     void stop();
 
     bool has(std::uint8_t station) const;
-    /// From the next request on.
+    /// Takes effect from the next request on.
     void set_faults(std::uint8_t station, const Misbehaviour& faults);
     Misbehaviour faults(std::uint8_t station) const;
 

@@ -12,43 +12,44 @@
 
 namespace panelgate::tap {
 
-/// What the line's master waits for an answer to.
-struct Question {
+/// The request whose reply the line's master waits for.
+struct PendingRequest {
     std::uint8_t station = 0;
     Bytes pdu;
 };
 
-/// A good frame, or damaged bytes between two of them.
+/// A good frame, or the damaged bytes between two good frames.
 struct Piece {
     enum class Kind : std::uint8_t {
         request,
-        answer,  ///< answers the question
-        reply,   ///< of another form than a request, and not to the question
+        answer,  ///< answers the pending request
+        reply,   ///< has a reply's form only, and does not answer the pending request
         damaged
     };
     Kind kind = Kind::damaged;
-    bool twofold = false;  ///< an answer that may as well be a request
-    Bytes bytes;           ///< address to CRC
+    bool ambiguous = false;  ///< an answer that may also be a request
+    Bytes bytes;             ///< address to CRC
     TimePoint begin;
     TimePoint end;
 };
 
-/// Cuts what both sides of a line say into frames. The function and the header give the lengths (a
-/// request's, a reply's, and that of the answer to the question), the CRC judges; no silence is
-/// needed between frames, and one inside does no harm before it is a hole. A start that still waits
-/// for bytes holds up the later ones. Behind damage a frame needs more than a CRC that fits: what
-/// it asks must make sense. Holds less than a kilobyte; work is linear in what is heard.
+/// Cuts what both sides of a line send into frames. Function and header give the length (of a
+/// request, of a reply, and of the answer to the pending request), the CRC decides; no silence is
+/// needed between frames, and one inside does no harm unless it is a hole. A possible start that
+/// waits for bytes delays the later ones. After damage a frame needs a sensible content besides a
+/// matching CRC. Buffers less than a kilobyte; work is linear in the input.
 class Cutter {
   public:
     explicit Cutter(const Settings& settings);
 
-    /// Bytes that have come by `now`, the last of them just then.
+    /// Adds bytes received by `now`, the last of them just then.
     void hear(TimePoint now, ByteView bytes);
-    /// The next piece, while `question` (or none) is open. `silence`: what is open will not go on.
-    std::optional<Piece> next(const Question* question, bool silence);
+    /// Returns the next piece, while `pending` (or no request) is open. `silence`: incomplete
+    /// frames will not continue.
+    std::optional<Piece> next(const PendingRequest* pending, bool silence);
 
     bool empty() const { return heard_.empty(); }
-    TimePoint last() const { return last_; }  ///< byte
+    TimePoint last() const { return last_; }  ///< when the last byte came
 
   private:
     struct Verdict {
@@ -56,9 +57,9 @@ class Cutter {
         Kind kind = Kind::nothing;
         std::size_t size = 0;
         Piece::Kind what = Piece::Kind::damaged;
-        bool twofold = false;
+        bool ambiguous = false;
     };
-    Verdict judge(std::size_t start, const Question* question, bool silence) const;
+    Verdict judge(std::size_t start, const PendingRequest* pending, bool silence) const;
     std::size_t size_of(std::size_t start, const modbus::ReplyLength& length, bool silence,
                         bool& open) const;
     std::size_t size_by_gap(bool silence, bool& open) const;
@@ -71,10 +72,10 @@ class Cutter {
     Duration character_;
     std::size_t damaged_run_;
     Bytes heard_;
-    std::vector<TimePoint> times_;  ///< when each of them had come, as the rate has it
+    std::vector<TimePoint> times_;  ///< when each byte had come, by the line's rate
     TimePoint last_{};
-    std::size_t looked_ = 0;  ///< nothing begins below
-    bool aligned_ = true;     ///< a frame begins at the front, if it is one
+    std::size_t looked_ = 0;  ///< no frame begins before this index
+    bool aligned_ = true;     ///< the front is the beginning of a frame, if there is one
 };
 
 }  // namespace panelgate::tap

@@ -14,97 +14,97 @@
 
 namespace panelgate::tap {
 
-/// After how long without an answer the line's master goes on: learned from requests that were
-/// surely not answered. The least of the last ones; nothing before there were three. A master may
-/// be given another timeout, so what was learned holds until replies later than that were waited
-/// for three times, and nothing was given up between.
+/// The time after which the line's master gives up without an answer, learned from requests that
+/// were surely not answered: the least of the last ones, at least three. A master's timeout may be
+/// changed, so the value is dropped after the master has waited for later replies three times
+/// without giving up in between.
 class GiveUp {
   public:
     void seen(Duration interval);
-    /// So long behind its request a reply came, and the master had not gone on.
+    /// A reply came this long after its request, and the master had still waited.
     void outwaited(Duration interval);
     std::optional<Duration> least() const;
-    /// What others have shown of the master does not hold here.
-    bool is_another() const { return refuted_; }
+    /// True if the master's timeout for other stations does not apply here.
+    bool is_different() const { return refuted_; }
 
   private:
     static constexpr std::size_t kNeeded = 3;
     static constexpr std::size_t kKept = 8;
     std::deque<Duration> seen_;
     std::deque<Duration> outwaited_;  ///< since the last one seen
-    bool refuted_ = false;            ///< by them
+    bool refuted_ = false;            ///< by longer waits
 };
 
-/// How one station answers, as far as that helps to tell whose a reply is.
+/// How one station answers, as far as it helps to match replies to requests.
 class Habits {
   public:
     explicit Habits(const Settings& settings) : settings_(settings) {}
 
-    /// A reply that surely was to that request came so long behind it. A panel answers in order:
-    /// nothing older is owed any more.
+    /// A reply that surely answers its request came `think` after it. A panel answers in order: no
+    /// earlier reply is outstanding any more.
     void answered(Duration think);
-    /// A reply came that may be to an older request. Two in a row that come as replies here use to
-    /// come, and nothing is owed any more: late ones would not keep that time.
+    /// A reply came that may answer an older request. After two in a row with the usual think time
+    /// no reply is outstanding any more: late ones would not keep that time.
     void answered_perhaps(Duration think);
     /// A request went unanswered: its reply may still come.
-    void owes(TimePoint asked, const Bytes& request);
-    /// May this reply be to another request than this one?
-    bool owes_other(TimePoint now, const Bytes& request, ByteView reply) const;
-    /// When the oldest of the same requests was asked that this reply may answer.
-    std::optional<TimePoint> owed_since(TimePoint now, const Bytes& request) const;
-    /// Is this a late reply? Then it, and what was asked before it, is owed no more.
+    void on_unanswered(TimePoint asked, const Bytes& request);
+    /// True if this reply may answer another unanswered request.
+    bool may_answer_other(TimePoint now, const Bytes& request, ByteView reply) const;
+    /// When the oldest equal request was asked that this reply may answer; empty: none.
+    std::optional<TimePoint> first_asked(TimePoint now, const Bytes& request) const;
+    /// True if this is a late reply; removes its request and all earlier ones.
     bool settle(TimePoint now, ByteView reply);
-    bool is_owed(TimePoint now, ByteView reply) const;
-    void forget_owed() { owed_.clear(); }
+    bool may_answer_earlier(TimePoint now, ByteView reply) const;
+    void forget_unanswered() { unanswered_.clear(); }
 
-    /// The longest think time lately; nothing before the first reply.
+    /// Longest recent think time; empty before the first reply.
     std::optional<Duration> longest_think() const { return longest_; }
 
     GiveUp give_up;
-    Bytes last_request;                 ///< PDU of the last one that was answered
+    Bytes last_request;                 ///< PDU of the last answered request
     Bytes last_reply;                   ///< its reply: address to CRC
-    std::optional<TimePoint> repeated;  ///< when it last said a reply twice
+    std::optional<TimePoint> repeated;  ///< when it last sent a reply twice
 
   private:
-    struct Owed {
+    struct Unanswered {
         TimePoint asked;
         Bytes request;
     };
-    bool is_open(const Owed& owed, TimePoint now) const {
-        return now - owed.asked < settings_.late_window;
+    bool is_open(const Unanswered& one, TimePoint now) const {
+        return now - one.asked < settings_.late_window;
     }
 
     Settings settings_;
-    std::deque<Owed> owed_;
+    std::deque<Unanswered> unanswered_;
     std::optional<Duration> longest_;
-    int usual_ = 0;  ///< replies in a row that came as usual while something was owed
+    int usual_ = 0;  ///< replies in a row with the usual think time while others were outstanding
 };
 
-/// Listens to a line whose master is somebody else, and tells which reply was to which request.
-/// Pure: bytes and time in, events out. Never says that a reply belongs to a request where it may
-/// be another's without `doubtful`. Memory is bounded.
+/// Listens to a line with another master, and matches replies to requests. Pure: bytes and time in,
+/// events out. A reply that may belong to another request is always marked `doubtful`. Memory is
+/// bounded.
 class Matcher {
   public:
     explicit Matcher(const Settings& settings);
 
     void on_rx(TimePoint now, ByteView bytes);
     void on_deadline(TimePoint now);
-    /// What was said meanwhile nobody here has heard: what is open ends in doubt.
+    /// Anything sent meanwhile is missed: an open request ends in doubt.
     void on_line_down(TimePoint now);
 
-    /// What has happened, in its order.
+    /// Returns the next event, in order.
     std::optional<Event> poll_action();
     std::optional<TimePoint> next_deadline() const;
 
   private:
     struct Asked {
-        Question question;
+        PendingRequest pending;
         TimePoint begin;
         TimePoint end;
-        bool damaged = false;  ///< bytes that are no frame were heard behind it
+        bool damaged = false;  ///< damaged bytes were heard after it
         std::size_t damaged_bytes = 0;
-        bool wrong = false;      ///< its station said something else
-        bool disturbed = false;  ///< somebody did: its master may have given it up at once
+        bool wrong = false;      ///< its station sent another frame
+        bool disturbed = false;  ///< another frame came: its master may have given it up at once
         bool doubtful = false;
     };
     enum class Reading : std::uint8_t { answer, request, open };
@@ -126,14 +126,15 @@ class Matcher {
     Duration patience(const Habits& habits) const;
     std::optional<TimePoint> resolved_at() const;
     Habits& of(std::uint8_t station);
-    const Question* question() const { return asked_ ? &asked_->question : nullptr; }
+    const PendingRequest* pending() const { return asked_ ? &asked_->pending : nullptr; }
     void note(FrameKind kind, std::uint8_t station, const Piece& piece);
-    void tell(Transaction transaction) { events_.emplace_back(std::move(transaction)); }
+    void report(Transaction transaction) { events_.emplace_back(std::move(transaction)); }
 
     Settings settings_;
     Cutter cutter_;
     std::optional<Asked> asked_;
-    std::optional<Piece> held_;  ///< its answer, or the same request again: what follows tells
+    std::optional<Piece>
+        candidate_;  ///< its answer, or the same request again: later frames decide
     std::map<std::uint8_t, Habits> habits_;
     GiveUp give_up_;        ///< of the whole line
     bool noise_ = false;    ///< since the last good frame

@@ -17,67 +17,67 @@
 
 namespace panelgate::tcp_server {
 
-/// What a listener has to know of a line. The bus outlives every map that names it.
+/// What a listener needs to know about a line. The bus outlives every map that refers to it.
 struct LineInfo {
     std::string name;
     bus::BusClient* bus = nullptr;
-    std::vector<std::uint8_t> stations;  ///< ids that the configuration lists
+    std::vector<std::uint8_t> stations;  ///< configured station addresses
     bool pass_unlisted = true;
     friend bool operator==(const LineInfo&, const LineInfo&) = default;
 };
 
-/// The station behind a unit id. Station 0 (of an alias) is everybody on that line.
+/// The station behind a unit id. Station 0 (from an alias) is a broadcast to that line.
 struct Target {
     bus::BusClient* bus = nullptr;
     std::uint8_t station = 0;
 };
 
-/// A client's unit id -> line and station, for one listener. Built once, never changes. Pure.
+/// Routes a client's unit id to a line and station, for one listener. Immutable. Pure.
 class UnitMap {
   public:
-    /// `lines`: at least those that the settings name, in any order. Aliases may point at any of
-    /// them; the other rules look only at the listener's own (settings.lines; empty: all given).
-    /// Throws std::invalid_argument when the settings name a line that is not there.
+    /// `lines`: at least those named by the settings, in any order. Aliases may refer to any of
+    /// them; the other rules apply only to the listener's own (settings.lines; empty: all given).
+    /// Throws std::invalid_argument if the settings name an unknown line.
     UnitMap(const Settings& settings, const std::vector<LineInfo>& lines);
 
-    /// An alias; a station that exactly one line of the listener lists; on a listener with one line
-    /// that passes unlisted stations also the rest of 1..247. Everything else, unit 0 without an
-    /// alias and 248..255 included, is Fault::not_routed.
+    /// Returns the target of an alias, or of a station listed by exactly one line of the listener;
+    /// on a listener with a single line that passes unlisted stations, also of the rest of 1..247.
+    /// Everything else, including unit 0 without an alias and 248..255, is Fault::not_routed.
     Result<Target> route(std::uint8_t unit) const;
-    /// Where a request to this unit is broadcast: all lines of the listener for unit 0 without an
-    /// alias, the one line of an alias to station 0; nowhere for any other unit.
+    /// Returns the lines a request to this unit is broadcast to: all of the listener's for unit 0
+    /// without an alias, one for an alias to station 0, none for any other unit.
     std::vector<bus::BusClient*> broadcast_lines(std::uint8_t unit) const;
-    /// An alias, or a station that the configuration lists.
+    /// True for an alias or a configured station.
     bool is_listed(std::uint8_t unit) const { return is_alias(unit) || listed_[unit]; }
     bool is_alias(std::uint8_t unit) const { return aliases_.contains(unit); }
-    /// The listener's own lines, in the order of the settings.
+    /// Returns the listener's own lines, in the order of the settings.
     const std::vector<bus::BusClient*>& lines() const { return lines_; }
 
   private:
     void add_stations(const LineInfo& line);
 
     std::map<std::uint8_t, Target> aliases_;
-    std::array<Target, 256> direct_{};  ///< bus is null where nothing is routed
+    std::array<Target, 256> direct_{};  ///< bus is null for unrouted units
     std::array<bool, 256> listed_{};
     std::vector<bus::BusClient*> lines_;
 };
 
-/// One client as the buses see it: who asks, and which of them were asked.
+/// One client as seen by the buses: its identity and the buses it has used.
 class Caller {
   public:
-    /// `name` is its address with the port, or that of a serial port; connections from one address
-    /// share a host. The buses call it PROTOCOL NAME.
+    /// `name` is its address with port, or its serial port; connections from one address share a
+    /// host. The buses show it as "PROTOCOL NAME".
     Caller(std::string name, bus::Host host, std::string protocol = "modbus_tcp");
 
     const std::string& name() const { return name_; }
     bus::Host host() const { return host_; }
-    /// Hands the request to a bus, for one of its stations; 0: all of them.
+    /// Passes the request to a bus for one of its stations; station 0: broadcast.
     void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
-    /// Has the bus count what was refused before it was asked.
+    /// Makes the bus count a request refused before it reached the bus.
     void tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu);
-    /// Takes back what still waits on the buses; it is answered Fault::cancelled.
-    /// May ask again.
+    /// Cancels its requests still queued on the buses (answered Fault::cancelled). Further requests
+    /// are allowed.
     void withdraw();
 
   private:
@@ -90,10 +90,10 @@ class Caller {
     std::set<bus::BusClient*> used_;
 };
 
-/// What is to be done with a request.
+/// What to do with a request.
 struct Refuse {
     modbus::ExceptionCode code;
-    std::vector<Target> asked{};  ///< whose buses count it as refused
+    std::vector<Target> asked{};  ///< their buses count it as refused
 };
 struct Forward {
     Target target;
@@ -106,11 +106,10 @@ struct Broadcast {
 struct Diagnose {};  ///< the gateway answers from its own registers
 using Decision = std::variant<Refuse, Forward, Broadcast, Diagnose>;
 
-/// Judges a request in the order of EXC-08: function 0 or 128..255 is 01; a write through a
-/// listener where only reads are allowed 01; a unit that nobody has 0A; a write that its bus would
-/// refuse 01, before anything else is said of it; anything but a write (BC-02) to a broadcast unit
-/// 01; a PDU that contradicts its function or cannot be answered 03. Asks nobody but for their
-/// rights.
+/// Decides on a request in the order of EXC-08: function 0 or 128..255 is 01; a write through a
+/// read-only listener 01; an unrouted unit 0A; a write that its bus would refuse 01, before any
+/// other check; anything but a write (BC-02) to a broadcast unit 01; a PDU that is inconsistent
+/// with its function or cannot be answered 03. Queries the buses only for access rights.
 Decision decide(std::uint8_t unit, ByteView pdu, const Settings& settings, const UnitMap& units);
 
 }  // namespace panelgate::tcp_server

@@ -16,34 +16,36 @@ class any_io_executor;
 
 namespace panelgate::tcp_server {
 
-/// One port for Modbus over TCP (README, Modbus/TCP), in the framing of its settings, and its
-/// connections; with settings.udp also for datagrams. One thread: everything runs on the
-/// executor given. The clock and the buses in the map outlive it; answers that come after its end
+/// A Modbus over TCP listener (README, Modbus/TCP) on one port, in the framing of its settings,
+/// with its connections; settings.udp adds datagrams. Single-threaded: everything runs on the given
+/// executor. The clock and the buses in the map must outlive it; answers that arrive after its end
 /// are dropped.
 class Listener {
   public:
-    /// `version`: of the program, for the device identification. Throws std::invalid_argument for
-    /// an allow list that cannot be read.
+    /// `version` is the program's, for the device identification. Throws std::invalid_argument for
+    /// an unreadable allow list.
     Listener(const boost::asio::any_io_executor& executor, rt::Clock& clock, Settings settings,
              UnitMap units, std::string version);
     ~Listener();  ///< as close_now()
     Listener(const Listener&) = delete;
     Listener& operator=(const Listener&) = delete;
 
-    /// Binds and accepts. Throws std::system_error with the address in its text when it cannot.
+    /// Binds and starts to accept. Throws std::system_error, with the address in its text, on
+    /// failure.
     void start();
-    /// Serves by these from the next request on; whoever may not be connected any more is cut off.
-    /// Only with settings.is_same_door(). Throws as the constructor does, and then nothing has
-    /// changed.
+    /// Applies new settings from the next request on; closes connections no longer allowed.
+    /// Requires settings.is_same_door(). Throws like the constructor, and then leaves everything
+    /// unchanged.
     void apply(Settings settings, UnitMap units);
-    /// The port it is bound to; 0 before start().
+    /// Returns the bound port; 0 before start().
     std::uint16_t port() const;
     Counters counters() const;
 
-    /// No new connections or requests; what is outstanding is answered, then each connection is
-    /// closed. `done` is called once, later, when none is left (also after close_now()).
+    /// Stops accepting connections and requests; answers outstanding requests, then closes each
+    /// connection. `done` is called once, asynchronously, when no connection is left (also after
+    /// close_now()).
     void stop(std::function<void()> done);
-    /// Cuts every connection; requests that wait are taken back from their buses.
+    /// Closes every connection at once; cancels requests still queued on the buses.
     void close_now();
 
   private:

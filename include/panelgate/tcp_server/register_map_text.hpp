@@ -4,7 +4,7 @@
 
 namespace panelgate::tcp_server {
 
-/// The map of the gateway's own unit, for people; ends with a line break.
+/// Returns a human-readable register map of the gateway's own unit, ending with a newline.
 std::string describe_register_map();
 
 }  // namespace panelgate::tcp_server

@@ -14,11 +14,11 @@
 
 namespace panelgate::tcp_server {
 
-/// What happens to unit 0 with a write.
+/// How a write to unit 0 is handled.
 enum class BroadcastMode : std::uint8_t { reply, silent, deny };
 
-/// Which repetitions (the same transaction id, unit and bytes, while the first is unanswered) get
-/// the one answer, and no turn on the bus of their own.
+/// Which retransmissions (same transaction id, unit and bytes, while the first is unanswered) share
+/// its one answer instead of using the bus again.
 enum class Retransmissions : std::uint8_t { join_writes, join, pass };
 
 struct UnitTarget {
@@ -27,50 +27,50 @@ struct UnitTarget {
     friend bool operator==(const UnitTarget&, const UnitTarget&) = default;
 };
 
-/// One listener for Modbus over TCP.
+/// Settings of one Modbus over TCP listener.
 struct Settings {
     std::string address = "127.0.0.1";
-    std::uint16_t port = 502;                  ///< 0: any free one
-    bool ipv6_only = false;                    ///< of "::": another listener has this port for IPv4
-    std::vector<std::string> lines;            ///< names; never empty after loading
+    std::uint16_t port = 502;        ///< 0: any free port
+    bool ipv6_only = false;          ///< with "::": another listener has this port on IPv4
+    std::vector<std::string> lines;  ///< line names; never empty after loading
     std::map<std::uint8_t, UnitTarget> units;  ///< aliases, looked up before `lines`
     modbus::Framing framing = modbus::Framing::tcp;
     modbus::HexDigits ascii_digits = modbus::HexDigits::upper_only;
-    BroadcastMode broadcast = BroadcastMode::reply;  ///< with framing tcp; else nobody is answered
+    BroadcastMode broadcast = BroadcastMode::reply;  ///< with framing tcp; otherwise always silent
     Retransmissions retransmissions = Retransmissions::join_writes;
-    /// The same port for datagrams, too (framing tcp only); there every repetition is joined,
+    /// Also serve UDP on the same port (framing tcp only); there every retransmission is joined
     /// unless `retransmissions` is pass.
     bool udp = false;
-    std::size_t udp_peers_per_address = 16;  ///< ports that may wait for answers
-    Duration udp_idle = 1min;                ///< then a sender of datagrams is forgotten
-    /// Datagrams without room that wait to be answered 06 (own_answers); more are dropped.
+    std::size_t udp_peers_per_address = 16;  ///< ports with outstanding requests
+    Duration udp_idle = 1min;                ///< then a UDP peer is dropped
+    /// Datagrams over the limit queued for an exception 06 (own_answers); more are dropped.
     std::size_t udp_busy_answers = 256;
     std::optional<std::uint8_t> diagnostics_unit = 255;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
-    /// Of one address (IPv6: one network of 64 bits): then its longest idle one gives way.
+    /// Per address (IPv6: per /64 network); beyond it the longest-idle connection is evicted.
     std::size_t max_connections_per_address = 64;
-    /// Requests of one connection on the buses, or answered and not yet taken by the client.
+    /// Requests of one connection on the buses, or with replies the client has not taken yet.
     std::size_t in_flight = 16;
-    std::size_t waiting = 64;  ///< requests that wait behind them; then nobody reads
-    /// What the gateway answers by itself, without a line, for all connections together.
-    std::size_t own_answers = 16;  ///< in a period, then they wait for the next one
+    std::size_t waiting = 64;  ///< requests queued behind them; beyond it reading stops
+    /// Replies the gateway generates itself, without a line, for all connections together.
+    std::size_t own_answers = 16;  ///< per period; more wait for the next
     Duration own_answers_period = 1ms;
-    Duration partial_adu_timeout = 5s;  ///< a half-sent ADU closes its connection
-    int bad_protocol_ids = 3;           ///< in a row close the connection
-    // Of RTU and ASCII.
-    Duration rtu_silence = 50ms;       ///< ends a request whose function tells no length
+    Duration partial_adu_timeout = 5s;  ///< an ADU not completed in time closes its connection
+    int bad_protocol_ids = 3;           ///< consecutive ones that close the connection
+    // RTU and ASCII only.
+    Duration rtu_silence = 50ms;       ///< ends a request whose function implies no length
     Duration ascii_pause = 1s;         ///< between two characters of a frame (SL 2.5.2.1)
-    std::size_t garbage_limit = 1024;  ///< bytes in a row that are no request close the connection
-    Duration output_timeout = 5min;    ///< a client that takes nothing for so long is closed
+    std::size_t garbage_limit = 1024;  ///< bytes without a request that close the connection
+    Duration output_timeout = 5min;    ///< a client that reads nothing for this long is closed
 
-    // For the identification of the gateway (2B/0E); may be empty.
-    std::string url;   ///< of its pages
-    std::string host;  ///< name of the machine
+    // For the device identification (2B/0E); may be empty.
+    std::string url;   ///< of the web interface
+    std::string host;  ///< host name
 
     std::string name() const { return endpoint_text(address, port); }
-    /// What cannot change without closing the one listener and opening another.
+    /// True if `other` differs only in what can change without reopening the listener.
     bool is_same_door(const Settings& other) const {
         return address == other.address && port == other.port && ipv6_only == other.ipv6_only &&
                framing == other.framing && ascii_digits == other.ascii_digits && udp == other.udp;

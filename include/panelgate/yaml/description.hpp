@@ -14,13 +14,13 @@ namespace panelgate::yaml {
 
 struct Node;
 
-/// What a key takes.
+/// What values a key accepts.
 struct KeyShape {
     enum class Kind : std::uint8_t { text, integer, number, boolean, duration, word, map, list };
-    std::string path;  ///< the keys from the top, places in lists left out: "lines/stations/id"
+    std::string path;  ///< keys from the top, without list indexes: "lines/stations/id"
     Kind kind = Kind::text;
     bool required = false;
-    std::vector<std::string> words;  ///< of Kind::word; of others, those that they take besides
+    std::vector<std::string> words;  ///< of Kind::word; for other kinds, words accepted besides
     std::int64_t min = 0;            ///< of Kind::integer
     std::int64_t max = 0;
     Duration shortest{};  ///< of Kind::duration
@@ -29,55 +29,54 @@ struct KeyShape {
     std::optional<double> most;
     std::optional<double> never;
 
-    /// Nothing behind the key; without a word maps and lists may have that, as if they were absent.
+    /// Whether the key may have no value; if not set, maps and lists may, as if they were absent.
     std::optional<bool> may_be_null;
     std::size_t fewest = 0;        ///< entries of a list or map
     std::size_t most_entries = 0;  ///< 0: no limit
-    /// A regular expression (ECMA 262) that has to match a text, or those in a list or map; ""
-    /// none.
+    /// Regular expression (ECMA 262) that a text, or those in a list or map, must match; "" none.
     std::string pattern;
     std::size_t longest_text = 0;  ///< characters; 0: no limit
-    bool may_be_number = true;     ///< such a text, for YAML
+    bool may_be_number = true;     ///< the text may look like a number to YAML
     bool holds_integers = false;   ///< a list of raw numbers
-    std::string keys;              ///< the same of the keys of a map that has no words for them
+    std::string keys;              ///< pattern for the keys of a map with free keys
 };
 
-/// What one key of a map wants of another; a merge may bring the other.
+/// A dependency between two keys of a map; a merge may supply the other.
 struct KeyRule {
     std::string map;  ///< its path
     std::string key;
     std::string other;
-    /// With `needs`: where `key` has one of them, `other` is there. Else `key` is only there where
-    /// `other` has one of them, or is absent and `absent_will_do`.
+    /// With `needs`: if `key` has one of them, `other` must be present. Otherwise `key` may be
+    /// present only if `other` has one of them, or is absent and `absent_will_do`.
     std::vector<std::string> words;
     bool needs = false;
     bool absent_will_do = false;
 };
 
-/// What a loader asks for, written down while it reads a document: MapReaders whose Problems have
-/// one tell it each key, whether it is there or not. So it knows the keys of each map that the
-/// document has.
+/// Records the keys that a loader asks for while it reads a document: each MapReader whose Problems
+/// have a Description reports every key, present or not, for each map in the document.
 class Description {
   public:
-    /// The whole document, whose keys have no path before them. Until forget(), nodes may not move.
+    /// Starts with the whole document, whose keys have no path before them. Nodes must not move
+    /// until forget().
     void begin(const Node& top) { paths_[&top] = ""; }
     void forget() { paths_.clear(); }
-    /// A key of `map`, with the path left out. What was told of a key before is kept: required, and
-    /// words, which say more than that it is a text.
+    /// Records a key of `map`; `shape` has no path. Keeps what is known already: required, and
+    /// words, which are more specific than a text.
     void tell(const Node& map, std::string_view key, KeyShape shape);
-    /// To be written into at once; nullptr: nothing is written down of this map.
+    /// Returns the entry of a key, to be modified at once; nullptr if this map is not recorded.
     KeyShape* shape(const Node& map, std::string_view key);
-    /// The path of the map is added.
-    void tell_rule(const Node& map, KeyRule rule);
-    /// What is behind a key of `map`: a map, or a list of maps.
-    void tell_below(const Node& map, std::string_view key, const Node& value);
+    /// Adds a rule, with the path of the map.
+    void add_rule(const Node& map, KeyRule rule);
+    /// Registers the value of a key of `map`: a map, or a list of maps.
+    void add_nested(const Node& map, std::string_view key, const Node& value);
 
     /// In the order in which they were asked for.
     const std::vector<KeyShape>& keys() const { return keys_; }
     const std::vector<KeyRule>& rules() const { return rules_; }
 
   private:
-    /// nullptr: nothing is written down of this map.
+    /// nullptr if this map is not recorded.
     const std::string* path_of(const Node& map) const;
 
     std::vector<KeyShape> keys_;

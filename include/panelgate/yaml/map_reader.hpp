@@ -15,24 +15,23 @@
 
 namespace panelgate::yaml {
 
-/// Where a key stands that people write elsewhere.
+/// Where a key belongs that users often write in another place.
 struct Elsewhere {
     std::string_view key;
-    std::string_view map;           ///< key of the map that has it, beside where it was written; or
-    std::string_view owner;         ///< who has it: "a station"
-    std::string_view instead = {};  ///< nobody has it: what to do, "remove it: ..."
-    std::span<const std::string_view> words = {};  ///< if its values are such
+    std::string_view map;           ///< key of the sibling map that has it; or
+    std::string_view owner;         ///< what has it: "a station"
+    std::string_view instead = {};  ///< if nothing has it: what to do, "remove it: ..."
+    std::span<const std::string_view> words = {};  ///< its possible values, if it has such
 };
 
-/// Reads the keys of one map with types and ranges. Every getter returns nothing both when the key
-/// is absent and when its value is wrong; a wrong value has then been added to the problems with
-/// its place and what would be right. finish() reports the keys nobody asked for, each with the
-/// nearest known one, so ask for every key you know before it. Does not own the node or the
-/// problems.
+/// Reads the keys of one map with types and ranges. Every getter returns nothing if the key is
+/// absent or its value is wrong; a wrong value is added to the problems with its place and a
+/// correction. finish() reports the keys that were not asked for, each with the nearest known one,
+/// so ask for every known key before it. Does not own the node or the problems.
 class MapReader {
   public:
     /// `what` names the map in messages: "a line", "serial". A node that is not a map is a problem,
-    /// told with an example such as "{mode: off}".
+    /// shown with an example such as "{mode: off}".
     MapReader(const Node& node, Problems& problems, std::string what,
               std::string_view example = {});
     ~MapReader() = default;
@@ -40,27 +39,28 @@ class MapReader {
     MapReader& operator=(const MapReader&) = delete;
 
     bool has(std::string_view key);
-    /// finish() will tell of a key that is probably this one, or belongs below it: that says more
-    /// than that it is missing.
+    /// True if finish() will report a key that is probably this one, or belongs below it, which
+    /// says more than that this key is missing.
     bool is_mistyped(std::string_view key) const;
-    /// Any scalar as it was written, quoted or not; an empty one is a problem.
+    /// Returns any scalar as written, quoted or not; an empty one is a problem.
     std::optional<std::string> text(std::string_view key);
-    /// As text(), and its absence is a problem.
+    /// Like text(), and absence is a problem.
     std::optional<std::string> required_text(std::string_view key);
-    /// A decimal integer without leading zeros or quotes (those around a variable aside), inside
-    /// [min, max].
+    /// Returns a decimal integer in [min, max], without leading zeros or quotes (unless these
+    /// enclose a variable).
     std::optional<std::int64_t> integer(std::string_view key, std::int64_t min, std::int64_t max);
     std::optional<std::int64_t> required_integer(std::string_view key, std::int64_t min,
                                                  std::int64_t max);
     std::optional<double> number(std::string_view key);
-    /// A number from 0 to 1.
+    /// Returns a number from 0 to 1.
     std::optional<double> share(std::string_view key);
-    /// `true` or `false`, also as True and TRUE, nothing else (no yes, no on).
+    /// Accepts `true` and `false`, also as True and TRUE, nothing else (no yes, no on).
     std::optional<bool> boolean(std::string_view key);
-    /// `250us`, `20ms`, `2s`, `5min` inside [min, max]; a bare number is a problem that asks for a
-    /// unit.
+    /// Returns a duration in [min, max]: `250us`, `20ms`, `2s`, `5min`; a bare number is a problem
+    /// that asks for a unit.
     std::optional<Duration> duration(std::string_view key, Duration min, Duration max);
-    /// One of the words; anything else is a problem that lists them (and the nearest).
+    /// Returns one of the words' values; anything else is a problem that lists the words (and the
+    /// nearest).
     template <class T>
     std::optional<T> choice(std::string_view key,
                             std::span<const std::pair<std::string_view, T>> words) {
@@ -70,56 +70,56 @@ class MapReader {
         if (!i) return std::nullopt;
         return words[*i].second;
     }
-    /// What else is to be said of a wrong value, as the end of the message.
+    /// Returns more about a wrong value, for the end of the message.
     using Hint = std::function<std::string(std::string_view typed)>;
     std::optional<std::size_t> choice_index(std::string_view key,
                                             std::span<const std::string_view> words,
                                             const Hint& hint = {});
 
-    /// The value is this word, which stands for itself beside what another getter takes: auto.
+    /// True if the value is this keyword, allowed besides another getter's values: auto.
     bool is_word(std::string_view key, std::string_view word);
 
-    /// The value itself, of any kind but null; nullptr when absent or null.
+    /// Returns the value of any kind; nullptr if absent or null.
     const Node* child(std::string_view key);
-    /// As child(), and another kind is a problem, told with an example such as "{mode: off}".
+    /// Like child(), but another kind is a problem, shown with an example such as "{mode: off}".
     const Node* map(std::string_view key, std::string_view example = {});
     const Node* sequence(std::string_view key, std::string_view example = {});
 
-    // What the caller looks at itself, for who writes down what is asked (Description). Call it
-    // where the value is judged; what is told of one key counts together.
+    // Checks that the caller makes itself, recorded for a Description. Call them where the value is
+    // checked; all calls for one key add up.
 
-    /// A text, or those in a list or map, matches this regular expression (ECMA 262); `number`: one
-    /// that YAML takes for a number may.
+    /// The text, or those in a list or map, must match this regular expression (ECMA 262);
+    /// `number`: it may look like a number to YAML.
     void looks_like(std::string_view key, std::string_view pattern, bool number = false);
     void no_longer(std::string_view key, std::size_t characters);
-    /// The same of the keys of a map that has no words for them.
+    /// Pattern for the keys of a map with free keys.
     void keyed_by(std::string_view key, std::string_view pattern);
-    /// Of a list: raw numbers.
+    /// The list holds raw numbers.
     void holds_integers(std::string_view key);
-    /// Less than what integer() was asked for.
+    /// A narrower range than integer() was called with.
     void within(std::string_view key, std::int64_t min, std::int64_t max);
     void never(std::string_view key, double number);
     void may_be_null(std::string_view key, bool may);
     void needed(std::string_view key);
     /// `most` 0: no limit.
     void entries(std::string_view key, std::size_t fewest, std::size_t most);
-    /// `key` has this word and `other` is absent, which it needs then.
+    /// True if `key` has this word and `other`, which it then needs, is absent.
     bool lacks(std::string_view key, std::string_view word, std::string_view other);
-    /// `key` belongs to these words of `other`; `absent`: and to none.
+    /// `key` is allowed only if `other` has one of these words, or, with `absent`, is missing.
     void belongs(std::string_view key, std::string_view other,
                  std::span<const std::string_view> words, bool absent = false);
 
-    /// Keys that stand in another map: finish() says where. Must outlive this.
+    /// Sets keys that belong in another map, which finish() then names. Must outlive this.
     void elsewhere(std::span<const Elsewhere> keys) { elsewhere_ = keys; }
 
-    /// Where the key's value stands (the map itself when the key is absent), for later problems.
+    /// Returns the place of the key's value (of the map if the key is absent), for later problems.
     Mark mark(std::string_view key) const;
     Mark mark() const { return node_->mark; }
     void problem(std::string_view key, std::string message);
     Problems& problems() { return *problems_; }
 
-    /// A key of other versions: a problem, "KEY why", where it stands, and never proposed. `key`
-    /// must outlive this.
+    /// Reports "KEY why" if a key of other versions is present; it is never suggested. `key` must
+    /// outlive this.
     void refuse(std::string_view key, const std::string& why);
 
     /// Reports unknown keys. Call once, last.
@@ -148,26 +148,26 @@ class MapReader {
     std::string what_;
     std::vector<std::string> known_;
     std::vector<std::string_view> refused_;
-    std::vector<std::string> excused_;  ///< required, absent, and likely to be mistyped
-    std::vector<std::string> parents_;  ///< of these, those with a map or a list
+    std::vector<std::string> excused_;  ///< required, absent, and probably mistyped
+    std::vector<std::string> parents_;  ///< known keys with a map or a list
     std::span<const Elsewhere> elsewhere_;
 };
 
-/// The text forms above, for scalars that are not map values. Nothing when the text is not one.
-/// Units: us, ms, s, min.
+/// Parse the text forms above for scalars that are not map values; nothing for other text. Units:
+/// us, ms, s, min.
 std::optional<Duration> parse_duration(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
-/// A regular expression (ECMA 262) of just the texts of these durations, or integers, as the
-/// functions above take them; 0 <= min <= max. That of integers is a part, without ^ and $.
+/// Regular expressions (ECMA 262) that match exactly these durations or integers, as the functions
+/// above accept them; 0 <= min <= max. The one for integers is a part, without ^ and $.
 inline constexpr std::string_view kIntegerPattern = "^(0|-?[1-9][0-9]*)$";
 std::string duration_pattern(Duration min, Duration max);
 std::string integer_pattern(std::int64_t min, std::int64_t max);
-/// "; a blank is missing after '101:'; write 101: floor1/31" for a key that is a number, a colon
-/// and its value; else "".
+/// Returns "; a blank is missing after '101:'; write 101: floor1/31" for a key that is a number, a
+/// colon and its value; else "".
 std::string number_blank_hint(std::string_view key);
-/// In the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
+/// Formats in the largest unit that is exact: 1500ms, 2s, 250us; nanoseconds below.
 std::string format_duration(Duration duration);
-/// That of whole milliseconds, rounded up: a time on the wire has no shorter text.
+/// Formats in whole milliseconds, rounded up, for times on the wire.
 std::string format_milliseconds(Duration duration);
 
 }  // namespace panelgate::yaml

@@ -25,8 +25,8 @@
 
 namespace panelgate::web {
 
-/// One text of /metrics for this caller; null when there is none. When the caller leaves, nothing
-/// more is made for it.
+/// Gets the text of /metrics for this caller, or null if there is none. If the caller leaves, its
+/// scrape is cancelled.
 boost::asio::awaitable<SharedText> scrape(std::shared_ptr<Caller> caller, MetricsSource* source,
                                           bool gzip);
 
@@ -84,7 +84,7 @@ json::object describe(const ReloadVerdict& verdict) {
     return object;
 }
 
-/// By the query, or by a body.
+/// The flag from the query or from the body.
 Parsed<bool> flag_of(const HttpRequest& request, const json::object& body, const char* name) {
     const auto query = query_flag(request, name);
     if (!query) return query;
@@ -153,8 +153,7 @@ Handling post_reload(HttpRequest request, const Api* api) {
     co_return answer_of(*verdict);
 }
 
-/// What is configured is the same for all of one role, and made once: who asks is told what it may
-/// do.
+/// The configuration is the same for all clients of a role, so it is rendered once per role.
 Handling get_configuration(HttpRequest request, const Api* api) {
     if (!api->providers.configuration)
         co_return to_response(problem(404, "this program shows no configuration"));
@@ -235,7 +234,7 @@ Handling get_metrics(HttpRequest request, const Api* api) {
 
 namespace {
 
-/// Resumes the coroutine by post: a source must not find itself called again from inside its own
+/// Resumes the coroutine by post, so that the source is not called again from inside its own
 /// completion.
 struct StartScrape {
     template <class Handler>

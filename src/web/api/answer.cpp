@@ -49,7 +49,7 @@ unsigned status_of(Fault fault) {
     std::abort();
 }
 
-/// Of what was not transmitted the words must not sound as if it had been.
+/// The text for a request that was not transmitted must not sound as if it had been.
 const char* detail_of(Fault fault, bool transmitted) {
     switch (fault) {
         case Fault::denied:
@@ -83,7 +83,7 @@ const char* detail_of(Fault fault, bool transmitted) {
     std::abort();
 }
 
-/// The panel manual's word for an exception code, or "".
+/// The panel manual's meaning of an exception code, or "".
 std::string meaning_of(std::uint8_t code, const profile::PanelProfile& profile) {
     for (const profile::ExceptionMeaning& exception : profile.exceptions) {
         if (exception.code == code) return exception.meaning;
@@ -159,7 +159,7 @@ std::string_view trimmed(std::string_view text) {
     return text;
 }
 
-/// Cuts off what comes before the separator; the rest stays in `text`.
+/// Removes and returns the part before the separator; the rest stays in `text`.
 std::string_view next(std::string_view& text, char separator) {
     const auto at = std::min(text.find(separator), text.size());
     const std::string_view part = text.substr(0, at);
@@ -167,7 +167,7 @@ std::string_view next(std::string_view& text, char separator) {
     return trimmed(part);
 }
 
-/// The weight among these parameters; 1 when there is none.
+/// The weight ("q=") among these parameters; 1 if there is none.
 double weight_of(std::string_view parameters) {
     while (!parameters.empty()) {
         const std::string_view one = next(parameters, ';');
@@ -239,7 +239,7 @@ HttpResponse csv_response(std::string body) {
 
 namespace {
 
-constexpr std::size_t kPackedOfATurn = 16 * 1024;  ///< bytes: some 0.3 ms
+constexpr std::size_t kPackedOfATurn = 16 * 1024;  ///< bytes: about 0.3 ms of work
 
 }  // namespace
 
@@ -249,13 +249,13 @@ boost::asio::awaitable<std::string> packed(std::string body) {
         const std::string_view piece = left.substr(0, kPackedOfATurn);
         gzip.add(piece);
         left.remove_prefix(piece.size());
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         if (!left.empty()) co_await std::move(turn);
     }
     co_return gzip.finish();
 }
 
-/// Some 0.1 ms.
+/// About 0.1 ms of work.
 constexpr std::size_t kEntriesOfATurn = 16;
 
 void LongAnswer::begin_member(std::string_view name) {
@@ -300,7 +300,7 @@ HttpResponse LongAnswer::response() {
     return response;
 }
 
-boost::asio::awaitable<void> others_turn() {
+boost::asio::awaitable<void> yield_turn() {
     const auto executor = co_await boost::asio::this_coro::executor;
     co_await boost::asio::post(executor, boost::asio::use_awaitable);
 }
@@ -315,12 +315,12 @@ Handling table_answer(HttpRequest request, Table table) {
         const boost::json::object one = table.entry(i);
         if (as_csv) {
             lines += csv_line(one, table.columns);
-            body.add(nullptr);  // counts turns
+            body.add(nullptr);  // only to count entries for is_turn_over()
         } else {
             body.add(one);
         }
         if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
@@ -339,7 +339,7 @@ boost::asio::awaitable<HttpResponse> KeptAnswer::give(std::shared_ptr<KeptAnswer
                                                       HttpRequest request) {
     HttpResponse response;
     response.content_type = self->content_type_;
-    const bool known = tell_tag(response, request.headers["if-none-match"], self->tag_);
+    const bool known = add_etag(response, request.headers["if-none-match"], self->tag_);
     response.headers.emplace_back("Vary", "Accept-Encoding");
     if (known) co_return response;
     response.shared_body = self->text_;

@@ -30,8 +30,8 @@
 
 namespace panelgate::web {
 
-/// What boost::json::basic_parser asks of a handler, of any size and without an effect: for those
-/// that want to see some of it, which hide the members of that name.
+/// A handler for boost::json::basic_parser that accepts everything. Derived handlers hide the
+/// members that they need.
 struct JsonHandler {
     using error_code = boost::system::error_code;
     using View = boost::json::string_view;
@@ -61,11 +61,11 @@ struct JsonHandler {
     bool on_comment(View, error_code&) { return true; }
 };
 
-/// Why a text is no value, and where.
+/// Why a text is not a valid value, and where.
 struct JsonFault {
     std::size_t at = 0;  ///< in the text
     std::string what;
-    bool is_json = false;  ///< but holds a number that none here could be
+    bool is_json = false;  ///< valid JSON, but with a number that cannot be represented
 };
 
 struct JsonRead {
@@ -73,17 +73,17 @@ struct JsonRead {
     std::optional<JsonFault> fault;
 };
 
-/// Numbers as they are written: whole ones are integers of 64 bits as far as they fit, 9e18 and
-/// 9007199254740993.0 included; others doubles, or exact_number() where
-/// a double has not as many digits. One beyond every double, and one that
-/// would become 0, is a fault.
+/// Parses JSON and keeps numbers exact: whole ones become 64-bit integers where they fit, 9e18 and
+/// 9007199254740993.0 included; others become doubles, or exact_number() where a double has too few
+/// digits. A number beyond the range of a double, or one that would become 0, is a fault.
 JsonRead read_json(std::string_view text);
 
 namespace {
 
 using boost::system::error_code;
 
-/// Sees the names of each open object. As many as the text has; the parser limits the depth.
+/// Collects the member names of each open object; their number is not limited. The parser limits
+/// the depth.
 class Names : public JsonHandler {
   public:
     bool on_object_begin(error_code&) {
@@ -123,7 +123,7 @@ std::optional<RepeatedMember> find_repeated_member(std::string_view json) {
     const std::size_t used = parser.write_some(false, json.data(), json.size(), error);
     auto& name = parser.handler().repeated;
     if (!name) return std::nullopt;
-    // With escapes the name is longer in the text: then its end has to do.
+    // An escaped name is longer in the text: then the position is that of its end.
     const std::string quoted = '"' + *name;
     const std::size_t begin = used - std::min(used, quoted.size());
     const bool plain = json.substr(begin, quoted.size()) == quoted;
@@ -139,7 +139,7 @@ std::optional<double> double_of(const std::string& text) {
     return number;
 }
 
-/// Makes the value, as boost::json's own handler does, but for numbers.
+/// Builds the value like boost::json's own handler, except for numbers.
 class Builder : public JsonHandler {
   public:
     bool on_document_begin(error_code&) {
@@ -248,7 +248,7 @@ constexpr std::array<Slip, 17> kSlips{{
     {",", "a value is missing before this ','"},
 }};
 
-/// What was done at `at`, where the parser stopped; "" when nobody knows.
+/// The likely mistake at `at`, where the parser stopped; "" if none is recognized.
 std::string slip_at(std::string_view text, std::size_t at) {
     const std::string_view rest = text.substr(at);
     if (rest.empty()) return "";
@@ -266,7 +266,7 @@ std::string slip_at(std::string_view text, std::size_t at) {
     return "";
 }
 
-/// Where the first byte is that belongs to no character.
+/// The position of the first byte that is not part of a valid UTF-8 character.
 std::size_t end_of_utf8(std::string_view text) {
     for (std::size_t at = 0; at < text.size();) {
         const std::size_t length = utf8_sequence(text.substr(at));
@@ -276,12 +276,12 @@ std::size_t end_of_utf8(std::string_view text) {
     return text.size();
 }
 
-/// The parser stopped at `used`.
+/// The fault at `used`, where the parser stopped.
 JsonFault fault_at(std::string_view text, std::size_t used, const error_code& error) {
     if (text.find_first_not_of(" \t\r\n") == text.npos)
         return {0, "it is empty; send an object, such as {\"value\": 1}"};
     if (!is_utf8(text)) return {end_of_utf8(text), "this is not UTF-8"};
-    // Of a number or a word that it had begun, it stops at the end.
+    // Inside a number or a word the parser stops at its end.
     std::string slip = slip_at(text, used);
     if (!slip.empty()) return {used, std::move(slip)};
     if (used >= text.size() || error == boost::json::error::incomplete)
@@ -328,7 +328,7 @@ Problem bad_json(std::string_view body, const JsonFault& fault) {
     return problem(400, kind + place_of(body, fault.at) + ": " + fault.what);
 }
 
-/// The number when it is whole and fits; JSON has no integers of its own.
+/// The value as an integer if it is whole and fits; JSON does not distinguish integers.
 std::optional<std::int64_t> as_whole(const json::value& value) {
     if (value.is_int64()) return value.get_int64();
     if (!value.is_double()) return std::nullopt;

@@ -19,26 +19,26 @@ namespace panelgate::web {
 
 struct RepeatedMember {
     std::string name;
-    std::size_t at = 0;  ///< where the second one begins, in the text
+    std::size_t at = 0;  ///< where the second occurrence begins in the text
 };
 
-/// The first member that an object in this text has twice, at any depth: parsers of values keep the
-/// last one and say nothing. Of a text that is no JSON: what is found before its fault.
+/// Finds the first duplicate member of any object in this text, at any depth; value parsers
+/// silently keep the last one. In invalid JSON only the part before the fault is searched.
 std::optional<RepeatedMember> find_repeated_member(std::string_view json);
 
-/// The names of members that a body may have; they are told apart by case, too.
+/// The member names that a body may have; case-sensitive.
 using Members = std::initializer_list<std::string_view>;
 
-/// The body as an object; 400 with line and column of what is wrong, a member that comes twice
-/// included, at any depth.
+/// Parses the body as an object. 400 with line and column of the error; a duplicate member is an
+/// error, too, at any depth.
 Parsed<boost::json::object> parse_object(std::string_view body);
-/// The same of one that has no other members: 400 for the first that nobody knows.
+/// The same; 400 for the first member that is not in `known`.
 Parsed<boost::json::object> parse_object(std::string_view body, Members known);
 
-/// A whole number in [low, high]; `name` is for the 400's text. 10.0 is whole.
+/// A whole number in [low, high]; 10.0 is whole. `name` is used in the text of the 400.
 Parsed<std::int64_t> whole_number(const boost::json::value& value, std::string_view name,
                                   std::int64_t low, std::int64_t high);
-/// The same of a required member.
+/// The same for a required member.
 Parsed<std::int64_t> number_member(const boost::json::object& object, std::string_view name,
                                    std::int64_t low, std::int64_t high);
 Parsed<std::string> string_member(const boost::json::object& object, std::string_view name);
@@ -49,7 +49,7 @@ Parsed<boost::json::array> values_member(const boost::json::object& object);
 /// or -32768..-1 for their two's complement. At least one.
 Parsed<std::vector<std::uint16_t>> values_member(const boost::json::object& object,
                                                  modbus::Table table);
-/// The member "value": a point's new one.
+/// The member "value": the new value of a point.
 Parsed<points::Value> value_member(const boost::json::object& object);
 /// True or false; false where there is no such member.
 Parsed<bool> flag_member(const boost::json::object& object, std::string_view name);

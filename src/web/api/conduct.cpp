@@ -22,19 +22,19 @@
 
 namespace panelgate::web {
 
-/// The handler's answer; where lines were asked for it, it names their transactions: "17, 18", or
-/// "floor1:17, floor2:3" where they are of several lines (Panelgate-Transactions).
+/// The handler's answer, with a Panelgate-Transactions header if it asked lines: "17, 18", or
+/// "floor1:17, floor2:3" for several lines.
 Handling costed(HttpRequest request, const Api* api, Handler handler);
 
-/// A write, once: with an Idempotency-Key (draft-ietf-httpapi-idempotency-key-header) that its
-/// client has sent before it is not done again, and gets the answer that the first one got, or
-/// would have got, where its client was gone by then. Only what may have changed something is
-/// remembered.
+/// Handles a write at most once: if its client has sent this Idempotency-Key
+/// (draft-ietf-httpapi-idempotency-key-header) before, the write is not repeated and gets the first
+/// one's answer, even if the client had left by then. Only writes that may have changed something
+/// are remembered.
 Handling keyed(HttpRequest request, const Api* api, Handler handler);
 
 namespace {
 
-constexpr std::size_t kLongest = 4000;  ///< characters: clients take 8,192 of a header
+constexpr std::size_t kLongest = 4000;  ///< characters: clients accept headers of 8,192
 
 std::string name_of(const void* line, const Directory& directory) {
     for (const LineEntry& entry : directory.lines) {
@@ -48,7 +48,7 @@ bool of_one_line(const std::vector<Caller::Cost>& costs) {
         costs, [&](const Caller::Cost& cost) { return cost.line == costs.front().line; });
 }
 
-/// What several parts of a request had in common stands there once.
+/// A transaction that several parts of a request share is listed once.
 std::string text_of(const std::vector<Caller::Cost>& costs, const Directory& directory) {
     const bool plain = of_one_line(costs);
     std::string text;
@@ -82,7 +82,7 @@ namespace {
 constexpr const char* kLost =
     "the gateway failed after something was sent: what came of the write is not known";
 
-/// The text within its quotes, where it has some: a client that leaves them out means the same.
+/// The key without its quotes; a key without quotes means the same.
 Parsed<std::string> key_of(std::string_view text, std::size_t most) {
     if (text.size() >= 2 && text.starts_with('"') && text.ends_with('"'))
         text = text.substr(1, text.size() - 2);
@@ -97,7 +97,7 @@ std::string client_of(const Caller& caller) {
     return caller.token().empty() ? "address " + caller.address() : "token " + caller.token();
 }
 
-/// Another request has another number, but for one in 2^64.
+/// A hash of the request; two requests have the same with a probability of 1 in 2^64.
 std::uint64_t number_of(const HttpRequest& request) {
     std::string text = request.method;
     for (const std::string& segment : request.path) text += '\n' + segment;
@@ -106,28 +106,28 @@ std::uint64_t number_of(const HttpRequest& request) {
     return std::hash<std::string>{}(text);
 }
 
-/// Asks the lines in place of the client, who may leave: then what still waits is not sent, and
-/// what is on a wire comes to its end and is remembered.
+/// Asks the lines on behalf of the client, which may leave: then requests that still wait are not
+/// sent, and one that is on a wire is completed and remembered.
 std::shared_ptr<Caller> worker_for(Caller& client) {
     auto worker = std::make_shared<Caller>(client.id(), client.address());
     worker->uses_token(client.token());
     return worker;
 }
 
-/// For as long as somebody works for the client.
-class Employment {
+/// Ties a worker to its client for as long as the write runs.
+class IdempotencyScope {
   public:
-    Employment(std::shared_ptr<Caller> client, std::shared_ptr<Caller> worker)
+    IdempotencyScope(std::shared_ptr<Caller> client, std::shared_ptr<Caller> worker)
         : client_(std::move(client)), worker_(std::move(worker)) {
         client_->at_leaving(worker_.get(), [worker = worker_.get()] { worker->hang_up(); });
     }
-    /// Lines know the client by its worker's name until it leaves.
-    ~Employment() {
+    /// Lines know the client by its worker's name until the client leaves.
+    ~IdempotencyScope() {
         client_->forget(worker_.get());
         if (!client_->has_left()) worker_->hand_over(*client_);
     }
-    Employment(const Employment&) = delete;
-    Employment& operator=(const Employment&) = delete;
+    IdempotencyScope(const IdempotencyScope&) = delete;
+    IdempotencyScope& operator=(const IdempotencyScope&) = delete;
 
   private:
     std::shared_ptr<Caller> client_;
@@ -156,7 +156,7 @@ Handling keyed(HttpRequest request, const Api* api, Handler handler) {
     auto begun = book->begin(now(), key, number_of(request), worker);
     if (const auto* refused = std::get_if<Problem>(&begun)) co_return to_response(*refused);
     if (auto* first = std::get_if<HttpResponse>(&begun)) co_return again(std::move(*first));
-    const Employment employment(request.caller, worker);
+    const IdempotencyScope scope(request.caller, worker);
     request.caller = worker;
     HttpResponse answer;
     try {
@@ -170,7 +170,7 @@ Handling keyed(HttpRequest request, const Api* api, Handler handler) {
         }
         throw;
     }
-    if (worker->has_left()) co_return answer;  // the server has ended, and its clock may have
+    if (worker->has_left()) co_return answer;  // the server is gone, and perhaps its clock
     if (worker->has_effect()) {
         book->end(now(), key, answer);
     } else {
@@ -186,7 +186,7 @@ std::string header(const HttpRequest& request, const char* name) {
     return found == request.headers.end() ? std::string() : found->second;
 }
 
-/// Behind a member's name that ends in _ms: its number; behind `time`: the instant.
+/// The end of the value of a member that ends in _ms, or of `time`; `at` if neither begins there.
 std::size_t end_of_age(std::string_view body, std::size_t at) {
     constexpr std::string_view kAge = "_ms\":";
     constexpr std::string_view kTime = "\"time\":\"";
@@ -198,7 +198,7 @@ std::size_t end_of_age(std::string_view body, std::size_t at) {
     return at;
 }
 
-/// Has it a body that others would be sent, too, in another coding?
+/// True if its body may be packed with gzip and is large enough.
 bool is_packable(const HttpResponse& response, std::size_t from) {
     if (response.events || response.shared_body || response.status == 304) return false;
     for (const auto& [name, value] : response.headers)
@@ -206,7 +206,7 @@ bool is_packable(const HttpResponse& response, std::size_t from) {
     return response.body.size() >= from;
 }
 
-/// Behind what the answer varies with already.
+/// Appends to an existing Vary header.
 void add_vary(HttpResponse& response, const std::string& name) {
     for (auto& [header, value] : response.headers) {
         if (header != "Vary") continue;
@@ -217,12 +217,12 @@ void add_vary(HttpResponse& response, const std::string& name) {
 }
 
 void set_tag(HttpResponse& response, const std::string& if_none_match) {
-    if (tell_tag(response, if_none_match, tag_of(response.body))) response.body.clear();
+    if (add_etag(response, if_none_match, tag_of(response.body))) response.body.clear();
 }
 
-Handling handled(HttpRequest request, const Api* api, Handler handler, Manner manner) {
-    if (manner.once) return keyed(std::move(request), api, handler);
-    if (manner.asks) return costed(std::move(request), api, handler);
+Handling handled(HttpRequest request, const Api* api, Handler handler, RoutePolicy policy) {
+    if (policy.once) return keyed(std::move(request), api, handler);
+    if (policy.asks) return costed(std::move(request), api, handler);
     return handler(std::move(request), api);
 }
 
@@ -257,27 +257,27 @@ bool names_tag(std::string_view if_none_match, std::string_view tag) {
     return false;
 }
 
-bool tell_tag(HttpResponse& response, std::string_view if_none_match, const std::string& tag) {
+bool add_etag(HttpResponse& response, std::string_view if_none_match, const std::string& tag) {
     response.headers.emplace_back("ETag", tag);
     const bool known = names_tag(if_none_match, tag);
     if (known) response.status = 304;
     return known;
 }
 
-Handling conduct(HttpRequest request, const Api* api, Handler handler, Manner manner) {
+Handling conduct(HttpRequest request, const Api* api, Handler handler, RoutePolicy policy) {
     const std::shared_ptr<Caller> caller = request.caller;
     const std::size_t gzip_from = api->providers.settings.gzip_from;
     const bool takes_gzip = accepts_gzip(header(request, "accept-encoding"));
     const std::string if_none_match = header(request, "if-none-match");
-    const auto wait = manner.asks ? wait_of(request) : std::nullopt;
-    Handling work = handled(std::move(request), api, handler, manner);
+    const auto wait = policy.asks ? wait_of(request) : std::nullopt;
+    Handling work = handled(std::move(request), api, handler, policy);
     HttpResponse response = co_await std::move(work);
     if (caller->has_left()) co_return response;
     if (wait) {
         const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(*wait).count();
         response.headers.emplace_back("Preference-Applied", "wait=" + std::to_string(seconds));
     }
-    if (manner.tagged && response.status == 200) set_tag(response, if_none_match);
+    if (policy.tagged && response.status == 200) set_tag(response, if_none_match);
     if (!is_packable(response, gzip_from)) co_return response;
     add_vary(response, "Accept-Encoding");
     if (!takes_gzip) co_return response;

@@ -19,9 +19,9 @@
 
 namespace panelgate::web {
 
-/// Which events a request wants: from the queries types, line, station and point, each a list with
-/// commas. 400 for a type that there is not, and where no event of the types could name what is
-/// asked for; 404 for a line, station or point that there is not.
+/// The events that a request asks for, from the queries types, line, station and point, each a
+/// comma-separated list. 400 for an unknown type, and if no event of these types could match; 404
+/// for an unknown line, station or point.
 Parsed<EventFilter> event_filter_of(const HttpRequest& request, const Directory& directory);
 
 namespace json = boost::json;
@@ -84,7 +84,7 @@ std::string known_types() {
     return text;
 }
 
-/// The parts between commas; none where the query is not given.
+/// The comma-separated parts of a query; none if it is not given.
 std::vector<std::string> list_of(const HttpRequest& request, const std::string& query) {
     std::vector<std::string> parts;
     const auto given = request.query.find(query);
@@ -103,7 +103,7 @@ Parsed<void> add_types(EventFilter& filter, const HttpRequest& request) {
     return {};
 }
 
-/// As events name it: one that nobody has listed by its id alone.
+/// The station's name in events; an unlisted one is named by its id alone.
 std::string name_in_events(const Directory& directory, const StationEntry& station) {
     const bool listed = std::ranges::any_of(
         directory.stations, [&](const StationEntry& one) { return one.name == station.name; });
@@ -130,7 +130,7 @@ Parsed<void> add_places(EventFilter& filter, const HttpRequest& request,
     return {};
 }
 
-/// A listener that could never be told anything has made a mistake.
+/// Rejects a filter that no event can match: it is the client's mistake.
 Parsed<void> check(const EventFilter& filter) {
     const auto fits = [&](const Kind& kind) {
         const bool wanted = filter.types.empty() || filter.types.contains(std::string(kind.type));

@@ -99,7 +99,7 @@ void KeyBook::erase(std::map<Key, Entry>::iterator entry) {
 
 namespace {
 
-constexpr unsigned kLongest = 86400;  ///< s: whoever waits for longer waits for the deadline
+constexpr unsigned kLongest = 86400;  ///< s: a longer wait is cut to the line's deadline anyway
 
 std::string_view trimmed(std::string_view text) {
     while (text.starts_with(' ') || text.starts_with('\t')) text.remove_prefix(1);

@@ -19,27 +19,28 @@
 
 namespace panelgate::web {
 
-/// Writes that carry an Idempotency-Key, by client and key: those under way, and for a time what
-/// became of the others, so that a request that is sent again changes nothing again (P2). Nothing
-/// is forgotten before its time: who has no more room is refused. Pure; one thread.
+/// Writes with an Idempotency-Key, by client and key: the running ones, and for a time the results
+/// of finished ones, so that a repeated request does not write again (P2). No entry is dropped
+/// before its time: a new request is refused when there is no room. Pure; one thread.
 class KeyBook {
   public:
-    using Key = std::pair<std::string, std::string>;  ///< the client, and what it said
+    using Key = std::pair<std::string, std::string>;  ///< client and key
     struct Fresh {};
 
     explicit KeyBook(const ApiSettings& settings) : settings_(settings) {}
 
-    /// To be carried out (then end() or drop() follows), the answer that the first one got, or why
-    /// neither: 422 for another request with this key, 409 while the first is under way, 503.
-    /// `request` tells requests apart. `worker` asks the lines for it.
+    /// Registers a request. Returns Fresh: carry it out, then call end() or drop(); the first
+    /// request's answer; or a problem: 422 for a different request with this key, 409 while the
+    /// first is running, 503 if there is no room. `request` is a hash of the request. `worker` asks
+    /// the lines for it.
     std::variant<Fresh, HttpResponse, Problem> begin(TimePoint now, const Key& key,
                                                      std::uint64_t request,
                                                      std::shared_ptr<Caller> worker);
-    /// This is what came of it.
+    /// Stores the answer of a finished request.
     void end(TimePoint now, const Key& key, const HttpResponse& answer);
-    /// Nothing came of it: it may be tried again.
+    /// Forgets a request that has had no effect: it may be tried again.
     void drop(const Key& key);
-    /// Whoever works for one that is under way leaves: what it works on goes away.
+    /// Makes the workers of all running requests leave, which drops their work.
     void dismiss();
 
     std::size_t size() const { return entries_.size(); }
@@ -47,11 +48,12 @@ class KeyBook {
   private:
     struct Entry {
         std::uint64_t request = 0;
-        std::shared_ptr<Caller> worker;  ///< null: it is over
+        std::shared_ptr<Caller> worker;  ///< null: finished
         HttpResponse answer{};
     };
 
-    /// Of one client, or, null, of any. None is over: no time.
+    /// Time until the first entry of a client (null: of any client) expires; zero if none is
+    /// finished.
     Duration until_one_ends(TimePoint now, const std::string* client) const;
     void forget_old(TimePoint now);
     void erase(std::map<Key, Entry>::iterator entry);
@@ -59,24 +61,24 @@ class KeyBook {
     ApiSettings settings_;
     std::map<Key, Entry> entries_;
     std::map<std::string, std::size_t> of_client_;
-    std::deque<std::pair<TimePoint, Key>> over_;  ///< by when they ended
+    std::deque<std::pair<TimePoint, Key>> over_;  ///< finished keys, ordered by end time
     std::size_t bytes_ = 0;                       ///< of the answers
 };
 
-/// N of "Prefer: wait=N" (RFC 7240 4.3): a whole number of seconds. Nothing for anything else,
-/// which is no error there.
+/// N of "Prefer: wait=N" (RFC 7240 4.3), a whole number of seconds. Nothing for any other value,
+/// which is not an error.
 std::optional<Duration> wait_of(std::string_view prefer);
-/// The same of a request's header.
+/// The same from a request's header.
 std::optional<Duration> wait_of(const HttpRequest& request);
 
-/// Until when a request is to be answered, however many transactions it takes: by its line's
-/// deadline, or when its client stops waiting, where that is sooner (P3).
+/// The time limit of a request over all its transactions: its line's deadline, or the client's
+/// "Prefer: wait", whichever is sooner (P3).
 class Patience {
   public:
-    /// `now` is called whenever it is asked.
+    /// `now` must outlive it.
     Patience(const HttpRequest& request, Duration deadline, const std::function<TimePoint()>& now);
 
-    /// Zero when the time is over.
+    /// Time left; zero if it is over.
     Duration left() const;
 
   private:

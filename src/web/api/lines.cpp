@@ -24,7 +24,7 @@ namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
-/// In the list of lines a finding is only its cause.
+/// In the list of lines a finding is reduced to its cause.
 json::object describe(const LineEntry& line, const bus::LineStatus& status) {
     json::object object;
     object["name"] = line.name;
@@ -95,7 +95,7 @@ Handling get_lines(HttpRequest request, const Api* api) {
         const LineEntry& line = api->directory->lines[i];
         body.add(describe(line, line.bus->status()));
         if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
@@ -181,10 +181,10 @@ Parsed<Wanted> wanted_of(std::string_view text) {
     return wanted;
 }
 
-/// Why nobody can be looked for on this line now.
+/// Why no discovery can start on this line now.
 std::optional<Problem> barred(const LineEntry& line, const DiscoverySource& source) {
     const bus::LineStatus status = line.bus->status();
-    // Its refusal of a write says who is master there.
+    // A listening line's refusal of a write names the reason: another master.
     if (const auto refusal = line.bus->refusal_of_write(0); status.listens && refusal)
         return problem_of(*refusal);
     if (source.report(line.name).state == DiscoveryReport::State::running)
@@ -239,7 +239,7 @@ Parsed<StationEntry> find_simulated(const Directory& directory, const std::strin
     return station;
 }
 
-/// Numbers, and true and false for 1 and 0.
+/// The body's members as numbers; true is 1 and false is 0.
 Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
     std::map<std::string, double> numbers;
     for (const auto& [key, value] : body) {

@@ -15,22 +15,24 @@
 
 namespace panelgate::web {
 
-/// The entries of {"items": [...]}: objects, at least one, no more than `most`.
+/// The entries of {"items": [...]}: at least one object, at most `most`.
 Parsed<std::vector<boost::json::object>> entries_of(std::string_view body, std::size_t most);
 
-/// An entry names a point or items: {"point": "press/temperature"}. It may have an "id" of any
-/// form, for who asks: its result repeats the entry.
+/// True if the entry names a point ({"point": "press/temperature"}) rather than items. Its "id", of
+/// any type, is the client's own: the result repeats the entry.
 bool names_point(const boost::json::object& entry);
-/// 400 for a member that no entry of its kind has: the names of what it wants, and these.
+/// 400 for a member that an entry of its kind does not have: the addressing members, and the given
+/// ones.
 Parsed<void> check_members(const boost::json::object& entry, Members of_points, Members of_items);
 Parsed<PointOfStation> point_of(const boost::json::object& entry, const Directory& directory);
-/// {"station", "device"} or {"station", "table", "address"}: one item there.
+/// The one item that {"station", "device"} or {"station", "table", "address"} names.
 Parsed<Items> item_of(const boost::json::object& entry, const Directory& directory);
 
-/// "items[2]: …": what is malformed fails the whole list, and nothing of it is done.
+/// Prefixes the problem with "items[2]: ". A malformed entry fails the whole list, and nothing of
+/// it is done.
 Problem in_entry(std::size_t index, Problem problem);
 
-/// Which of them are on which line, in their order. `line_of` gives a line's name; null: none.
+/// Groups entries by line, in their order. `line_of` returns a line's name; null: skip the entry.
 template <class Entry, class LineOf>
 std::map<std::string, std::vector<Entry*>> by_line(std::vector<Entry>& entries, LineOf line_of) {
     std::map<std::string, std::vector<Entry*>> lines;
@@ -41,8 +43,8 @@ std::map<std::string, std::vector<Entry*>> by_line(std::vector<Entry>& entries, 
     return lines;
 }
 
-/// Runs all of them at once, in the loop of who awaits; goes on when the last has ended. Then the
-/// first exception of any is thrown.
+/// Runs all of them concurrently on the awaiting coroutine's executor and resumes when the last has
+/// ended. Then rethrows the first exception.
 boost::asio::awaitable<void> gather(std::vector<boost::asio::awaitable<void>> all);
 
 }  // namespace panelgate::web

@@ -23,7 +23,7 @@ const Embedded& shipped_openapi();
 
 namespace json = boost::json;
 
-/// The hash is that of kStyle: whoever changes it finds the new one in the test that fails.
+/// The hash of kStyle; if kStyle changes, the failing test prints the new one.
 const std::string_view kDocsPolicy =
     "default-src 'none'; style-src 'sha256-fWbekVYlHSwYu87tjV+rN7ks9fNyUO16S/JCn5FNdY8='; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -76,13 +76,13 @@ const json::array& array_in(const json::object& object, std::string_view name) {
 
 std::string code(const std::string& text) { return "<code>" + text + "</code>"; }
 
-/// "Reading" of {"$ref": "#/components/schemas/Reading"}, "" of anything else.
+/// "Reading" for {"$ref": "#/components/schemas/Reading"}, "" for anything else.
 std::string name_of_reference(const json::object& object) {
     const std::string path = text_in(object, "$ref");
     return path.substr(path.rfind('/') + 1);
 }
 
-/// The document's own words for what a reference means.
+/// The object that a reference points to, or the object itself.
 const json::object& resolved(const json::object& document, const json::object& object,
                              std::string_view kind) {
     const std::string name = name_of_reference(object);
@@ -90,7 +90,7 @@ const json::object& resolved(const json::object& document, const json::object& o
     return object_in(object_in(object_in(document, "components"), kind), name);
 }
 
-/// A type in few words: "array of Register", "integer or null", "one of a, b".
+/// A short text for a type: "array of Register", "integer or null", "one of a, b".
 std::string type_text(const json::object& schema) {
     const std::string name = name_of_reference(schema);
     if (!name.empty()) return "<a href=\"#" + name + "\">" + name + "</a>";
@@ -203,7 +203,7 @@ std::string operations_of(const json::object& document, const std::string& tag) 
     return text;
 }
 
-/// Of one of the parts that the document is kept in: what stands between its braces.
+/// The members of one part of the document: the text between its outer braces.
 std::string members_in(std::string_view part) {
     for (const auto& [name, text] : shipped_openapi()) {
         if (name == part) {
@@ -245,7 +245,7 @@ std::string docs_page(const json::object& document) {
 
 namespace {
 
-/// Nothing but what this server sends, and no script or style within the page.
+/// Only content from this server, and no inline scripts or styles.
 constexpr const char* kPolicy =
     "default-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'; "
     "object-src 'none'";
@@ -254,7 +254,7 @@ HttpResponse answer(const HttpRequest& request, const PageFile& file) {
     HttpResponse response;
     response.content_type = file.type;
     const auto asked = request.headers.find("if-none-match");
-    const bool known = tell_tag(response, asked == request.headers.end() ? "" : asked->second,
+    const bool known = add_etag(response, asked == request.headers.end() ? "" : asked->second,
                                 "W/\"" + std::string(file.hash) + '"');
     response.headers.emplace_back("Cache-Control", "no-cache");
     response.headers.emplace_back("Vary", "Accept-Encoding");

@@ -11,18 +11,18 @@ namespace panelgate::web {
 struct PageFile {
     std::string_view name;                  ///< "index.html", "scope.js"
     std::string_view type;                  ///< for Content-Type
-    std::string_view hash;                  ///< another one when the file differs
+    std::string_view hash;                  ///< changes with the file's content
     std::span<const unsigned char> packed;  ///< in the content coding gzip
 };
 
-/// All of them; "index.html" is the page.
+/// All files; "index.html" is the page.
 std::span<const PageFile> shipped_page();
 
-/// openapi.json, made of the parts that were compiled into the program.
+/// The text of openapi.json, assembled from the embedded parts.
 const std::string& openapi_text();
-/// An OpenAPI document as a page for people: no script, and nothing from elsewhere. Pure.
+/// Renders an OpenAPI document as an HTML page without scripts or external resources. Pure.
 std::string docs_page(const boost::json::object& document);
-/// What a browser may do with that page: show it, with its own style.
+/// The Content-Security-Policy of that page: its own style only.
 extern const std::string_view kDocsPolicy;
 
 }  // namespace panelgate::web

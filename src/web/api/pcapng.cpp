@@ -31,7 +31,7 @@ void put(std::string& text, std::uint64_t value, int bytes) {
     for (int i = 0; i < bytes; ++i) text += static_cast<char>((value >> (8 * i)) & 0xFF);
 }
 
-/// To the next multiple of four.
+/// Pads to a multiple of four bytes.
 void pad(std::string& text) { text.append((4 - text.size() % 4) % 4, '\0'); }
 
 void put_option(std::string& body, std::uint16_t code, std::string_view value) {
@@ -41,7 +41,7 @@ void put_option(std::string& body, std::uint16_t code, std::string_view value) {
     pad(body);
 }
 
-/// The length stands at both ends, so that a file can be read backwards.
+/// The length is written at both ends, so that a file can be read backwards.
 void put_block(std::string& text, std::uint32_t type, const std::string& body) {
     constexpr std::size_t kAround = 12;
     put(text, type, 4);
@@ -57,7 +57,7 @@ Pcapng::Pcapng(std::string_view application, std::string_view interface, std::ui
     put(section, kByteOrder, 4);
     put(section, 1, 2);  // version 1.0
     put(section, 0, 2);
-    put(section, UINT64_MAX, 8);  // its length is not said
+    put(section, UINT64_MAX, 8);  // section length unknown
     put_option(section, kApplication, application);
     put_option(section, kEndOfOptions, {});
     put_block(text_, kSection, section);
@@ -65,7 +65,7 @@ Pcapng::Pcapng(std::string_view application, std::string_view interface, std::ui
     std::string described;
     put(described, link, 2);
     put(described, 0, 2);
-    put(described, 0, 4);  // packets are never cut
+    put(described, 0, 4);  // snapshot length: no limit
     put_option(described, kInterfaceName, interface);
     put_option(described, kTimeResolution, std::string_view(&kMicroseconds, 1));
     put_option(described, kEndOfOptions, {});
@@ -109,7 +109,8 @@ constexpr std::uint32_t kTcp = 2;                  ///< EXP_PDU_PT_TCP
 constexpr std::uint32_t kMaster = 0x7F'00'00'01;   ///< 127.0.0.1
 constexpr std::uint32_t kStation = 0x7F'00'01'00;  ///< 127.0.1.ID
 constexpr std::uint32_t kMastersPort = 1;
-constexpr std::uint32_t kStationsPort = 502;  ///< by which Modbus/TCP tells requests from replies
+constexpr std::uint32_t kStationsPort =
+    502;  ///< by which the Modbus/TCP dissector distinguishes requests from replies
 constexpr std::size_t kCrc = 2;
 
 std::string_view dissector_of(Form form) {
@@ -121,7 +122,7 @@ void put_tag(Writer& out, Tag tag, std::uint32_t value) {
     out.u16(static_cast<std::uint16_t>(tag)).u16(4).u16(value >> 16).u16(value & 0xFFFF);
 }
 
-/// Filled up with zeros to a multiple of four.
+/// Padded with zeros to a multiple of four.
 void put_tag(Writer& out, Tag tag, std::string_view text) {
     const std::size_t size = (text.size() + 3) / 4 * 4;
     out.u16(static_cast<std::uint16_t>(tag)).u16(static_cast<unsigned>(size));
@@ -158,7 +159,7 @@ bool is_seen_by_rtu(ByteView adu, bool request) {
     switch (adu[1]) {
         case 1:
         case 2:
-            // With an address from 0x300 on it looks like a reply of three bytes.
+            // A request for an address from 0x300 on looks like a reply with three bytes of data.
             return request ? adu.size() == kShort && adu[2] != 3
                            : adu.size() != kShort || adu[2] == 3;
         case 3:
@@ -194,8 +195,8 @@ std::vector<std::string> comments_on(const bus::TraceFrame& frame) {
 TracePcapng::TracePcapng(std::string_view version, std::string_view line)
     : file_("panelgate " + std::string(version), line, kExportedPdu) {}
 
-/// What is damaged is shown as the bytes that it is. A reply has the form of its request, or
-/// Wireshark would not find them together.
+/// Damaged frames are exported as plain bytes. A reply is exported like its request, or Wireshark
+/// would not match them.
 ExportedFrame TracePcapng::exported(const bus::TraceFrame& frame) {
     ExportedFrame made;
     made.adu = frame.bytes;

@@ -14,11 +14,11 @@
 
 namespace panelgate::web {
 
-/// A file in the format of Wireshark's captures (draft-ietf-opsawg-pcapng): one section, little
-/// endian, with one interface whose times are in microseconds. Pure.
+/// Writes a pcapng file (draft-ietf-opsawg-pcapng): one little-endian section with one interface,
+/// timestamps in microseconds. Pure.
 class Pcapng {
   public:
-    enum class Way : std::uint8_t { in = 1, out = 2 };  ///< as epb_flags has them
+    enum class Way : std::uint8_t { in = 1, out = 2 };  ///< values of epb_flags
     struct Packet {
         WallTime time{};
         Way way = Way::in;
@@ -27,10 +27,10 @@ class Pcapng {
     };
     static constexpr std::size_t kLongestComment = 1000;
 
-    /// `link`: what the bytes of its packets are (LINKTYPE_…).
+    /// `link`: the link type of its packets (LINKTYPE_…).
     Pcapng(std::string_view application, std::string_view interface, std::uint16_t link);
     void add(const Packet& packet);
-    /// What was written since the last call: pieces of one file.
+    /// Returns what was written since the last call: the next piece of the file.
     std::string take() { return std::exchange(text_, {}); }
 
   private:
@@ -39,13 +39,13 @@ class Pcapng {
 
 inline constexpr std::uint16_t kExportedPdu = 252;  ///< LINKTYPE_WIRESHARK_UPPER_PDU
 
-/// A frame as Wireshark's exported PDU: the dissector that shows it, then addresses and ports, as
-/// if the master were 127.0.0.1 and station 31 were 127.0.1.31. Pure.
+/// A frame as a Wireshark exported PDU: the dissector to use, then addresses and ports, as if the
+/// master were 127.0.0.1 and station 31 were 127.0.1.31. Pure.
 struct ExportedFrame {
     enum class Form : std::uint8_t {
         rtu,    ///< Modbus RTU
-        tcp,    ///< as Modbus/TCP would say it, without the CRC
-        bytes,  ///< nothing but bytes
+        tcp,    ///< translated to Modbus/TCP, without the CRC
+        bytes,  ///< raw bytes
     };
     Form form = Form::bytes;
     bool request = false;  ///< from the master
@@ -53,22 +53,23 @@ struct ExportedFrame {
 };
 std::string exported_pdu(const ExportedFrame& frame);
 
-/// Does the dissector of Modbus RTU see that this good frame is a request, or a reply? It goes by
-/// function and length alone (packet-mbtcp.c, 4.0), knows no broadcasts and nothing shorter than
-/// five bytes.
+/// True if Wireshark's Modbus RTU dissector recognizes this valid frame as a request or reply. It
+/// goes by function and length alone (packet-mbtcp.c, 4.0), and does not know broadcasts or frames
+/// shorter than five bytes.
 bool is_seen_by_rtu(ByteView adu, bool request);
 
-/// A line's trace for Wireshark, which shows its frames as Modbus RTU with no preference set, and
-/// in the words of Modbus/TCP what it would not understand as RTU (05, 06, broadcasts). Who sent
-/// each and why, what was thrown away and what was decided stand as comments. Pure.
+/// Exports a line's trace for Wireshark, which shows the frames as Modbus RTU without any
+/// preference set. Frames that its RTU dissector does not understand (05, 06, broadcasts) are
+/// exported as Modbus/TCP. Comments give the sender and reason of each frame, what was discarded
+/// and what was decided. Pure.
 class TracePcapng {
   public:
     TracePcapng(std::string_view version, std::string_view line);
-    /// Parts in their order. A decision stands with the frame that follows it, or with the last.
+    /// Adds the next part. A decision is attached to the frame that follows it, or to the last one.
     void add(const bus::TracePart& part);
-    /// What was written since the last call: pieces of one file, but for its last packet.
+    /// Returns what was written since the last call, except for the last packet.
     std::string take() { return file_.take(); }
-    /// The rest of the file.
+    /// Returns the rest of the file.
     std::string finish();
 
   private:
@@ -78,8 +79,8 @@ class TracePcapng {
 
     Pcapng file_;
     std::optional<Pcapng::Packet> last_;
-    bool as_tcp_ = false;               ///< the last request
-    std::vector<std::string> decided_;  ///< and no frame has followed yet
+    bool as_tcp_ = false;               ///< the last request was exported as Modbus/TCP
+    std::vector<std::string> decided_;  ///< decisions that no frame has followed yet
 };
 
 }  // namespace panelgate::web

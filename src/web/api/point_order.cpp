@@ -40,8 +40,8 @@ json::object confirmed(const points::PointWrite& write) {
     return body;
 }
 
-Parsed<json::object> told(const PointOrder& order, const bus::Answer& answer,
-                          const profile::PanelProfile& profile) {
+Parsed<json::object> write_result(const PointOrder& order, const bus::Answer& answer,
+                                  const profile::PanelProfile& profile) {
     if (auto failed = problem_of(answer, profile)) return std::move(*failed);
     return confirmed(order.write);
 }

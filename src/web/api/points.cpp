@@ -61,7 +61,7 @@ constexpr std::string_view kColumnsOfAll[] = {"line",  "station", "name",    "va
                                               "label", "unit",    "quality", "age_ms",
                                               "at",    "type",    "writable"};
 
-/// What a form needs to write it, and how often it is read.
+/// Adds what an input form needs, and the poll interval.
 void describe_settings(json::object& object, const Point& point) {
     if (point.min) object["min"] = exact_number(point.min->text());
     if (point.max) object["max"] = exact_number(point.max->text());
@@ -95,7 +95,7 @@ json::object describe(const Api& api, const points::StationPoints& station, cons
     return object;
 }
 
-/// A point and whose it is.
+/// A point and its station.
 using Owned = std::pair<const StationEntry*, const Point*>;
 
 std::vector<Owned> points_of_all(const Directory& directory) {
@@ -139,8 +139,8 @@ Handling get_points(HttpRequest request, const Api* api) {
     table.entry = [api, all, with_raw = *raw](std::size_t i) {
         return describe(*api, *all, all->points()[i], with_raw);
     };
-    Handling telling = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(telling);
+    Handling answering = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(answering);
 }
 
 Handling get_all_points(HttpRequest request, const Api* api) {
@@ -158,8 +158,8 @@ Handling get_all_points(HttpRequest request, const Api* api) {
             object[name] = value;
         return object;
     };
-    Handling telling = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(telling);
+    Handling answering = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(answering);
 }
 
 Handling get_point(HttpRequest request, const Api* api) {
@@ -173,7 +173,7 @@ Handling get_point(HttpRequest request, const Api* api) {
 Handling get_interpretations(HttpRequest request, const Api* api) {
     auto items = items_of_table_path(request, *api->directory);
     if (!items) co_return to_response(items.error());
-    constexpr unsigned kMost = 16;  // registers: a look at one value, not a memory dump
+    constexpr unsigned kMost = 16;  // registers: for one value, not for a memory dump
     if (modbus::is_bit_table(items->span.table) || items->span.count > kMost)
         co_return to_response(problem(422, "interpretations are of 1 to 16 registers"));
     const Duration deadline = api->directory->line_of(items->station).deadline;

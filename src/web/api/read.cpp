@@ -81,7 +81,7 @@ Parsed<BatchRead> read_of(const json::object& entry, const Api& api) {
     return read;
 }
 
-/// What is malformed fails all of them; what cannot be read is told in its place.
+/// A malformed entry fails the whole list; one that cannot be read is reported in its place.
 Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
     const auto entries = entries_of(body, api.providers.settings.max_items);
     if (!entries) return entries.error();
@@ -113,29 +113,29 @@ json::object point_result(const BatchRead& read) {
     reading.label = points::label_of(point, read.reading.items);
     reading.quality = reading.value ? points::Quality::good : points::Quality::bad;
     reading.age = read.reading.age;
-    json::object told;
-    told["station"] = read.items.station.name;
-    for (const auto& [name, value] : point_json(point, reading)) told[name] = value;
+    json::object result;
+    result["station"] = read.items.station.name;
+    for (const auto& [name, value] : point_json(point, reading)) result[name] = value;
     if (read.view.raw)
-        told["raw"] = json::array(read.reading.items.begin(), read.reading.items.end());
-    told["source"] = read.reading.cached ? "cache" : "bus";
-    return told;
+        result["raw"] = json::array(read.reading.items.begin(), read.reading.items.end());
+    result["source"] = read.reading.cached ? "cache" : "bus";
+    return result;
 }
 
-json::object told_of(const BatchRead& read) {
+json::object outcome_of(const BatchRead& read) {
     if (read.problem) return json_of(*read.problem);
-    json::object told;
-    told["status"] = 200;
+    json::object result;
+    result["status"] = 200;
     const json::object rest =
         read.point ? point_result(read) : describe(read.items, read.view, read.reading);
-    for (const auto& [name, value] : rest) told[name] = value;
-    return told;
+    for (const auto& [name, value] : rest) result[name] = value;
+    return result;
 }
 
 json::object result_of(const BatchRead& read) {
-    json::object told = told_of(read);
-    told["item"] = read.item;
-    return told;
+    json::object result = outcome_of(read);
+    result["item"] = read.item;
+    return result;
 }
 
 const std::string* line_of(const BatchRead& read) {
@@ -163,7 +163,7 @@ Handling post_read(HttpRequest request, const Api* api) {
     for (const BatchRead& read : *reads) {
         body.add(result_of(read));
         if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }

@@ -35,8 +35,8 @@ namespace panelgate::web {
 namespace asio = boost::asio;
 namespace {
 
-/// Starts a transaction and resumes the coroutine by post: a bus must not find itself called again
-/// from inside its own completion.
+/// Starts a transaction and resumes the coroutine by post, so that the bus is not called again from
+/// inside its own completion.
 struct StartTransact {
     template <class Handler>
     void operator()(Handler handler, bus::BusClient* bus, bus::Request request) const {
@@ -96,7 +96,7 @@ std::optional<std::string> query(const HttpRequest& request, const char* name) {
     return given->second;
 }
 
-/// The one of all that has this label; otherwise 400 with the labels of all.
+/// The value with this label; otherwise 400 with the list of all labels.
 template <class Word, std::size_t N>
 Parsed<Word> word_of(const char* what, const std::string& text, const Word (&all)[N]) {
     std::string known;
@@ -184,7 +184,7 @@ Parsed<View> view_of(const Wording& wording, modbus::Table table) {
     const bool text = *type == points::Type::string;
     if (wording.length && !text) return problem(400, "only a string has a length");
     if (text && !wording.length) {
-        // One text of all registers.
+        // One string over all registers.
         view.value.length = 2 * wording.count;
         view.items = wording.count;
         return view;
@@ -206,8 +206,8 @@ json::array values_of(const View& view, std::span<const std::uint16_t> items) {
 
 namespace {
 
-/// What stopped a read after some of its items: its time may just have been too short for all, and
-/// then no panel is to blame.
+/// The problem of a read that failed after some of its items. If its time was too short for all of
+/// them, the panel is not to blame.
 Problem stopped(Problem problem, const bus::Answer& answer, const Patience& patience,
                 std::size_t done, unsigned wanted) {
     if (done == 0 || answer.refusal || answer.pdu) return problem;
@@ -264,7 +264,7 @@ Parsed<View> prepare_read(Items& items, const Wording& wording, unsigned max_tra
     if (items.span.end() > modbus::kTableItems)
         return problem(400, std::to_string(items.span.count) + " items from " +
                                 std::to_string(items.span.first) + " go beyond address 65535");
-    // A notation names memory: it is read through the first table that the panel can read it by.
+    // A notation names memory: it is read through the first table that the panel can read it with.
     const auto table = table_to_read(items);
     if (!table) return table.error();
     items.span.table = *table;
@@ -299,7 +299,7 @@ json::object describe(const Items& items, const View& view, const Reading& readi
 
 namespace {
 
-/// As large as the panel's own frames are, which REST may use.
+/// Plan limits with the panel's full frame sizes, which REST may use.
 points::PlanLimits limits_of(const StationEntry& station, const SerialFormat& serial) {
     points::PlanLimits limits =
         points::make_plan_limits(*station.profile, serial, silent_interval(serial));
@@ -308,7 +308,7 @@ points::PlanLimits limits_of(const StationEntry& station, const SerialFormat& se
     return limits;
 }
 
-/// Those of one station, as the plan has them: by number.
+/// The entries of one station; wants have the same index.
 struct Plan {
     std::vector<BatchRead*> entries;
     std::vector<points::Want> wants;
@@ -328,7 +328,7 @@ Plan plan_of(std::vector<BatchRead*> entries, const SerialFormat& serial) {
     return plan;
 }
 
-/// Of what was read, the part that the entry wants.
+/// Copies the entry's part of what was read.
 void take(BatchRead& entry, const modbus::Span& span, const Reading& read) {
     const modbus::Span& wanted = entry.items.span;
     const std::uint32_t first = std::max(span.first, wanted.first);
@@ -340,14 +340,14 @@ void take(BatchRead& entry, const modbus::Span& span, const Reading& read) {
     entry.reading.age = std::max(entry.reading.age, read.age);
 }
 
-/// The panel has said that it will not give all of these items.
+/// True if the panel refused the read with exception 1 to 4.
 bool is_refused(const bus::Answer& answer) {
     if (answer.refusal || !answer.pdu) return false;
     const auto code = modbus::exception_of(*answer.pdu);
     return code && *code <= 4;
 }
 
-/// Its halves are asked for next; false when it has none.
+/// Queues the two halves of the read next; false if it cannot be split.
 bool halve(Plan& plan, const points::PlannedRead& read) {
     auto halves = points::bisect(read, plan.wants);
     if (!halves) return false;

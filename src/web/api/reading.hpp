@@ -23,22 +23,22 @@
 
 namespace panelgate::web {
 
-/// What REST asks of a station (0: of all of a line), or why it may not be transmitted.
+/// The bus request to a station (0: broadcast), or why it may not be transmitted.
 Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu);
 
-/// One transaction, as one of the caller's: when it leaves or hangs up, what still waits in a queue
-/// is never transmitted, and what it asks for after that is cancelled. Throws
-/// boost::system::system_error(operation_aborted) when the caller has left meanwhile: nobody is
-/// there to answer, and what the handler points to may be gone.
+/// Runs one transaction for the caller. When the caller leaves or hangs up, a request that is still
+/// queued is never transmitted, and later ones are cancelled. Throws
+/// boost::system::system_error(operation_aborted) if the caller has left meanwhile: there is no
+/// client to answer, and what the handler points to may be gone.
 boost::asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
                                         bus::Request request);
 
-/// Tells the bus who asks, for as long as the client is there.
+/// Registers the client's name with the bus until the client leaves.
 void introduce(Caller& caller, bus::BusClient* bus);
 
-/// How a client wants values told, in its own words: queries, or members of an entry of a list.
+/// How a client wants values rendered, as given: from queries, or from the members of a list entry.
 struct Wording {
-    std::optional<std::string> type;   ///< as points have it
+    std::optional<std::string> type;   ///< a point's type
     std::optional<std::string> order;  ///< ABCD…
     std::optional<unsigned> length;    ///< characters of a string
     unsigned count = 1;                ///< values
@@ -46,60 +46,60 @@ struct Wording {
 };
 inline constexpr unsigned kMaxText = 240;  ///< characters of a string
 
-/// From the queries type, order, length and raw.
+/// Reads the queries type, order, length and raw.
 Parsed<Wording> wording_of(const HttpRequest& request);
-/// From the members of these names, and count.
+/// Reads the members of these names, and count.
 Parsed<Wording> wording_of(const boost::json::object& entry);
 
-/// How the items of a read are understood. Made of a wording and a table, so that both agree.
+/// How the items of a read are interpreted, checked against their table.
 struct View {
-    points::Point value;  ///< what each value is: its type, order and length
-    unsigned items = 1;   ///< of the table, of all values
-    bool raw = false;     ///< the items themselves are shown, too
+    points::Point value;  ///< type, order and length of each value
+    unsigned items = 1;   ///< items of all values together
+    bool raw = false;     ///< show the raw items, too
 };
-/// 400 for a type or an order that nobody knows, or that a table of bits does not have.
+/// 400 for a type or an order that is unknown or not possible for a table of bits.
 Parsed<View> view_of(const Wording& wording, modbus::Table table);
 
-/// The values in these items (bits as 0 and 1), as many as view.items: null where there is none.
+/// The values in these items (bits as 0 and 1); null for an item range that has no value.
 boost::json::array values_of(const View& view, std::span<const std::uint16_t> items);
 
-/// Items as they were read.
+/// The items that were read.
 struct Reading {
     std::vector<std::uint16_t> items;  ///< bits as 0 and 1
     unsigned transactions = 0;
-    Duration age{};  ///< of the oldest
+    Duration age{};  ///< age of the oldest item
     bool cached = false;
 
-    /// A normal reply that has all items of this span.
+    /// Appends the items of a normal reply that covers this span.
     void take(const bus::Answer& answer, const modbus::Span& span);
 };
 
-/// Reads all of it, in as many transactions as the panel needs, one after the other; or why not all
-/// of it could be read before its time was over.
+/// Reads the whole span, in as many consecutive transactions as the panel needs; or returns why not
+/// all of it could be read in time.
 boost::asio::awaitable<Parsed<Reading>> read_all(std::shared_ptr<Caller> caller,
                                                  const StationEntry* station, modbus::Span span,
                                                  Patience patience);
 
-/// The items that such a read begins with, as many as it wants and by a table that the panel can
-/// read them by; and how they are told. 400 and 422 for what cannot be.
+/// Completes the items of a read: their count, and a table that the panel can read. Returns how to
+/// render them; 400 or 422 for an impossible read.
 Parsed<View> prepare_read(Items& items, const Wording& wording, unsigned max_transactions);
 
 /// {"station","table","address","notation","values",["raw"],"age_ms","source",["transactions"]}
 boost::json::object describe(const Items& items, const View& view, const Reading& reading);
 
-/// One of many reads: what is asked for, and what came of it.
+/// One read of a list, and its result.
 struct BatchRead {
-    boost::json::object item;  ///< as it was asked
+    boost::json::object item;  ///< the entry as sent
     Items items;
     View view;
-    std::optional<PointOfStation> point{};  ///< whose value it is
-    std::optional<Problem> problem{};       ///< why it was not, or cannot be, read
-    Reading reading{};                      ///< filled as its pieces come
+    std::optional<PointOfStation> point{};  ///< set if the entry names a point
+    std::optional<Problem> problem{};       ///< why it failed
+    Reading reading{};                      ///< filled piece by piece
 };
 
-/// Reads those of one line, station by station, in as few requests as their panels' profiles allow,
-/// one after the other. A read that the panel refuses is halved until what it does not have stands
-/// alone, so that nobody fails with a neighbour. `transactions` is counted up.
+/// Reads the entries of one line, station by station, in as few consecutive requests as the panels'
+/// profiles allow. A read that a panel refuses is bisected until only the missing items fail, so
+/// that no entry fails because of its neighbour. `transactions` is incremented.
 boost::asio::awaitable<void> read_line(std::shared_ptr<Caller> caller, const LineEntry* line,
                                        std::vector<BatchRead*> entries, Patience patience,
                                        unsigned* transactions);

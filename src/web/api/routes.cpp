@@ -16,23 +16,23 @@ constexpr Role kSee = Role::viewer;
 constexpr Role kChange = Role::operator_;
 constexpr std::string_view kReading = "count type order length raw";
 
-/// A page holds no data of the plant: whoever may connect gets it, and its token asks for the rest.
+/// A page contains no data of the plant: every client gets it, and its token requests the data.
 constexpr Role kPage = Role::none;
 constexpr bool kProbe = true;
 
-constexpr Manner kPlain{};
-constexpr Manner kTagged{.tagged = true};
-constexpr Manner kAsks{.asks = true};
-constexpr Manner kOnce{.once = true};
-constexpr Manner kWrites{.asks = true, .once = true};
+constexpr RoutePolicy kPlain{};
+constexpr RoutePolicy kTagged{.tagged = true};
+constexpr RoutePolicy kAsks{.asks = true};
+constexpr RoutePolicy kOnce{.once = true};
+constexpr RoutePolicy kWrites{.asks = true, .once = true};
 
 struct Row {
     std::string_view verb;
     std::string_view pattern;
     Handler handler;
     Role needed;
-    Manner manner = {};
-    std::string_view queries = {};  ///< with a blank between them
+    RoutePolicy policy = {};
+    std::string_view queries = {};  ///< separated by blanks
     bool probe = false;
 };
 constexpr Row kRows[] = {
@@ -73,7 +73,7 @@ constexpr Row kRows[] = {
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
     {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},
-    // Before the tables: "devices" is none of them.
+    // Before the table routes: "devices" is not a table.
     {"GET", "/api/v1/stations/{}/devices/{}/plan", get_device_plan, kSee, kTagged, "count values"},
     {"GET", "/api/v1/stations/{}/{}/{}/plan", get_table_plan, kSee, kTagged, "count values"},
     {"GET", "/api/v1/stations/{}/devices/{}", get_device, kSee, kAsks, kReading},
@@ -98,7 +98,7 @@ std::vector<Route> routes(std::shared_ptr<const Api> api) {
     std::vector<Route> made;
     for (const Row& row : kRows) {
         const auto call = [api, &row](HttpRequest request) {
-            return conduct(std::move(request), api.get(), row.handler, row.manner);
+            return conduct(std::move(request), api.get(), row.handler, row.policy);
         };
         made.push_back({row.verb, row.pattern, row.needed, call, words_of(row.queries), row.probe});
     }

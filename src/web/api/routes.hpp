@@ -14,13 +14,13 @@ namespace panelgate::web {
 
 class KeptAnswer;
 
-/// What handlers work on. The directory outlives every caller that has not left.
+/// The handlers' data. The directory outlives every caller that has not left.
 struct Api {
     const Directory* directory = nullptr;
-    std::shared_ptr<const Directory> keeps;  ///< the same, where it may be replaced
+    std::shared_ptr<const Directory> keeps;  ///< keeps the directory alive when it is replaced
     Providers providers;
     std::shared_ptr<KeyBook> keys;  ///< never null
-    /// What get_configuration() has made, by the role of who asks. Never null.
+    /// The answers of get_configuration(), by the client's role. Never null.
     std::shared_ptr<std::map<Role, std::shared_ptr<KeptAnswer>>> configuration;
 };
 using Handler = Handling (*)(HttpRequest request, const Api* api);
@@ -77,9 +77,9 @@ Handling put_device(HttpRequest request, const Api* api);
 
 /// Every path of the contract's section 5. The handlers share the API.
 std::vector<Route> routes(std::shared_ptr<const Api> api);
-/// What each path may be asked, and by whom, for people: method, path, role.
+/// Method, path and required role of each route, for the configuration's answer.
 boost::json::array offered();
-/// Those that need no bus: probes, and the faults of simulated panels.
+/// The routes that need no bus: probes, and the faults of simulated panels.
 std::vector<Route> simulator_routes(std::shared_ptr<const Api> api);
 
 }  // namespace panelgate::web

@@ -11,7 +11,7 @@ namespace panelgate::web {
 
 namespace {
 
-/// As many as the query `count` says.
+/// Sets the count from the query `count`.
 Parsed<Items> counted(const HttpRequest& request, Parsed<Items> items) {
     if (!items) return items;
     const unsigned most = modbus::kTableItems - items->span.first;

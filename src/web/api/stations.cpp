@@ -88,7 +88,7 @@ Handling get_stations(HttpRequest request, const Api* api) {
     for (std::size_t i = 0; i < api->directory->stations.size(); ++i) {
         body.add(describe(api->directory->stations[i]));
         if (!body.is_turn_over()) continue;
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
@@ -110,7 +110,7 @@ constexpr std::string_view kPointColumns[] = {"time", "value"};
 constexpr std::string_view kLineColumns[] = {"time",       "load_percent", "requests",   "errors",
                                              "latency_ms", "wire_ms",      "queue_depth"};
 
-/// Tells instants by the clock on the wall, as it is now.
+/// Converts instants to wall-clock time.
 struct WallClock {
     TimePoint now;
     WallTime shown;
@@ -118,7 +118,7 @@ struct WallClock {
     std::string text(TimePoint at) const { return rfc3339(wall_time_of(at, now, shown)); }
 };
 
-/// 2 decimals: what was measured is no better.
+/// Two decimals, the precision of the measurement.
 json::value rounded(const std::optional<double>& value) {
     if (!value) return nullptr;
     return std::round(*value * 100) / 100;
@@ -149,7 +149,7 @@ json::object describe(const bus::LineSample& sample, const WallClock& wall) {
     return object;
 }
 
-/// `describe_one` makes an object of a sample.
+/// `describe_one` returns an object for a sample.
 template <class Sample, class Describe>
 Table table_of(std::vector<Sample> samples, std::span<const std::string_view> columns,
                Describe describe_one) {
@@ -184,8 +184,8 @@ Handling get_point_history(HttpRequest request, const Api* api) {
     table.members["point"] = point.name;
     table.members["unit"] = point.unit;
     table.members["every_ms"] = whole_ms(history->width());
-    Handling telling = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(telling);
+    Handling answering = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(answering);
 }
 
 Handling get_line_history(HttpRequest request, const Api* api) {
@@ -200,8 +200,8 @@ Handling get_line_history(HttpRequest request, const Api* api) {
                  [wall](const bus::LineSample& sample) { return describe(sample, wall); });
     table.members["line"] = (*line)->name;
     table.members["every_ms"] = whole_ms(history->width());
-    Handling telling = table_answer(std::move(request), std::move(table));
-    co_return co_await std::move(telling);
+    Handling answering = table_answer(std::move(request), std::move(table));
+    co_return co_await std::move(answering);
 }
 
 namespace {
@@ -216,7 +216,7 @@ Parsed<void> check_raw_station(const Directory& directory, const LineEntry& line
     return check_may_write(*line.bus, id);
 }
 
-/// Nobody answers a broadcast, so it can do nothing but write.
+/// No station answers a broadcast, so a broadcast can only write.
 Problem no_broadcast() {
     Problem made = problem_of(Fault::denied, false);
     made.detail =
@@ -236,7 +236,7 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
         return problem(400, "pdu must be 1 to 253 bytes as pairs of hex digits");
     }
     const auto id = static_cast<std::uint8_t>(*station);
-    const bool reads = modbus::is_pure_read(*pdu);  // also of one that is malformed
+    const bool reads = modbus::is_pure_read(*pdu);  // also if it is malformed
     const bool spreads = modbus::is_broadcastable(pdu->front());
     auto made = request_to(id, std::move(*pdu));
     if (id == 0 && !spreads && (made || reads)) return no_broadcast();
@@ -245,7 +245,8 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
     return made;
 }
 
-/// What was no request, or is refused before its bus is asked: the bus counts and logs it.
+/// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
+/// it.
 void tell_refused(Caller& caller, bus::BusClient& bus, const json::object& body) {
     const auto station = number_member(body, "station", 0, modbus::kMaxStation);
     const auto hex = string_member(body, "pdu");
@@ -255,7 +256,7 @@ void tell_refused(Caller& caller, bus::BusClient& bus, const json::object& body)
     bus.tell_refused(static_cast<std::uint8_t>(*station), *pdu, caller.id());
 }
 
-/// A panel's exception is an answer, too.
+/// A panel's exception reply is a normal answer here.
 HttpResponse raw_answer(const bus::Answer& answer) {
     if (answer.refusal || !answer.pdu) return to_response(problem_of(answer));
     json::object body;

@@ -27,32 +27,32 @@ namespace panelgate::web {
 
 struct TracePage {
     bus::TracePart part;
-    std::uint64_t next = 0;  ///< what follows this page: trace_since(next)
+    std::uint64_t next = 0;  ///< for the next page: trace_since(next)
 };
 
 /// The last frames, decisions and transactions, at most `most` of each.
 TracePage last_of_trace(const bus::BusClient& bus, std::size_t most);
-/// The first that follow this number, all of them together at most `most`; a transaction's number
-/// is that of its end. Where nothing does, `next` is the newest there is, so that who asks on finds
-/// the way after a restart.
+/// The first entries after this sequence number, at most `most` in total; a transaction counts by
+/// the number of its end. If there are none, `next` is the newest number, so that a client recovers
+/// after a restart.
 TracePage trace_since(const bus::BusClient& bus, std::uint64_t since, std::size_t most);
 
-/// What a line remembers, as JSON says it. Instants are seconds of the gateway's monotonic clock;
-/// `time` is by the clock on the wall.
+/// Trace entries as JSON. Instants are seconds of the gateway's monotonic clock; `time` is
+/// wall-clock time.
 boost::json::object describe(const bus::TraceFrame& frame);
 boost::json::object describe(const bus::TraceDecision& decision);
 boost::json::object describe(const bus::TraceTransaction& transaction);
 boost::json::object describe(const bus::IncidentHead& incident);
 
-/// Its three lists, as members. Both outlive it: whoever asks waits for it, and others have their
-/// turn meanwhile.
+/// Adds the three lists of the part as members, yielding to the loop. Both pointers must stay valid
+/// until it has finished.
 boost::asio::awaitable<void> add_part(LongAnswer* body, const bus::TracePart* part);
 
-/// A part of a trace for people at a terminal: a row for each transaction with its times in
-/// milliseconds, its frames below it, and decisions between them in the order of the line.
+/// Formats a part of a trace for a terminal: a row for each transaction with its times in
+/// milliseconds, its frames below it, and decisions in between, in the order of the line.
 std::string trace_text(const bus::TracePart& part);
 
-/// An answer that is a capture, to be kept under this name.
+/// A capture as a download with this file name.
 HttpResponse pcapng_response(std::string body, const std::string& file_name);
 
 namespace {
@@ -76,7 +76,7 @@ void cut_behind(std::vector<Entry>& entries, std::uint64_t last) {
     std::erase_if(entries, [last](const Entry& entry) { return entry.sequence > last; });
 }
 
-/// Leaves the oldest of all.
+/// Keeps the oldest `most` entries.
 void cut(bus::TracePart& part, std::size_t most) {
     std::vector<std::uint64_t> numbers;
     add_numbers(numbers, part.frames);
@@ -134,7 +134,7 @@ asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
     for (const Entry& entry : *entries) {
         body->add(describe(entry));
         if (!body->is_turn_over()) continue;
-        asio::awaitable<void> turn = others_turn();
+        asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
     }
     body->end_list();
@@ -220,7 +220,7 @@ constexpr const char* kHead =
     "      IN   TOTAL  CLIENT\n";
 constexpr std::string_view kIndent = "                               ";
 
-/// "12.3", or "-" for what did not happen.
+/// "12.3", or "-" if one of them did not happen.
 std::string ms(const std::optional<TimePoint>& from, const std::optional<TimePoint>& to) {
     if (!from || !to) return "-";
     std::array<char, 32> text{};
@@ -279,7 +279,7 @@ std::string row(const bus::TraceDecision& one) {
     return rfc3339(one.time) + "  " + one.text + '\n';
 }
 
-/// Of a frame whose transaction is not in the part.
+/// A row for a frame whose transaction is not in the part.
 std::string row(const bus::TraceFrame& one) {
     return rfc3339(one.time) + "    " + std::string(mark_of(one.kind)) + ' ' +
            upper_hex(one.bytes) + "  " + std::string(label(one.kind)) + '\n';
@@ -313,9 +313,9 @@ HttpResponse pcapng_response(std::string body, const std::string& file_name) {
     return response;
 }
 
-/// All that there is when it is asked; what comes meanwhile is the next file's.
+/// The whole trace at the time of the request, without entries that come later.
 Handling get_trace_pcapng(HttpRequest request, const Api* api) {
-    constexpr std::size_t kOfATurn = 64;  // entries: some 0.1 ms
+    constexpr std::size_t kOfATurn = 64;  // entries: about 0.1 ms of work
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
@@ -329,7 +329,7 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
         since = page.next;
         file.add(page.part);
         body += file.take();
-        boost::asio::awaitable<void> turn = others_turn();
+        boost::asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
         if (request.caller->has_left()) co_return HttpResponse{};
     }
@@ -339,10 +339,10 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
 
 namespace {
 
-constexpr unsigned kDefaultTrace = 100;  ///< of each
+constexpr unsigned kDefaultTrace = 100;  ///< entries of each kind
 constexpr unsigned kMaxTrace = 500;
 
-/// The page that a query asks for.
+/// The page that the queries ask for.
 Parsed<TracePage> page_of(const HttpRequest& request, const bus::BusClient& bus) {
     const auto since = request.query.find("since");
     const bool follows = since != request.query.end();
@@ -391,7 +391,7 @@ namespace {
 
 constexpr std::string_view kCapture = ".pcapng";
 
-/// Of "7" and "7.pcapng".
+/// Parsed from "7" or "7.pcapng".
 struct Wanted {
     std::uint64_t id = 0;
     bool capture = false;

@@ -36,10 +36,10 @@ Parsed<points::Rounding> rounding_of(const HttpRequest& request) {
     return *round ? points::Rounding::nearest : points::Rounding::exact;
 }
 
-/// As the path names it: "press/points/setpoint".
+/// Logs and answers a refusal; the log names the target as the path does: "press/points/setpoint".
 HttpResponse refused(const HttpRequest& request, const Problem& why) {
     std::string at;
-    for (std::size_t i = 3; i < request.path.size(); ++i)  // behind /api/v1/stations
+    for (std::size_t i = 3; i < request.path.size(); ++i)  // after /api/v1/stations
         at += (at.empty() ? "" : "/") + request.path[i];
     log_refused(*request.caller, at, why);
     return to_response(why);
@@ -51,9 +51,9 @@ Handling carry_out(HttpRequest request, Parsed<Writing> writing, const Api* api)
     const Patience patience(request, deadline, api->providers.now);
     boost::asio::awaitable<Parsed<json::object>> writes =
         write(request.caller, &*writing, patience);
-    const Parsed<json::object> told = co_await std::move(writes);
-    if (!told) co_return to_response(told.error());
-    co_return json_response(200, *told);
+    const Parsed<json::object> result = co_await std::move(writes);
+    if (!result) co_return to_response(result.error());
+    co_return json_response(200, *result);
 }
 
 Handling put_items(HttpRequest request, Parsed<Items> items, const Api* api) {
@@ -92,18 +92,18 @@ namespace {
 constexpr Members kOfPoints = {"value", "round", "verify"};
 constexpr Members kOfItems = {"values", "value", "type", "order", "length", "verify"};
 
-/// One of many writes, and what came of it.
+/// One write of a list, and its result.
 struct BatchWrite {
-    json::object item;  ///< as it was asked
+    json::object item;  ///< the entry as sent
     std::optional<Writing> writing;
     json::object result;
 };
 
-json::object ended(const Parsed<json::object>& told) {
-    if (!told) return json_of(told.error());
+json::object ended(const Parsed<json::object>& written) {
+    if (!written) return json_of(written.error());
     json::object result;
     result["status"] = 200;
-    for (const auto& [name, value] : *told) result[name] = value;
+    for (const auto& [name, value] : *written) result[name] = value;
     return result;
 }
 
@@ -122,7 +122,7 @@ Parsed<Writing> write_of(const json::object& entry, const Directory& directory) 
     return write_of(*to, entry, *round ? points::Rounding::nearest : points::Rounding::exact);
 }
 
-/// As the entry names it: "press/setpoint", "press/GDT108".
+/// The target as the entry names it: "press/setpoint", "press/GDT108".
 std::string place_of(const json::object& entry) {
     std::string place;
     for (const char* name : {"point", "station", "device", "table", "address"}) {
@@ -134,8 +134,8 @@ std::string place_of(const json::object& entry) {
     return place;
 }
 
-/// What is malformed fails all of them, before anything goes out; what cannot be written is told in
-/// its place.
+/// A malformed entry fails the whole list before anything is sent; one that cannot be written is
+/// reported in its place.
 Parsed<std::vector<BatchWrite>> writes_of(const HttpRequest& request, const Api& api) {
     const auto entries = entries_of(request.body, api.providers.settings.max_items);
     if (!entries) return entries.error();
@@ -156,14 +156,14 @@ Parsed<std::vector<BatchWrite>> writes_of(const HttpRequest& request, const Api&
     return writes;
 }
 
-/// Those of one line, one after the other, in their order.
+/// Writes the entries of one line, one after the other, in their order.
 boost::asio::awaitable<void> write_line(std::shared_ptr<Caller> caller,
                                         std::vector<BatchWrite*> writes, Patience patience) {
     for (BatchWrite* one : writes) {
         boost::asio::awaitable<Parsed<json::object>> pending =
             write(caller, &*one->writing, patience);
-        const Parsed<json::object> told = co_await std::move(pending);
-        one->result = ended(told);
+        const Parsed<json::object> result = co_await std::move(pending);
+        one->result = ended(result);
     }
 }
 
@@ -196,8 +196,8 @@ Handling post_write(HttpRequest request, const Api* api) {
 
 namespace {
 
-/// The function that most of the line's listed panels take as a broadcast; the preferred one when
-/// they do not decide.
+/// The function that most of the line's listed panels accept as a broadcast; in a tie the preferred
+/// one.
 std::uint8_t broadcast_function(const Directory& directory, const LineEntry& line,
                                 const std::vector<std::uint8_t>& functions) {
     const auto takers = [&](std::uint8_t function) {
@@ -232,7 +232,7 @@ Parsed<bus::Request> broadcast_request(const Directory& directory, const LineEnt
     return request_to(0, encode_write(function, static_cast<std::uint16_t>(*address), *cells));
 }
 
-/// Confirmed: whoever is listed on the line shows it.
+/// `confirmed`: all listed stations of the line have the new values.
 HttpResponse verified_answer(json::array stations, bool confirmed) {
     json::object body;
     body["transmitted"] = true;
@@ -241,8 +241,8 @@ HttpResponse verified_answer(json::array stations, bool confirmed) {
     return json_response(200, body);
 }
 
-/// Asks each listed station of the line, one after the other, for as long as there is time; the
-/// others are told as not read.
+/// Reads back from each listed station of the line, one after the other, while there is time; the
+/// rest is reported as not read.
 Handling read_everywhere(HttpRequest request, const Api* api, const LineEntry* line,
                          Verification written, Patience patience) {
     json::array stations;
@@ -252,11 +252,11 @@ Handling read_everywhere(HttpRequest request, const Api* api, const LineEntry* l
         boost::asio::awaitable<ReadBack> reads =
             read_back(request.caller, &station, &written, patience);
         const ReadBack back = co_await std::move(reads);
-        json::object told;
-        told["station"] = station.name;
-        tell(told, back);
+        json::object result;
+        result["station"] = station.name;
+        add_read_back(result, back);
         all = all && back.holds.value_or(false);
-        stations.push_back(std::move(told));
+        stations.push_back(std::move(result));
     }
     const bool confirmed = all && !stations.empty();
     co_return verified_answer(std::move(stations), confirmed);
@@ -271,7 +271,8 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
     if (!body) co_return to_response(body.error());
     const auto verify = flag_member(*body, "verify");
     if (!verify) co_return to_response(verify.error());
-    // What is no request says so first; one is the bus's to refuse, which counts and tells it.
+    // An invalid request is reported first; a valid one is for the bus to refuse, which counts and
+    // logs it.
     auto planned = broadcast_request(*api->directory, **line, *body);
     if (!planned) co_return to_response(planned.error());
     bus::Request made = std::move(*planned);
@@ -287,7 +288,7 @@ Handling post_broadcast(HttpRequest request, const Api* api) {
 
 namespace {
 
-/// The panel's own names of these items, one each; none where it has none.
+/// The panel's notation of each item; none if the panel type is unknown.
 json::array notations(const Items& items) {
     json::array names;
     if (items.station.unknown_panel) return names;
@@ -301,7 +302,7 @@ json::array notations(const Items& items) {
     return names;
 }
 
-/// The frame as its panel gets it: what it lacks goes out as what does the same.
+/// The frame as it would be sent, with functions translated that the panel lacks.
 std::string frame_of(const StationEntry& station, Bytes pdu) {
     auto request = modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide);
     if (!request) return "";
@@ -324,7 +325,7 @@ HttpResponse describe(const Items& items, Bytes pdu, unsigned requests) {
     return json_response(200, body);
 }
 
-/// Of several requests that a long read takes, the first.
+/// The plan of a read; if it takes several requests, the first of them.
 HttpResponse plan_of_read(Items items) {
     if (items.area != nullptr) {
         const auto range = check_range(items, items.area->readable, "readable");
@@ -350,7 +351,7 @@ HttpResponse plan_of_write(Items items, const std::string& values) {
     return describe(*writable, made.pdu(), 1);
 }
 
-/// What would go out; nothing does.
+/// The request that would be sent; nothing is sent.
 HttpResponse plan(const HttpRequest& request, Parsed<Items> items) {
     if (!items) return to_response(items.error());
     const auto values = request.query.find("values");

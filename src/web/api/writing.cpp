@@ -24,10 +24,10 @@ namespace panelgate::web {
 
 namespace {
 
-/// Behind function and address of 0F and 10: quantity and byte count.
+/// Offset of the data of 0F and 10: function, address, quantity and byte count.
 constexpr std::size_t kMultipleHead = 6;
 
-/// The panel's own view of this memory comes first, then the others.
+/// The tables that show this memory: the request's, the area's own, then the others.
 std::vector<modbus::Table> tables_of(const profile::PanelProfile& panel, const modbus::Span& span) {
     std::vector<modbus::Table> tables{span.table};
     const profile::Area* area = panel.find_area(span.table, span.first);
@@ -99,7 +99,7 @@ bool Verification::holds(std::span<const std::uint16_t> items) const {
 
 namespace {
 
-/// With the items that are really written.
+/// Checks the written items against the area's writable range.
 Parsed<void> check_area(Items items, std::size_t count) {
     if (items.area == nullptr) return {};
     items.span.count = static_cast<unsigned>(count);
@@ -164,7 +164,7 @@ Problem not_writable(modbus::Table table) {
     return made;
 }
 
-/// With what reading back needs, when the body wants it.
+/// Makes the write, with its verification if the body asks for it.
 Parsed<Writing> writing_of(const StationEntry& station, Bytes pdu, const json::object& body) {
     const auto verify = flag_member(body, "verify");
     if (!verify) return verify.error();
@@ -178,8 +178,8 @@ Parsed<Writing> writing_of(const StationEntry& station, Bytes pdu, const json::o
     return made;
 }
 
-/// The registers of values of a type: "f32", "i32", ... A string has as many as its `length` says,
-/// or as it needs.
+/// Encodes typed values ("f32", "i32", ...) as registers. A string takes `length` characters, or as
+/// many as it needs.
 Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus::Table table) {
     const auto wording = wording_of(body);
     if (!wording) return wording.error();
@@ -231,7 +231,7 @@ Parsed<Writing> plan(const PointOfStation& to, const Parsed<json::object>& body,
     return made;
 }
 
-/// Nobody knows what came of it: it was on the wire, and no reply told.
+/// The outcome is unknown: the request was transmitted, and no reply came.
 bool is_unknown(const bus::Answer& answer) {
     return answer.transmitted && !answer.refusal && !answer.pdu;
 }
@@ -250,14 +250,14 @@ void log_refused(const Caller& caller, const std::string& at, const Problem& why
                {{"at", at}, {"status", std::to_string(why.status)}, {"why", why.detail}});
 }
 
-void tell(json::object& told, const ReadBack& back) {
-    told["verified"] = nullptr;
+void add_read_back(json::object& result, const ReadBack& back) {
+    result["verified"] = nullptr;
     if (!back.holds) {
-        told["verify_detail"] = back.why;
+        result["verify_detail"] = back.why;
         return;
     }
-    told["verified"] = *back.holds;
-    if (!*back.holds) told["read_back"] = json::array(back.items.begin(), back.items.end());
+    result["verified"] = *back.holds;
+    if (!*back.holds) result["read_back"] = json::array(back.items.begin(), back.items.end());
 }
 
 boost::asio::awaitable<ReadBack> read_back(std::shared_ptr<Caller> caller,
@@ -308,16 +308,16 @@ boost::asio::awaitable<Parsed<json::object>> write(std::shared_ptr<Caller> calle
     request.within = patience.left();
     const bus::Answer answer = co_await ask(caller, writing->station.bus, std::move(request));
     auto failed = problem_of(answer, *writing->station.profile);
-    json::object told = confirmed(*writing);
-    json::object& verified = failed ? failed->extensions : told;
+    json::object result = confirmed(*writing);
+    json::object& verified = failed ? failed->extensions : result;
     if (writing->verification && (!failed || is_unknown(answer))) {
         boost::asio::awaitable<ReadBack> reads =
             read_back(std::move(caller), &writing->station, &*writing->verification, patience);
         const ReadBack back = co_await std::move(reads);
-        tell(verified, back);
+        add_read_back(verified, back);
     }
     if (failed) co_return std::move(*failed);
-    co_return told;
+    co_return result;
 }
 
 }  // namespace panelgate::web

@@ -18,7 +18,7 @@ Duration Logins::turn(TimePoint now, const std::string& address) {
     return mine - now;
 }
 
-Duration Logins::pause() const { return Duration(1s) / settings_.a_second; }
+Duration Logins::pause() const { return Duration(1s) / settings_.checks_per_second; }
 
 bool Logins::guesses(TimePoint now, const Failures& failures) const {
     return count_at(now, failures) > settings_.free;
@@ -39,7 +39,7 @@ void Logins::failed(TimePoint now, const std::string& address) {
 void Logins::succeeded(const std::string& address) {
     const auto known = known_.find(address);
     if (known == known_.end()) return;
-    known->second.free -= pause();  // it was no guess
+    known->second.free -= pause();  // not a guess
     if (known->second.count <= 1) {
         known_.erase(known);
     } else {
@@ -59,16 +59,16 @@ void Places::apply(const Settings& settings) {
     limit_ = settings.max_connections;
     limit_of_address_ = settings.max_connections_per_address;
     limit_of_streams_ = settings.max_streams_per_address;
-    limit_of_held_ = settings.max_held;
+    limit_of_throttled_ = settings.max_throttled;
     limit_of_probes_ = settings.probe_places;
 }
 
 Places::Arrival Places::admit(const std::string& address) const {
     Arrival arrival;
-    if (placed(address) >= limit_of_address_) {
+    if (counted_connections(address) >= limit_of_address_) {
         arrival.leaves = longest(State::idle, false, &address);
         arrival.probes_only = !arrival.leaves;
-    } else if (in_state(address, State::wrong) >= limit_of_held_) {
+    } else if (in_state(address, State::wrong) >= limit_of_throttled_) {
         arrival.leaves = longest(State::wrong, false, &address);
     } else if (guests() >= limit_) {
         arrival.leaves = longest(State::wrong, false);
@@ -116,7 +116,7 @@ void Places::idle(Id id) {
 
 void Places::leave(Id id) { guests_.erase(id); }
 
-bool Places::is_held(Id id) const {
+bool Places::is_throttled(Id id) const {
     const auto guest = guests_.find(id);
     return guest != guests_.end() && guest->second.state == State::wrong;
 }
@@ -128,11 +128,12 @@ std::size_t Places::probes() const {
 
 std::size_t Places::guests() const { return guests_.size() - probes(); }
 
-std::size_t Places::placed(const std::string& address) const {
+std::size_t Places::counted_connections(const std::string& address) const {
     return static_cast<std::size_t>(std::ranges::count_if(guests_, [&](const auto& entry) {
         const Guest& guest = entry.second;
-        const bool takes_place = guest.state != State::wrong && guest.state != State::streaming;
-        return !guest.probes_only && takes_place && guest.address == address;
+        const bool counts_against_limit =
+            guest.state != State::wrong && guest.state != State::streaming;
+        return !guest.probes_only && counts_against_limit && guest.address == address;
     }));
 }
 
@@ -163,11 +164,11 @@ std::optional<Places::Id> Places::suspect_of_another(const std::string& address)
     return std::nullopt;
 }
 
-Duration Ration::take(TimePoint now, const std::string& address, std::size_t bytes) {
+Duration RateLimiter::take(TimePoint now, const std::string& address, std::size_t bytes) {
     if (used_until_.size() >= settings_.addresses)
         std::erase_if(used_until_, [&](const auto& entry) { return entry.second <= now; });
     TimePoint& used = used_until_[address];
-    const Duration cost = settings_.request + Duration(1s) * bytes / settings_.bytes_a_second;
+    const Duration cost = settings_.request + Duration(1s) * bytes / settings_.bytes_per_second;
     used = std::min(std::max(used, now) + cost, now + settings_.burst + settings_.longest_wait);
     return std::max(used - now - settings_.burst, Duration::zero());
 }

@@ -11,19 +11,19 @@
 
 namespace panelgate::web {
 
-/// Who guesses tokens is slowed down, by address. A wrong one is answered late. What is right is
-/// not, and that tells it apart before the answer of a wrong one comes; so an address that guesses
-/// is looked at one request at a time, at a fixed pace: hanging up early wins nothing. The hold is
-/// so much longer than the pace that a few dozen who wait for their answers leave turns for what is
-/// right. Each right one makes up for a wrong one: behind one address there may be many. Pure.
+/// Slows down token guessing, per address. The reply to a wrong token is delayed, a right one's is
+/// not; since that difference already shows, an address that guesses has its requests checked one
+/// at a time, at a fixed rate, so hanging up early gains nothing. The delay is so much longer than
+/// that interval that even a few dozen waiting guessers leave turns for right tokens. Each right
+/// token cancels a wrong one, since many users may share an address. Pure.
 class Logins {
   public:
     explicit Logins(const LoginSettings& settings) : settings_(settings) {}
     void apply(const LoginSettings& settings) { settings_ = settings; }
 
-    /// How long a request with a token waits before anybody looks at it: its turn is taken.
+    /// Returns how long a request with a token waits before it is checked, and takes that turn.
     Duration turn(TimePoint now, const std::string& address);
-    /// How long a wrong one waits for its answer then.
+    /// Returns how long the reply to a wrong token is then delayed.
     Duration hold(TimePoint now, const std::string& address) const;
     void failed(TimePoint now, const std::string& address);
     void succeeded(const std::string& address);
@@ -33,9 +33,9 @@ class Logins {
     struct Failures {
         unsigned count = 0;
         TimePoint last;
-        TimePoint free{};  ///< when the next request with a token may be looked at
+        TimePoint free{};  ///< when the next token may be checked
     };
-    Duration pause() const;  ///< between two turns of an address
+    Duration pause() const;  ///< between two checks for an address
     bool guesses(TimePoint now, const Failures& failures) const;
     unsigned count_at(TimePoint now, const Failures& failures) const;
 
@@ -43,39 +43,38 @@ class Logins {
     std::map<std::string, Failures> known_;
 };
 
-/// Who may stay when many want to: so many connections, so many of them an address; those that
-/// stream events are open all day, have a limit of their own and never give way. Whoever is held
-/// for a wrong token takes no place of its address, which may have so many held besides: to be
-/// closed would tell it to try again. Who comes to a full house displaces, in this order: of an
-/// address without a place, whoever of it has had no request for longest; of one with too many
-/// held, the one that is held for longest; of a full house, the one held for longest, then the one
-/// without a request for longest, then one that waits to be looked at and is of another address
-/// that guesses. Where nobody gives way there are a few places more that answer probes, and the
-/// newest of these displaces the oldest. Pure.
+/// Decides which connections stay when limits are reached: in all and per address. Event streams
+/// stay open all day, so they have a limit of their own and are never displaced. A connection
+/// throttled for a wrong token does not count against its address, which may have so many of them
+/// besides: closing it would invite a retry. A new connection displaces, if its address is at its
+/// limit, that address's longest-idle one; if its address has too many throttled ones, the one
+/// throttled longest; if all places are taken, the one throttled longest, else the longest-idle
+/// one, else an unchecked one of another guessing address. If none can be displaced, a few extra
+/// places answer probes only, and the newest there displaces the oldest. Pure.
 class Places {
   public:
     using Id = std::uint64_t;
     struct Arrival {
         bool probes_only = false;
-        std::optional<Id> leaves;  ///< has no place any more: to be closed
+        std::optional<Id> leaves;  ///< displaced connection, to be closed
     };
 
     explicit Places(const Settings& settings);
-    /// For who comes from now on.
+    /// Applies new limits to connections that arrive later.
     void apply(const Settings& settings);
 
     Arrival arrive(Id id, const std::string& address);
-    /// A whole request is here: nobody takes its place before idle(). These do nothing for who has
-    /// none.
+    /// A complete request has arrived: the connection keeps its place until idle(). These calls
+    /// ignore unknown ids.
     void busy(Id id);
-    /// Its address guesses tokens and its own has not been looked at: another address may take its
-    /// place. Not the same one, or a guess could displace what is right.
+    /// Its address guesses tokens and its own token is not checked yet: another address may
+    /// displace it. Not the same address, or a guess could displace a right token.
     void suspect(Id id);
-    /// It waits for no more than to be told that its token is wrong, and is closed then.
+    /// Its token is wrong: it waits for the delayed refusal and is then closed.
     void wrong(Id id);
-    /// From now on it streams events. False when its address has as many streams as it may have.
+    /// Marks it as an event stream. False if its address has reached its limit of streams.
     bool stream(Id id);
-    bool is_held(Id id) const;
+    bool is_throttled(Id id) const;
     void idle(Id id);
     void leave(Id id);
 
@@ -85,16 +84,16 @@ class Places {
         std::string address;
         bool probes_only = false;
         State state = State::idle;
-        std::uint64_t since = 0;  ///< turn at which it became idle, or came
+        std::uint64_t since = 0;  ///< turn at which it became idle or arrived
     };
     void set(Id id, State state);
     std::size_t probes() const;
-    std::size_t guests() const;  ///< other than probes
-    /// Of an address: neither held nor streaming.
-    std::size_t placed(const std::string& address) const;
+    std::size_t guests() const;  ///< all but probes
+    /// Counts an address's connections that are neither throttled nor streaming.
+    std::size_t counted_connections(const std::string& address) const;
     std::size_t in_state(const std::string& address, State state) const;
     Arrival admit(const std::string& address) const;
-    /// Of all, or of one address.
+    /// Returns the one longest in `state`, of all or of one address.
     std::optional<Id> longest(State state, bool probes_only,
                               const std::string* address = nullptr) const;
     std::optional<Id> suspect_of_another(const std::string& address) const;
@@ -102,26 +101,26 @@ class Places {
     std::size_t limit_ = 0;
     std::size_t limit_of_address_ = 0;
     std::size_t limit_of_streams_ = 0;
-    std::size_t limit_of_held_ = 0;
+    std::size_t limit_of_throttled_ = 0;
     std::size_t limit_of_probes_ = 0;
     std::map<Id, Guest> guests_;
     std::uint64_t turn_ = 0;
 };
 
-/// What an address may have of the loop's time, so that whoever asks without a pause slows neither
-/// the lines nor other addresses: each request takes some of it, and so does each byte that is made
-/// or sent. Who has used up its share and a burst waits before it is answered. Pure.
-class Ration {
+/// Limits an address's share of the loop's time, so that a client requesting without pause slows
+/// neither the lines nor other addresses: each request costs time, and so does each byte produced
+/// or sent. An address over its share and burst waits for its replies. Pure.
+class RateLimiter {
   public:
-    explicit Ration(const RationSettings& settings) : settings_(settings) {}
-    void apply(const RationSettings& settings) { settings_ = settings; }
+    explicit RateLimiter(const RateLimitSettings& settings) : settings_(settings) {}
+    void apply(const RateLimitSettings& settings) { settings_ = settings; }
 
-    /// A request is answered with `bytes`. How long it has to wait for that.
+    /// Charges a reply of `bytes`; returns how long it must wait.
     Duration take(TimePoint now, const std::string& address, std::size_t bytes);
 
   private:
-    RationSettings settings_;
-    std::map<std::string, TimePoint> used_until_;  ///< by address, those in the future
+    RateLimitSettings settings_;
+    std::map<std::string, TimePoint> used_until_;  ///< by address; only future times matter
 };
 
 }  // namespace panelgate::web

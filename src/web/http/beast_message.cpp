@@ -29,7 +29,7 @@ std::optional<std::string> decode(std::string_view text, bool plus_is_blank) {
     return out;
 }
 
-/// Cuts off what comes before the separator; the rest (without it) stays in `text`.
+/// Removes and returns the part before the separator; the rest (without it) stays in `text`.
 std::string_view next_part(std::string_view& text, char separator) {
     const auto at = text.find(separator);
     const std::string_view part = text.substr(0, at);
@@ -37,8 +37,8 @@ std::string_view next_part(std::string_view& text, char separator) {
     return part;
 }
 
-/// Cuts off "http://host:port" (schemes are compared without case, RFC 3986 3.1). Nothing when
-/// there is none.
+/// Removes "http://host:port" and returns the authority (schemes are case-insensitive, RFC 3986
+/// 3.1); nullopt if there is none.
 std::optional<std::string> take_authority(std::string_view& target) {
     for (const std::string_view scheme : {"http://", "https://"}) {
         if (to_lower(target.substr(0, scheme.size())) != scheme) continue;
@@ -78,7 +78,7 @@ std::optional<Target> parse_target(std::string_view target) {
 namespace http = boost::beast::http;
 namespace {
 
-/// What the request is to: that of an absolute target, else the Host.
+/// Returns the authority of an absolute target, otherwise the Host.
 std::string authority_of(const BeastRequest& message, const Target& target) {
     return target.authority ? *target.authority : std::string(message[http::field::host]);
 }

@@ -20,26 +20,26 @@ namespace panelgate::web {
 /// 9112 3.2).
 struct Target {
     std::vector<std::string> path;
-    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
-    std::optional<std::string> authority;           ///< of an absolute one: "host:80"
+    std::multimap<std::string, std::string> query;  ///< decoded, repeated names kept
+    std::optional<std::string> authority;           ///< of an absolute target: "host:80"
 };
-/// Nothing when it has another form, a broken percent-encoding, or decodes to what is not UTF-8.
+/// Parses a target; nullopt for another form, a broken percent-encoding, or invalid UTF-8.
 std::optional<Target> parse_target(std::string_view target);
 
-// Between Beast's messages and ours.
+// Conversion between Beast's messages and ours.
 
 using BeastRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
 constexpr std::uint32_t kHeaderLimit = 16 * 1024;
 
-/// The target, "*" of OPTIONS as a path. Nothing when it cannot be understood.
+/// Parses the target; "*" (OPTIONS) becomes a path. nullopt if malformed.
 std::optional<Target> target_of(const BeastRequest& message);
-/// Is it clear where the body ends? Only `chunked` is understood (RFC 9112 6.1, 6.3): what follows
-/// anything else could be taken for a request.
+/// True if the end of the body is well defined. Only `chunked` is supported (RFC 9112 6.1, 6.3):
+/// bytes after anything else could be taken for a request.
 bool has_sound_framing(const BeastRequest& message);
-/// 400 when a header that is looked at comes twice: which of them counts?
+/// Returns 400 if a header that is read occurs twice and would be ambiguous.
 std::optional<Problem> repeated_field(const BeastRequest& message);
-/// The host that is asked (RFC 9112 3.2); "" of HTTP/1.0 without one.
+/// Returns the requested host (RFC 9112 3.2); "" for HTTP/1.0 without one.
 Parsed<std::string> host_of(const BeastRequest& message, const Target& target);
 HttpRequest to_request(BeastRequest&& message, Target target, std::string host);
 
@@ -61,7 +61,7 @@ void set_head(Message& message, const HttpResponse& response, bool keep_alive,
     message.keep_alive(keep_alive);
 }
 
-/// Is it the client's fault, and not the end of its connection between two requests?
+/// True for a malformed request, as opposed to a connection closed between requests.
 bool is_parse_error(boost::system::error_code why);
 Problem problem_of_parse(boost::system::error_code why, std::size_t max_body);
 

@@ -12,7 +12,7 @@ bool allows(const Set& set, const Key& key) {
     return set.empty() || set.contains(key);
 }
 
-/// `how`: members of JSON.
+/// `how`: JSON members.
 std::string loss(const std::string& how) { return "event: lost\ndata: {" + how + "}\n\n"; }
 
 constexpr const char* kComment = ": \n\n";
@@ -30,14 +30,14 @@ std::string EventHub::Listener::take() {
     if (hub_ == nullptr) return text;
     if (const std::uint64_t lost = std::exchange(lost_, 0); lost > 0)
         text += loss("\"events\":" + std::to_string(lost) + ",\"exact\":true");
-    for (std::size_t looked_at = 0; text.size() < kTaken; ++looked_at) {
+    for (std::size_t examined = 0; text.size() < kTakeBytes; ++examined) {
         const Event* event = hub_->next(*this);
         if (event == nullptr) return text;
-        if (looked_at == kLookedAt) break;
+        if (examined == kTakeExamined) break;
         place_ = event->number;
         if (filter_.passes(event->topic)) text += event->text;
     }
-    return text.empty() ? kComment : text;  // there is more
+    return text.empty() ? kComment : text;  // more events are pending
 }
 
 std::string EventHub::Listener::heartbeat() {
@@ -67,7 +67,7 @@ std::optional<std::uint64_t> EventHub::number_of(std::string_view id) const {
     return number;
 }
 
-/// The first behind its place, of the types that it wants.
+/// Returns the first event after its place, of the types it wants.
 const EventHub::Event* EventHub::next(const Listener& listener) const {
     const Event* first = nullptr;
     for (const auto& [type, ring] : rings_) {
@@ -79,8 +79,8 @@ const EventHub::Event* EventHub::next(const Listener& listener) const {
     return first;
 }
 
-/// How many may have gone that it would have been given: those of other filters and types between
-/// them are counted, too, because nobody knows any more what they were.
+/// Returns an upper bound of the events it lost: discarded events of other filters and types count
+/// too, since their topics are no longer known.
 std::uint64_t EventHub::missed(const Listener& listener) const {
     std::uint64_t gone = 0;
     for (const auto& [type, ring] : rings_) {
@@ -103,7 +103,7 @@ std::shared_ptr<EventHub::Listener> EventHub::listen(EventFilter filter, std::st
         listener->opening_ += '\n';
         if (const std::uint64_t lost = missed(*listener); lost > 0)
             listener->opening_ += loss("\"events\":" + std::to_string(lost) + ",\"exact\":false");
-    } else {  // of another life: whatever this one has to tell is new
+    } else {  // from a previous run: all events here are new
         listener->opening_ += "\n" + loss(R"("events":null,"exact":false)");
     }
     listeners_.push_back(listener);
@@ -125,7 +125,7 @@ bool EventHub::announce(std::string_view type) {
     return false;
 }
 
-/// The oldest of a ring gives way. Who has not got it yet has lost it.
+/// Drops a ring's oldest event; it counts as lost to listeners that have not read it.
 void EventHub::forget(Ring& ring) {
     const Event& oldest = ring.events.front();
     for (const auto& weak : listeners_) {
@@ -149,7 +149,7 @@ void EventHub::publish(EventTopic topic, std::string_view json) {
     while (ring.events.size() > kKept || (ring.bytes > kKeptBytes && ring.events.size() > 1))
         forget(ring);
     const EventTopic& wanted = ring.events.back().topic;
-    const auto listeners = listeners_;  // waking one may end another
+    const auto listeners = listeners_;  // wake() may end a listener
     for (const auto& weak : listeners) {
         const auto listener = weak.lock();
         if (!listener || listener->ended_) continue;

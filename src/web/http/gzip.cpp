@@ -12,10 +12,9 @@
 namespace panelgate::web {
 namespace {
 
-/// zlib.h, deflateInit2: a window of 2^15, and 16 for a gzip header and trailer.
+/// zlib.h, deflateInit2: a window of 2^15; plus 16 for a gzip header and trailer.
 constexpr int kGzipWindow = 15 + 16;
-/// A text that repeats itself as that of /metrics: 9 would take four times as long for a third
-/// less.
+/// For text as repetitive as /metrics: 9 would take four times as long to save a third.
 constexpr int kLevel = 1;
 constexpr int kMemory = 8;  // zlib's default
 
@@ -79,13 +78,13 @@ struct Gzip::Stream {
     }
     ~Stream() { deflateEnd(&z); }
 
-    /// Puts in all of what z has, as far as `flush` says.
+    /// Compresses all input of z, flushing as `flush` requests.
     void run(int flush) {
         std::array<char, 64 * 1024> space;
         do {
             z.next_out = reinterpret_cast<Bytef*>(space.data());
             z.avail_out = static_cast<uInt>(space.size());
-            deflate(&z, flush);  // Z_BUF_ERROR: there was nothing to do
+            deflate(&z, flush);  // Z_BUF_ERROR: nothing to do
             body.append(space.data(), space.size() - z.avail_out);
         } while (z.avail_out == 0);
     }
@@ -101,7 +100,7 @@ Gzip::~Gzip() = default;
 void Gzip::add(std::string_view piece) {
     while (!piece.empty()) {
         const auto size = std::min<std::size_t>(piece.size(), std::numeric_limits<uInt>::max());
-        // zlib reads only, and takes no const.
+        // zlib only reads, but takes no const.
         stream_->z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(piece.data()));
         stream_->z.avail_in = static_cast<uInt>(size);
         stream_->run(Z_NO_FLUSH);

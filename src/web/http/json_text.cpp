@@ -13,11 +13,11 @@ namespace panelgate::web {
 namespace json = boost::json;
 namespace {
 
-constexpr char kExactNumber = '\xFF';  ///< in front of its digits; never in UTF-8
+constexpr char kExactNumber = '\xFF';  ///< prefix of the digits; never in UTF-8
 
 void append(std::string& text, const json::value& value);
 
-/// Most texts need no escape; a trace has thousands of them.
+/// Fast path: most texts need no escape, and a trace has thousands of them.
 void append(std::string& text, json::string_view words) {
     const bool plain = std::ranges::none_of(words, [](char c) {
         return static_cast<unsigned char>(c) < 0x20 || c == '"' || c == '\\';
@@ -55,7 +55,7 @@ void append(std::string& text, const json::object& object) {
     text += '}';
 }
 
-/// As deep as a value is nested: what is parsed has a limit, what is made here is flat.
+/// Recursion is bounded: parsed values have a depth limit, those made here are flat.
 void append(std::string& text, const json::value& value) {
     if (const json::array* array = value.if_array()) return append(text, *array);
     if (const json::object* object = value.if_object()) return append(text, *object);

@@ -30,14 +30,14 @@ error_code HttpListener::open() {
 
 void HttpListener::apply(std::shared_ptr<const Site> site) {
     allowed_ = rt::AccessList(site->settings.allow);
-    const bool others_may = site->settings.tokens != shared_->site->settings.tokens ||
-                            site->settings.anonymous != shared_->site->settings.anonymous;
+    const bool rights_changed = site->settings.tokens != shared_->site->settings.tokens ||
+                                site->settings.anonymous != shared_->site->settings.anonymous;
     shared_->serve(std::move(site));
     const auto sessions = sessions_;
     for (const auto& [id, session] : sessions) {
         if (!allowed_.allows(session->peer())) {
             session->stop(shared_->site->settings.request_timeout);
-        } else if (others_may) {
+        } else if (rights_changed) {
             session->end_events();
         }
     }

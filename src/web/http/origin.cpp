@@ -15,7 +15,7 @@ namespace {
 
 namespace ip = boost::asio::ip;
 
-/// IPv4 also where a socket shows it as IPv6, and without a zone: nobody writes it.
+/// Unmaps IPv4-mapped IPv6 and removes the zone, which hosts are written without.
 ip::address plain(const ip::address& address) {
     if (address.is_v4()) return address;
     const ip::address_v6 v6 = address.to_v6();
@@ -34,7 +34,7 @@ bool is_address_v6(const std::string& text) {
     return !error;
 }
 
-/// What names in use are made of; RFC 3986 allows more.
+/// Accepts the characters of names in practice; RFC 3986 allows more.
 bool is_name(std::string_view text) {
     return !text.empty() && std::ranges::all_of(text, [](unsigned char c) {
         return (std::isalnum(c) != 0 && c < 0x80) || c == '-' || c == '.' || c == '_';
@@ -107,20 +107,21 @@ std::string header(const HttpRequest& request, const char* name) {
     return found == request.headers.end() ? std::string() : to_lower(found->second);
 }
 
-/// A page is shown; the interface is for programs, and each call of it may cost time on a line.
+/// True for a page; API and metrics are for programs, and each call may use a line.
 bool is_page(const HttpRequest& request) {
     return request.path.empty() || (request.path[0] != "api" && request.path[0] != "metrics");
 }
 
-/// Fetch Metadata: https://www.w3.org/TR/fetch-metadata/
+/// A user followed a link. Fetch Metadata: https://www.w3.org/TR/fetch-metadata/
 bool follows_link(const HttpRequest& request) {
     return (request.method == "GET" || request.method == "HEAD") &&
            header(request, "sec-fetch-mode") == "navigate" &&
            header(request, "sec-fetch-dest") == "document" && is_page(request);
 }
 
-/// "http://gateway:8080"; "null" is nobody's. Another port is another site, which may be anybody's
-/// on this machine; but for names that the configuration has, by which a proxy is called.
+/// True for an origin of ours, such as "http://gateway:8080"; "null" is not. Another port is
+/// another site, possibly another user's on this machine, except for configured names, where a
+/// proxy may use it.
 bool is_ours(std::string_view origin, const HttpRequest& request, const HostNames& names,
              const boost::asio::ip::address& local) {
     const std::size_t scheme = origin.find("://");
@@ -143,8 +144,8 @@ std::optional<Problem> check_origin(const HttpRequest& request, const HostNames&
     if (header(request, "sec-fetch-site") == "cross-site" && !follows_link(request)) {
         return problem(403, "a page of another site may not ask this gateway", "foreign-page");
     }
-    // Browsers name the site of whoever changes something, or wants to read the answer, also where
-    // they tell nothing else (plain HTTP). A read costs time on a line, too.
+    // Browsers send Origin with a change, or a read of the answer by script, even where they send
+    // no Fetch Metadata (plain HTTP). A read uses the line too.
     if (request.method != "OPTIONS" && request.headers.contains("origin") &&
         !is_ours(header(request, "origin"), request, names, local))
         return problem(403,

@@ -13,7 +13,7 @@
 
 namespace panelgate::web {
 
-/// ASCII only: what HTTP compares without case is nothing else.
+/// ASCII only, as is all that HTTP compares case-insensitively.
 inline std::string to_lower(std::string_view text) {
     std::string lower(text);
     for (char& c : lower) {
@@ -22,25 +22,26 @@ inline std::string to_lower(std::string_view text) {
     return lower;
 }
 
-/// The host of "NAME", "NAME:PORT", "[ADDRESS]:PORT": in lower case, without brackets and without
-/// the dot at the end. Nothing when it is none.
+/// Returns the host of "NAME", "NAME:PORT", "[ADDRESS]:PORT" in lower case, without brackets or a
+/// trailing dot; nullopt if malformed.
 std::optional<std::string> host_of_authority(std::string_view authority);
-/// Its port; "" where it names none.
+/// Returns its port, "" if there is none.
 std::string port_of_authority(std::string_view authority);
 
-/// What this machine calls itself, without asking a name server.
+/// Returns this machine's own names, without a DNS query.
 std::vector<std::string> machine_names();
 
-/// By which names the server may be called. A page whose name was rebound to our address calls us
-/// by its own; browsers let no page choose another. Pure.
+/// The names under which the server may be addressed: protects against DNS rebinding, since a
+/// rebound page sends its own name and browsers let no page choose another. Pure.
 class HostNames {
   public:
     HostNames(const Settings& settings, const std::vector<std::string>& machine);
 
-    /// `host` is of host_of_authority(); `local` is the connection's address at our end. Always
-    /// ours are that address, the one that is listened on, and the loopback, by address and name.
+    /// True for a name of ours. `host` comes from host_of_authority(), `local` is the connection's
+    /// local address. That address, the listen address and the loopback (address and name) are
+    /// always accepted.
     bool knows(const std::string& host, const boost::asio::ip::address& local) const;
-    /// The configuration names it: a proxy may have another port there.
+    /// True for a configured name, where a proxy may use another port.
     bool is_configured(const std::string& host) const { return configured_.contains(host); }
 
   private:
@@ -49,10 +50,9 @@ class HostNames {
     std::set<boost::asio::ip::address> addresses_;
 };
 
-/// May who asks from there, under this name, have anything that is not free? 421 when the request
-/// is for another host (`request.host`; a request of HTTP/1.0 may have none). 403 when a browser
-/// says that a page of another site asks, unless its user follows a link to a page of ours; and
-/// when there is an Origin that is not ours, but for OPTIONS.
+/// Checks a request for anything not public. 421 if it is for another host (`request.host`;
+/// HTTP/1.0 may have none). 403 if the browser reports a page of another site, unless the user
+/// follows a link to one of our pages; and for a foreign Origin, except with OPTIONS.
 std::optional<Problem> check_origin(const HttpRequest& request, const HostNames& names,
                                     const boost::asio::ip::address& local);
 

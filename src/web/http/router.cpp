@@ -21,7 +21,7 @@ namespace panelgate::web {
 
 namespace {
 
-/// In a time that does not depend on where the texts differ.
+/// Compares in a time independent of where the texts differ.
 bool same_secret(std::string_view given, std::string_view secret) {
     unsigned difference = given.size() == secret.size() ? 0 : 1;
     for (std::size_t i = 0; i < given.size(); ++i) {
@@ -36,8 +36,7 @@ std::string_view header(const HttpRequest& request, const char* name) {
     return found == request.headers.end() ? std::string_view() : found->second;
 }
 
-/// The token after "Bearer" and its blanks (RFC 9110 11.4; schemes are compared without
-/// case, 11.1).
+/// Returns the token after "Bearer" and blanks (RFC 9110 11.4; schemes are case-insensitive, 11.1).
 std::optional<std::string_view> bearer_token(std::string_view authorization) {
     constexpr std::string_view kScheme = "bearer ";
     if (to_lower(authorization.substr(0, kScheme.size())) != kScheme) return std::nullopt;
@@ -46,7 +45,7 @@ std::optional<std::string_view> bearer_token(std::string_view authorization) {
     return authorization;
 }
 
-/// The token that it carries; null for one that nobody has. All are compared, whichever matches.
+/// Returns the request's token, null if unknown. Always compares all tokens.
 const Token* token_of(const HttpRequest& request, const Settings& settings) {
     const auto given = bearer_token(header(request, "authorization"));
     if (!given) return nullptr;
@@ -63,14 +62,14 @@ Problem unauthorized(std::string detail) {
     return made;
 }
 
-/// Media types are compared without case (RFC 9110 8.3.1).
+/// Media types are case-insensitive (RFC 9110 8.3.1).
 bool is_json(std::string_view content_type) {
     std::string_view type = content_type.substr(0, content_type.find(';'));
     while (type.ends_with(' ') || type.ends_with('\t')) type.remove_suffix(1);
     return to_lower(type) == "application/json";
 }
 
-/// What a form of any site could send. DELETE is no method of forms, and has no body.
+/// True for what a form of any site could send. Forms have no DELETE.
 bool is_foreign_form(const HttpRequest& request) {
     if (request.method == "GET" || request.method == "HEAD" || request.method == "DELETE")
         return false;
@@ -87,7 +86,7 @@ std::optional<Problem> check_access(const HttpRequest& request, Role needed,
         if (settings.anonymous >= needed) return std::nullopt;
         return unauthorized("this needs a token");
     }
-    // Nothing of it is repeated: without a scheme it may be the token.
+    // Do not echo the value: without a scheme it may be the token.
     if (!carries_token(request))
         return unauthorized("this gateway knows tokens only; send 'Authorization: Bearer TOKEN'");
     const Token* token = token_of(request, settings);
@@ -123,7 +122,7 @@ std::string token_name(const HttpRequest& request, const Settings& settings) {
 namespace asio = boost::asio;
 namespace {
 
-/// What the pattern's {} stand for in this path, or nothing when it does not match.
+/// Returns the segments matched by the pattern's {}; nullopt if the path does not match.
 std::optional<std::vector<std::string>> match(std::string_view pattern,
                                               const std::vector<std::string>& path) {
     std::vector<std::string> arguments;
@@ -146,7 +145,7 @@ std::optional<std::vector<std::string>> match(std::string_view pattern,
 struct Found {
     const Route* route = nullptr;
     std::vector<std::string> arguments;
-    std::string allow;  ///< methods of the path; empty: no such path
+    std::string allow;  ///< methods of the path; empty: unknown path
 };
 
 void add_verb(std::string& allow, std::string_view verb) {
@@ -179,7 +178,8 @@ Problem not_found(const Found& found) {
     return made;
 }
 
-/// What the path can be asked; of the whole server, of each of its paths (RFC 9110 9.3.7).
+/// Answers OPTIONS for a path, or for the whole server with all its paths' methods (RFC 9110
+/// 9.3.7).
 HttpResponse options(const Found& found, const HttpRequest& request, const Site& site) {
     std::string allow = found.allow;
     if (request.path == std::vector<std::string>{"*"}) {
@@ -192,14 +192,14 @@ HttpResponse options(const Found& found, const HttpRequest& request, const Site&
     return response;
 }
 
-asio::awaitable<void> hold_up(Duration hold) {
+asio::awaitable<void> throttle(Duration hold) {
     if (hold == Duration::zero()) co_return;
     asio::steady_timer timer(co_await asio::this_coro::executor, hold);
     boost::system::error_code ignored;
     co_await timer.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
+void record_login(const HttpRequest& request, bool failed, Shared& shared) {
     const std::string& address = request.caller->address();
     if (!failed) return shared.logins.succeeded(address);
     ++shared.counters.login_failures;
@@ -208,7 +208,7 @@ void judge_login(const HttpRequest& request, bool failed, Shared& shared) {
             {{"listener", shared.site->settings.name()}, {"client", address}});
 }
 
-/// Whoever has a token, but none for this; other refusals of tokens are failed logins.
+/// Logs a token with insufficient rights; unknown tokens are logged as failed logins.
 void tell_refused(const HttpRequest& request, const Problem& why) {
     if (why.status != 403) return;
     std::string path;
@@ -217,7 +217,7 @@ void tell_refused(const HttpRequest& request, const Problem& why) {
                {{"path", path}, {"method", request.method}, {"why", why.detail}});
 }
 
-/// check_access(), and what comes of a token.
+/// check_access() with the throttling of token guesses.
 asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role needed,
                                               Shared* shared) {
     const Settings& settings = shared->site->settings;
@@ -226,19 +226,19 @@ asio::awaitable<std::optional<Problem>> admit(const HttpRequest* request, Role n
     const std::string& address = request->caller->address();
     const Duration turn = shared->logins.turn(shared->site->now(), address);
     if (turn > Duration::zero()) shared->places.suspect(request->caller->id());
-    asio::awaitable<void> waiting_for_turn = hold_up(turn);
+    asio::awaitable<void> waiting_for_turn = throttle(turn);
     co_await std::move(waiting_for_turn);
-    // Whoever hangs up is told nothing by that.
+    // Hanging up must reveal nothing about the token.
     if (request->caller->has_left()) co_return std::nullopt;
     shared->places.busy(request->caller->id());
     const auto refused = check_access(*request, needed, settings);
-    // With a token, nothing but one that nobody has is a 401.
+    // With a token, only an unknown one gives 401.
     const bool failed = refused && refused->status == 401;
     const Duration hold = shared->logins.hold(shared->site->now(), address);
-    judge_login(*request, failed, *shared);
+    record_login(*request, failed, *shared);
     if (failed && hold > Duration::zero()) {
         shared->places.wrong(request->caller->id());
-        asio::awaitable<void> waiting = hold_up(hold);
+        asio::awaitable<void> waiting = throttle(hold);
         co_await std::move(waiting);
     }
     co_return refused;
@@ -251,11 +251,11 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
     Found found = find_route(request, site->routes);
     const bool probe = found.route != nullptr && found.route->probe;
     if (barred && !probe) {
-        // At once, it would come again at once: that is no slower than to guess.
+        // An immediate reply would be retried immediately: be as slow as for a guess.
         Duration hold = Duration::zero();
         if (barred->status == 503 && request.caller)
             hold = shared->logins.hold(site->now(), request.caller->address());
-        asio::awaitable<void> waiting = hold_up(hold);
+        asio::awaitable<void> waiting = throttle(hold);
         co_await std::move(waiting);
         co_return to_response(*barred);
     }
@@ -268,7 +268,7 @@ Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> ba
         tell_refused(request, *refused);
         co_return to_response(*refused);
     }
-    // Probes are answered whatever their makers add.
+    // Probes are answered with any query.
     auto mistaken = probe ? std::nullopt : check_queries(request, found.route->queries);
     if (!mistaken) mistaken = check_encoding(request);
     if (mistaken) co_return to_response(*mistaken);

@@ -10,28 +10,28 @@
 
 namespace panelgate::web {
 
-/// May this request do what needs the role? 401 for a wrong token, or for none where one would
-/// help; 403 for a token whose role is not enough. A request that changes something and comes from
-/// a browser (Origin) must say application/json (415): a foreign page cannot do that unasked.
+/// Checks whether the request has the role. 401 for a wrong token, or for none where one would
+/// help; 403 for an insufficient role. A browser's request (Origin) that changes something must be
+/// application/json (415), which a foreign page cannot send unasked.
 std::optional<Problem> check_access(const HttpRequest& request, Role needed,
                                     const Settings& settings);
 
-/// It carries a token, right or wrong: all else in its Authorization is no guess.
+/// True if it carries a token, right or wrong; any other Authorization is no guess.
 bool carries_token(const HttpRequest& request);
 
-/// 415 for a body that was compressed, or coded in any other way: nobody here decodes it.
+/// Returns 415 for a compressed or otherwise encoded body, which is not supported.
 std::optional<Problem> check_encoding(const HttpRequest& request);
 
-/// What it may do, by its token or without one; none for a token that nobody has.
+/// Returns the role of its token, or the anonymous one; none for an unknown token.
 Role role_of(const HttpRequest& request, const Settings& settings);
 
-/// The name of the token that it carries, "" without one that is known.
+/// Returns the name of its token, "" without a known one.
 std::string token_name(const HttpRequest& request, const Settings& settings);
 
-/// Finds the handler and calls it, when the request may. 404 for an unknown path, 405 with Allow
-/// for a method the path does not have. HEAD is answered as GET; whoever sends it leaves out the
-/// body. `barred` is the answer to everything but probes. `shared` outlives it, and the site
-/// as long as the caller has not left.
+/// Calls the route's handler if the request may use it. 404 for an unknown path, 405 with Allow for
+/// a method the path lacks. HEAD is answered like GET; the sender omits the body. `barred`, if set,
+/// is the reply to everything but probes. `shared` must outlive it; the site, only until the caller
+/// has left.
 Handling dispatch(HttpRequest request, Shared* shared, std::optional<Problem> barred = {});
 
 }  // namespace panelgate::web

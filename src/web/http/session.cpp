@@ -34,7 +34,7 @@ using boost::system::error_code;
 Departure::Departure(tcp::socket& socket, Duration grace)
     : socket_(socket), grace_(grace), timer_(socket.get_executor()) {}
 
-/// A reset shows also while there is something unread.
+/// A reset is reported even with unread input.
 void Departure::start(std::shared_ptr<void> owner, std::function<void()> left) {
     owner_ = owner;
     left_ = std::move(left);
@@ -53,7 +53,7 @@ void Departure::request_ends() {
     timer_.cancel();
 }
 
-/// Stops looking once a pipelined request is there.
+/// Stops watching once a pipelined request has arrived.
 void Departure::watch_input() {
     if (watching_ || !socket_.is_open()) return;
     watching_ = true;
@@ -70,7 +70,7 @@ void Departure::look_at_input() {
     if (n > 0) return;
     if (n == 0) return ask_later();
     if (errno != EAGAIN && errno != EWOULDBLOCK) return tell();
-    watch_input();  // it was the beginning of this very request
+    watch_input();  // it was the rest of this request
 }
 
 void Departure::ask_later() {
@@ -82,7 +82,7 @@ void Departure::ask_later() {
     });
 }
 
-/// The wait also ends when both sides have closed their sending sides.
+/// The wait also ends when both directions are shut down.
 bool Departure::was_reset() {
     int why = 0;
     socklen_t size = sizeof why;
@@ -100,13 +100,13 @@ namespace http = boost::beast::http;
 namespace {
 
 constexpr std::size_t kReadSize = 4096;
-constexpr std::size_t kWhole = 64 * 1024;  ///< bytes of a body that go out in one piece
-/// What a client whose request was refused may still send before it is cut off.
+constexpr std::size_t kWhole = 64 * 1024;  ///< bytes of a body sent in one piece
+/// What a client may still send after a refusal before the connection is cut.
 constexpr std::size_t kDrainLimit = 1024 * 1024;
 constexpr Duration kDrainTime = 2s;
-/// Bytes of events that the kernel holds for a client, so that one which is slow is told in time
-/// what it has lost: by itself it takes megabytes.
-constexpr int kHeldEvents = 128 * 1024;
+/// Send buffer for events, in bytes, so that a slow client learns in time what it has lost: the
+/// kernel's default buffers megabytes.
+constexpr int kEventSendBuffer = 128 * 1024;
 constexpr std::string_view kContinue = "HTTP/1.1 100 Continue\r\n\r\n";
 
 Problem no_place() {
@@ -129,7 +129,7 @@ HttpSession::HttpSession(asio::ip::tcp::socket socket, std::shared_ptr<Shared> s
       buffer_(kHeaderLimit + kReadSize + shared_->site->settings.max_body),
       departure_(stream_.socket(), shared_->site->settings.half_close_grace),
       turn_(stream_.get_executor()),
-      last_moment_(stream_.get_executor()),
+      final_send_timer_(stream_.get_executor()),
       time_to_read_(shared_->site->settings.request_timeout) {
     ErrorCode ignored;
     stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
@@ -157,7 +157,7 @@ asio::awaitable<bool> HttpSession::serve_one() {
     const bool head = message.method() == http::verb::head;
     asio::awaitable<HttpResponse> answering = answer(std::move(message));
     HttpResponse response = co_await std::move(answering);
-    asio::awaitable<void> waiting = wait_for_ration(&response);
+    asio::awaitable<void> waiting = wait_for_rate_limit(&response);
     co_await std::move(waiting);
     bool more = false;
     if (response.events && !head && !shared_->places.stream(caller_->id()))
@@ -166,7 +166,7 @@ asio::awaitable<bool> HttpSession::serve_one() {
         asio::awaitable<void> sending = send_events(std::move(response.events));
         co_await std::move(sending);
     } else if (!caller_->has_left()) {
-        const bool stays = keep_alive && !stopping_ && !shared_->places.is_held(caller_->id());
+        const bool stays = keep_alive && !stopping_ && !shared_->places.is_throttled(caller_->id());
         asio::awaitable<bool> sending = send(std::move(response), head, stays);
         more = co_await std::move(sending);
     }
@@ -182,7 +182,7 @@ asio::awaitable<HttpResponse> HttpSession::answer(BeastRequest message) {
     auto host = host_of(message, *target);
     std::optional<Problem> barred;
     if (!host) barred = host.error();
-    // Probes are asked for no name; what has two is no request.
+    // Probes need no Host; a duplicate or invalid one is an error even there.
     if (barred && message.count(http::field::host) > 0) co_return to_response(*barred);
     departure_.ask_by(nullptr);
     if (message.version() >= 11) departure_.ask_by([this] { send_interim(); });
@@ -205,27 +205,27 @@ void HttpSession::set_busy(bool busy) {
     }
 }
 
-asio::awaitable<void> HttpSession::wait_for_ration(const HttpResponse* response) {
+asio::awaitable<void> HttpSession::wait_for_rate_limit(const HttpResponse* response) {
     if (response->probe || stopping_ || !shared_->site->now) co_return;
     const std::size_t body =
         response->shared_body ? response->shared_body->size() : response->body.size();
     const std::size_t bytes = std::max(body, response->made);
-    const Duration wait = shared_->ration.take(shared_->site->now(), caller_->address(), bytes);
+    const Duration wait = shared_->rate_limit.take(shared_->site->now(), caller_->address(), bytes);
     if (wait == Duration::zero()) co_return;
     ErrorCode ignored;
     turn_.expires_after(wait);
     co_await turn_.async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 }
 
-/// Before the answer, which it cannot mix with: nothing is on its way, so all of it is taken.
-/// Clients step over it (RFC 9110 15.2).
+/// Sent before the reply: the socket buffer is empty, so it is written whole. Clients skip it (RFC
+/// 9110 15.2).
 void HttpSession::send_interim() {
     ErrorCode ignored;
     stream_.socket().non_blocking(true, ignored);
     stream_.socket().write_some(asio::buffer(kContinue), ignored);
 }
 
-/// One whole request, into parser_.
+/// Reads one complete request into parser_.
 asio::awaitable<boost::system::error_code> HttpSession::receive() {
     parser_.emplace();
     parser_->header_limit(kHeaderLimit);
@@ -247,7 +247,7 @@ asio::awaitable<boost::system::error_code> HttpSession::receive() {
                                      asio::redirect_error(asio::use_awaitable, error));
     if (!error && !has_sound_framing(parser_->get())) error = http::error::bad_transfer_encoding;
     if (error || parser_->is_done()) co_return error;
-    // Beast would add the trailer to it, and nothing there may count (RFC 9110 6.5.1).
+    // Beast would merge the trailer, whose fields must not count (RFC 9110 6.5.1).
     http::request_header<> head = parser_->get().base();
     error = co_await receive_body();
     parser_->get().base() = std::move(head);
@@ -266,10 +266,10 @@ asio::awaitable<boost::system::error_code> HttpSession::receive_body() {
     co_return error;
 }
 
-/// The handler's answer; exceptions end here.
+/// Runs the handler; its exceptions end here.
 asio::awaitable<HttpResponse> HttpSession::handle(HttpRequest request,
                                                   std::optional<Problem> barred) {
-    const std::shared_ptr<const Site> site = shared_->site;  // to the end of this request
+    const std::shared_ptr<const Site> site = shared_->site;  // until this request ends
     const std::string path = request.path.empty() ? "/" : request.path.front();
     std::string what;
     if (!barred) barred = check_origin(request, shared_->hosts, local_);
@@ -297,7 +297,7 @@ asio::awaitable<bool> HttpSession::refuse(ErrorCode why) {
     co_return false;
 }
 
-/// Did it go out, and may another request follow?
+/// Sends the reply; true if another request may follow.
 asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool keep_alive) {
     ErrorCode error;
     departure_.request_ends();
@@ -311,8 +311,8 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
         set_head(message, response, keep_alive, shared_->site->product);
         co_await http::async_write(stream_, message,
                                    asio::redirect_error(asio::use_awaitable, error));
-        // In pieces of 64 KB, between which the loop serves others: Beast would hand the kernel all
-        // of it at once.
+        // In pieces of 64 KB, between which the loop serves others: Beast would pass the whole body
+        // to the kernel at once.
         if (!error && !head) {
             const asio::const_buffer body = asio::buffer(*response.shared_body);
             co_await asio::async_write(stream_, body,
@@ -326,24 +326,24 @@ asio::awaitable<bool> HttpSession::send(HttpResponse response, bool head, bool k
                                    asio::redirect_error(asio::use_awaitable, error));
     }
     sending_ = false;
-    last_moment_.cancel();
+    final_send_timer_.cancel();
     co_return !error && keep_alive;
 }
 
-/// Until the client goes away or the server stops. A comment every 15 s keeps middle boxes from
-/// forgetting the connection, and notices a client that has gone.
+/// Streams events until the client leaves or the server stops. A comment every 15 s keeps
+/// middleboxes from dropping the connection and detects a lost client.
 asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listener> listener) {
     constexpr Duration kHeartbeat = 15s;
     ++shared_->counters.requests[200];
     sending_ = true;
     bool asked = false;
     ErrorCode ignored;
-    stream_.socket().set_option(asio::socket_base::send_buffer_size(kHeldEvents), ignored);
-    asio::steady_timer bell(stream_.get_executor());
-    listener->wake = [&bell] { bell.cancel(); };
+    stream_.socket().set_option(asio::socket_base::send_buffer_size(kEventSendBuffer), ignored);
+    asio::steady_timer wake_timer(stream_.get_executor());
+    listener->wake = [&wake_timer] { wake_timer.cancel(); };
     departure_.ask_by([&] {
         asked = true;
-        bell.cancel();
+        wake_timer.cancel();
     });
     listener_ = listener;
     std::string text =
@@ -360,8 +360,8 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
         if (!text.empty()) continue;
         if (listener->ended() || stopping_ || events_end_) break;
         ErrorCode rung;
-        bell.expires_after(kHeartbeat);
-        co_await bell.async_wait(asio::redirect_error(asio::use_awaitable, rung));
+        wake_timer.expires_after(kHeartbeat);
+        co_await wake_timer.async_wait(asio::redirect_error(asio::use_awaitable, rung));
         text = rung ? listener->take() : listener->heartbeat();
         if (text.empty() && std::exchange(asked, false)) text = listener->heartbeat();
     }
@@ -369,11 +369,11 @@ asio::awaitable<void> HttpSession::send_events(std::shared_ptr<EventHub::Listene
     listener->wake = nullptr;
     listener_.reset();
     sending_ = false;
-    last_moment_.cancel();
+    final_send_timer_.cancel();
 }
 
-/// Reads on after a refusal: closing with unread bytes would reset the connection, and the client
-/// would lose the answer.
+/// Reads on after a refusal: closing with unread input would reset the connection, and the client
+/// would lose the reply.
 asio::awaitable<void> HttpSession::drain() {
     ErrorCode error;
     stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, error);
@@ -402,8 +402,8 @@ void HttpSession::stop(Duration reading) {
     if (listener_ && listener_->wake) listener_->wake();
     if (!busy_) close();
     if (!sending_) return;
-    last_moment_.expires_after(time_to_read_);
-    last_moment_.async_wait([self = weak_from_this()](const ErrorCode& cancelled) {
+    final_send_timer_.expires_after(time_to_read_);
+    final_send_timer_.async_wait([self = weak_from_this()](const ErrorCode& cancelled) {
         const auto session = self.lock();
         if (session && !cancelled && session->sending_) session->abandon();
     });

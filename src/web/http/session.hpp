@@ -20,21 +20,21 @@
 
 namespace panelgate::web {
 
-/// Notices that a client has left while its request runs and nobody reads (P2). Whoever has only
-/// closed its sending side gets its answer (P3), and looks like one that has left: it is asked now
-/// and then by some bytes that clients step over, which the system of one that has left answers
-/// with a reset. A part of what owns the socket, too.
+/// Detects that a client has left while its request runs and the session does not read (P2). A
+/// half-closed client still gets its reply (P3) but looks the same, so it is probed now and then
+/// with bytes that clients skip; the system of one that has left answers with a reset. Owned
+/// together with the socket.
 class Departure {
   public:
     Departure(boost::asio::ip::tcp::socket& socket, Duration grace);
 
-    /// `owner` holds this and the socket; it is kept until the socket is closed. `left` is called
-    /// once at most, never from inside these calls.
+    /// `owner` owns this and the socket; kept until the socket is closed. `left` is called at most
+    /// once, never from inside these calls.
     void start(std::shared_ptr<void> owner, std::function<void()> left);
     void request_runs();
-    /// How it is asked; null: it cannot be.
+    /// Sets how the client is probed; null: not possible.
     void ask_by(std::function<void()> ask) { ask_ = std::move(ask); }
-    /// Its answer leaves now, or will not.
+    /// The reply is being sent, or will not be.
     void request_ends();
 
   private:
@@ -54,24 +54,25 @@ class Departure {
     bool watching_ = false;  ///< a wait of watch_input() is pending
 };
 
-/// One HTTP connection: reads a request, answers it, and again. Owned by the listener until run()
-/// has ended; everything in the one thread.
+/// One HTTP connection: reads and answers requests one after another. Owned by the listener until
+/// run() has ended; single-threaded.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
   public:
-    /// With `probes_only` it answers one request, and only of what is free.
+    /// With `probes_only` it answers a single request, and only probes.
     HttpSession(boost::asio::ip::tcp::socket socket, std::shared_ptr<Shared> shared,
                 std::shared_ptr<Caller> caller, bool probes_only);
 
-    /// Serves until the client goes away, breaks the protocol, is idle for too long, or stop().
+    /// Serves until the client leaves, breaks the protocol or is idle for too long, or until
+    /// stop().
     static boost::asio::awaitable<void> run(std::shared_ptr<HttpSession> self);
-    /// Answers the request that runs, then closes; closes at once when none does. From now on a
-    /// client has no longer than `reading` to take an answer.
+    /// Answers the running request, then closes; without one, closes at once. From now on a client
+    /// has at most `reading` to take a reply.
     void stop(Duration reading);
-    /// Where events are sent, the stream ends behind what waits.
+    /// Ends an event stream after the pending events.
     void end_events();
-    /// The address of the other end.
+    /// Returns the peer's address.
     boost::asio::ip::address peer() const;
-    /// Closes at once; whoever works for the client is told.
+    /// Closes at once and notifies those working for the client.
     void abandon();
 
   private:
@@ -86,7 +87,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::asio::awaitable<bool> refuse(ErrorCode why);
     boost::asio::awaitable<bool> send(HttpResponse response, bool head, bool keep_alive);
     boost::asio::awaitable<void> send_events(std::shared_ptr<EventHub::Listener> listener);
-    boost::asio::awaitable<void> wait_for_ration(const HttpResponse* response);
+    boost::asio::awaitable<void> wait_for_rate_limit(const HttpResponse* response);
     boost::asio::awaitable<void> drain();
     void set_busy(bool busy);
     void send_interim();
@@ -95,20 +96,21 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
     boost::beast::tcp_stream stream_;
     std::shared_ptr<Shared> shared_;
     std::shared_ptr<Caller> caller_;
-    boost::asio::ip::address local_;  ///< at our end
+    boost::asio::ip::address local_;  ///< local address
     const bool probes_only_;
     boost::beast::flat_buffer buffer_;
     std::optional<Parser> parser_;
     Departure departure_;
     std::shared_ptr<EventHub::Listener> listener_;  ///< while events are sent
-    bool asked_before_ = false;              ///< it is not the first request that is waited for
-    bool sending_ = false;                   ///< an answer, or events
-    boost::asio::steady_timer turn_;         ///< of its address
-    boost::asio::steady_timer last_moment_;  ///< after stop(): to take the answer
-    bool busy_ = false;                      ///< a whole request is here and not yet answered
+    bool asked_before_ = false;                     ///< not the first request
+    bool sending_ = false;                          ///< a reply or events
+    boost::asio::steady_timer turn_;                ///< waits for its address's share
+    boost::asio::steady_timer
+        final_send_timer_;  ///< after stop(): the client's time to take the reply
+    bool busy_ = false;     ///< a complete request is not answered yet
     bool stopping_ = false;
     bool events_end_ = false;
-    Duration time_to_read_;  ///< of an answer
+    Duration time_to_read_;  ///< the client's time to take a reply
 };
 
 }  // namespace panelgate::web

@@ -10,29 +10,29 @@
 
 namespace panelgate::web {
 
-/// What the sessions of one listener have in common. One thread.
+/// State shared by the sessions of one listener. Single-threaded.
 struct Shared {
     explicit Shared(std::shared_ptr<const Site> with_site)
         : site(std::move(with_site)),
           hosts(site->settings, machine_names()),
           logins(site->settings.logins),
           places(site->settings),
-          ration(site->settings.ration) {}
+          rate_limit(site->settings.rate_limit) {}
 
-    /// Another one from now on; who works on the one before holds it.
+    /// Replaces the site; running requests keep the previous one alive.
     void serve(std::shared_ptr<const Site> other) {
         site = std::move(other);
         hosts = HostNames(site->settings, machine_names());
         logins.apply(site->settings.logins);
         places.apply(site->settings);
-        ration.apply(site->settings.ration);
+        rate_limit.apply(site->settings.rate_limit);
     }
 
     std::shared_ptr<const Site> site;
     HostNames hosts;
     Logins logins;
     Places places;
-    Ration ration;
+    RateLimiter rate_limit;
     Counters counters;
 };
 

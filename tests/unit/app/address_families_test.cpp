@@ -7,7 +7,7 @@ namespace {
 
 class AddressFamilies : public testing::Test {
   protected:
-    /// Of the last of these listeners.
+    /// The setting of the last of these listeners.
     bool last_is_six_only() {
         separate_families(config);
         return config.modbus_tcp.back().ipv6_only;
@@ -34,7 +34,7 @@ TEST_F(AddressFamilies, EachHasItsOwnKindOnOnePort) {
     config.modbus_tcp.erase(config.modbus_tcp.begin());
     EXPECT_FALSE(last_is_six_only());
     config.http.emplace();
-    config.http->port = 502;  // of 127.0.0.1
+    config.http->port = 502;  // on 127.0.0.1
     EXPECT_TRUE(last_is_six_only());
 }
 

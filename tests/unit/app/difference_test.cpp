@@ -32,7 +32,7 @@ std::vector<std::string> told(const std::string& before, const std::string& afte
     return told(load(before), load(after));
 }
 
-/// `of_line` and `stations` are what differs.
+/// `of_line` and `stations` are the parts that differ.
 std::string plant(const std::string& of_line, const std::string& stations) {
     return "lines:\n  - {name: floor1, device: sim, " + of_line + "stations: [" + stations +
            "]}\nmodbus_tcp: [{listen: '127.0.0.1:1502'}]\n";

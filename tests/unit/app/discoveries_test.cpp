@@ -16,8 +16,8 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using State = web::DiscoveryReport::State;
 
-/// floor1 has press 31; on its wire are an unlisted GT at 20 and, where a test says so, others. A
-/// question costs 10 ms when it is answered and 40 when not.
+/// floor1 has press 31; on its wire are an unlisted GT at 20 and further stations where a test adds
+/// them. A request takes 10 ms if it is answered and 40 ms if not.
 class DiscoveriesTest : public testing::Test {
   protected:
     DiscoveriesTest() {
@@ -37,13 +37,13 @@ class DiscoveriesTest : public testing::Test {
         EXPECT_EQ(request.patience, 100ms) << "nobody knows how long it needs";
         EXPECT_TRUE(request.request.is_read());
         EXPECT_NE(request.station, 31) << "it is listed";
-        if (request.station == held) return std::nullopt;
+        if (request.station == unanswered) return std::nullopt;
         const bool is_there = request.station == 20;
         bus.shares[0].busy += is_there ? 10ms : 40ms;
         if (!is_there) return test::FakeBus::fault(Fault::timeout, true);
         return test::FakeBus::reply(gt.handle(clock.now(), 0, request.request.pdu()));
     }
-    /// For as long as it takes, or until a question stays open.
+    /// Runs until all is done, or a request stays unanswered.
     void run() {
         io.restart();
         io.poll();
@@ -63,7 +63,7 @@ class DiscoveriesTest : public testing::Test {
     Plant plant;
     web::EventHub hub;
     std::shared_ptr<web::EventHub::Listener> listener = hub.listen({});
-    std::uint8_t held = 0;  ///< a station whose question nobody answers yet
+    std::uint8_t unanswered = 0;  ///< a station that does not answer yet
     Discoveries discoveries{clock,
                             [this] {
                                 return Discoveries::Place{plant,
@@ -106,7 +106,7 @@ TEST_F(DiscoveriesTest, TellsHowFarItIs) {
 }
 
 TEST_F(DiscoveriesTest, SomebodyEndsItAndWhatWasFoundStays) {
-    held = 22;
+    unanswered = 22;
     discoveries.start("floor1", "18-40", 50);
     run();
     EXPECT_EQ(report().state, State::running);
@@ -125,7 +125,7 @@ TEST_F(DiscoveriesTest, SomebodyEndsItAndWhatWasFoundStays) {
 TEST_F(DiscoveriesTest, CanBeDoneAgain) {
     discoveries.start("floor1", "20", 50);
     run();
-    held = 21;
+    unanswered = 21;
     EXPECT_FALSE(discoveries.start("floor1", "21", 20));
     EXPECT_EQ(report().state, State::running);
     EXPECT_EQ(report().share_percent, 20u);
@@ -137,7 +137,7 @@ TEST_F(DiscoveriesTest, CanBeDoneAgain) {
 TEST_F(DiscoveriesTest, WhoAnsweredLateIsAskedOnceMore) {
     bus.script = [this](const bus::Request& request) -> std::optional<bus::Answer> {
         if (request.station == 20 && bus.requests.size() == 1) {
-            bus.stations[20].last_reply = Duration::zero();  // a moment behind its timeout
+            bus.stations[20].last_reply = Duration::zero();  // a moment after its timeout
             return test::FakeBus::fault(Fault::timeout, true);
         }
         return answer(request);

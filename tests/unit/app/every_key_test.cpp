@@ -32,7 +32,7 @@ std::optional<config::Config> load(const std::string& text) {
     return config::load(text, files(), problems);
 }
 
-/// One of each map, where any key may be left out or have its default.
+/// One of each map, in which any key may be left out or have its default.
 constexpr const char* kPlain = R"(lines:
   - name: a
     device: /dev/ttyS1
@@ -62,7 +62,7 @@ std::string text_of(const fs::path& path) {
     return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Has what the example has only in one way, or not at all.
+/// Has what the example has in only one way, or not at all.
 constexpr const char* kFurther = R"(lines:
   - name: a
     device: /dev/ttyS1
@@ -108,7 +108,7 @@ constexpr const char* kWords =
     "a-1/400209 panasonic-gt b 127.0.0.1:99 10.0.0.0/8 /dev/ttyS9 press/UW140 oven/GDT300 "
     "a/2 floor1/20 /run/secrets/other ";
 
-/// What a value may be instead, likely ones first.
+/// Alternative values, likely ones first.
 std::vector<std::string> others(const yaml::Node& value) {
     const std::string& now = value.scalar;
     std::vector<std::string> all{now == "true" ? "false" : "true", "1" + now, now + "1"};
@@ -119,11 +119,11 @@ std::vector<std::string> others(const yaml::Node& value) {
 }
 
 struct Leaf {
-    std::string key;  ///< "lines/stations/id": without the places in lists
+    std::string key;  ///< "lines/stations/id": without list indices
     yaml::Node* value;
 };
 
-/// Templates and merges are told by what they make.
+/// Templates and merges show by their effect.
 void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& leaves) {
     if (node.kind == yaml::Node::Kind::scalar) leaves.push_back({key, &node});
     for (yaml::Node& item : node.items) find_leaves(item, key, leaves);
@@ -134,7 +134,7 @@ void find_leaves(yaml::Node& node, const std::string& key, std::vector<Leaf>& le
     }
 }
 
-/// Some other value that the loader takes makes a difference.
+/// Another value that the loader accepts makes a difference.
 bool makes_a_difference(const yaml::Node& tree, yaml::Node& value, const config::Config& before) {
     const yaml::Node kept = value;
     bool differs = false;
@@ -173,7 +173,7 @@ std::string generic_path(const std::string& path, const std::string& key) {
     return path.empty() ? key : path + '/' + key;
 }
 
-/// The maps whose keys have this path before them; "" is the top.
+/// The maps at this path; "" is the top.
 void find_maps(yaml::Node& node, const std::string& path, const std::string& wanted,
                std::vector<yaml::Node*>& found) {
     if (node.kind == yaml::Node::Kind::map && path == wanted) found.push_back(&node);
@@ -182,7 +182,7 @@ void find_maps(yaml::Node& node, const std::string& path, const std::string& wan
         find_maps(entry.value, generic_path(path, entry.key), wanted, found);
 }
 
-/// `base` with the key taken out of the first map that can have it, or with this value there.
+/// `base` without the key in the first map that can have it, or with this value there.
 std::optional<config::Config> load_with(const char* base, const std::string& path,
                                         const std::string& value) {
     yaml::Problems problems("x.yaml");
@@ -205,7 +205,7 @@ TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
         if (text.otherwise.empty()) continue;
         const std::string path(text.path);
         auto with = load_with(kPlain, path, std::string(text.otherwise));
-        const char* base = with ? kPlain : kFurther;  // some belong to ASCII only
+        const char* base = with ? kPlain : kFurther;  // some keys are for ASCII only
         if (!with) with = load_with(base, path, std::string(text.otherwise));
         const auto without = load_with(base, path, "");
         ASSERT_TRUE(without && with) << path;

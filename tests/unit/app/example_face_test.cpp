@@ -14,8 +14,8 @@ namespace {
 
 using namespace test;
 
-/// All that a new way in is made of: "press 100" reads a register and "press 100 7" writes it.
-/// What may be asked, who may write, whose turn it is and what is owed is others' business.
+/// All that a new northbound protocol needs: "press 100" reads a register and "press 100 7" writes
+/// it. What may be read, who may write, scheduling and outstanding replies are handled elsewhere.
 class TextFace {
   public:
     explicit TextFace(const Plant& plant) : plant_(plant) {}

@@ -10,7 +10,7 @@
 namespace panelgate::app {
 namespace {
 
-/// A line that counts how often it was looked at.
+/// A line that counts how often it is sampled.
 class CountedLine final : public bus::LineBus {
   public:
     void start() override {}

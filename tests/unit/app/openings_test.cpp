@@ -16,16 +16,16 @@ using ::testing::HasSubstr;
 class OpeningsTest : public testing::Test {
   protected:
     void add(const std::string& address, std::uint16_t port, errc::errc_t& why) {
-        doors.push_back({"modbus_tcp", address, port,
-                         [this, &why] {
-                             ++tries;
-                             return errc::make_error_code(why);
-                         },
-                         [port] { return port; }});
+        handles.push_back({"modbus_tcp", address, port,
+                           [this, &why] {
+                               ++tries;
+                               return errc::make_error_code(why);
+                           },
+                           [port] { return port; }});
     }
     std::string refusal() {
         try {
-            openings.open(doors);
+            openings.open(handles);
         } catch (const CannotListen& error) {
             return error.what();
         }
@@ -34,7 +34,7 @@ class OpeningsTest : public testing::Test {
 
     test::ManualClock clock;
     Openings openings{clock};
-    std::vector<Door> doors;
+    std::vector<ListenerHandle> handles;
     rt::LogTap log;
     int tries = 0;
     errc::errc_t first = errc::success;
@@ -44,11 +44,11 @@ class OpeningsTest : public testing::Test {
 TEST_F(OpeningsTest, SayWhereEachListens) {
     add("127.0.0.1", 502, first);
     add("::1", 502, second);
-    openings.open(doors);
+    openings.open(handles);
     EXPECT_EQ(log.count("info listening modbus_tcp=127.0.0.1:502"), 1u);
     EXPECT_EQ(log.count("info listening modbus_tcp=[::1]:502"), 1u);
     EXPECT_EQ(openings.missing(), "");
-    EXPECT_EQ(openings.standing(), "modbus_tcp 127.0.0.1:502, modbus_tcp [::1]:502");
+    EXPECT_EQ(openings.listening(), "modbus_tcp 127.0.0.1:502, modbus_tcp [::1]:502");
     EXPECT_EQ(clock.armed(), 0u);
 }
 
@@ -56,7 +56,7 @@ TEST_F(OpeningsTest, P7AnAddressThatIsNotThereYetIsTriedUntilItIs) {
     first = errc::address_not_available;
     add("2001:db8::7", 502, first);
     add("127.0.0.1", 502, second);
-    openings.open(doors);
+    openings.open(handles);
     EXPECT_EQ(log.count("listening modbus_tcp=127.0.0.1:502"), 1u);
     EXPECT_THAT(openings.missing(), HasSubstr("modbus_tcp [2001:db8::7]:502"));
     clock.advance(1h);
@@ -71,7 +71,7 @@ TEST_F(OpeningsTest, P7AnAddressThatIsNotThereYetIsTriedUntilItIs) {
 TEST_F(OpeningsTest, P7NothingEndsAGatewayThatServes) {
     first = errc::address_not_available;
     add("192.0.2.7", 502, first);
-    openings.open(doors);
+    openings.open(handles);
     first = errc::address_in_use;
     clock.advance(10 * Openings::kPause);
     EXPECT_EQ(log.count("listener waits modbus_tcp=192.0.2.7:502 why=\"Address already in use\""),
@@ -84,7 +84,7 @@ TEST_F(OpeningsTest, P7NothingEndsAGatewayThatServes) {
 TEST_F(OpeningsTest, NobodyIsTriedAgainAfterTheEnd) {
     first = errc::address_not_available;
     add("192.0.2.7", 502, first);
-    openings.open(doors);
+    openings.open(handles);
     openings.stop();
     clock.advance(1min);
     EXPECT_EQ(tries, 1);

@@ -39,7 +39,7 @@ class PlantTest : public testing::Test {
     test::FakeBus bus2{io.get_executor()};
     config::Line floor1 = line("floor1", {station(31, "press"), station(5, "mixer")});
     config::Line floor2 = line("floor2", {station(5, "oven"), station(7, "meter")});
-    test::ManualClock clock;  // of what the plant keeps
+    test::ManualClock clock;  // for the plant's histories
     Plant plant;
 };
 

@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// The figures are four pieces; the version tells which copy it is.
+/// The figures are four pieces; the version identifies the copy.
 class ScrapesTest : public testing::Test {
   protected:
     struct Client {
@@ -159,7 +159,7 @@ TEST_F(ScrapesTest, AQueueThatIsFullTakesNobodyElse) {
 }
 
 TEST_F(ScrapesTest, TextsThatAreStillBeingSentAreBounded) {
-    with({.held_bytes = 1});
+    with({.sending_bytes = 1});
     Client& slow = ask(1);
     run();
     const Client& refused = ask(2);

@@ -15,7 +15,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// press 31 has one point and one poll block, meter 5 may only be read.
+/// press 31 has one point and one poll block; meter 5 is read-only.
 class ShowingTest : public testing::Test {
   protected:
     ShowingTest() {
@@ -43,7 +43,7 @@ class ShowingTest : public testing::Test {
             points::make_plan_limits(panel, SerialFormat{}, 2ms), now);
         plant.at("floor1", 31).points.emplace(press.points, press.polls, *polls);
     }
-    /// The poll of the point brings a value.
+    /// Simulates a poll that reads the point's value.
     void poll() {
         while (points::quality_of(polls->reading(0), 1s, now) != points::Quality::good) {
             now = std::max(now, *polls->next_due());

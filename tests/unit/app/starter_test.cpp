@@ -27,7 +27,7 @@ scan::StationFinding station(std::uint8_t id, std::vector<scan::Candidate> candi
     return found;
 }
 
-/// Which every shipped profile allows.
+/// An address that every shipped profile allows.
 constexpr SerialFormat kFormat{38400, 8, Parity::none, 1};
 
 /// One station of each shipped profile.

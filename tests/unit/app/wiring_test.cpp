@@ -16,7 +16,7 @@
 namespace panelgate::app {
 namespace {
 
-/// press 31 is guarded, meter 5 may only be read; both are of the profile `generic`.
+/// press 31 is guarded, meter 5 is read-only; both have the profile `generic`.
 class WiringTest : public testing::Test {
   protected:
     WiringTest() {

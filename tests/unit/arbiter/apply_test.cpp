@@ -3,7 +3,7 @@
 namespace panelgate::arbiter {
 namespace {
 
-/// Other settings for an arbiter that runs.
+/// New settings for a running arbiter.
 class ApplyTest : public ArbiterTest {
   protected:
     StationSettings& station(std::size_t index) { return settings.stations[index]; }
@@ -50,7 +50,7 @@ TEST_F(ApplyTest, P1AShorterTimeoutEndsNoRestThatHasBegun) {
     EXPECT_EQ(bus.sent.size(), sent) << "its reply to the first may still come";
 }
 
-TEST_F(ApplyTest, P1WhatIsOwedIsOwedOnAnotherWireToo) {
+TEST_F(ApplyTest, P1OutstandingRepliesStayOutstandingOnAnotherWireToo) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();
     bus.line_down();
@@ -71,7 +71,7 @@ TEST_F(ApplyTest, P1WhatIsOwedIsOwedOnAnotherWireToo) {
 
 TEST_F(ApplyTest, P3BetweenTwoLinesRequestsWaitForTheirTurn) {
     const Ticket first = bus.submit(17, read_at(1), 1);
-    bus.arbiter().hold();
+    bus.arbiter().suspend();
     const Ticket second = bus.submit(18, read_at(2), 2);
     EXPECT_TRUE(bus.arbiter().is_waiting());
     bus.run_to_end_of_request();
@@ -92,8 +92,8 @@ TEST_F(ApplyTest, P3BetweenTwoLinesRequestsWaitForTheirTurn) {
     }
 }
 
-TEST_F(ApplyTest, P7WhoWaitsForALineThatDoesNotOpenIsToldSo) {
-    bus.arbiter().hold();
+TEST_F(ApplyTest, P7JobsForALineThatDoesNotOpenAreAnsweredSo) {
+    bus.arbiter().suspend();
     const Ticket waits = bus.submit(17, kRead, 1);
     bus.arbiter().on_line_left();
     bus.line_down();
@@ -102,7 +102,7 @@ TEST_F(ApplyTest, P7WhoWaitsForALineThatDoesNotOpenIsToldSo) {
     EXPECT_EQ(bus.try_submit(17, kRead).error(), Fault::line_down);
 }
 
-TEST_F(ApplyTest, P1AWireThatSomebodyElseHasUsedRestsForAsLongAsHeIsOwed) {
+TEST_F(ApplyTest, P1AWireThatAnotherMasterHasUsedRestsWhileItsRepliesAreOutstanding) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();
     const TimePoint sent = bus.now();
@@ -126,7 +126,7 @@ TEST_F(ApplyTest, P1TheTurnaroundOfABroadcastHoldsOnAnotherLineToo) {
     const TimePoint sent = script.now();
     script.run_for(50ms);
     EXPECT_GE(script.arbiter().clear_at(script.now()), sent + 800ms);
-    script.arbiter().hold();
+    script.arbiter().suspend();
     script.arbiter().on_line_left();
     script.line_up();
     script.submit(17, kRead, 1);

@@ -1,4 +1,4 @@
-// What those that do not answer may cost (P4).
+// What stations that do not answer may cost (P4).
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -31,7 +31,7 @@ TEST_F(ArbiterTest, P4AfterThreeSilentTransactionsTheAnswerIsImmediate) {
     EXPECT_EQ(bus.sent.size(), frames);
 }
 
-TEST_F(ArbiterTest, P4WhoHasNeverAnsweredIsProbedWithWhatIsWanted) {
+TEST_F(ArbiterTest, P4AStationThatHasNeverAnsweredIsProbedWithWhatIsWanted) {
     while (!bus.arbiter().health(17).offline()) {
         if (bus.arbiter().idle()) bus.submit(17, kWrite, 7);
         bus.run_for(100ms);
@@ -104,9 +104,8 @@ TEST_F(ArbiterTest, P4AWriteMayBeTheProbeOnceAnInterval) {
     EXPECT_EQ(bus.arbiter().health(17).state(), Health::online);
 }
 
-/// A panel stops inside a reply for 400 ms, beside one that is well. It has no time of the line to
-/// spend, so the other one is served meanwhile; and still what it says when it goes on is waited
-/// for.
+/// A panel stops inside a reply for 400 ms, beside a healthy one. Its budget is used up, so the
+/// other one is served meanwhile; the rest of its reply is still awaited.
 TEST_F(ArbiterTest, P4AReplyThatBrokeOffIsWaitedForOnceMoreForTheRestOfATimeout) {
     const Bytes reply = modbus::encode_adu(17, kReply);
     const auto ask = [&](std::uint8_t station) {
@@ -150,7 +149,7 @@ TEST_F(ArbiterTest, P4ADamagedReplyIsNotSilence) {
     EXPECT_FALSE(bus.arbiter().health(17).offline());
 }
 
-TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
+TEST_F(ArbiterTest, P4ASilenceWhoseRetryIsNotAwaitedCountsAllTheSame) {
     bus.submit(17, read_at(1), 1);
     ASSERT_EQ(bus.sent.size(), 1u);
     bus.submit(18, read_at(2), 2);
@@ -161,10 +160,9 @@ TEST_F(ArbiterTest, P4ASilenceWhoseRetryNobodyWaitsForCountsAllTheSame) {
     EXPECT_EQ(bus.arbiter().health(17).silent_in_a_row(), 1);
 }
 
-/// How much of the line station 17 takes, its own time and the rests behind it, when from the fifth
-/// second on each of its replies comes `late` behind its request; while one client asks another
-/// panel again and again: that one wants the line also in the moment between an answer and its next
-/// request.
+/// Share of the line that station 17 takes, its own time and the rests after it, if from the fifth
+/// second on each of its replies is `late` after its request; meanwhile one client keeps asking
+/// another panel: it counts as using the line also between an answer and its next request.
 double share_of_late_panel(BusScript& bus, Duration late) {
     std::multimap<TimePoint, std::uint8_t> replies;
     std::size_t seen = 0;

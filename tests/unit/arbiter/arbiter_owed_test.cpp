@@ -1,4 +1,4 @@
-// What is owed (P1): no reply answers a request that it was not given for.
+// Outstanding replies (P1): no reply answers a request that it was not sent for.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,7 +40,7 @@ TEST_F(ArbiterTest, P1WhereTheLineRestsAllWaitUntilALateReplyCanNoLongerCome) {
     EXPECT_EQ(script.answer(other).pdu.value(), kReply);
 }
 
-TEST_F(ArbiterTest, P1ALateReplyOfTheSameShapeAnswersNobodyAndEndsTheRest) {
+TEST_F(ArbiterTest, P1ALateReplyOfTheSameShapeAnswersNoRequestAndEndsTheRest) {
     settings.stations[0].retries = 0;
     BusScript script{settings};
     const Ticket first = script.submit(17, read_at(1), 1);
@@ -69,7 +69,7 @@ TEST_F(ArbiterTest, P1BytesBeforeAReplyCouldHaveBegunAreStaleOnARealLine) {
     EXPECT_EQ(script.answer(ticket).pdu.value(), "03 06 00 01 00 02 00 03"_hex);
 }
 
-TEST_F(ArbiterTest, P1AStationThatSaysItsRepliesTwiceIsLeftAloneUntilTheSecondHasPassed) {
+TEST_F(ArbiterTest, P1AStationThatSendsItsRepliesTwiceRestsUntilTheSecondHasPassed) {
     const auto ask = [&](Client client) {
         bus.submit(17, kRead, client);
         bus.run_to_end_of_request();
@@ -79,7 +79,7 @@ TEST_F(ArbiterTest, P1AStationThatSaysItsRepliesTwiceIsLeftAloneUntilTheSecondHa
     };
     ask(1);
     bus.run_for(80ms);
-    bus.hear_reply(17, kReply);  // the copy
+    bus.hear_reply(17, kReply);  // the duplicate
     bus.run_for(200ms);
     const TimePoint replied = ask(1);
     bus.submit(17, read_at(5), 1);
@@ -129,7 +129,7 @@ TEST_F(ArbiterDoubtTest, P1WhatIsDoubtfulIsNoAnswerForThoseWhoHaveLeftEither) {
     EXPECT_EQ(script.answer(doubted).pdu.error(), Fault::cancelled);
 }
 
-TEST_F(ArbiterDoubtTest, P5AnAnswerThatComesAgainWhenItIsAskedAgainIsBelievedAndNothingIsOwed) {
+TEST_F(ArbiterDoubtTest, P5AnAnswerThatComesAgainWhenAskedAgainIsTrustedAndNothingIsOutstanding) {
     ASSERT_TRUE(script.next_sent(100ms));
     answer(kReply);
     EXPECT_EQ(script.answer(doubted).pdu.value(), kReply);
@@ -137,7 +137,7 @@ TEST_F(ArbiterDoubtTest, P5AnAnswerThatComesAgainWhenItIsAskedAgainIsBelievedAnd
     EXPECT_TRUE(script.next_sent(60ms));
 }
 
-TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
+TEST_F(ArbiterDoubtTest, P1AfterADuplicateTheOutstandingReplyAnswersNoOtherRequest) {
     ASSERT_TRUE(script.next_sent(100ms));
     answer(reply_number(2));
     script.submit(17, read_at(3), 1);
@@ -150,7 +150,7 @@ TEST_F(ArbiterDoubtTest, P1BehindACopyTheReplyThatIsOwedAnswersNobodyElse) {
     EXPECT_EQ(script.next_sent(100ms)->adu, modbus::encode_adu(17, read_at(3)));
 }
 
-TEST_F(ArbiterDoubtTest, P1WhoSaysADoubtfulAnswerOnceMoreSpeaksTwiceAndIsLeftAloneFromThenOn) {
+TEST_F(ArbiterDoubtTest, P1AStationThatRepeatsADoubtfulAnswerSendsTwiceAndRestsFromThenOn) {
     script.run_for(5ms);
     script.hear_reply(17, kReply);
     ASSERT_EQ(script.answer(doubted).pdu.value(), kReply);
@@ -161,7 +161,7 @@ TEST_F(ArbiterDoubtTest, P1WhoSaysADoubtfulAnswerOnceMoreSpeaksTwiceAndIsLeftAlo
     EXPECT_GE(next->at - replied, Duration(5ms)) << "its copy would answer this";
 }
 
-TEST_F(ArbiterTest, P1BehindAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTwiceToo) {
+TEST_F(ArbiterTest, P1AfterAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTwiceToo) {
     bus.submit(17, kRead, 1);
     bus.run_to_end_of_request();
     bus.run_for(3ms);
@@ -173,10 +173,10 @@ TEST_F(ArbiterTest, P1BehindAReplyThatCameDamagedAndThenWholeTheNextOneMayComeTw
     bus.submit(17, read_at(5), 1);
     const auto next = bus.next_sent(300ms);
     ASSERT_TRUE(next);
-    EXPECT_GE(next->at - replied, CopyGuard::kSaidAgain);
+    EXPECT_GE(next->at - replied, DuplicateGuard::kRepeatDelay);
 }
 
-/// A busy panel says so twice and then gives the value: that is no copy.
+/// A busy panel reports busy twice and then gives the value: no duplicate.
 TEST_F(ArbiterTest, P5AnExceptionThatRepeatsAnotherOneIsNotAskedForOnceMore) {
     const auto refuse = [&](std::uint16_t address) {
         const Ticket asked = bus.submit(17, read_at(address), 1);
@@ -191,7 +191,7 @@ TEST_F(ArbiterTest, P5AnExceptionThatRepeatsAnotherOneIsNotAskedForOnceMore) {
     refuse(3);
 }
 
-TEST_F(ArbiterTest, P1WhatWasOwedWhenTheLineWasLostAnswersNobodyWhenItIsBack) {
+TEST_F(ArbiterTest, P1RepliesOutstandingWhenTheLineWasLostAnswerNoRequestWhenItIsBack) {
     bus.submit(17, read_at(1), 1);
     bus.run_to_end_of_request();
     bus.line_down();

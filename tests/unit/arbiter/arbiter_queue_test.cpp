@@ -1,4 +1,4 @@
-// Whose turn it is (P9).
+// Order of the queue (P9).
 #include <gtest/gtest.h>
 
 #include <vector>

@@ -1,4 +1,4 @@
-// What is owed where the way to the wire may hold it back, across connections (P1, P4).
+// Outstanding replies where the transport may delay them, across connections (P1, P4).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,10 +10,10 @@
 namespace panelgate::arbiter {
 namespace {
 
-/// A device server that hangs takes connections all the same: its kernel does.
+/// A device server that hangs still accepts connections: its kernel does.
 class AfterAReset : public ArbiterTest {
   protected:
-    /// A request was sent twice and not answered, then the line was opened anew.
+    /// A request was sent twice and not answered, then the line was reopened.
     AfterAReset() {
         settings.may_stall = true;
         settings.stations[0].late_window = 500ms;
@@ -41,7 +41,7 @@ class AfterAReset : public ArbiterTest {
     Ticket second = 0;
 };
 
-TEST_F(AfterAReset, P1WhatWasOwedBeforeAnswersNobody) {
+TEST_F(AfterAReset, P1EarlierOutstandingRepliesAnswerNoRequest) {
     ask();
     ASSERT_FALSE(read_at_2_was_sent()) << "nothing tells yet that its reply would be its own";
     script->hear_reply(17, kReply);  // the server goes on: the first attempt's
@@ -49,7 +49,7 @@ TEST_F(AfterAReset, P1WhatWasOwedBeforeAnswersNobody) {
     script->hear_reply(17, "03 06 02 2B 00 00 00 65"_hex);  // the second's
     script->run_for(20ms);
     EXPECT_FALSE(script->answered(second));
-    script->hear_reply(17, "03 02 00 01"_hex);  // what was asked to prove the way
+    script->hear_reply(17, "03 02 00 01"_hex);  // the reply to the proof
     script->run_for(20ms);
     ASSERT_TRUE(read_at_2_was_sent()) << "nothing is owed any more";
     script->hear_reply(17, "03 06 00 01 00 02 00 03"_hex);
@@ -57,7 +57,7 @@ TEST_F(AfterAReset, P1WhatWasOwedBeforeAnswersNobody) {
     EXPECT_EQ(script->resets, 0);
 }
 
-TEST_F(AfterAReset, P1WhatIsProvedRestsUntilWhatIsOwedCouldHaveCome) {
+TEST_F(AfterAReset, P1AfterAProofItRestsUntilOutstandingRepliesCouldHaveCome) {
     ask();
     script->hear_reply(17, "03 02 00 01"_hex);
     const TimePoint proved = script->now();
@@ -68,12 +68,12 @@ TEST_F(AfterAReset, P1WhatIsProvedRestsUntilWhatIsOwedCouldHaveCome) {
     EXPECT_GE(script->now() - proved, 900ms) << "the timeout, and as much for being late";
 }
 
-TEST_F(AfterAReset, P1ARefusalMayBeOfWhatIsOwed) {
+TEST_F(AfterAReset, P1AnExceptionMayAnswerAnOutstandingRequest) {
     ask();
     script->hear_reply(17, "83 02"_hex);
     script->run_for(900ms);
     EXPECT_FALSE(read_at_2_was_sent()) << "two are owed yet, of three";
-    script->hear_reply(17, "83 02"_hex);  // what was sent to prove the way is, of another length
+    script->hear_reply(17, "83 02"_hex);  // the answer to the proof, of another length
     while (!read_at_2_was_sent()) ASSERT_TRUE(script->next_sent(2s));
     script->run_to_end_of_request();
     script->hear_reply(17, "83 02"_hex);
@@ -83,7 +83,7 @@ TEST_F(AfterAReset, P1ARefusalMayBeOfWhatIsOwed) {
     EXPECT_EQ(script->resets, 0);
 }
 
-TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked) {
+TEST_F(AfterAReset, APanelThatIsSilentToAProofComesBackByClientRequests) {
     settings.offline.after = 2;  // it has been silent once
     script->apply(settings);
     ask();
@@ -96,19 +96,19 @@ TEST_F(AfterAReset, APanelThatIsSilentToWhatNobodyAskedComesBackByWhatItWasAsked
     EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, read_at(1)));
 }
 
-TEST_F(AfterAReset, APanelThatAnswersWrongWhatNobodyAskedComesBackAsWell) {
+TEST_F(AfterAReset, APanelThatAnswersAProofWronglyComesBackAsWell) {
     ask();
-    const Bytes told_apart = script->sent.back().adu;
+    const Bytes proof = script->sent.back().adu;
     script->hear_reply(17, "03 04 00 01 00 02"_hex);
     script->run_for(1s);
     ASSERT_EQ(script->resets, 1);
     EXPECT_FALSE(script->arbiter().health(17).offline());
     open_anew(2s);
     ask();
-    EXPECT_NE(script->sent.back().adu, told_apart);
+    EXPECT_NE(script->sent.back().adu, proof);
 }
 
-TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
+TEST_F(AfterAReset, P1AfterASecondAnswerItRestsUntilOutstandingRepliesCouldHaveCome) {
     ask();
     script->run_for(1s);
     open_anew(2s);
@@ -116,7 +116,7 @@ TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
     script->hear_reply(17, kReply);
     script->run_for(800ms);
     ASSERT_FALSE(read_at_2_was_sent());
-    script->hear_reply(17, kReply);  // so it was the one before: as many as are owed may follow
+    script->hear_reply(17, kReply);  // an earlier one: as many may follow as are outstanding
     script->run_for(900ms);
     ASSERT_FALSE(read_at_2_was_sent());
     ASSERT_TRUE(script->next_sent(2s));
@@ -124,7 +124,7 @@ TEST_F(AfterAReset, P1WhatIsAnsweredOnceMoreRestsUntilWhatIsOwedCouldHaveCome) {
     EXPECT_EQ(script->resets, 1) << "none for that";
 }
 
-TEST_F(AfterAReset, WhatCannotBeMistakenGoesItselfAndProvesTheWay) {
+TEST_F(AfterAReset, WhatCannotBeMistakenGoesItselfAndProvesTheTransport) {
     const Ticket write = script->submit(17, kWrite, 1);
     script->run_to_end_of_request();
     ASSERT_EQ(script->sent.back().adu, modbus::encode_adu(17, kWrite)) << "reads alone are owed";
@@ -134,10 +134,10 @@ TEST_F(AfterAReset, WhatCannotBeMistakenGoesItselfAndProvesTheWay) {
     EXPECT_EQ(script->resets, 0);
 }
 
-/// Owes the replies to reads and to a write, on a connection before the one that is open.
-class AWriteIsOwed : public AfterAReset {
+/// Replies to reads and to a write are outstanding, from a connection before the open one.
+class AWriteIsOutstanding : public AfterAReset {
   protected:
-    AWriteIsOwed() {
+    AWriteIsOutstanding() {
         const Ticket write = script->submit(17, "06 00 05 00 01"_hex, 1);
         while (!script->answered(write)) script->run_for(10ms);
         open_anew(3s);
@@ -146,21 +146,21 @@ class AWriteIsOwed : public AfterAReset {
     }
 };
 
-TEST_F(AWriteIsOwed, P4AWriteOfAnotherPlaceGoesAtOnce) {
+TEST_F(AWriteIsOutstanding, P4AWriteOfAnotherPlaceGoesAtOnce) {
     EXPECT_EQ(script->sent.back().adu, modbus::encode_adu(17, kWrite)) << "its reply names it";
     script->hear_reply(17, kWrite);
     EXPECT_EQ(script->answer(second).pdu.value(), kWrite);
     EXPECT_EQ(script->resets, 0);
 }
 
-TEST_F(AWriteIsOwed, P1ARefusalOfItAnswersNoOther) {
+TEST_F(AWriteIsOutstanding, P1ARefusalOfItAnswersNoOther) {
     script->hear_reply(17, "86 02"_hex);
     EXPECT_FALSE(script->answered(second));
     script->hear_reply(17, kWrite);
     EXPECT_EQ(script->answer(second).pdu.value(), kWrite);
 }
 
-TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheWay) {
+TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheTransport) {
     const Ticket other = script->submit(18, kRead, 2);
     script->run_to_end_of_request();
     script->hear_reply(18, kReply);

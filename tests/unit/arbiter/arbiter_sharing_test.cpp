@@ -38,7 +38,7 @@ TEST_F(ArbiterTest, P6OneMayJoinWhileTheRequestLeavesButNotLater) {
     EXPECT_TRUE(uart.next_sent());
 }
 
-TEST_F(ArbiterTest, P6NobodyJoinsWhatAFarEndMayHaveAlready) {
+TEST_F(ArbiterTest, P6NoReadJoinsWhatAFarEndMayHaveAlready) {
     bus.submit(17, kRead, 1);
     const Ticket late = bus.submit(17, kRead, 2);
     bus.hear_reply(17, kReply);

@@ -1,4 +1,4 @@
-// Writes, broadcasts and deadlines (P2, P3): nothing is done twice, or for nobody.
+// Writes, broadcasts and deadlines (P2, P3): nothing is sent twice, or without a client.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -24,7 +24,7 @@ TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
     }
 }
 
-TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationSaysSo) {
+TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationAllowsIt) {
     settings.stations[0].retry_writes = true;
     BusScript script{settings};
     script.submit(17, kWrite);
@@ -32,7 +32,7 @@ TEST_F(ArbiterTest, RepeatsAWriteWhenTheStationSaysSo) {
     EXPECT_EQ(script.sent.size(), 2u);
 }
 
-TEST_F(ArbiterTest, P6SaysWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOver) {
+TEST_F(ArbiterTest, P6ReportsWhatAWriteTouchesWhenItLeavesAndWhenItsAttemptIsOver) {
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
     bus.hear_reply(17, kReply);
@@ -95,7 +95,7 @@ TEST_F(ArbiterTest, BroadcastOfSeveralIsAnsweredWithAddressAndQuantity) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), "10 00 64 00 02"_hex);
 }
 
-TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
+TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNoClient) {
     const Ticket broadcast = bus.submit(0, kWrite);
     const Ticket read = bus.submit(17, kRead, 2);
     bus.run_to_end_of_request();
@@ -105,7 +105,7 @@ TEST_F(ArbiterTest, AReplyToABroadcastIsCountedAndGivenToNobody) {
     EXPECT_FALSE(bus.answered(read));
 }
 
-/// Rates may differ by 2 %, and a long request has left that much sooner than we reckon.
+/// Rates may differ by 2 %, and a long request has left that much sooner than computed.
 TEST_F(ArbiterTest, P2AWriteIsConfirmedByAPanelWhoseClockIsFast) {
     const Bytes write = Writer().u8(16).u16(100).u16(123).u8(246).raw(Bytes(246)).take();
     const Bytes confirmation = "10 00 64 00 7B"_hex;
@@ -124,8 +124,8 @@ TEST_F(ArbiterTest, P2AWriteIsConfirmedByAPanelWhoseClockIsFast) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), confirmation);
 }
 
-/// It repeats another one, so it waits for what else may come; meanwhile the process stands still.
-TEST_F(ArbiterTest, P3AReplyThatWasHeldBackIsNotGivenToWhomItIsTooLateFor) {
+/// The reply repeats another one, so it is kept as a candidate; meanwhile the process is stopped.
+TEST_F(ArbiterTest, P3ACandidateIsNotGivenToClientsItIsTooLateFor) {
     bus.submit(17, read_at(1));
     bus.run_to_end_of_request();
     bus.run_for(3ms);

@@ -1,4 +1,4 @@
-// A line whose panels speak ASCII: the same promises.
+// A line in ASCII mode: the same promises.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -104,7 +104,7 @@ TEST_F(AsciiLine, AWrongLrcIsDamageAndTheReadGoesAgainAtOnce) {
     EXPECT_EQ(bus.answer(ticket).pdu.value(), kReply);
 }
 
-TEST_F(AsciiLine, P1ALateReplyAnswersNobodyAndEndsTheRest) {
+TEST_F(AsciiLine, P1ALateReplyAnswersNoRequestAndEndsTheRest) {
     settings.stations[0].retries = 0;
     BusScript script{settings};
     const Ticket first = script.submit(17, read_at(1), 1);
@@ -228,7 +228,7 @@ TEST_F(AsciiLine, ADamagedEchoIsACollision) {
     EXPECT_EQ(script.arbiter().station_counters().at(17).echo_mismatches, 1u);
 }
 
-TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereThatIsSaid) {
+TEST_F(AsciiLine, LowerCaseIsTakenOnlyWhereConfigured) {
     Bytes lower = kReplyText;
     for (std::uint8_t& c : lower) c = static_cast<std::uint8_t>(c >= 'A' && c <= 'F' ? c + 32 : c);
     ASSERT_NE(lower, kReplyText);
@@ -259,7 +259,7 @@ TEST_F(AsciiLine, NothingIsSentIntoAFrameThatHasBegun) {
     EXPECT_LT(sent->at - begun, 30ms);
 }
 
-TEST_F(AsciiLine, AColonAloneHoldsTheLineUpForAMomentOnly) {
+TEST_F(AsciiLine, ASingleColonBlocksTheLineOnlyBriefly) {
     bus.hear(text(":"));
     bus.submit(17, kRead);
     const TimePoint begun = bus.now();
@@ -288,7 +288,7 @@ TEST_F(AsciiLine, AReplyOfUnknownLengthNeedsNoSilence) {
     EXPECT_EQ(bus.answer(ticket).at, bus.now());
 }
 
-TEST_F(AsciiLine, TheTraceHasTheFramesAsRtuSaysThem) {
+TEST_F(AsciiLine, TheTraceHasTheFramesInRtuForm) {
     ask();
     bus.hear_reply(17, kReply);
     ASSERT_EQ(bus.notes.size(), 2u);

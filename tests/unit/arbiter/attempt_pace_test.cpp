@@ -14,7 +14,7 @@ using test::group_of;
 constexpr std::uint8_t kStation = 17;
 const Bytes kReply = "11 03 06 02 2B 00 00 00 64 C8 BA"_hex;
 
-/// What has to be looked at and what need not, while a reply of 11 bytes comes.
+/// Which bytes must be read at once and which need not, while a reply of 11 bytes comes.
 class AttemptPaceTest : public testing::Test {
   protected:
     static Attempt attempt_of(bool may_stall, EchoFilter echo = {}, bool as_asked = false) {
@@ -63,7 +63,7 @@ TEST_F(AttemptPaceTest, TwoLooksAreEnoughWhereTheReplyIsWhatWasAskedFor) {
     EXPECT_EQ(hear(1, 11), Verdict::replied);
 }
 
-TEST_F(AttemptPaceTest, TellsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
+TEST_F(AttemptPaceTest, ReportsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
     for (const std::size_t there : {std::size_t{10}, std::size_t{11}}) {
         attempt_ = attempt_of(false, {}, true);
         hear(0, 1);
@@ -76,18 +76,18 @@ TEST_F(AttemptPaceTest, TellsWhetherTheReplyWasThereWhenItsEndWasLookedAt) {
     }
 }
 
-TEST_F(AttemptPaceTest, AnExceptionThatNobodyForesawTellsNothingOfTheEndAndWhenItBeganIsKnown) {
+TEST_F(AttemptPaceTest, AnUnexpectedExceptionShowsNothingAboutTheEndAndWhenItBeganIsKnown) {
     attempt_ = attempt_of(false, {}, true);
     hear(0, 1);
     now_ = start_ + 11 * kCharacter;
     const Bytes rest = "83 02 C1 34"_hex;
     EXPECT_EQ(attempt_.on_rx(now_, rest, [](ByteView) { return true; }), Verdict::replied);
-    EXPECT_TRUE(attempt_.overslept());
+    EXPECT_TRUE(attempt_.unexpected_exception());
     EXPECT_FALSE(attempt_.end_look());
     EXPECT_EQ(attempt_.first_sign(now_), 5ms + kCharacter);
 }
 
-TEST_F(AttemptPaceTest, ALookBeforeItsTimeTellsNothingOfTheEnd) {
+TEST_F(AttemptPaceTest, ALookBeforeItsTimeShowsNothingAboutTheEnd) {
     attempt_ = attempt_of(false, {}, true);
     hear(0, 1);
     hear(1, 5);
@@ -95,13 +95,13 @@ TEST_F(AttemptPaceTest, ALookBeforeItsTimeTellsNothingOfTheEnd) {
     EXPECT_EQ(busy(), 11 * kCharacter);
 }
 
-TEST_F(AttemptPaceTest, WhoseRepliesAreOverSoonerIsLookedAtSooner) {
+TEST_F(AttemptPaceTest, RepliesThatEndSoonerAreLookedAtSooner) {
     Drift drift;
     for (int i = 0; i < 50; ++i) drift.on_look(11 * kCharacter, true);
     Settings line;
     Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
     timing.patience = timing.usual = 500ms;
-    timing.notice = 40us;
+    timing.wake_latency = 40us;
     timing.drift = drift;
     attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
     hear(0, 1);
@@ -115,7 +115,7 @@ TEST_F(AttemptPaceTest, AShortReplyIsSleptThroughAllTheSame) {
     line.serial.baud = 921600;
     Attempt::Timing timing = Attempt::timing_of(line, TimePoint{1h}, 8, Duration::zero());
     timing.patience = timing.usual = 500ms;
-    timing.notice = Notice::kMost;
+    timing.wake_latency = WakeLatency::kMost;
     timing.as_asked = true;
     attempt_ = Attempt(group_of(kStation, "03 00 6B 00 03"_hex), timing, {});
     const Duration character = character_time(line.serial);
@@ -137,7 +137,7 @@ TEST_F(AttemptPaceTest, ALateLookAtTheFirstByteIsMadeUpForByAnyBetterOne) {
     EXPECT_EQ(busy(), 11 * kCharacter);
 }
 
-TEST_F(AttemptPaceTest, BytesThatAreLateAreWantedOneByOneUntilTheNextTells) {
+TEST_F(AttemptPaceTest, BytesThatAreLateAreWantedOneByOneUntilTheNextDecides) {
     hear(0, 3);
     start_ += 4ms;  // a hole
     now_ = start_ + 7 * kCharacter;
@@ -197,7 +197,7 @@ TEST_F(AttemptPaceTest, OverTcpNothingComesAtTheRateOfTheLine) {
     EXPECT_EQ(attempt_.busy_until(), std::nullopt);
 }
 
-TEST_F(AttemptPaceTest, WhatBeginsLikeAnEchoThatNobodyExpectsIsLookedAtWhenTheReplyIsThere) {
+TEST_F(AttemptPaceTest, WhatBeginsLikeAnUnexpectedEchoIsLookedAtWhenTheReplyIsThere) {
     attempt_ =
         attempt_of(false, {"11 03 00 6B 00 03 76 87"_hex, EchoFilter::Expect::perhaps}, true);
     hear(0, 1);

@@ -29,11 +29,11 @@ Attempt::Timing timing_of(Duration patience, Duration usual) {
 
 class AttemptTest : public testing::Test {
   protected:
-    /// So long after the request had left.
+    /// This long after the request had left.
     Verdict hear(Duration after, const Bytes& bytes) {
         return attempt_.on_rx(attempt_.timing().sent + after, bytes, ends_);
     }
-    /// Asks at each deadline until there is a verdict; when that was, in ended_.
+    /// Calls on_deadline until there is a verdict; its time is in ended_.
     Verdict run_to_verdict() {
         for (int i = 0; i < 100; ++i) {
             const TimePoint due = attempt_.deadline();
@@ -63,7 +63,7 @@ TEST_F(AttemptTest, AReplyMayComeBehindNoiseAndBehindAnotherStationsFrame) {
     EXPECT_EQ(hear(20ms, encode_adu(kStation + 1, kReply)), Verdict::open);
     EXPECT_EQ(hear(40ms, encode_adu(kStation, kReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
-    EXPECT_FALSE(attempt_.take_strays().empty());
+    EXPECT_FALSE(attempt_.take_unsolicited().empty());
 }
 
 TEST_F(AttemptTest, AHoleInAReplyIsWaitedForAndALongerOneMakesItDamage) {
@@ -93,7 +93,7 @@ TEST_F(AttemptTest, DamageDoesNotEndItBeforeTheStationsUsualTime) {
     EXPECT_EQ(hear(90ms, encode_adu(kStation, kReply)), Verdict::replied);
 }
 
-TEST_F(AttemptTest, AGoodFrameOfTheStationThatDoesNotAnswerEndsItWhereItIsNoStray) {
+TEST_F(AttemptTest, AGoodFrameOfTheStationThatDoesNotAnswerEndsItUnlessUnsolicited) {
     Attempt other = attempt_;
     EXPECT_EQ(hear(10ms, encode_adu(kStation, kOfOtherShape)), Verdict::wrong);
     std::swap(attempt_, other);
@@ -105,16 +105,16 @@ TEST_F(AttemptTest, AGoodFrameOfTheStationThatDoesNotAnswerEndsItWhereItIsNoStra
 TEST_F(AttemptTest, P1ARejectedReplyCountsAsHeardAndTheNextOneAnswers) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
     attempt_.reject_reply();
-    const auto strays = attempt_.take_strays();
-    ASSERT_EQ(strays.size(), 1u);
-    EXPECT_EQ(strays[0].bytes, encode_adu(kStation, kReply));
+    const auto unsolicited = attempt_.take_unsolicited();
+    ASSERT_EQ(unsolicited.size(), 1u);
+    EXPECT_EQ(unsolicited[0].bytes, encode_adu(kStation, kReply));
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kOtherReply);
 }
 
-TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
+TEST_F(AttemptTest, P1ACandidateAnswersWhenNothingElseCameInTheTimeThatTheStationNeeds) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
-    attempt_.hold_reply(60ms, false);
+    attempt_.keep_candidate(60ms, false);
     Attempt other = attempt_;
     EXPECT_EQ(hear(15ms, "FF FF"_hex), Verdict::open);
     EXPECT_EQ(attempt_.on_deadline(attempt_.timing().sent + 60ms - 1ns, ends_), Verdict::open);
@@ -124,28 +124,28 @@ TEST_F(AttemptTest, P1AReplyThatIsHeldAnswersWhenNothingElseCameInTheTimeThatThe
     std::swap(attempt_, other);
     EXPECT_EQ(hear(50ms, encode_adu(kStation, kOtherReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kOtherReply);
-    const auto strays = attempt_.take_strays();
-    ASSERT_EQ(strays.size(), 1u);
-    EXPECT_EQ(strays[0].bytes, encode_adu(kStation, kReply));
+    const auto unsolicited = attempt_.take_unsolicited();
+    ASSERT_EQ(unsolicited.size(), 1u);
+    EXPECT_EQ(unsolicited[0].bytes, encode_adu(kStation, kReply));
 }
 
-TEST_F(AttemptTest, P1WhereCopiesAreKnownTheReplyThatIsHeldIsNoAnswer) {
+TEST_F(AttemptTest, P1WhereDuplicatesAreKnownTheCandidateIsNoAnswer) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
-    attempt_.hold_reply(60ms, true);
+    attempt_.keep_candidate(60ms, true);
     EXPECT_EQ(run_to_verdict(), Verdict::doubtful) << "and it is asked once more";
     EXPECT_EQ(ended_, Duration(70ms)) << "a copy may have kept it from saying its own";
-    EXPECT_TRUE(attempt_.take_strays().empty()) << "it proves no copy either";
+    EXPECT_TRUE(attempt_.take_unsolicited().empty()) << "it proves no copy either";
 }
 
-TEST_F(AttemptTest, P1WhatIsHeldAndComesOnceMoreIsTheAnswerAndTellsOfNoCopy) {
+TEST_F(AttemptTest, P1ACandidateThatComesOnceMoreIsTheAnswerAndShowsNoDuplicate) {
     ASSERT_EQ(hear(10ms, encode_adu(kStation, kReply)), Verdict::replied);
-    attempt_.hold_reply(60ms, true);
+    attempt_.keep_candidate(60ms, true);
     EXPECT_EQ(hear(30ms, encode_adu(kStation, kReply)), Verdict::replied);
     EXPECT_EQ(attempt_.reply(), kReply);
-    EXPECT_TRUE(attempt_.take_strays().empty());
+    EXPECT_TRUE(attempt_.take_unsolicited().empty());
 }
 
-TEST_F(AttemptTest, P6ARepeatedReadTakesNobodyAlong) {
+TEST_F(AttemptTest, P6NoReadJoinsARepeatedOne) {
     Attempt::Timing timing = attempt_.timing();
     timing.tolerance = 1ms;  // of a real UART
     const Attempt first(group_of(kStation, kRead), timing, {});
@@ -153,10 +153,10 @@ TEST_F(AttemptTest, P6ARepeatedReadTakesNobodyAlong) {
     const Job job = group_of(kStation, "03 00 6C 00 01"_hex).jobs[0];
     const Duration whole = timing.sent - timing.started;
     const TimePoint leaving = timing.sent - whole / 40;
-    EXPECT_TRUE(first.takes_along(leaving, job));
-    EXPECT_FALSE(first.takes_along(timing.sent - whole / 100, job)) << "the rate may be off";
-    EXPECT_FALSE(attempt_.takes_along(leaving, job)) << "the far end may have it already";
-    EXPECT_FALSE(retry.takes_along(leaving, job));
+    EXPECT_TRUE(first.can_join(leaving, job));
+    EXPECT_FALSE(first.can_join(timing.sent - whole / 100, job)) << "the rate may be off";
+    EXPECT_FALSE(attempt_.can_join(leaving, job)) << "the far end may have it already";
+    EXPECT_FALSE(retry.can_join(leaving, job));
 }
 
 }  // namespace

@@ -86,8 +86,8 @@ TEST_F(BacklogTest, P2ACancelledClientHasNothingLeftAndTheOthersOfASharedRetryHa
     EXPECT_TRUE(backlog_.cancel(1).empty());
 }
 
-/// Those who left while it was on the wire are still among its jobs.
-TEST_F(BacklogTest, P2ARetryEndsWithTheLastWhoWaitsForIt) {
+/// Clients that left while it was on the wire are still among its jobs.
+TEST_F(BacklogTest, P2ARetryEndsWithTheLastClientThatWaitsForIt) {
     Job left = read(1, 17);
     left.gone = true;
     retry({read(2, 17), left, read(3, 17)});

@@ -1,4 +1,4 @@
-// What a panel that answers broadcasts, as none should, may be taken for (P8).
+// What the replies of a panel that wrongly answers broadcasts may be taken for (P8).
 
 #include "panelgate/arbiter/outstanding.hpp"
 
@@ -89,13 +89,13 @@ TEST_F(ArbiterBehindABroadcast, OthersGoMeanwhile) {
     EXPECT_EQ(sent(read_at(7), left + 110ms), left + settings.broadcast_turnaround);
 }
 
-TEST_F(ArbiterBehindABroadcast, WhoWasNeverHeardHasItsResponseTimeout) {
+TEST_F(ArbiterBehindABroadcast, AStationNeverHeardHasItsResponseTimeout) {
     const TimePoint left = broadcast();
     bus.submit(17, kToOne, 2, PriorityClass::write);
     EXPECT_EQ(sent(kToOne, left + 1s), left + settings.unlisted.response_timeout);
 }
 
-TEST_F(ArbiterBehindABroadcast, WhoHasAnsweredOneIsWaitedForAsForAnyReplyThatItOwes) {
+TEST_F(ArbiterBehindABroadcast, AStationThatHasAnsweredOneIsWaitedForAsForAnyOutstandingReply) {
     teach(20ms);
     broadcast();
     bus.run_for(20ms);

@@ -15,7 +15,7 @@ TEST(ClientNames, TheLastNameCountsUntilTheClientHasGone) {
     EXPECT_EQ(names.of(7), "a client without a name");
 }
 
-TEST(ClientNames, P9AreBoundedAndWhoIsKnownMayChangeItsName) {
+TEST(ClientNames, P9AreBoundedAndAKnownClientMayChangeItsName) {
     ClientNames names;
     for (Client client = 1; client <= ClientNames::kClients + 1; ++client) names.set(client, "x");
     EXPECT_EQ(names.of(ClientNames::kClients), "x");

@@ -1,4 +1,4 @@
-// What panels that do not answer, or not always, cost those beside them (P4), in virtual time.
+// What panels that do not answer, or not always, cost the other panels (P4), in virtual time.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 using test::BusScript;
 
-constexpr std::uint8_t kOdd = 3;
+constexpr std::uint8_t kFlaky = 3;
 constexpr std::array<std::uint8_t, 4> kHealthy{1, 2, 4, 5};
 constexpr Duration kQuick = 3ms;
 const Bytes kRead = "03 00 00 00 01"_hex;
@@ -39,10 +39,10 @@ Settings five_stations() {
 /// Five panels on a line, and clients each of which asks again as soon as it is answered.
 class Plant {
   public:
-    /// After how long station 3 answers the request of this number to it; nothing: never.
-    using Odd = std::function<std::optional<Duration>(int)>;
+    /// Think time of station 3 for its n-th request; empty: no answer.
+    using Pattern = std::function<std::optional<Duration>(int)>;
 
-    explicit Plant(Odd odd) : odd_(std::move(odd)) {}
+    explicit Plant(Pattern pattern) : pattern_(std::move(pattern)) {}
 
     /// A client that asks these stations in turn.
     void add_client(std::vector<std::uint8_t> stations) {
@@ -62,7 +62,8 @@ class Plant {
         }
     }
     void forget() { vain_.clear(), started_ = bus.now(), answers.clear(), faults.clear(); }
-    /// Of the time since then, taken by requests to these stations that were not answered in time.
+    /// Share of the time since then taken by requests to these stations that were not answered in
+    /// time.
     double share_in_vain(std::uint8_t from, std::uint8_t to) const {
         Duration all{};
         for (const auto& [station, cost] : vain_) {
@@ -100,7 +101,7 @@ class Plant {
             if (ticket) client.open = *ticket;
         }
     }
-    /// What has left since the last time, and what is to be heard now.
+    /// Handles what was sent since the last call, and what is heard now.
     void speak() {
         for (; seen_ < bus.sent.size(); ++seen_) {
             const auto& [at, adu, what] = bus.sent[seen_];
@@ -108,7 +109,7 @@ class Plant {
             open_ = adu[0];
             open_since_ = at;
             const int number = asked[open_]++;
-            const auto after = open_ == kOdd ? odd_(number) : std::optional<Duration>(kQuick);
+            const auto after = open_ == kFlaky ? pattern_(number) : std::optional<Duration>(kQuick);
             const TimePoint end = at + wire_time(bus.settings().serial, adu.size());
             if (open_ <= 5 && after) replies_.push_back({end + *after, open_});
         }
@@ -121,7 +122,7 @@ class Plant {
         bus.hear_reply(station, Writer().u8(3).u8(2).u16(++value_).take());
     }
 
-    Odd odd_;
+    Pattern pattern_;
     std::vector<ClientOf> clients_;
     std::vector<Reply> replies_;
     std::size_t seen_ = 0;
@@ -140,7 +141,7 @@ std::optional<Duration> when(bool answers, Duration after = kQuick) {
     return answers ? std::optional(after) : std::nullopt;
 }
 
-class Intermittent : public testing::TestWithParam<Plant::Odd> {};
+class Intermittent : public testing::TestWithParam<Plant::Pattern> {};
 
 TEST_P(Intermittent, P4PanelsFailuresTakeAFifthOfALineThatOthersWant) {
     Plant plant(GetParam());
@@ -148,8 +149,8 @@ TEST_P(Intermittent, P4PanelsFailuresTakeAFifthOfALineThatOthersWant) {
     plant.run_for(10s);
     plant.forget();
     plant.run_for(100s);
-    EXPECT_LE(plant.share_in_vain(kOdd, kOdd), 0.21);
-    EXPECT_GT(plant.asked[kOdd], 20) << "and it is asked all the same";
+    EXPECT_LE(plant.share_in_vain(kFlaky, kFlaky), 0.21);
+    EXPECT_GT(plant.asked[kFlaky], 20) << "and it is asked all the same";
     EXPECT_EQ(plant.faults[1], 0);
 }
 
@@ -174,30 +175,30 @@ TEST(Costs, P4APanelThatLosesOneFrameInTwentyHardlyNotices) {
     add_one_client_each(plant);
     plant.run_for(300s);
     // Both of two attempts fail in one of 400.
-    EXPECT_GT(plant.answers[kOdd], 2000);
-    EXPECT_LT(plant.faults[kOdd] * 200, plant.answers[kOdd]);
+    EXPECT_GT(plant.answers[kFlaky], 2000);
+    EXPECT_LT(plant.faults[kFlaky] * 200, plant.answers[kFlaky]);
 }
 
 TEST(Costs, P4APanelThatNeedsAlmostItsTimeoutIsNeverCutShort) {
     Plant plant([](int n) { return when(n % 20 != 7, 480ms); });
     add_one_client_each(plant);
     plant.run_for(120s);
-    EXPECT_EQ(plant.faults[kOdd], 0);
-    EXPECT_GT(plant.answers[kOdd], 100);
+    EXPECT_EQ(plant.faults[kFlaky], 0);
+    EXPECT_GT(plant.answers[kFlaky], 100);
 }
 
 TEST(Costs, P4AnIntermittentPanelThatIsAloneIsRetriedAndWaitedFor) {
     Plant plant([](int n) { return when(n % 2 == 0); });
-    plant.add_client({kOdd});
+    plant.add_client({kFlaky});
     plant.run_for(30s);
-    EXPECT_EQ(plant.faults[kOdd], 0);
-    EXPECT_GT(plant.answers[kOdd], 20);
+    EXPECT_EQ(plant.faults[kFlaky], 0);
+    EXPECT_GT(plant.answers[kFlaky], 20);
 }
 
-TEST(Costs, P4IdsThatNobodyHasHeardTakeAFifthAtFirstAndALittleInTheLongRun) {
+TEST(Costs, P4UnheardIdsTakeAFifthAtFirstAndALittleInTheLongRun) {
     Plant plant([](int) { return std::nullopt; });
     for (const std::uint8_t id : kHealthy) plant.add_client({id});
-    plant.add_client({kOdd});
+    plant.add_client({kFlaky});
     plant.run_for(8s);
     std::vector<std::uint8_t> strangers;
     for (std::uint8_t id = 6; id < 247; ++id) strangers.push_back(id);
@@ -207,11 +208,11 @@ TEST(Costs, P4IdsThatNobodyHasHeardTakeAFifthAtFirstAndALittleInTheLongRun) {
     EXPECT_LE(plant.share_in_vain(6, 247), 0.25);
     plant.run_for(40s);
     plant.forget();
-    const int before = plant.asked[kOdd];
+    const int before = plant.asked[kFlaky];
     plant.run_for(100s);
     EXPECT_LE(plant.share_in_vain(6, 247), 0.025);
-    EXPECT_LE(plant.share_in_vain(kOdd, 247), 0.05);
-    EXPECT_GT(plant.asked[kOdd] - before, 10) << "the configured one is probed all the same";
+    EXPECT_LE(plant.share_in_vain(kFlaky, 247), 0.05);
+    EXPECT_GT(plant.asked[kFlaky] - before, 10) << "the configured one is probed all the same";
 }
 
 TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
@@ -223,22 +224,22 @@ TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
         bus.hear_reply(station, Writer().u8(3).u8(2).u16(value).take());
     };
     for (const Duration needs : {kQuick, Duration(300ms)}) {
-        bus.submit(kOdd, kRead, 7);
-        answer(kOdd, needs, static_cast<std::uint16_t>(needs / 1ms));
+        bus.submit(kFlaky, kRead, 7);
+        answer(kFlaky, needs, static_cast<std::uint16_t>(needs / 1ms));
         bus.run_for(60s);
-        bus.submit(kOdd, kRead, 7);
+        bus.submit(kFlaky, kRead, 7);
         for (const std::uint8_t id : kHealthy) bus.submit(id, kRead, id);
         const std::size_t first = bus.sent.size();
         std::vector<std::uint8_t> order;
         while (bus.sent.back().kind != FrameKind::retry) {
             ASSERT_TRUE(bus.next_sent(2s));
             order.push_back(bus.sent.back().adu[0]);
-            if (order.back() != kOdd)
+            if (order.back() != kFlaky)
                 answer(order.back(), kQuick, static_cast<std::uint16_t>(bus.sent.size()));
         }
         const std::size_t others = bus.sent.size() - first - 1;
         EXPECT_EQ(others, needs == kQuick ? 1u : 4u);
-        answer(kOdd, kQuick, 9);
+        answer(kFlaky, kQuick, 9);
         bus.run_for(60s);
     }
 }

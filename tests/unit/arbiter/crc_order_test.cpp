@@ -46,7 +46,7 @@ TEST_F(BothOrders, P1TheOtherOrderIsNoReply) {
     EXPECT_EQ(line.arbiter().station_counters().at(17).symptoms.crc_swapped, 1u);
 }
 
-TEST_F(BothOrders, P1ALateReplyOfTheOtherKindIsKnownAndAnswersNobody) {
+TEST_F(BothOrders, P1ALateReplyOfTheOtherKindIsKnownAndAnswersNoRequest) {
     BusScript line = script();
     const Ticket silent = line.submit(17, read_at(1), 1);
     const Ticket other = line.submit(18, read_at(2), 2);

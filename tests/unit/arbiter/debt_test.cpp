@@ -16,85 +16,87 @@ const Bytes kRefusal = "83 02"_hex;
 
 TimePoint at(Duration since) { return TimePoint{} + since; }
 
-TEST(Debt, TakesTheOldestThatAReplyMayAnswer) {
-    Debt debt;
-    debt.add(at(1s), kThree);
-    debt.add(at(2s), kThree);
-    debt.add(at(3s), kTwo);
-    EXPECT_EQ(debt.take(kReplyOfTwo), kTwo);
-    EXPECT_EQ(debt.oldest(kReplyOfThree)->sent, at(1s));
-    EXPECT_EQ(debt.take(kReplyOfThree), kThree);
-    EXPECT_EQ(debt.oldest(kReplyOfThree)->sent, at(2s));
-    EXPECT_EQ(debt.take(kReplyOfTwo), Bytes{});
-    EXPECT_EQ(debt.size(), 1u);
+TEST(OutstandingReplies, TakesTheOldestThatAReplyMayAnswer) {
+    OutstandingReplies outstanding;
+    outstanding.add(at(1s), kThree);
+    outstanding.add(at(2s), kThree);
+    outstanding.add(at(3s), kTwo);
+    EXPECT_EQ(outstanding.take(kReplyOfTwo), kTwo);
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree)->sent, at(1s));
+    EXPECT_EQ(outstanding.take(kReplyOfThree), kThree);
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree)->sent, at(2s));
+    EXPECT_EQ(outstanding.take(kReplyOfTwo), Bytes{});
+    EXPECT_EQ(outstanding.size(), 1u);
 }
 
-TEST(Debt, ARefusalMayBeOfAny) {
-    Debt debt;
-    debt.add(at(1s), kThree);
-    debt.add(at(2s), kTwo);
-    EXPECT_TRUE(debt.fits(kRefusal));
-    EXPECT_EQ(debt.take(kRefusal), kThree);
+TEST(OutstandingReplies, ARefusalMayBeOfAny) {
+    OutstandingReplies outstanding;
+    outstanding.add(at(1s), kThree);
+    outstanding.add(at(2s), kTwo);
+    EXPECT_TRUE(outstanding.fits(kRefusal));
+    EXPECT_EQ(outstanding.take(kRefusal), kThree);
 }
 
-TEST(Debt, PassesOverWhatCouldNotComeAnyMore) {
-    Debt debt;
-    debt.add(at(1s), kThree);
-    debt.add(at(2s), kThree);
-    EXPECT_EQ(debt.oldest(kReplyOfThree, at(1s))->sent, at(2s));
-    EXPECT_EQ(debt.oldest(kReplyOfThree, at(5s))->sent, at(2s)) << "the last, where none could";
-    EXPECT_EQ(debt.oldest(kReplyOfTwo, at(0s)), nullptr);
+TEST(OutstandingReplies, PassesOverWhatCouldNotComeAnyMore) {
+    OutstandingReplies outstanding;
+    outstanding.add(at(1s), kThree);
+    outstanding.add(at(2s), kThree);
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree, at(1s))->sent, at(2s));
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree, at(5s))->sent, at(2s))
+        << "the last, where none could";
+    EXPECT_EQ(outstanding.oldest(kReplyOfTwo, at(0s)), nullptr);
 }
 
-TEST(Debt, TellsWhetherAReadsReplyWouldBeItsOwn) {
-    Debt debt;
-    debt.add(at(1s), kThree);
+TEST(OutstandingReplies, KnowsWhetherAReadsReplyWouldBeItsOwn) {
+    OutstandingReplies outstanding;
+    outstanding.add(at(1s), kThree);
     const auto ambiguous = [&](const Bytes& pdu, bool again = false) {
-        return debt.is_ambiguous(test::request_of(pdu), again);
+        return outstanding.is_ambiguous(test::request_of(pdu), again);
     };
     EXPECT_TRUE(ambiguous("03 00 00 00 03"_hex)) << "of another place, but as long";
     EXPECT_FALSE(ambiguous(kTwo));
     EXPECT_FALSE(ambiguous("04 00 64 00 03"_hex));
-    debt.add(at(2s), "01 00 00 00 08"_hex);
+    outstanding.add(at(2s), "01 00 00 00 08"_hex);
     EXPECT_TRUE(ambiguous("01 00 00 00 01"_hex)) << "a byte each";
     EXPECT_FALSE(ambiguous("01 00 00 00 09"_hex));
     EXPECT_TRUE(ambiguous(kThree)) << "asked anew, its value would be too old";
     EXPECT_FALSE(ambiguous(kThree, true)) << "repeated, it is an answer";
-    debt.add(at(3s), "06 00 01 00 07"_hex);
+    outstanding.add(at(3s), "06 00 01 00 07"_hex);
     EXPECT_FALSE(ambiguous("06 00 01 00 08"_hex)) << "the reply names the value";
     EXPECT_TRUE(ambiguous("06 00 01 00 07"_hex));
-    debt.add(at(4s), "10 00 01 00 01 02 00 07"_hex);
+    outstanding.add(at(4s), "10 00 01 00 01 02 00 07"_hex);
     EXPECT_TRUE(ambiguous("10 00 01 00 01 02 00 08"_hex)) << "and that of 10 only the count";
 }
 
-TEST(Debt, StationsServeInTurn) {
-    Debt debt;
-    debt.add(at(1s), kThree);
-    debt.add(at(3s), kTwo);
-    debt.add(at(5s), kThree);
-    debt.close_before(at(5s), at(2s));
-    EXPECT_EQ(debt.size(), 2U);
-    EXPECT_EQ(debt.oldest(kReplyOfThree)->sent, at(1s)) << "of another connection";
-    EXPECT_FALSE(debt.fits(kReplyOfTwo));
-    debt.close_before(at(9s), {});
-    EXPECT_TRUE(debt.empty());
+TEST(OutstandingReplies, StationsServeInTurn) {
+    OutstandingReplies outstanding;
+    outstanding.add(at(1s), kThree);
+    outstanding.add(at(3s), kTwo);
+    outstanding.add(at(5s), kThree);
+    outstanding.close_before(at(5s), at(2s));
+    EXPECT_EQ(outstanding.size(), 2U);
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree)->sent, at(1s)) << "of another connection";
+    EXPECT_FALSE(outstanding.fits(kReplyOfTwo));
+    outstanding.close_before(at(9s), {});
+    EXPECT_TRUE(outstanding.empty());
 }
 
-TEST(Debt, IsOnlyOfOneRequest) {
-    Debt debt;
-    EXPECT_FALSE(debt.is_only(kThree));
-    debt.add(at(1s), kThree);
-    EXPECT_TRUE(debt.is_only(kThree));
-    debt.add(at(2s), kTwo);
-    EXPECT_FALSE(debt.is_only(kThree));
-    EXPECT_EQ(debt.last_sent(), at(2s));
+TEST(OutstandingReplies, IsOnlyOfOneRequest) {
+    OutstandingReplies outstanding;
+    EXPECT_FALSE(outstanding.is_only(kThree));
+    outstanding.add(at(1s), kThree);
+    EXPECT_TRUE(outstanding.is_only(kThree));
+    outstanding.add(at(2s), kTwo);
+    EXPECT_FALSE(outstanding.is_only(kThree));
+    EXPECT_EQ(outstanding.last_sent(), at(2s));
 }
 
-TEST(Debt, ForgetsTheOldestOfTooMany) {
-    Debt debt;
-    for (std::size_t i = 0; i < Debt::kMost + 2; ++i) debt.add(at(std::chrono::seconds(i)), kThree);
-    EXPECT_EQ(debt.size(), Debt::kMost);
-    EXPECT_EQ(debt.oldest(kReplyOfThree)->sent, at(2s));
+TEST(OutstandingReplies, ForgetsTheOldestOfTooMany) {
+    OutstandingReplies outstanding;
+    for (std::size_t i = 0; i < OutstandingReplies::kMost + 2; ++i)
+        outstanding.add(at(std::chrono::seconds(i)), kThree);
+    EXPECT_EQ(outstanding.size(), OutstandingReplies::kMost);
+    EXPECT_EQ(outstanding.oldest(kReplyOfThree)->sent, at(2s));
 }
 
 }  // namespace

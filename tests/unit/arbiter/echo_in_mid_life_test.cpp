@@ -20,7 +20,7 @@ class EchoInMidLife : public Echo {
         hear_echo(bus);
         EXPECT_FALSE(bus.answered(write));
     }
-    /// A read goes out that tells.
+    /// A read is sent that detects the echo.
     void ask() {
         ASSERT_TRUE(bus.next_sent(600ms));
         ASSERT_EQ(bus.sent.back().kind, FrameKind::learn_echo);
@@ -64,7 +64,7 @@ TEST_F(EchoInMidLife, P2AnAnswerThatWasJustQuickConfirmsTheWriteOnce) {
     EXPECT_EQ(writes, 1);
 }
 
-TEST_F(EchoInMidLife, P2ARefusedReadTellsAsWellAndTheWriteIsNotRepeated) {
+TEST_F(EchoInMidLife, P2ARefusedReadDecidesAsWellAndTheWriteIsNotRepeated) {
     ask();
     bus.run_to_end_of_request();
     reply(bus, "83 02"_hex);

@@ -36,7 +36,7 @@ TEST(EchoFilter, TakesTheWholeFrameOutInAnyPieces) {
     }
 }
 
-TEST(EchoFilter, TellsADifferenceAndGivesBackWhatItHeld) {
+TEST(EchoFilter, DetectsADifferenceAndReturnsWhatItBuffered) {
     EchoFilter sure(kFrame, Expect::certainly);
     EXPECT_TRUE(sure.feed("11 06 00"_hex).empty());
     EXPECT_EQ(copy(sure.feed("FF 01"_hex)), "11 06 00 FF 01"_hex);
@@ -146,7 +146,7 @@ TEST(EchoMemory, P8AnEchoThatMayHaveBeenTheAnswerItselfIsLearnedAgain) {
     EXPECT_EQ(memory.state(), EchoState::absent);
 }
 
-TEST(EchoMemory, P8FewRepliesWithoutTheEchoThatWasHeardTellNotThatThereIsNoneAnyMore) {
+TEST(EchoMemory, P8AFewRepliesWithoutAnEchoDoNotShowThatAKnownEchoIsGone) {
     EchoMemory memory(EchoMode::automatic);
     EXPECT_TRUE(memory.on_echo(test::request_of(kRead)));
     memory.on_mismatch();
@@ -160,7 +160,7 @@ TEST(EchoMemory, P8FewRepliesWithoutTheEchoThatWasHeardTellNotThatThereIsNoneAny
     EXPECT_FALSE(memory.expects_one()) << "another device";
 }
 
-TEST_F(Echo, P8AReplyBehindAFrameOfSomebodyTellsNothingAboutAnEcho) {
+TEST_F(Echo, P8AReplyAfterAForeignFrameShowsNothingAboutAnEcho) {
     BusScript bus(settings(EchoMode::automatic));
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -169,7 +169,7 @@ TEST_F(Echo, P8AReplyBehindAFrameOfSomebodyTellsNothingAboutAnEcho) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::unknown);
 }
 
-TEST_F(Echo, P8AReplyBehindARequestOfAnotherMasterTellsNothingAboutAnEcho) {
+TEST_F(Echo, P8AReplyAfterARequestOfAnotherMasterShowsNothingAboutAnEcho) {
     BusScript bus(settings(EchoMode::automatic));
     bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -209,7 +209,7 @@ TEST_F(Echo, P8TheFirstWriteToASilentStationIsNotTransmitted) {
     for (const auto& sent : bus.sent) EXPECT_EQ(sent.adu[1], 3);
 }
 
-TEST_F(Echo, P8ALineWhereAReadDidNotTellConfirmsNothingByOneFrame) {
+TEST_F(Echo, P8ALineWhereAReadWasInconclusiveConfirmsNothingByOneFrame) {
     BusScript bus(settings(EchoMode::automatic));
     const Ticket ticket = bus.submit(17, kWriteCoil);
     const Bytes tail(bus.sent[0].adu.begin() + 2, bus.sent[0].adu.end());
@@ -260,7 +260,7 @@ TEST_F(Echo, P8AnAdapterThatNoLongerHearsItselfIsLearnedAnew) {
     EXPECT_EQ(bus.arbiter().echo(), EchoState::absent);
 }
 
-TEST_F(Echo, P1WhatComesBeforeTheEchoIsSomebodyElses) {
+TEST_F(Echo, P1AFrameBeforeTheEchoIsAnotherMasters) {
     for (const EchoMode mode : {EchoMode::automatic, EchoMode::on}) {
         BusScript bus(settings(mode));
         read_once(bus, true);
@@ -287,7 +287,7 @@ TEST_F(Echo, P8AWriteIsNotConfirmedByWhatComesBeforeItsEcho) {
     EXPECT_FALSE(bus.answer(ticket).pdu);
 }
 
-TEST_F(Echo, P1AReplyBehindAnotherMastersQuestionOfItsShapeIsNobodys) {
+TEST_F(Echo, P1AReplyAfterAnotherMastersRequestOfItsShapeIsAmbiguous) {
     BusScript bus(settings(EchoMode::off));
     const Ticket ticket = bus.submit(17, kRead);
     bus.run_to_end_of_request();
@@ -296,7 +296,7 @@ TEST_F(Echo, P1AReplyBehindAnotherMastersQuestionOfItsShapeIsNobodys) {
     EXPECT_FALSE(bus.answered(ticket));
     bus.run_for(2s);
     EXPECT_EQ(bus.answer(ticket).pdu.error(), Fault::damaged) << "not silent";
-    // What it asks for besides is told apart.
+    // Reads beyond it are distinguished.
     const Ticket next = bus.submit(17, kRead);
     bus.run_to_end_of_request();
     bus.hear(modbus::encode_adu(17, "03 00 00 00 01"_hex));
@@ -316,7 +316,7 @@ TEST_F(Echo, P8AnEchoThatTheConfigurationDeniesIsFoundAllTheSame) {
     EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
 }
 
-TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurnaround) {
+TEST_F(Echo, P8TheEchoOfABroadcastIsNoForeignFrameAndTheNextRequestLeavesAtTheTurnaround) {
     BusScript bus(settings(EchoMode::on));
     bus.submit(0, kWriteRegister, 1);
     const TimePoint start = bus.now();
@@ -328,7 +328,7 @@ TEST_F(Echo, P8TheEchoOfABroadcastIsNobodysFrameAndTheNextRequestLeavesAtTheTurn
     EXPECT_EQ(bus.arbiter().station_counters().at(17).discarded_bytes, 0u);
 }
 
-TEST_F(Echo, P8TheEchoOfARequestNobodyAnswersIsNoSignOfLife) {
+TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
     BusScript bus(settings(EchoMode::on));
     for (int i = 0; i < 3; ++i) {
         const Ticket ticket = bus.submit(17, kRead);

@@ -1,4 +1,4 @@
-// What is told of each transaction: its number, its instants, and how it ended.
+// What is reported of each transaction: its number, its instants, and how it ended.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -16,7 +16,7 @@ class ExchangeTest : public testing::Test {
         settings.explain = true;
         settings.paced = true;
     }
-    /// Asks 17, lets its reply come byte by byte behind 5 ms.
+    /// Asks 17; its reply comes byte by byte after 5 ms.
     void answer_one(BusScript& bus) {
         bus.submit(17, kRead);
         bus.run_to_end_of_request();
@@ -33,7 +33,7 @@ class ExchangeTest : public testing::Test {
     Settings settings = settings_38400();
 };
 
-TEST_F(ExchangeTest, TellsWhenWhatOfATransactionHappened) {
+TEST_F(ExchangeTest, ReportsTheInstantsOfATransaction) {
     BusScript bus{settings};
     const TimePoint asked = bus.now();
     answer_one(bus);
@@ -95,7 +95,7 @@ TEST_F(ExchangeTest, ReadsThatShareATransactionNameTheSame) {
     EXPECT_EQ(bus.answer(two).transactions, std::vector<Transaction>{2});
 }
 
-TEST_F(ExchangeTest, SaysWhatWasDamagedWrongBroadcastOrLost) {
+TEST_F(ExchangeTest, ReportsWhatWasDamagedWrongBroadcastOrLost) {
     settings.unlisted.retries = settings.stations[0].retries = settings.stations[1].retries = 0;
     BusScript bus{settings};
     bus.submit(17, kRead);
@@ -124,7 +124,7 @@ TEST_F(ExchangeTest, WhatIsRefusedHasCostNone) {
     EXPECT_TRUE(bus.exchanges.empty());
 }
 
-TEST_F(ExchangeTest, NobodyIsToldWhoDoesNotWantItExplained) {
+TEST_F(ExchangeTest, NothingIsReportedWithoutExplain) {
     settings.explain = false;
     BusScript bus{settings};
     answer_one(bus);

@@ -16,18 +16,18 @@ using test::any;
 
 class JobQueueLimits : public test::QueueFixture {
   protected:
-    /// Of the one that had to go, 0 when it was none; the newcomer was taken.
+    /// Ticket of the dropped job, 0: none; the newcomer was taken.
     Ticket shed_for(Job job) {
-        const auto admission = queue_.push(std::move(job));
-        EXPECT_TRUE(admission.taken);
+        const auto pushed = queue_.push(std::move(job));
+        EXPECT_TRUE(pushed.taken);
         EXPECT_TRUE(queue_.consistent());
-        return admission.shed.empty() ? 0 : admission.shed.front().ticket;
+        return pushed.shed.empty() ? 0 : pushed.shed.front().ticket;
     }
     bool refuses(Job job) {
-        const auto admission = queue_.push(std::move(job));
-        EXPECT_TRUE(admission.taken || admission.shed.empty());
+        const auto pushed = queue_.push(std::move(job));
+        EXPECT_TRUE(pushed.taken || pushed.shed.empty());
         EXPECT_TRUE(queue_.consistent());
-        return !admission.taken;
+        return !pushed.taken;
     }
 };
 
@@ -47,8 +47,8 @@ TEST_F(JobQueueLimits, P9RefusesMoreThanTheLimitWhenAllHaveTheSame) {
     EXPECT_TRUE(refuses(read(1, 1)));
 }
 
-/// Else one of them would lose every time, and nothing of it would ever be served.
-TEST_F(JobQueueLimits, P9OfThoseWhoAreEquallyGreedyTheNewestRequestGoes) {
+/// Otherwise the same client would lose every time and never be served.
+TEST_F(JobQueueLimits, P9OfEquallyGreedyClientsTheNewestRequestGoes) {
     limits(3, 4);
     const Ticket first = add(read(1, 1, 100));
     const Ticket second = add(read(3, 1, 100));
@@ -85,7 +85,7 @@ TEST_F(JobQueueLimits, P6ContainedReadsCountOnceWhicheverCameFirst) {
     EXPECT_EQ(queue_.size(), 4u);
     queue_.remove_if([&](const Job& job) { return job.ticket == wide; });
     EXPECT_TRUE(queue_.consistent());
-    EXPECT_EQ(queue_.size(), 5u);  // the first two count again; 17 rides on 17 and 18
+    EXPECT_EQ(queue_.size(), 5u);  // the first two count again; 17 is carried by 17 and 18
 }
 
 TEST_F(JobQueueLimits, P6AReadThatRidesIsTakenWhenTheQueueIsFull) {
@@ -132,7 +132,7 @@ TEST_F(JobQueueLimits, P9PollsGoBeforeReadsAndReadsBeforeWrites) {
     EXPECT_TRUE(queue_.has(1, 1) && write_ != 0);
 }
 
-/// Else nobody would ever read beside more writers than there are places.
+/// Otherwise no client could read beside more writers than there are places.
 TEST_F(JobQueueLimits, P9WritesLeaveAFifthOfThePlacesToReads) {
     limits(5, 5);
     for (Client client = 1; client <= 3; ++client) add(write(client, 1));
@@ -162,7 +162,7 @@ TEST_F(JobQueueLimits, P9AWriteTakesThePlaceOfAReadEvenOfItsOwn) {
     EXPECT_EQ(shed_for(write(1, 4)), own);
 }
 
-TEST_F(JobQueueLimits, P9AFloodOfWritesDoesNotTakeTheReadsOfThoseWhoHaveLess) {
+TEST_F(JobQueueLimits, P9AFloodOfWritesDoesNotDropTheReadsOfClientsWithLess) {
     limits(6, 6);
     for (std::uint8_t station = 1; station <= 4; ++station) add(write(1, station));
     add(read(2, 1));
@@ -220,13 +220,13 @@ void plays_beside_a_flood(Host flood, Host polite, PriorityClass priority) {
                 .client = client,
                 .host = host,
                 .priority = as};
-        auto admission = queue.push(std::move(job));
-        for (const Job& shed : admission.shed) {
+        auto pushed = queue.push(std::move(job));
+        for (const Job& shed : pushed.shed) {
             EXPECT_NE(shed.client, 1000u);
             --open[shed.client];
         }
-        if (admission.taken) ++open[client];
-        return admission.taken;
+        if (pushed.taken) ++open[client];
+        return pushed.taken;
     };
     constexpr Client kPolite = 1000;
     int longest = 0;

@@ -104,15 +104,15 @@ class Model {
     }
     static Host own(const Job& job) { return job.host == 0 ? 1000 + job.client : job.host; }
 
-    void check_admission(const Job& job, const JobQueue::Admission& admission) const {
+    void check_admission(const Job& job, const JobQueue::PushResult& pushed) const {
         const std::size_t size = counting([](const Job&) { return true; });
         if (rides(job) || (size < settings_.limit && of_client(job) < settings_.per_client)) {
-            EXPECT_TRUE(admission.taken && admission.shed.empty());
+            EXPECT_TRUE(pushed.taken && pushed.shed.empty());
         } else if (of_client(job) >= settings_.per_client) {
-            EXPECT_FALSE(admission.taken);
+            EXPECT_FALSE(pushed.taken);
         } else {
-            EXPECT_EQ(admission.taken, !admission.shed.empty());
-            if (!admission.shed.empty()) check_shed(job, admission.shed.front(), size);
+            EXPECT_EQ(pushed.taken, !pushed.shed.empty());
+            if (!pushed.shed.empty()) check_shed(job, pushed.shed.front(), size);
         }
     }
 
@@ -185,11 +185,11 @@ class JobQueueBesideAModel : public JobQueueModel {
   protected:
     void push() {
         const Job job = any_job(9, 4, 12);
-        const auto admission = queue_.push(job);
-        model_.check_admission(job, admission);
-        for (const Job& shed : admission.shed) model_.remove(shed.ticket);
-        if (admission.taken) model_.add(job);
-        shed_ += static_cast<int>(admission.shed.size());
+        const auto pushed = queue_.push(job);
+        model_.check_admission(job, pushed);
+        for (const Job& shed : pushed.shed) model_.remove(shed.ticket);
+        if (pushed.taken) model_.add(job);
+        shed_ += static_cast<int>(pushed.shed.size());
     }
     void pop() {
         const auto test = any_test();

@@ -39,21 +39,21 @@ TEST_F(JobQueueTest, StationsOfOneClientDoNotWaitForEachOther) {
     EXPECT_EQ(next([](const Job& job) { return job.station != 7; }), 0u);
 }
 
-TEST_F(JobQueueTest, ABroadcastWaitsForWhatIsOlderAndHoldsWhatIsYounger) {
+TEST_F(JobQueueTest, ABroadcastWaitsForOlderJobsAndDelaysYoungerOnes) {
     const Ticket older = add(read(1, 7));
     const Ticket broadcast = add(write(1, 0));
     const Ticket younger = add(write(1, 8));
-    const Ticket stranger = add(read(2, 7));
+    const Ticket of_other_client = add(read(2, 7));
     std::vector<Ticket> first;
     queue_.any_first([&](const Job& job) {
         first.push_back(job.ticket);
         return false;
     });
-    EXPECT_THAT(first, ElementsAre(older, stranger));
-    EXPECT_THAT(drain(), ElementsAre(older, broadcast, younger, stranger));
+    EXPECT_THAT(first, ElementsAre(older, of_other_client));
+    EXPECT_THAT(drain(), ElementsAre(older, broadcast, younger, of_other_client));
 }
 
-TEST_F(JobQueueTest, WhoWaitsBehindABroadcastIsNotTakenAlong) {
+TEST_F(JobQueueTest, AJobBehindABroadcastIsNotTakenAlong) {
     add(write(1, 0));
     add(read(1, 7));
     const Ticket free = add(read(2, 7));
@@ -112,8 +112,8 @@ TEST_F(JobQueueTest, P9APollGetsEveryTenthTurnBesideReadsOrWrites) {
     }
 }
 
-/// Runnable or not at random: whoever could have run all the time got its turn.
-TEST_F(JobQueueTest, P9NobodyWaitsLongerThanItsTurnsWhateverTheOthersMay) {
+/// Runnable or not at random: a job that was always runnable got its turn.
+TEST_F(JobQueueTest, P9NoJobWaitsLongerThanItsTurnsWhateverTheOthersMay) {
     for (const PriorityClass steady : {PriorityClass::read, PriorityClass::poll}) {
         queue_ = JobQueue(QueueSettings{});
         unsigned random = 1;
@@ -212,7 +212,7 @@ TEST_F(JobQueueTest, KnowsWhatWaitsForAStation) {
     EXPECT_TRUE(queue_.has(1, 8));
 }
 
-TEST_F(JobQueueTest, TellsTheEarliestMomentAtWhichOneIsTooLate) {
+TEST_F(JobQueueTest, KnowsTheEarliestMomentAtWhichOneIsTooLate) {
     EXPECT_FALSE(queue_.first_expiry());
     for (const Duration at : {5s, 3s, 4s}) {
         Job late = read(1, 1);

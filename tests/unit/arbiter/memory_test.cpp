@@ -104,7 +104,7 @@ TEST(AdaptiveTimeout, OfALineAnswersTheClientEarlyAndStillWaitsForALateReply) {
     EXPECT_GT(bus.next_sent()->at - start, Duration(900ms)) << "where it is not answered";
 }
 
-TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
+TEST(Explain, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
     Settings settings = settings_with(0s);
     settings.explain = true;
     settings.quarantine = Quarantine::line;
@@ -128,7 +128,7 @@ TEST(Explain, SaysWhyEachRequestGoesNowAndWhyOneIsRefused) {
               "nobody but this request for 500.0 ms: station 17 did not answer and may do so late");
 }
 
-TEST(Explain, SaysWhyAReadThatWasAnsweredIsAskedOnceMore) {
+TEST(Explain, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
     Settings settings = settings_with(0s);
     settings.explain = true;
     BusScript bus(settings);

@@ -11,7 +11,7 @@ TEST(ProbeBudget, AllowsTheFirstAtOnce) {
     EXPECT_TRUE(ProbeBudget(ProbeBudget::kOffline).allows(kStart));
 }
 
-TEST(ProbeBudget, P4WhoSpendsWheneverItMayStaysAtItsShare) {
+TEST(ProbeBudget, P4SpendingWheneverAllowedStaysAtTheShare) {
     for (const double share : {ProbeBudget::kOffline, ProbeBudget::kFailing}) {
         ProbeBudget budget(share);
         TimePoint now = kStart;
@@ -36,7 +36,7 @@ TEST(ProbeBudget, AllowsNothingBeforeItsTimeAndSomethingThen) {
     EXPECT_TRUE(budget.allows(budget.next()));
 }
 
-TEST(ProbeBudget, TimeInWhichNothingWasSpentIsNotSavedUp) {
+TEST(ProbeBudget, UnusedTimeIsNotSavedUp) {
     ProbeBudget budget(0.2);
     budget.spend(kStart, 100ms);
     const Duration rest = budget.next() - kStart;
@@ -44,7 +44,7 @@ TEST(ProbeBudget, TimeInWhichNothingWasSpentIsNotSavedUp) {
     EXPECT_EQ(budget.next() - (kStart + 1h), rest);
 }
 
-TEST(ProbeBudget, P4WhatIsSpentAllTheSameIsADebtAndPaidUpToALimit) {
+TEST(ProbeBudget, P4AnExcessIsPaidOffUpToALimit) {
     ProbeBudget budget(0.2);
     for (int i = 1; i <= 3; ++i) budget.spend(kStart + i * 100ms, 100ms, 1h);
     EXPECT_EQ(budget.next(), kStart + 1500ms) << "a fifth of that time was spent";

@@ -38,7 +38,7 @@ TEST_F(QuietTest, TheGapFollowsAReplyThatCameBeforeTheRequestCanHaveLeft) {
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 56ms);
 }
 
-TEST_F(QuietTest, BytesThatNobodyAskedForPostponeTheNextRequest) {
+TEST_F(QuietTest, UnsolicitedBytesPostponeTheNextRequest) {
     quiet_.on_noise(kStart + 50ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 60ms);
 }
@@ -62,7 +62,7 @@ TEST_F(QuietTest, BytesWithPausesAreFramesHoweverManyTheyAre) {
     }
 }
 
-TEST_F(QuietTest, RestsAsLongAsTheLongestThatItWasToldAndUntilThatIsOver) {
+TEST_F(QuietTest, RestsForTheLongestRequestedTimeAndUntilThatIsOver) {
     quiet_.rest_until(kStart + 300ms);
     quiet_.rest_until(kStart + 200ms);
     EXPECT_EQ(quiet_.free_at(kGap), kStart + 300ms);
@@ -78,7 +78,7 @@ TEST_F(QuietTest, P1AQuarantineLastsUntilTheLatestInstantThatItWasGiven) {
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 600ms);
 }
 
-TEST_F(QuietTest, P1OnlyTheStationThatOwesLiftsItsQuarantine) {
+TEST_F(QuietTest, P1OnlyTheStationWithOutstandingRepliesLiftsItsQuarantine) {
     quiet_.quarantine(kStart, 17, kStart + 500ms);
     quiet_.lift(kStart, 18);
     EXPECT_EQ(quiet_.quarantined_until(), kStart + 500ms);
@@ -86,7 +86,7 @@ TEST_F(QuietTest, P1OnlyTheStationThatOwesLiftsItsQuarantine) {
     EXPECT_LE(quiet_.quarantined_until(), kStart);
 }
 
-TEST_F(QuietTest, TellsOnceHowMuchOfAQuarantineHasPassed) {
+TEST_F(QuietTest, ReportsOnceHowMuchOfAQuarantineHasPassed) {
     EXPECT_EQ(quiet_.take_rested(kStart + 1s), 0ms);
     quiet_.quarantine(kStart + 1s, 17, kStart + 1500ms);
     EXPECT_EQ(quiet_.take_rested(kStart + 1200ms), 200ms);

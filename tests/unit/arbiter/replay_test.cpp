@@ -1,5 +1,5 @@
 // Every script again with a fault at each of its steps: whatever goes wrong when, each request gets
-// one answer, the line comes to rest, and nothing is sent for nobody.
+// one answer, the line becomes idle, and nothing is sent without a client.
 
 #include <gtest/gtest.h>
 
@@ -215,7 +215,7 @@ TEST_P(Replay, EndsWellWithAFaultAtAnyStep) {
 INSTANTIATE_TEST_SUITE_P(Every, Replay, testing::ValuesIn(kScripts),
                          [](const auto& info) { return std::string(info.param.name); });
 
-/// What was recorded is what was done.
+/// The recorded steps equal the executed ones.
 TEST(BusScript, PlaysWhatItRecorded) {
     for (const Script& script : kScripts) {
         BusScript bus(settings_of(script));

@@ -6,16 +6,16 @@ namespace panelgate::arbiter {
 namespace {
 
 struct ReplyEnd {
-    Duration early(Duration reply) const { return notice.early() + drift.early(reply); }
+    Duration early(Duration reply) const { return wake_latency.early() + drift.early(reply); }
     void on_look(Duration reply, bool whole) {
-        notice.on_look(whole);
+        wake_latency.on_look(whole);
         drift.on_look(reply, whole);
     }
-    Notice notice;
+    WakeLatency wake_latency;
     Drift drift;
 };
 
-/// Replies that are over when `over` says, of so long a reply by the line's rate.
+/// Replies that end when `over` says, for a reply of this duration at the line's rate.
 template <class Over>
 int whole_looks(ReplyEnd& end, int looks, Over over) {
     int whole = 0;
@@ -30,7 +30,7 @@ int whole_looks(ReplyEnd& end, int looks, Over over) {
 
 double us(Duration d) { return 1e3 * to_milliseconds(d); }
 
-TEST(ReplyEnd, IsWhatTheRateSaysUntilALookTells) { EXPECT_EQ(ReplyEnd().early(3ms), 0ms); }
+TEST(ReplyEnd, IsByTheRateUntilALookShowsIt) { EXPECT_EQ(ReplyEnd().early(3ms), 0ms); }
 
 TEST(ReplyEnd, FollowsAPanelWhoseClockIsFastOrSlow) {
     for (const int percent : {-2, 0, 2}) {

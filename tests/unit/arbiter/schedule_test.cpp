@@ -37,7 +37,7 @@ class ScheduleTest : public testing::Test {
         echo = EchoMemory(settings.echo);
     }
     static Bytes read_of(unsigned address) { return Writer().u8(3).u16(address).u16(1).take(); }
-    /// A read, or a write, of a client of its own, that touches no other one.
+    /// A read or a write of its own client, that touches no other one.
     Job job(std::uint8_t station, bool write = false) {
         const auto address = static_cast<unsigned>(10 * ++ticket);
         const Bytes pdu = write ? Writer().u8(6).u16(address).u16(1).take() : read_of(address);
@@ -61,7 +61,7 @@ class ScheduleTest : public testing::Test {
         return {.jobs = {one}, .station = station, .request = one.request, .attempts = 1};
     }
     Schedule::Next next() { return schedule.next(now, stations, quiet, echo); }
-    /// Which stations are asked, one after the other: "2 1 r3", r for what goes again.
+    /// The stations asked, in order: "2 1 r3", r for retries.
     std::string order(std::size_t most = 99) {
         std::string text;
         for (; most > 0; --most) {
@@ -128,7 +128,7 @@ TEST_F(ScheduleTest, P4ADearRetryLeavesTheOthersNoMoreTimeThanItMayTake) {
     EXPECT_EQ(order(), "r1 3") << "what the others took counts";
 }
 
-TEST_F(ScheduleTest, P4WhoHasManyClientsDoesNotHaveAllTurnsBeforeADearRetry) {
+TEST_F(ScheduleTest, P4AStationWithManyClientsDoesNotHaveAllTurnsBeforeALongRetry) {
     for (int i = 0; i < 6; ++i) wait(2);
     wait(3);
     schedule.retry(now, failed(1), kDear);
@@ -150,17 +150,17 @@ TEST_F(ScheduleTest, NothingElseGoesToAStationBeforeItsRetry) {
     EXPECT_EQ(order(), "r1 1 1");
 }
 
-TEST_F(ScheduleTest, P1AStationThatOwesAReplyIsPassedOver) {
+TEST_F(ScheduleTest, P1AStationWithAnOutstandingReplyIsPassedOver) {
     wait(1);
     wait(2);
-    stations.of(1).owe(now, read_of(9999), now - 500ms);
+    stations.of(1).add_outstanding(now, read_of(9999), now - 500ms);
     EXPECT_EQ(order(), "2");
     EXPECT_EQ(schedule.next_start(stations, quiet), stations.of(1).rested());
     now = stations.of(1).rested();
     EXPECT_EQ(order(), "1");
 }
 
-TEST_F(ScheduleTest, P1WhileTheLineRestsNobodyIsAsked) {
+TEST_F(ScheduleTest, P1WhileTheLineRestsNoStationIsAsked) {
     wait(2);
     quiet.quarantine(now, 1, now + 100ms);
     EXPECT_EQ(order(), "");
@@ -186,7 +186,7 @@ TEST_F(ScheduleTest, P4AProbeGoesWhenTheLineIsFreeAndOnABusyOneWhenItHasWaited) 
     EXPECT_EQ(order(1), "1") << "but not for ever";
 }
 
-TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadTellsWhetherTheLineHearsItself) {
+TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadShowsWhetherTheLineHasAnEcho) {
     settings.echo = EchoMode::automatic;
     rebuild();
     const Ticket write = wait(1, true);
@@ -203,7 +203,7 @@ TEST_F(ScheduleTest, P8BeforeTheFirstWriteAReadTellsWhetherTheLineHearsItself) {
     EXPECT_EQ(writing->jobs.front().ticket, write);
 }
 
-TEST_F(ScheduleTest, ABroadcastGoesAloneAndToNobody) {
+TEST_F(ScheduleTest, ABroadcastGoesAloneAndToNoStation) {
     wait(0, true);
     const auto group = next().group;
     ASSERT_TRUE(group);
@@ -211,22 +211,22 @@ TEST_F(ScheduleTest, ABroadcastGoesAloneAndToNobody) {
     EXPECT_EQ(group->jobs.size(), 1u);
 }
 
-TEST_F(ScheduleTest, P1OnALineThatMayStallWhatIsOwedWantsANewWay) {
+TEST_F(ScheduleTest, P1OnALineThatMayStallOutstandingRepliesNeedAReopening) {
     settings.may_stall = true;
     rebuild();
     wait(1);
-    stations.of(1).owe(now, read_of(9999), now - 500ms);
+    stations.of(1).add_outstanding(now, read_of(9999), now - 500ms);
     now = stations.of(1).rested();
-    EXPECT_TRUE(next().new_way);
-    schedule.on_way_opened(now);
+    EXPECT_TRUE(next().reopen);
+    schedule.on_transport_opened(now);
     const auto proof = next();
     ASSERT_TRUE(proof.group) << "a connection proves nothing";
     EXPECT_TRUE(proof.group->probe);
     EXPECT_NE(proof.group->request.reply_length(), test::request_of(read_of(9999)).reply_length())
         << "no reply to one is one to the other";
-    schedule.on_way_proved(now);
+    schedule.on_transport_proved(now);
     const auto proved = next();
-    EXPECT_FALSE(proved.new_way) << "something that was sent later has been answered";
+    EXPECT_FALSE(proved.reopen) << "something that was sent later has been answered";
     ASSERT_TRUE(proved.group);
     EXPECT_FALSE(proved.group->probe);
 }
@@ -234,7 +234,7 @@ TEST_F(ScheduleTest, P1OnALineThatMayStallWhatIsOwedWantsANewWay) {
 TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
     const Group group = failed(1);
     Station& station = stations.of(1);
-    station.owe(now, group.request.pdu(), now - 500ms);
+    station.add_outstanding(now, group.request.pdu(), now - 500ms);
     EXPECT_FALSE(schedule.line_rests_until(now, group, now - 500ms, station))
         << "its replies have never been late";
     settings.quarantine = Quarantine::line;
@@ -246,7 +246,7 @@ TEST_F(ScheduleTest, P1TheWholeLineRestsWhereTheConfigurationSaysSo) {
         << "a probe lets the others go on";
 }
 
-TEST_F(ScheduleTest, PartsOfWhatWasAskedForTogetherGoAgainButThoseOfWhoHasLeft) {
+TEST_F(ScheduleTest, PartsOfAJoinedReadGoAgainExceptForClientsThatHaveLeft) {
     Group group = failed(1);
     group.jobs.push_back(job(1));
     group.jobs.push_back(job(1));

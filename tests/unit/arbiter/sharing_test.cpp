@@ -18,7 +18,7 @@ Bytes registers(unsigned address, unsigned count) {
 
 class SharingTest : public test::QueueFixture {
   protected:
-    /// One whose profile vouches for this many registers; 0: nobody does.
+    /// A station whose profile guarantees this many registers; 0: none does.
     static Station station_that_takes(std::uint16_t count) {
         StationSettings settings;
         settings.id = 1;
@@ -56,7 +56,7 @@ TEST_F(SharingTest, P6ReadsThatTouchAreJoinedAlsoByOneThatLiesBetween) {
     EXPECT_TRUE(group.joined());
 }
 
-TEST_F(SharingTest, P6NothingIsReadThatNobodyAskedFor) {
+TEST_F(SharingTest, P6NothingIsReadThatNoClientAskedFor) {
     wait(registers(13, 2));
     wait("04 00 0C 00 01"_hex);
     wait("06 00 0A 00 01"_hex);
@@ -102,7 +102,7 @@ TEST_F(SharingTest, P6AJoinThatDidNotComeAboutIsRememberedAndItsPartsGoAlone) {
     EXPECT_LT(gather(registers(10, 2)).jobs.size(), 3u) << "the whole was refused";
 }
 
-TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
+TEST_F(SharingTest, AClientThatAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
     wait(registers(10, 2));
     wait(registers(12, 1));
     Group group = gather(registers(10, 4));
@@ -114,12 +114,12 @@ TEST_F(SharingTest, WhoAskedForTheWholeStaysWithItWhenTheOthersAreSplitOff) {
     EXPECT_TRUE(gather(registers(10, 4)).joined()) << "no join was refused";
 }
 
-TEST_F(SharingTest, P2WhoHasLeftIsNotAskedForAgainWhenAJoinIsSplit) {
+TEST_F(SharingTest, P2ForAClientThatHasLeftNothingIsSentWhenAJoinIsSplit) {
     wait(registers(12, 2));
     wait(registers(14, 2));
     Group group = gather(registers(10, 2));
     ASSERT_TRUE(group.joined());
-    group.on_gone(group.jobs[1].client);
+    group.on_client_gone(group.jobs[1].client);
     const Ticket gone = group.jobs[1].ticket;
     EXPECT_EQ(sharing_.split(group).size(), 2u);
     ASSERT_EQ(group.jobs.size(), 1u);

@@ -19,7 +19,7 @@ class StationHealthTest : public testing::Test {
     TimePoint now{1h};
 };
 
-TEST_F(StationHealthTest, NobodyKnowsItBeforeTheFirstTry) {
+TEST_F(StationHealthTest, IsUnknownBeforeTheFirstTry) {
     EXPECT_EQ(health.state(), Health::unknown);
     EXPECT_FALSE(health.last_success());
 }
@@ -63,7 +63,7 @@ TEST_F(StationHealthTest, EachReturnFromASilenceMayHaveBeenARestart) {
     EXPECT_EQ(health.returns(), 3u);
 }
 
-TEST_F(StationHealthTest, OneThatNobodyWaitsForAgainGoesAtTheFirstSilence) {
+TEST_F(StationHealthTest, OneThatIsNotAwaitedAgainGoesAtTheFirstSilence) {
     EXPECT_TRUE(health.on_silence(now, true));
     EXPECT_TRUE(health.offline());
 }

@@ -35,14 +35,14 @@ class StationTest : public testing::Test {
         station_.on_reply(now_, attempt, 30ms, 25ms);
     }
     void answer(const Bytes& request, const Bytes& reply) { answer(group_of(kId, request), reply); }
-    /// A request was waited for in vain.
+    /// A request was not answered.
     void miss(const Bytes& request, Verdict verdict = Verdict::silent) {
         const TimePoint sent = now_;
         now_ += kTimeout;
         station_.on_failed(now_, verdict, kTimeout);
-        station_.owe(now_, request, sent);
+        station_.add_outstanding(now_, request, sent);
     }
-    /// This request goes there, for the first time or again.
+    /// This request is sent, for the first time or again.
     bool may_ask(TimePoint now, const Bytes& pdu) const {
         return now >= station_.clear_at(test::request_of(pdu), true);
     }
@@ -54,7 +54,7 @@ class StationTest : public testing::Test {
     TimePoint now_{1h};
 };
 
-TEST_F(StationTest, P1WhatOwesAReplyMayOnlyBeAskedTheVerySameUntilItHasRested) {
+TEST_F(StationTest, P1WithAnOutstandingReplyOnlyTheVerySameMayBeAskedUntilItHasRested) {
     EXPECT_TRUE(may_ask(now_, kOther));
     miss(kRead);
     const TimePoint rested = station_.rested();
@@ -62,30 +62,30 @@ TEST_F(StationTest, P1WhatOwesAReplyMayOnlyBeAskedTheVerySameUntilItHasRested) {
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(rested - 1ns, kOther));
     station_.on_asked(rested - 1ns, group_of(kId, kRead));
-    EXPECT_TRUE(station_.owes());
+    EXPECT_TRUE(station_.has_outstanding());
     EXPECT_TRUE(may_ask(rested, kOther));
     station_.on_asked(rested, group_of(kId, kOther));
-    EXPECT_FALSE(station_.owes()) << "it has lapsed";
+    EXPECT_FALSE(station_.has_outstanding()) << "it has lapsed";
 }
 
-TEST_F(StationTest, P1EachAttemptIsOwedAReplyAndTheLastOneThatComesEndsTheRest) {
+TEST_F(StationTest, P1EachAttemptHasAnOutstandingReplyAndTheLastOneThatComesEndsTheRest) {
     miss(kRead);
     miss(kRead);
-    answer(group_of(kId, kRead, 3), kReply);  // nobody knows to which of the three
-    const auto first = station_.on_stray_frame(now_ + 10ms, kOtherValue);
-    EXPECT_EQ(first.stray, Stray::late);
+    answer(group_of(kId, kRead, 3), kReply);  // to which of the three is unknown
+    const auto first = station_.on_unsolicited_frame(now_ + 10ms, kOtherValue);
+    EXPECT_EQ(first.kind, Unsolicited::late);
     EXPECT_EQ(first.lateness, Duration(0)) << "what can no longer come makes no other look late";
     EXPECT_FALSE(first.settled);
     EXPECT_FALSE(may_ask(now_ + 10ms, kOther));
-    const auto second = station_.on_stray_frame(now_ + 20ms, kThirdValue);
-    EXPECT_EQ(second.stray, Stray::late);
+    const auto second = station_.on_unsolicited_frame(now_ + 20ms, kThirdValue);
+    EXPECT_EQ(second.kind, Unsolicited::late);
     EXPECT_TRUE(second.settled);
-    EXPECT_FALSE(station_.owes());
+    EXPECT_FALSE(station_.has_outstanding());
     EXPECT_TRUE(may_ask(now_ + 20ms, kOther));
 }
 
-/// It may be what came damaged, said once more: then the reply to the repeated request still comes.
-TEST_F(StationTest, P1BehindADamagedReplyOneThatHasBeenLateOwesAReplyToTheRepeatedRequest) {
+/// It may be the damaged reply resent: then the reply to the retry still comes.
+TEST_F(StationTest, P1AfterADamagedReplyTheRetrysReplyOfALateStationIsOutstanding) {
     const auto repeat = [&] {
         now_ += 2s;
         station_.on_asked(now_, group_of(kId, kRead));
@@ -100,27 +100,27 @@ TEST_F(StationTest, P1BehindADamagedReplyOneThatHasBeenLateOwesAReplyToTheRepeat
     for (int i = 0; i < 2; ++i) {
         now_ += 2s;
         miss(kRead);
-        station_.on_stray_frame(now_ + 50ms, kReply);
+        station_.on_unsolicited_frame(now_ + 50ms, kReply);
     }
     EXPECT_GT(station_.worst_lateness(), Duration(0));
     repeat();
-    EXPECT_TRUE(station_.owes());
+    EXPECT_TRUE(station_.has_outstanding());
     EXPECT_FALSE(may_ask(now_ + kTimeout, kOther));
 }
 
-TEST_F(StationTest, P1WhatRepeatsTheReplyBeforeItMayBeACopyAndWhatIsOwedStillComes) {
+TEST_F(StationTest, P1ARepetitionOfThePreviousReplyMayBeADuplicateAndTheOutstandingOneStillComes) {
     miss(kRead);
     answer(group_of(kId, kRead, 2), kReply);
-    const auto same = station_.on_stray_frame(now_ + 20ms, kReply);
-    EXPECT_EQ(same.stray, Stray::late) << "as a rule";
+    const auto same = station_.on_unsolicited_frame(now_ + 20ms, kReply);
+    EXPECT_EQ(same.kind, Unsolicited::late) << "as a rule";
     EXPECT_FALSE(same.settled);
-    EXPECT_TRUE(station_.owes());
-    const auto other = station_.on_stray_frame(now_ + 40ms, kOtherValue);
+    EXPECT_TRUE(station_.has_outstanding());
+    const auto other = station_.on_unsolicited_frame(now_ + 40ms, kOtherValue);
     EXPECT_TRUE(other.settled);
     EXPECT_TRUE(may_ask(now_ + 40ms, kOther)) << "copies are not its habit yet";
 }
 
-TEST_F(StationTest, P1ACopyThatIsHeardAmidBytesThatAreNoFrameTellsThatTheStationSpeaksTwice) {
+TEST_F(StationTest, P1ADuplicateAmidDamagedBytesShowsThatTheStationSendsTwice) {
     answer(kRead, kReply);
     Bytes heard = "23 03"_hex;
     const Bytes adu = modbus::encode_adu(kId, kReply);
@@ -132,20 +132,20 @@ TEST_F(StationTest, P1ACopyThatIsHeardAmidBytesThatAreNoFrameTellsThatTheStation
     EXPECT_TRUE(may_ask(now_ + 100ms, kOther));
 }
 
-TEST_F(StationTest, P1ACopyThatIsKnownOnlyBehindTheReplyThatItPrecededHoldsTheStationAllTheSame) {
+TEST_F(StationTest, P1ADuplicateDetectedAfterTheReplyThatItPrecededMakesTheStationRestAllTheSame) {
     answer(kRead, kReply);
     answer(kOther, kOtherValue);
     EXPECT_TRUE(may_ask(now_ + 10ms, kRead));
-    station_.on_stray_frame(now_ + 20ms, kOtherValue);
+    station_.on_unsolicited_frame(now_ + 20ms, kOtherValue);
     EXPECT_FALSE(may_ask(now_ + 20ms, kRead));
 }
 
 TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProvesThatOneHasPassed) {
     const TimePoint sent = now_;
     miss(kRead);
-    EXPECT_TRUE(station_.owes_since(TimePoint{}));
-    EXPECT_TRUE(station_.owes_since(sent));
-    EXPECT_FALSE(station_.owes_since(sent + 1ns));
+    EXPECT_TRUE(station_.has_outstanding_since(TimePoint{}));
+    EXPECT_TRUE(station_.has_outstanding_since(sent));
+    EXPECT_FALSE(station_.has_outstanding_since(sent + 1ns));
     const TimePoint rested = station_.rested();
     now_ = rested + 1h;
     station_.on_proved(now_, sent - 1ns);
@@ -154,14 +154,14 @@ TEST_F(StationTest, P1WhereTheLineMayStallOnlyALaterRequestThatWasAnsweredProves
     EXPECT_GE(station_.rested(), now_ + kTimeout) << "it may have reached the station only now";
 }
 
-TEST_F(StationTest, P5AReplyThatHasComeDamagedIsNotOwedButSomeSayItOnceMore) {
+TEST_F(StationTest, P5AReplyThatCameDamagedIsNotOutstandingButSomeResendIt) {
     station_.on_damaged_reply(now_, test::request_of(kRead), now_);
-    EXPECT_FALSE(station_.owes());
+    EXPECT_FALSE(station_.has_outstanding());
     EXPECT_TRUE(may_ask(now_, kRead));
     EXPECT_FALSE(may_ask(now_, kOther));
     answer(group_of(kId, kRead, 2), kReply);
     EXPECT_FALSE(may_ask(now_ + 100ms, kOther)) << "the retry's own reply may come second";
-    EXPECT_TRUE(may_ask(now_ + CopyGuard::kSaidAgain, kOther));
+    EXPECT_TRUE(may_ask(now_ + DuplicateGuard::kRepeatDelay, kOther));
 }
 
 TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAnyTook) {
@@ -183,19 +183,19 @@ TEST_F(StationTest, P4AProbeWaitsAsLongAsMostRepliesTakeAndNowAndThenAsLongAsAny
     EXPECT_LE(dear, 3);
 }
 
-TEST_F(StationTest, TellsWhatAFrameIsThatNobodyWaitsForAndChangesNothingByThat) {
-    EXPECT_EQ(station_.judge(now_, kReply), Stray::unasked);
+TEST_F(StationTest, ClassifiesAnUnsolicitedFrameAndChangesNothingByThat) {
+    EXPECT_EQ(station_.judge(now_, kReply), Unsolicited::unasked);
     answer(kRead, kReply);
     for (int i = 0; i < 3; ++i) {
-        EXPECT_EQ(station_.judge(now_ + 20ms, kReply), Stray::copy);
-        EXPECT_EQ(station_.judge(now_ + 20ms, "03 02 00 00"_hex), Stray::second);
-        EXPECT_EQ(station_.judge(now_ + 20ms, kLongReply), Stray::unasked);
-        EXPECT_EQ(station_.judge(now_ + 1min, kReply), Stray::unasked);
+        EXPECT_EQ(station_.judge(now_ + 20ms, kReply), Unsolicited::duplicate);
+        EXPECT_EQ(station_.judge(now_ + 20ms, "03 02 00 00"_hex), Unsolicited::second);
+        EXPECT_EQ(station_.judge(now_ + 20ms, kLongReply), Unsolicited::unasked);
+        EXPECT_EQ(station_.judge(now_ + 1min, kReply), Unsolicited::unasked);
     }
     miss(kLong);
-    EXPECT_EQ(station_.judge(now_, kLongReply), Stray::late);
-    EXPECT_EQ(station_.judge(now_, kLongReply), Stray::late);
-    EXPECT_TRUE(station_.owes());
+    EXPECT_EQ(station_.judge(now_, kLongReply), Unsolicited::late);
+    EXPECT_EQ(station_.judge(now_, kLongReply), Unsolicited::late);
+    EXPECT_TRUE(station_.has_outstanding());
 }
 
 TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHasEverNeeded) {
@@ -204,12 +204,12 @@ TEST_F(StationTest, P4OneThatHasFallenSilentIsNotRetriedAndWaitedForAsLongAsItHa
     EXPECT_TRUE(station_.may_retry(group_of(kId, kRead)));
     EXPECT_FALSE(station_.may_retry(group_of(kId, kWrite)));
     station_.on_given_up(now_, Fault::timeout);
-    EXPECT_TRUE(station_.suspect());
+    EXPECT_TRUE(station_.missed_last());
     EXPECT_FALSE(station_.may_retry(group_of(kId, kRead)));
     EXPECT_GE(patience(kRead), Duration(30ms));
     EXPECT_LT(patience(kRead), kTimeout / 2);
     answer(kRead, kReply);
-    EXPECT_FALSE(station_.suspect());
+    EXPECT_FALSE(station_.missed_last());
     EXPECT_EQ(patience(kRead), kTimeout);
 }
 
@@ -228,16 +228,16 @@ TEST_F(StationTest, P4OneThatKeepsFailingWithoutBeingSilentHasAFifthOfTheBus) {
 }
 
 TEST_F(StationTest, P4AReplyDoesNotPayForTheSilencesBeforeIt) {
-    EXPECT_FALSE(station_.in_debt(now_));
+    EXPECT_FALSE(station_.over_budget(now_));
     miss(kRead);
     const TimePoint missed = now_;
     answer(kRead, kReply);
-    EXPECT_TRUE(station_.in_debt(now_));
+    EXPECT_TRUE(station_.over_budget(now_));
     EXPECT_TRUE(station_.may_spend(now_)) << "one silence can happen to anybody";
-    EXPECT_FALSE(station_.in_debt(missed + 4 * kTimeout));
+    EXPECT_FALSE(station_.over_budget(missed + 4 * kTimeout));
 }
 
-TEST_F(StationTest, P4WhatItsFailuresTakeBeyondAFifthHoldsItsRequests) {
+TEST_F(StationTest, P4FailuresBeyondAFifthThrottleItsRequests) {
     while (station_.may_spend(now_)) {
         miss(kRead);
         answer(kRead, kReply);
@@ -252,7 +252,7 @@ TEST_F(StationTest, P4HalfOfTheLastAttemptsInVainMakeItFlakyAndLateRepliesDoNotM
     for (int i = 0; i < Station::kFlaky; ++i) {
         EXPECT_FALSE(station_.flaky());
         miss(kRead);
-        station_.on_stray_frame(now_ + 100ms, kReply);
+        station_.on_unsolicited_frame(now_ + 100ms, kReply);
     }
     EXPECT_TRUE(station_.flaky());
     EXPECT_LT(station_.patience(group_of(kId, kRead), std::nullopt, false, true), kTimeout / 2);
@@ -268,33 +268,33 @@ TEST_F(StationTest, P4DamagedRepliesDoNotMakeItFlaky) {
 TEST_F(StationTest, P4WhileARetryIsDueItsSilenceIsKnown) {
     answer(kRead, kReply);
     station_.on_retry(false);
-    EXPECT_FALSE(station_.suspect());
+    EXPECT_FALSE(station_.missed_last());
     station_.on_retry(true);
-    EXPECT_TRUE(station_.suspect());
+    EXPECT_TRUE(station_.missed_last());
     EXPECT_LT(patience(kRead), kTimeout / 2);
     answer(kRead, kReply);
-    EXPECT_FALSE(station_.suspect());
+    EXPECT_FALSE(station_.missed_last());
 }
 
-TEST_F(StationTest, AStrangerThatIsWantedIsNotForgotten) {
-    Station stranger = station(false);
-    stranger.on_asked(now_, group_of(kId, kRead));
-    stranger.on_wanted(now_ + 30s);
-    EXPECT_FALSE(stranger.forgettable(now_ + Station::kForgetStranger));
-    EXPECT_TRUE(stranger.forgettable(now_ + 30s + Station::kForgetStranger));
+TEST_F(StationTest, AnUnheardStationThatIsWantedIsNotForgotten) {
+    Station unheard = station(false);
+    unheard.on_asked(now_, group_of(kId, kRead));
+    unheard.on_wanted(now_ + 30s);
+    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard));
+    EXPECT_TRUE(unheard.forgettable(now_ + 30s + Station::kForgetUnheard));
 }
 
-TEST_F(StationTest, OnlyAStrangerIsForgottenWhenNobodyHasAskedForItForAMinute) {
-    Station stranger = station(false);
-    stranger.on_asked(now_, group_of(kId, kRead));
+TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotAskedForAMinute) {
+    Station unheard = station(false);
+    unheard.on_asked(now_, group_of(kId, kRead));
     station_.on_asked(now_, group_of(kId, kRead));
-    EXPECT_FALSE(stranger.forgettable(now_ + Station::kForgetStranger - 1ns));
-    EXPECT_TRUE(stranger.forgettable(now_ + Station::kForgetStranger));
+    EXPECT_FALSE(unheard.forgettable(now_ + Station::kForgetUnheard - 1ns));
+    EXPECT_TRUE(unheard.forgettable(now_ + Station::kForgetUnheard));
     EXPECT_FALSE(station_.forgettable(now_ + 1h));
-    stranger.owe(now_, kRead, now_);
-    EXPECT_FALSE(stranger.forgettable(now_ + 1h)) << "it owes something";
-    stranger.on_stray_frame(now_ + 1s, kReply);
-    EXPECT_FALSE(stranger.forgettable(now_ + 1h)) << "it was heard";
+    unheard.add_outstanding(now_, kRead, now_);
+    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it owes something";
+    unheard.on_unsolicited_frame(now_ + 1s, kReply);
+    EXPECT_FALSE(unheard.forgettable(now_ + 1h)) << "it was heard";
 }
 
 }  // namespace

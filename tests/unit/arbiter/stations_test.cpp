@@ -35,9 +35,9 @@ class StationsTest : public testing::Test {
         now_ += 1s;
         const auto attempt = test::answered(now_ - 30ms, now_, test::group_of(id, kRead), kReply);
         stations_.on_reply(now_, 30ms);
-        if (stations_.of(id).on_reply(now_, attempt, 30ms, 25ms).back) stations_.on_back();
+        if (stations_.of(id).on_reply(now_, attempt, 30ms, 25ms).back) stations_.on_recovery();
     }
-    /// It has failed until it is offline; the attempts cost so much each.
+    /// It fails until it is offline; each attempt costs `cost`.
     void kill(std::uint8_t id, Duration cost) {
         for (int i = 0; i < 10; ++i) {
             now_ += cost;
@@ -79,7 +79,7 @@ TEST_F(StationsTest, P4WhenOneIsBackTheOthersAreAskedAtOnce) {
     EXPECT_LE(wait_for_probe(), 0s);
 }
 
-TEST_F(StationsTest, P4OnlyWhereAnotherHasAnsweredSinceIsAFlakyStationHeldShort) {
+TEST_F(StationsTest, P4AFlakyStationHasAShortWaitOnlyWhereAnotherHasAnsweredSince) {
     answer(1);
     answer(2);
     for (int i = 0; i < Station::kFlaky; ++i) {
@@ -88,15 +88,15 @@ TEST_F(StationsTest, P4OnlyWhereAnotherHasAnsweredSinceIsAFlakyStationHeldShort)
     }
     const Station& flaky = stations_.of(1);
     ASSERT_TRUE(flaky.flaky());
-    EXPECT_FALSE(stations_.spent(now_, flaky)) << "it may be the line";
+    EXPECT_FALSE(stations_.flaky_beside_others(now_, flaky)) << "it may be the line";
     EXPECT_TRUE(stations_.affords_retry(now_, flaky));
     answer(2);
-    EXPECT_TRUE(stations_.spent(now_, flaky));
+    EXPECT_TRUE(stations_.flaky_beside_others(now_, flaky));
     EXPECT_FALSE(stations_.affords_retry(now_, flaky));
-    EXPECT_FALSE(stations_.spent(now_ + 1min, flaky)) << "nobody else is there";
+    EXPECT_FALSE(stations_.flaky_beside_others(now_ + 1min, flaky)) << "nobody else is there";
 }
 
-TEST_F(StationsTest, P4StrangersDoNotUseUpWhatTheProbesOfOthersMayCost) {
+TEST_F(StationsTest, P4UnheardStationsDoNotUseUpTheProbeBudgetOfOthers) {
     constexpr std::uint8_t kStranger = 200;
     answer(1);
     kill(2, 20ms);
@@ -113,7 +113,7 @@ TEST_F(StationsTest, P4StrangersDoNotUseUpWhatTheProbesOfOthersMayCost) {
     EXPECT_TRUE(stations_.may_spend(now_, job_for(3))) << "which is not that of who is listed";
 }
 
-TEST_F(StationsTest, AStrangerIsWaitedForAsLongAsTheKnownNeedUnlessItsClientIsPatient) {
+TEST_F(StationsTest, AnUnheardStationIsWaitedForAsLongAsTheKnownNeedUnlessItsClientIsPatient) {
     constexpr std::uint8_t kStranger = 9;
     answer(1);
     Group group = test::group_of(kStranger, kRead);

@@ -24,22 +24,22 @@ Settings one_station() {
 }
 
 /// A line with station 17, which was asked for kRead.
-class StraysTest : public testing::Test {
+class UnsolicitedFramesTest : public testing::Test {
   protected:
-    StraysTest() {
-        strays.on_sent(modbus::encode_adu(17, kRead));
+    UnsolicitedFramesTest() {
+        unsolicited.on_sent(modbus::encode_adu(17, kRead));
         quiet.on_sent(now, 17);
         stations.of(17);
     }
-    /// What this is taken for, as the trace says it; with a blank between two.
+    /// Classification of these bytes in the trace, separated by blanks.
     std::string heard(const Bytes& bytes, bool idle = false) {
         now += 1s;
         quiet.on_noise(now);
-        strays.hear(bytes);
-        strays.note(now, strays.take(17), idle, stations, quiet, ledger);
-        EXPECT_FALSE(strays.pending());
+        unsolicited.hear(bytes);
+        unsolicited.note(now, unsolicited.take(17), idle, stations, quiet, outbox);
+        EXPECT_FALSE(unsolicited.pending());
         std::string words;
-        while (const auto action = ledger.poll()) {
+        while (const auto action = outbox.poll()) {
             const auto* note = std::get_if<Note>(&*action);
             if (note == nullptr) continue;
             EXPECT_EQ(direction_of(note->kind), FrameDirection::discarded);
@@ -47,29 +47,29 @@ class StraysTest : public testing::Test {
         }
         return words;
     }
-    const StationCounters& counters() const { return ledger.stations().at(17); }
+    const StationCounters& counters() const { return outbox.stations().at(17); }
 
     Settings settings = one_station();
-    Strays strays{settings.serial};
+    UnsolicitedFrames unsolicited{settings.serial};
     Stations stations{settings};
     Quiet quiet{1s, 2ms};
-    Ledger ledger{settings};
+    Outbox outbox{settings};
     TimePoint now{1h};
 };
 
-TEST_F(StraysTest, TheFrameSentLastIsItsEcho) {
+TEST_F(UnsolicitedFramesTest, TheFrameSentLastIsItsEcho) {
     EXPECT_EQ(heard(modbus::encode_adu(17, kRead)), "echo");
     EXPECT_EQ(counters().symptoms.echoes, 1u);
     EXPECT_EQ(counters().foreign_frames, 0u);
 }
 
-TEST_F(StraysTest, ARequestThatIsNotOursIsAnotherMasters) {
+TEST_F(UnsolicitedFramesTest, ARequestThatIsNotOursIsAnotherMasters) {
     EXPECT_EQ(heard(modbus::encode_adu(18, kRead)), "foreign request");
     EXPECT_EQ(counters().symptoms.requests, 1u);
     EXPECT_EQ(counters().foreign_frames, 1u);
 }
 
-TEST_F(StraysTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
+TEST_F(UnsolicitedFramesTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
     const TimePoint before = quiet.free_at(2ms);
     heard(modbus::encode_adu(18, kRead));
     EXPECT_GE(quiet.free_at(2ms), now + 20ms) << "a panel may think as long";
@@ -77,7 +77,7 @@ TEST_F(StraysTest, BehindAnotherMastersRequestTheLineRestsForItsReply) {
     EXPECT_LT(before, now);
 }
 
-TEST_F(StraysTest, WhatNobodyAnswersOrHasAlreadyAnsweredNeedsNoRest) {
+TEST_F(UnsolicitedFramesTest, UnansweredOrAlreadyAnsweredRequestsNeedNoRest) {
     heard(modbus::encode_adu(0, "10 00 01 00 01 02 00 05"_hex));
     EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "a broadcast";
     Bytes both = modbus::encode_adu(18, kRead);
@@ -87,22 +87,22 @@ TEST_F(StraysTest, WhatNobodyAnswersOrHasAlreadyAnsweredNeedsNoRest) {
     EXPECT_EQ(quiet.free_at(2ms), now + 2ms) << "its reply was heard with it";
 }
 
-TEST_F(StraysTest, AGoodFrameOfAPanelThatNobodyAskedIsForeign) {
+TEST_F(UnsolicitedFramesTest, AGoodFrameOfAPanelThatWasNotAskedIsForeign) {
     EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign");
     EXPECT_EQ(heard(modbus::encode_adu(99, kReply)), "foreign");
     EXPECT_EQ(counters().symptoms.unasked, 2u);
     EXPECT_EQ(counters().foreign_frames, 2u);
 }
 
-TEST_F(StraysTest, AReplyThatIsOwedIsLateAndTellsHowMuch) {
-    stations.of(17).owe(now, kRead, now - 500ms);
+TEST_F(UnsolicitedFramesTest, AnOutstandingReplyIsLateAndShowsByHowMuch) {
+    stations.of(17).add_outstanding(now, kRead, now - 500ms);
     EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "late");
     EXPECT_EQ(counters().late_frames, 1u);
     EXPECT_EQ(counters().foreign_frames, 0u);
     EXPECT_EQ(heard(modbus::encode_adu(17, kReply)), "foreign") << "it was owed once only";
 }
 
-TEST_F(StraysTest, BytesThatAreNoFrameAreDamagedAndCounted) {
+TEST_F(UnsolicitedFramesTest, BytesThatAreNoFrameAreDamagedAndCounted) {
     EXPECT_EQ(heard("FF 00 FF"_hex), "damaged");
     EXPECT_EQ(counters().symptoms.strays, 1u);
     EXPECT_EQ(counters().discarded_bytes, 3u);
@@ -111,35 +111,39 @@ TEST_F(StraysTest, BytesThatAreNoFrameAreDamagedAndCounted) {
     EXPECT_EQ(heard(mixed), "foreign damaged");
 }
 
-TEST_F(StraysTest, WhatIsAWrongReplyIsNeitherEchoNorRequestNorOwed) {
-    EXPECT_TRUE(strays.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations));
-    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, kRead), stations)) << "echo";
-    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, "03 00 00 00 01"_hex), stations))
+TEST_F(UnsolicitedFramesTest, AWrongReplyIsNeitherEchoNorRequestNorOutstanding) {
+    EXPECT_TRUE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations));
+    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kRead), stations))
+        << "echo";
+    EXPECT_FALSE(
+        unsolicited.is_wrong_reply(now, modbus::encode_adu(17, "03 00 00 00 01"_hex), stations))
         << "a request";
-    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(99, kReply), stations)) << "nobody";
-    stations.of(17).owe(now, kRead, now - 500ms);
-    EXPECT_FALSE(strays.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations)) << "owed";
+    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(99, kReply), stations))
+        << "nobody";
+    stations.of(17).add_outstanding(now, kRead, now - 500ms);
+    EXPECT_FALSE(unsolicited.is_wrong_reply(now, modbus::encode_adu(17, kReply), stations))
+        << "owed";
 }
 
-TEST_F(StraysTest, GathersNoMoreThanAnyFrameHas) {
-    EXPECT_FALSE(strays.pending());
-    strays.hear(Bytes(modbus::ReplyFramer::kMaxHeard, 0xFF));
-    EXPECT_TRUE(strays.pending());
-    EXPECT_FALSE(strays.full());
-    strays.hear("FF"_hex);
-    EXPECT_TRUE(strays.full());
-    strays.forget();
-    EXPECT_FALSE(strays.pending());
+TEST_F(UnsolicitedFramesTest, GathersNoMoreThanAnyFrameHas) {
+    EXPECT_FALSE(unsolicited.pending());
+    unsolicited.hear(Bytes(modbus::ReplyFramer::kMaxHeard, 0xFF));
+    EXPECT_TRUE(unsolicited.pending());
+    EXPECT_FALSE(unsolicited.full());
+    unsolicited.hear("FF"_hex);
+    EXPECT_TRUE(unsolicited.full());
+    unsolicited.forget();
+    EXPECT_FALSE(unsolicited.pending());
 }
 
-TEST_F(StraysTest, TheTrailIsOfWhoAnsweredWhatWasSentBefore) {
-    EXPECT_EQ(strays.replied_before(), 0);
-    strays.on_replied(17);
-    EXPECT_EQ(strays.replied_before(), 0) << "it answered what is on the wire";
-    strays.on_sent(modbus::encode_adu(18, kRead));
-    EXPECT_EQ(strays.replied_before(), 17);
-    strays.on_sent(modbus::encode_adu(18, kRead));
-    EXPECT_EQ(strays.replied_before(), 0) << "the one between was not answered";
+TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
+    EXPECT_EQ(unsolicited.replied_before(), 0);
+    unsolicited.on_replied(17);
+    EXPECT_EQ(unsolicited.replied_before(), 0) << "it answered what is on the wire";
+    unsolicited.on_sent(modbus::encode_adu(18, kRead));
+    EXPECT_EQ(unsolicited.replied_before(), 17);
+    unsolicited.on_sent(modbus::encode_adu(18, kRead));
+    EXPECT_EQ(unsolicited.replied_before(), 0) << "the one between was not answered";
 }
 
 }  // namespace

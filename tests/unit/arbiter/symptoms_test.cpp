@@ -1,4 +1,4 @@
-// What the line doctor is told: how attempts ended, and what was heard besides.
+// Input of the line doctor: how attempts ended, and what else was heard.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ class SymptomsTest : public testing::Test {
 TEST_F(SymptomsTest, EveryAttemptEndsInOneWay) {
     ask(17, kRead, modbus::encode_adu(17, kReply));
     ask(17, kRead, {});
-    ask(17, kRead, modbus::encode_adu(18, kReply));          // somebody else answers
+    ask(17, kRead, modbus::encode_adu(18, kReply));          // another station answers
     ask(17, kRead, "11 03 06 02 2B 00 00 00 64 C8 BB"_hex);  // right length, wrong CRC
     ask(17, kRead, "11 03 06 02 2B"_hex);
     ask(17, kRead, "00 00 00 00 00 00 00 00 00 00 00 00 FF"_hex);
@@ -78,14 +78,14 @@ TEST_F(SymptomsTest, RepeatedSilenceIsCountedUntilASoundComes) {
     EXPECT_EQ(of(17).mute_in_a_row, 0u);
 }
 
-TEST_F(SymptomsTest, ThePauseBeforeAnAttemptIsToldWithItsOutcome) {
+TEST_F(SymptomsTest, ThePauseBeforeAnAttemptIsReportedWithItsOutcome) {
     const Ticket first = bus().submit(17, kRead);
     bus().submit(18, kRead, 2);
     bus().run_to_end_of_request();
     bus().run_for(3ms);
     bus().hear_reply(17, kReply);
     EXPECT_TRUE(bus().answered(first));
-    bus().run_for(400ms);  // 18 is asked right behind that reply, and is silent
+    bus().run_for(400ms);  // 18 is asked right after that reply, and is silent
     EXPECT_EQ(of(17).answered_after[6], 1u) << "64 ms and more: the line had just come up";
     EXPECT_EQ(of(18).silent_after[0], 0u) << "it may be off";
     ask(18, kRead, modbus::encode_adu(18, kReply));
@@ -93,14 +93,14 @@ TEST_F(SymptomsTest, ThePauseBeforeAnAttemptIsToldWithItsOutcome) {
     EXPECT_EQ(of(18).answered_after[Symptoms::kPauses - 1], 1u);
 }
 
-TEST_F(SymptomsTest, AStationThatStaysSilentTellsNothingAboutThePauseBefore) {
+TEST_F(SymptomsTest, AStationThatStaysSilentShowsNothingAboutThePauseBefore) {
     ask(17, kRead, {});
     ask(17, kRead, {});
     EXPECT_GE(of(17).silent, 2u);
     for (std::size_t i = 0; i < Symptoms::kPauses; ++i) EXPECT_EQ(of(17).silent_after[i], 0u) << i;
 }
 
-TEST_F(SymptomsTest, AReplyThatComesTwiceIsDoubledGluedOrApartAndWithOtherValues) {
+TEST_F(SymptomsTest, AReplyThatComesTwiceIsADuplicateGluedOrApartAndWithOtherValues) {
     const Bytes reply = modbus::encode_adu(17, kReply);
     Bytes twice = reply;
     twice.insert(twice.end(), reply.begin(), reply.end());
@@ -118,7 +118,7 @@ TEST_F(SymptomsTest, AReplyThatComesTwiceIsDoubledGluedOrApartAndWithOtherValues
     EXPECT_EQ(of(17).late, 0u);
 }
 
-TEST_F(SymptomsTest, ALateReplyIsNoDoubledOne) {
+TEST_F(SymptomsTest, ALateReplyIsNoDuplicate) {
     bus().submit(17, kRead);
     bus().run_to_end_of_request();
     bus().run_for(130ms);
@@ -131,7 +131,7 @@ TEST_F(SymptomsTest, ALateReplyIsNoDoubledOne) {
     EXPECT_LE(of(17).worst_lateness, 31ms + settings.end_of_frame) << "silence judges it";
 }
 
-TEST_F(SymptomsTest, AnotherMastersRequestIsToldFromNoiseAlsoWhenItsReplyIsGluedToIt) {
+TEST_F(SymptomsTest, AnotherMastersRequestIsDistinguishedFromNoiseAlsoWhenItsReplyIsGluedToIt) {
     ask(17, kRead, modbus::encode_adu(17, kReply));
     bus().hear_reply(3, "03 00 00 00 01"_hex);
     bus().run_for(100ms);
@@ -181,7 +181,7 @@ TEST_F(SymptomsTest, AnExceptionWithAnotherFunctionsNumberIsCountedBesides) {
     EXPECT_EQ(of(17).wrong_exceptions, 2u);
 }
 
-TEST_F(SymptomsTest, WhoAnswersABroadcastIsNobodyWhoSpeaksUnasked) {
+TEST_F(SymptomsTest, APanelThatAnswersABroadcastIsNotUnsolicited) {
     const Bytes write = "10 00 64 00 01 02 12 34"_hex;
     ask(18, kRead, modbus::encode_adu(18, kReply));
     for (const Bytes& said : {"10 00 64 00 01"_hex, "90 02"_hex}) {

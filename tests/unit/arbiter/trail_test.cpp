@@ -7,10 +7,10 @@ namespace {
 
 class TrailTest : public testing::Test {
   protected:
-    /// A reply, and behind it bytes of nobody.
+    /// A reply, followed by unsolicited bytes.
     void reply_with(Duration delay) {
         reply();
-        trail_.on_stray(now_ + delay);
+        trail_.on_unsolicited(now_ + delay);
     }
     void reply() {
         now_ += 1s;
@@ -21,28 +21,28 @@ class TrailTest : public testing::Test {
     TimePoint now_{1h};
 };
 
-TEST_F(TrailTest, OfAStationThatSaysNoMoreThanItsRepliesNothingIsExpected) {
+TEST_F(TrailTest, NothingIsExpectedOfAStationThatSendsOnlyReplies) {
     for (int i = 0; i < 20; ++i) reply();
-    EXPECT_EQ(trail_.hold(), Duration(0));
+    EXPECT_EQ(trail_.settle_time(), Duration(0));
     EXPECT_LE(trail_.until(), now_);
 }
 
 TEST_F(TrailTest, WhatIsRareIsAnAccident) {
     for (int i = 1; i < Trail::kOften; ++i) reply_with(5ms);
     reply();
-    EXPECT_EQ(trail_.hold(), Duration(0));
+    EXPECT_EQ(trail_.settle_time(), Duration(0));
 }
 
 TEST_F(TrailTest, WhatComesOftenIsWaitedForSomewhatLongerThanItHasEverLasted) {
     for (int i = 0; i < Trail::kOften; ++i) reply_with((4 + i) * 1ms);
     reply();
     const Duration longest = (3 + Trail::kOften) * 1ms;
-    EXPECT_GT(trail_.hold(), longest);
-    EXPECT_LT(trail_.hold(), 2 * longest);
-    EXPECT_EQ(trail_.until(), now_ + trail_.hold());
+    EXPECT_GT(trail_.settle_time(), longest);
+    EXPECT_LT(trail_.settle_time(), 2 * longest);
+    EXPECT_EQ(trail_.until(), now_ + trail_.settle_time());
 }
 
-TEST_F(TrailTest, NobodyWaitsForWhatHasComeAlready) {
+TEST_F(TrailTest, NothingWaitsForWhatHasComeAlready) {
     for (int i = 0; i <= Trail::kOften; ++i) reply_with(5ms);
     EXPECT_TRUE(trail_.seen());
     EXPECT_LE(trail_.until(), now_);
@@ -54,24 +54,24 @@ TEST_F(TrailTest, NobodyWaitsForWhatHasComeAlready) {
 TEST_F(TrailTest, SeveralPiecesBehindOneReplyAreOneTrailUpToTheLast) {
     for (int i = 0; i < Trail::kOften; ++i) {
         reply_with(2ms);
-        trail_.on_stray(now_ + 8ms);
-        trail_.on_stray(now_ + 4ms);
+        trail_.on_unsolicited(now_ + 8ms);
+        trail_.on_unsolicited(now_ + 4ms);
     }
     reply();
-    EXPECT_GT(trail_.hold(), Duration(8ms));
+    EXPECT_GT(trail_.settle_time(), Duration(8ms));
 }
 
 TEST_F(TrailTest, WhatComesLongAfterTheReplyIsSomethingElse) {
     for (int i = 0; i < 20; ++i) reply_with(Trail::kLongest + 1ns);
     reply();
     EXPECT_FALSE(trail_.seen());
-    EXPECT_EQ(trail_.hold(), Duration(0));
+    EXPECT_EQ(trail_.settle_time(), Duration(0));
 }
 
 TEST_F(TrailTest, IsUnlearnedAsSoonAsItStops) {
     for (int i = 0; i < 20; ++i) reply_with(5ms);
     for (unsigned i = 0; i < Trail::kReplies; ++i) reply();
-    EXPECT_EQ(trail_.hold(), Duration(0));
+    EXPECT_EQ(trail_.settle_time(), Duration(0));
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ TEST(AdaptiveTimeout, FollowsTheTurnaroundBetweenFloorAndCeiling) {
     EXPECT_EQ(timeout.value(seen), Duration(30ms));
 }
 
-TEST(DriftAlarm, TellsOnceUntilTheStationHasRecovered) {
+TEST(DriftAlarm, ReportsOnceUntilTheStationHasRecovered) {
     DriftAlarm alarm;
     Turnaround seen;
     int told = 0;

@@ -27,7 +27,7 @@ class WaitingReadsTest : public testing::Test {
         ReadSpan span;
     };
     Job job(Client client) {
-        const Bytes read = Writer().u8(3).u16(0).u16(1).take();  // its span is told beside it
+        const Bytes read = Writer().u8(3).u16(0).u16(1).take();  // its span is passed separately
         return {.ticket = ++ticket, .request = test::request_of(read), .client = client};
     }
     void add(const Job& job, const ReadSpan& span) {
@@ -51,7 +51,7 @@ class WaitingReadsTest : public testing::Test {
             if (counts[client] == 0) counts.erase(client);
         };
     }
-    /// Who should count, the slow way.
+    /// The reads that should count, recomputed.
     bool should_count(const Waiting& one) const {
         return std::ranges::none_of(waiting, [&](const Waiting& other) {
             if (other.span == one.span) return other.job.ticket < one.job.ticket;
@@ -123,7 +123,7 @@ TEST_F(WaitingReadsTest, OnesThatOnlyOverlapCountBoth) {
     EXPECT_EQ(reads.counting(), 2u);
 }
 
-TEST_F(WaitingReadsTest, OneFreesAPlaceWhenNobodyElseCountsInItsStead) {
+TEST_F(WaitingReadsTest, OneFreesAPlaceIfNoOtherCountsInstead) {
     const Job first = add(1, span(10, 10));
     EXPECT_TRUE(reads.frees(first.ticket, span(10, 10)));
     const Job rider = add(2, span(12, 3));

@@ -1,5 +1,5 @@
-// When a request has really left: later than computed, where switching takes time or the driver
-// still holds bytes.
+// When a request has really left: later than computed, if switching takes time or the driver still
+// buffers bytes.
 #include <gtest/gtest.h>
 
 #include "panelgate/arbiter/arbiter.hpp"
@@ -97,7 +97,7 @@ TEST_F(WireEnd, SwitchingToSendingComesBeforeTheFirstBit) {
     EXPECT_TRUE(bus.answered(ticket));
 }
 
-TEST_F(WireEnd, ALineThatCannotTellIsNotAsked) {
+TEST_F(WireEnd, ALineThatCannotReportTheEndIsNotAsked) {
     BusScript bus{settings};
     bool asked = false;
     bus.unsent = [&] {

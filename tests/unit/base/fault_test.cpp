@@ -23,7 +23,7 @@ TEST(Fault, UsesOnlyTheOutcomesOfTheMetric) {
     EXPECT_EQ(used, outcomes);
 }
 
-TEST(Fault, CallsRefusedWhatNeverHadAWay) {
+TEST(Fault, RefusedMeansNeverRouted) {
     EXPECT_EQ(outcome_of(Fault::denied), Outcome::refused);
     EXPECT_EQ(outcome_of(Fault::malformed), Outcome::refused);
     EXPECT_EQ(outcome_of(Fault::not_routed), Outcome::refused);

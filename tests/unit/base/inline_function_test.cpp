@@ -11,7 +11,7 @@ namespace {
 
 using Ask = InlineFunction<int(int), 32>;
 
-TEST(InlineFunction, CallsWhatItHolds) {
+TEST(InlineFunction, CallsWhatItStores) {
     const int added = 5;
     const Ask ask = [&](int x) { return x + added; };
     EXPECT_TRUE(ask);
@@ -39,7 +39,7 @@ TEST(InlineFunction, IsEmptyAtFirstAndWhenItWasMovedFrom) {
     EXPECT_FALSE(empty);
 }
 
-TEST(InlineFunction, EndsWhatItHeldOnce) {
+TEST(InlineFunction, DestroysWhatItStoredOnce) {
     const auto held = std::make_shared<int>(1);
     {
         Ask ask = [held](int x) { return *held + x; };
@@ -55,7 +55,7 @@ TEST(InlineFunction, EndsWhatItHeldOnce) {
     EXPECT_EQ(held.use_count(), 1);
 }
 
-TEST(InlineFunction, GivesItsArgumentsAwayAndMayChangeWhatItHolds) {
+TEST(InlineFunction, ForwardsItsArgumentsAndMayChangeItsState) {
     int calls = 0;
     const InlineFunction<std::string(std::string), 16> shout = [&calls](std::string text) {
         ++calls;

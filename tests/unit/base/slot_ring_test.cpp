@@ -12,7 +12,7 @@ using Told = std::vector<std::pair<Duration, double>>;
 
 constexpr TimePoint kStart{100s};
 
-/// Four slots of 10 s; times are told from kStart on.
+/// Four slots of 10 s; times are relative to kStart.
 class SlotRingTest : public testing::Test {
   protected:
     Told told(Duration now) const {
@@ -42,7 +42,7 @@ TEST_F(SlotRingTest, KeepsTheLastValueOfEachSlot) {
     EXPECT_FALSE(ring.at(kStart - 1s));
 }
 
-TEST_F(SlotRingTest, P10WhatWasNotPutIsAbsentAndNever0) {
+TEST_F(SlotRingTest, P10AnUnsetSlotIsAbsentAndNever0) {
     put(0s, 1);
     put(30s, 4);
     EXPECT_EQ(told(30s), (Told{{0s, 1}, {30s, 4}}));

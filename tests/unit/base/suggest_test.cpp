@@ -15,7 +15,7 @@ TEST(Nearest, FindsWhatWasProbablyMeant) {
     EXPECT_EQ(nearest("reply_time_outs", kKeys), "reply_timeout") << "two edits";
 }
 
-TEST(Nearest, SaysNothingWhenNothingIsNear) {
+TEST(Nearest, ReturnsNothingIfNoneIsNear) {
     EXPECT_EQ(nearest("address", kKeys), "");
     EXPECT_EQ(nearest("reply_tmt", kKeys), "") << "four edits";
     EXPECT_EQ(nearest("", kKeys), "");
@@ -36,14 +36,14 @@ TEST(Nearest, TakesTheNearerOfTwo) {
 
 TEST(Nearest, FindsTheWordItself) { EXPECT_EQ(nearest("baud", kKeys), "baud"); }
 
-TEST(Suggest, KnowsOtherWaysToWriteAWord) {
+TEST(Suggest, KnowsOtherSpellings) {
     constexpr std::array<std::string_view, 3> kWords{"panasonic-gt", "data_bits", "info"};
     EXPECT_EQ(nearest("Panasonic GT", kWords), "panasonic-gt");
     EXPECT_EQ(nearest("dataBits", kWords), "data_bits");
     EXPECT_EQ(nearest("INFO", kWords), "info");
 }
 
-TEST(Suggest, KnowsTheWordsOfOtherTrades) {
+TEST(Suggest, KnowsSynonymsOfOtherIndustries) {
     constexpr std::array<std::string_view, 5> kWords{"baud", "i16", "f32", "none", "warn"};
     EXPECT_EQ(nearest("baudrate", kWords), "baud");
     EXPECT_EQ(nearest("int16", kWords), "i16");

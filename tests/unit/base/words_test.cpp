@@ -7,7 +7,7 @@
 namespace panelgate {
 namespace {
 
-/// The words of the first `count` enumerators, in their order, by commas.
+/// Labels of the first `count` enumerators, in order, separated by commas.
 template <class Enum>
 std::string words(std::size_t count) {
     std::string text;

@@ -11,9 +11,9 @@ namespace {
 
 class AnswersTest : public testing::Test {
   protected:
-    /// Writes its name when it is answered.
-    Handed to(char name) {
-        return {[this, name](const Answer&) { told += name; }, {}};
+    /// Appends its name when it is answered.
+    Delivery to(char name) {
+        return {[this, name](const Answer&) { delivered += name; }, {}};
     }
     void run() {
         io.restart();
@@ -22,70 +22,70 @@ class AnswersTest : public testing::Test {
 
     boost::asio::io_context io{1};
     std::optional<Answers> answers{io.get_executor()};
-    std::string told;
+    std::string delivered;
 };
 
 TEST_F(AnswersTest, GivesThemInTheirOrderWhenTheCallIsOver) {
     answers->add(to('a'), false);
     answers->add(to('b'), false);
-    EXPECT_EQ(told, "");
+    EXPECT_EQ(delivered, "");
     run();
-    EXPECT_EQ(told, "ab");
+    EXPECT_EQ(delivered, "ab");
     run();
-    EXPECT_EQ(told, "ab") << "once";
+    EXPECT_EQ(delivered, "ab") << "once";
 }
 
 TEST_F(AnswersTest, GivesWhatTheLoopBringsWithoutAnotherTurn) {
     answers->add(to('a'), true);
-    EXPECT_EQ(told, "");
-    answers->hand_over();
-    EXPECT_EQ(told, "a");
+    EXPECT_EQ(delivered, "");
+    answers->deliver();
+    EXPECT_EQ(delivered, "a");
     run();
-    EXPECT_EQ(told, "a");
+    EXPECT_EQ(delivered, "a");
 }
 
 TEST_F(AnswersTest, WhatCameFirstGoesFirst) {
     answers->add(to('a'), false);
     answers->add(to('b'), true);
-    answers->hand_over();
-    EXPECT_EQ(told, "ab");
+    answers->deliver();
+    EXPECT_EQ(delivered, "ab");
     run();
-    EXPECT_EQ(told, "ab");
+    EXPECT_EQ(delivered, "ab");
 }
 
 TEST_F(AnswersTest, AnswersWhatAnAnswerLeadsToLater) {
     answers->add({[this](const Answer&) {
-                      told += 'a';
+                      delivered += 'a';
                       answers->add(to('b'), false);
                       answers->add(to('c'), true);
-                      answers->hand_over();
-                      told += '.';
+                      answers->deliver();
+                      delivered += '.';
                   },
                   {}},
                  true);
-    answers->hand_over();
-    EXPECT_EQ(told, "a.");
+    answers->deliver();
+    EXPECT_EQ(delivered, "a.");
     run();
-    EXPECT_EQ(told, "a.bc");
+    EXPECT_EQ(delivered, "a.bc");
 }
 
 TEST_F(AnswersTest, GivesWhatIsLeftAfterItsEnd) {
     answers->add(to('a'), false);
     answers.reset();
     run();
-    EXPECT_EQ(told, "a");
+    EXPECT_EQ(delivered, "a");
 }
 
 TEST_F(AnswersTest, MayEndWhileItGives) {
     answers->add({[this](const Answer&) {
-                      told += 'a';
+                      delivered += 'a';
                       answers.reset();
                   },
                   {}},
                  true);
     answers->add(to('b'), true);
-    answers->hand_over();
-    EXPECT_EQ(told, "ab");
+    answers->deliver();
+    EXPECT_EQ(delivered, "ab");
 }
 
 }  // namespace

@@ -23,10 +23,10 @@ const Bytes kRead = "03 00 6B 00 03"_hex;
 const Bytes kReply = "03 06 02 2B 00 00 00 64"_hex;
 const Bytes kWrite = "06 00 01 00 03"_hex;
 
-/// What a bus tells of its line besides answers.
-class BusTellsTest : public testing::Test {
+/// What a bus reports of its line besides answers.
+class BusReportsTest : public testing::Test {
   protected:
-    BusTellsTest() {
+    BusReportsTest() {
         settings.name = "floor1";
         settings.arbiter.serial = {1000000, 8, Parity::none, 1};
         settings.arbiter.unlisted.response_timeout = 5ms;
@@ -40,7 +40,7 @@ class BusTellsTest : public testing::Test {
         line->reply = kReply;
         bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
     }
-    /// Asks and runs the loop until answered.
+    /// Sends a request and runs the loop until it is answered.
     void ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1) {
         std::optional<Answer> got;
         bus->transact({.station = station, .request = test::request_of(pdu), .client = client},
@@ -55,7 +55,7 @@ class BusTellsTest : public testing::Test {
     std::unique_ptr<Bus> bus;
 };
 
-TEST_F(BusTellsTest, WhoHasHungUpKeepsItsRow) {
+TEST_F(BusReportsTest, WhoHasHungUpKeepsItsRow) {
     bus->start();
     for (ClientId client = 1; client <= 3; ++client) {
         bus->name_client(client, "modbus_tcp 10.0.0.7:500" + std::to_string(client));
@@ -69,29 +69,29 @@ TEST_F(BusTellsTest, WhoHasHungUpKeepsItsRow) {
     EXPECT_TRUE(clients[0].gone);
 }
 
-TEST_F(BusTellsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
-    std::vector<WriteEvent> told;
+TEST_F(BusReportsTest, P6TellsOfEveryWriteBeforeItsAnswer) {
+    std::vector<WriteEvent> writes;
     settings.observe = [&](const BusEvent& event) {
-        if (const auto* write = std::get_if<WriteEvent>(&event)) told.push_back(*write);
+        if (const auto* write = std::get_if<WriteEvent>(&event)) writes.push_back(*write);
     };
     make_bus();
     bus->start();
     ask(17, kRead);
-    EXPECT_TRUE(told.empty());
+    EXPECT_TRUE(writes.empty());
     line->reply = kWrite;
     ask(17, kWrite);
-    ASSERT_EQ(told.size(), 2u);
-    EXPECT_EQ(told[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
-    EXPECT_FALSE(told[0].ended);
-    EXPECT_EQ(told[0].client, 1u);
-    EXPECT_TRUE(told[1].ended);
+    ASSERT_EQ(writes.size(), 2u);
+    EXPECT_EQ(writes[0].items, (modbus::Span{modbus::Table::holding_registers, 1, 1}));
+    EXPECT_FALSE(writes[0].ended);
+    EXPECT_EQ(writes[0].client, 1u);
+    EXPECT_TRUE(writes[1].ended);
     line->fail_writes = true;
     ask(0, kWrite);
-    ASSERT_EQ(told.size(), 4u) << "lost on its way: nobody knows what has come of it";
-    EXPECT_EQ(told[3].station, 0);
+    ASSERT_EQ(writes.size(), 4u) << "lost on its way: nobody knows what has come of it";
+    EXPECT_EQ(writes[3].station, 0);
 }
 
-TEST_F(BusTellsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
+TEST_F(BusReportsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     settings.stations[17].name = "press";
     make_bus();
     const rt::LogTap log;
@@ -112,7 +112,7 @@ TEST_F(BusTellsTest, CountsAndLogsAWriteThatWasRefusedBeforeItWasARequest) {
     EXPECT_EQ(report.stations.front().requests.at(5)[Outcome::refused], 1u);
 }
 
-TEST_F(BusTellsTest, EveryAcceptedWriteIsInTheLogWhoeverElseHasWritten) {
+TEST_F(BusReportsTest, EveryAcceptedWriteIsInTheLogWhoeverElseHasWritten) {
     make_bus();
     bus->start();
     line->reply = kWrite;
@@ -130,7 +130,7 @@ TEST_F(BusTellsTest, EveryAcceptedWriteIsInTheLogWhoeverElseHasWritten) {
     EXPECT_EQ(log.count("outcome=timeout"), 1u);
 }
 
-TEST_F(BusTellsTest, WhatIsNoFunctionIsNoWrite) {
+TEST_F(BusReportsTest, WhatIsNoFunctionIsNoWrite) {
     make_bus();
     const rt::LogTap log;
     bus->tell_refused(17, "00"_hex, 1);
@@ -140,7 +140,7 @@ TEST_F(BusTellsTest, WhatIsNoFunctionIsNoWrite) {
     EXPECT_EQ(log.count("write"), 1u) << "nobody knows what it does";
 }
 
-TEST_F(BusTellsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
+TEST_F(BusReportsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
     bus->start();
     for (int i = 0; i < 20; ++i) {
         ask(17, kRead);
@@ -152,7 +152,7 @@ TEST_F(BusTellsTest, P10TheLoadIsOfTheLastTenSecondsWhoeverAskedBefore) {
     EXPECT_EQ(bus->status().load_percent, 0) << "idle since, and nobody has asked";
 }
 
-TEST_F(BusTellsTest, CountsHowOftenAStationMayHaveBeenRestarted) {
+TEST_F(BusReportsTest, CountsHowOftenAStationMayHaveBeenRestarted) {
     bus->start();
     ask(17, kRead);
     const std::uint64_t before = bus->station_status(17).returns;

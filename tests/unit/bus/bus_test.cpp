@@ -43,8 +43,8 @@ class BusTest : public testing::Test {
         };
         settings.doctor.rest = {};
         settings.observe = [this](const BusEvent& event) {
-            const auto* told = std::get_if<LineEvent>(&event);
-            if (told != nullptr && !told->why.empty()) seen.push_back(told->why);
+            const auto* line_event = std::get_if<LineEvent>(&event);
+            if (line_event != nullptr && !line_event->why.empty()) seen.push_back(line_event->why);
         };
         make_bus();
     }
@@ -55,7 +55,7 @@ class BusTest : public testing::Test {
         bus = std::make_unique<Bus>(io.get_executor(), clock, settings, std::move(memory));
     }
     bool run_until(const std::function<bool()>& so) { return test::run_until(io, clock, so); }
-    /// Asks and runs the loop until answered.
+    /// Sends a request and runs the loop until it is answered.
     Answer ask(std::uint8_t station, const Bytes& pdu, ClientId client = 1, bool poll = false) {
         std::optional<Answer> got;
         bus->transact(
@@ -70,7 +70,7 @@ class BusTest : public testing::Test {
     test::ManualClock clock;
     Settings settings;
     test::MemoryLine* line = nullptr;
-    std::vector<std::string> seen;  ///< why the line's state is not just that
+    std::vector<std::string> seen;  ///< causes and findings of line events
     std::unique_ptr<Bus> bus;
 };
 
@@ -309,7 +309,7 @@ TEST_F(BusTest, AnAnswerMaySubmitTheNextRequest) {
     EXPECT_TRUE(run_until([&] { return answers == 20; }));
 }
 
-/// The loop was busy while the reply came, and its time is over when the alarm rings.
+/// The reply arrived while the loop was busy, and the timeout expires before it is read.
 TEST_F(BusTest, P1AReplyThatLiesInTheDeviceWhenItsTimeIsOverIsNoTimeout) {
     line->reply.clear();
     bus->start();
@@ -325,7 +325,7 @@ TEST_F(BusTest, P1AReplyThatLiesInTheDeviceWhenItsTimeIsOverIsNoTimeout) {
     EXPECT_EQ(bus->station_status(17).state, Health::online);
 }
 
-/// They came before the request: they hold it up for the gap, and are nobody's reply.
+/// Bytes before the request delay it by the gap and answer nothing.
 TEST_F(BusTest, P1StaleBytesAreReadBeforeARequestIsSent) {
     bus->start();
     clock.advance(1s);

@@ -1,4 +1,4 @@
-// What a line remembers: transactions with their instants, and what happened around errors.
+// A line's records: transactions with their instants, and what happened around errors.
 #include <gmock/gmock.h>
 
 #include <boost/asio/io_context.hpp>
@@ -52,8 +52,8 @@ class BusTrace : public testing::Test {
     void ask_often(int times) {
         for (int i = 0; i < times; ++i) ask();
     }
-    /// Asks once and hears nothing; by another function, so that nothing has to show afterwards
-    /// that no reply is outstanding.
+    /// Sends one request without a reply. Uses another function, so that its reply cannot stay
+    /// outstanding for later requests.
     void fail() {
         line->reply.clear();
         ask("04 00 64 00 01"_hex);

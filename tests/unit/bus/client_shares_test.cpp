@@ -13,8 +13,8 @@ constexpr TimePoint kNow{1h};
 std::vector<ClientShare> shares_of(const arbiter::BusShares& used,
                                    const arbiter::ClientNames& names,
                                    const ClientAccounts& accounts) {
-    DepartedClients nobody;
-    return client_shares({used, names, accounts, nobody}, kNow);
+    DepartedClients none;
+    return client_shares({used, names, accounts, none}, kNow);
 }
 
 TEST(ClientShares, TheGreediestComesFirstWithItsName) {
@@ -67,11 +67,11 @@ TEST(ClientShares, OfMoreThanAHundredTheGreediestAreShownWithTheirShareOfAll) {
 
 TEST(ClientShares, TellWhatAClientAskedAndHowItLastFailed) {
     ClientAccounts accounts;
-    accounts.answered(7, Outcome::timeout, kNow);  // of one that has gone
-    for (int i = 0; i < 3; ++i) accounts.asked(7);
-    accounts.answered(7, Outcome::ok, kNow);
-    accounts.answered(7, Outcome::busy, kNow - 3s);
-    accounts.answered(7, Outcome::cached, kNow);
+    accounts.count_outcome(7, Outcome::timeout, kNow);  // for a departed client
+    for (int i = 0; i < 3; ++i) accounts.count_request(7);
+    accounts.count_outcome(7, Outcome::ok, kNow);
+    accounts.count_outcome(7, Outcome::busy, kNow - 3s);
+    accounts.count_outcome(7, Outcome::cached, kNow);
     const std::vector<ClientShare> shares = shares_of({}, {}, accounts);
     ASSERT_EQ(shares.size(), 1u);
     EXPECT_EQ(shares[0].requests, 3u);
@@ -85,7 +85,7 @@ TEST(ClientShares, TellWhatAClientAskedAndHowItLastFailed) {
 TEST(ClientShares, OfMoreClientsThanThereIsRoomForTheFirstAreCounted) {
     ClientAccounts accounts;
     for (ClientId client = 1; client <= 2 * ClientAccounts::kClients; ++client)
-        accounts.asked(client);
+        accounts.count_request(client);
     EXPECT_EQ(accounts.all().size(), ClientAccounts::kClients);
 }
 
@@ -146,7 +146,7 @@ TEST(DepartedClients, AreBoundedInTimeAndNumberAndNothingIsLost) {
     EXPECT_EQ(departed.forgotten().used.busy, Duration(1s));
     EXPECT_TRUE(departed.rows(kNow + 1h).empty());
     EXPECT_EQ(departed.forgotten().used.busy, Duration(3s));
-    EXPECT_EQ(departed.forgotten().asked.requests, 3u);
+    EXPECT_EQ(departed.forgotten().totals.requests, 3u);
 }
 
 TEST(ClientShares, NamesOfServersClientsLoseTheirPorts) {

@@ -14,7 +14,7 @@ class LineHistoryTest : public testing::Test {
         report.stations.resize(2);
         history.record(now, report);
     }
-    /// A request to the first or second station, and what it took.
+    /// Counts a request to the first or second station, with its duration.
     void request(std::size_t station, Outcome outcome, Duration took) {
         ++report.stations[station].requests[3][outcome];
         report.stations[station].request_duration.observe(took);

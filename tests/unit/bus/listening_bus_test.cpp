@@ -39,8 +39,8 @@ class ListeningBusTest : public testing::Test {
         bus = std::make_unique<ListeningBus>(io.get_executor(), clock, settings, std::move(memory));
         bus->start();
     }
-    /// Somebody says it so long behind what was said before.
-    void say(Duration pause, std::uint8_t station, const Bytes& pdu) {
+    /// A frame arrives this long after the one before.
+    void hear(Duration pause, std::uint8_t station, const Bytes& pdu) {
         const Bytes adu = modbus::encode_adu(station, pdu);
         clock.advance(pause + wire_time(settings.arbiter.serial, adu.size()));
         line->come(adu);
@@ -64,8 +64,8 @@ class ListeningBusTest : public testing::Test {
 
 TEST_F(ListeningBusTest, TellsWhatPassesBy) {
     EXPECT_EQ(bus->station_status(17).state, Health::unknown);
-    say(10ms, 17, kRead);
-    say(4ms, 17, kReply);
+    hear(10ms, 17, kRead);
+    hear(4ms, 17, kReply);
     ASSERT_EQ(heard.size(), 1u);
     EXPECT_EQ(heard[0].reply, kReply);
     EXPECT_EQ(outcomes, std::vector{Outcome::ok});
@@ -89,14 +89,14 @@ TEST_F(ListeningBusTest, TellsWhatPassesBy) {
 }
 
 TEST_F(ListeningBusTest, SaysWhoDoesNotAnswerItsMaster) {
-    for (int i = 0; i < 4; ++i) say(300ms, 17, kRead);
+    for (int i = 0; i < 4; ++i) hear(300ms, 17, kRead);
     EXPECT_EQ(bus->station_status(17).state, Health::offline);
     EXPECT_EQ(report_of("press").up, false);
     EXPECT_EQ(report_of("press").requests.at(3)[Outcome::timeout], 3u);
-    say(4ms, 17, kReply);
+    hear(4ms, 17, kReply);
     EXPECT_EQ(bus->station_status(17).state, Health::heard);
-    say(10ms, 17, kRead);
-    say(4ms, 17, "83 02"_hex);
+    hear(10ms, 17, kRead);
+    hear(4ms, 17, "83 02"_hex);
     EXPECT_EQ(report_of("press").wire.exceptions.at(2), 1u);
     const HeardCounts counts = bus->station_status(17).heard.value();
     EXPECT_EQ(counts.timeouts, 3u);
@@ -104,9 +104,9 @@ TEST_F(ListeningBusTest, SaysWhoDoesNotAnswerItsMaster) {
 }
 
 TEST_F(ListeningBusTest, CountsWhatNobodyListedTogether) {
-    say(10ms, 5, kRead);
-    say(4ms, 5, kReply);
-    say(10ms, 0, "06 00 64 00 07"_hex);
+    hear(10ms, 5, kRead);
+    hear(4ms, 5, kReply);
+    hear(10ms, 0, "06 00 64 00 07"_hex);
     EXPECT_EQ(report_of("other").requests.at(3)[Outcome::ok], 1u);
     EXPECT_EQ(bus->report().wire.broadcasts, 1u);
     EXPECT_EQ(bus->report().stations.size(), 2u);
@@ -135,7 +135,7 @@ TEST_F(ListeningBusTest, RefusesEveryRequestAndSendsNothing) {
 }
 
 TEST_F(ListeningBusTest, SaysThatTheLineIsDown) {
-    say(10ms, 17, kRead);
+    hear(10ms, 17, kRead);
     line->events()->on_down("unplugged");
     EXPECT_FALSE(bus->status().up);
     EXPECT_EQ(bus->status().state, "down: unplugged");
@@ -145,11 +145,11 @@ TEST_F(ListeningBusTest, SaysThatTheLineIsDown) {
 }
 
 TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
-    say(10ms, 17, kRead);
-    say(4ms, 17, kReply);
-    say(10ms, 17, "83 02"_hex);  // nobody asked
-    say(10ms, 18, kRead);
-    say(10ms, 18, "83 02"_hex);
+    hear(10ms, 17, kRead);
+    hear(4ms, 17, kReply);
+    hear(10ms, 17, "83 02"_hex);  // no request
+    hear(10ms, 18, kRead);
+    hear(10ms, 18, "83 02"_hex);
     const auto all = bus->trace(9).transactions;
     ASSERT_EQ(all.size(), 2u);
     EXPECT_EQ(all[0].id, 1u);
@@ -167,11 +167,11 @@ TEST_F(ListeningBusTest, RecordsTheTransactionsOfItsMaster) {
 }
 
 TEST_F(ListeningBusTest, KeepsWhatHappenedAroundASilence) {
-    say(10ms, 17, kRead);
-    say(4ms, 17, kReply);
-    say(10ms, 17, kRead);
-    say(2s, 18, kRead);  // its master has gone on
-    say(4ms, 18, kReply);
+    hear(10ms, 17, kRead);
+    hear(4ms, 17, kReply);
+    hear(10ms, 17, kRead);
+    hear(2s, 18, kRead);  // the master has gone on
+    hear(4ms, 18, kReply);
     const auto heads = bus->incidents();
     ASSERT_EQ(heads.size(), 1u);
     EXPECT_EQ(heads[0].cause, "timeout");

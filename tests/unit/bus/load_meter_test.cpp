@@ -9,7 +9,7 @@ constexpr TimePoint kStart{1h};
 
 class LoadMeterTest : public ::testing::Test {
   protected:
-    /// A second of which the line is busy for this long at the end; per cent then.
+    /// Records a second that was busy for this long at its end, and returns the load in per cent.
     double second(Duration busy_for) {
         now += 1s;
         busy += busy_for;

@@ -13,7 +13,7 @@ namespace {
 const Bytes kRead = "03 0000 0001"_hex;
 const Bytes kWrite = "06 0000 0001"_hex;
 
-/// press 31 may be written, meter 5 only read; oven 20 is guarded against functions above 6.
+/// press 31 may be written, meter 5 is read-only; oven 20 is guarded against functions above 6.
 Rights plant() {
     Stations stations;
     stations[31].name = "press";

@@ -14,7 +14,7 @@ namespace {
 
 constexpr TraceSettings kSmall{4, 10, 4, 64, 64};
 
-/// A line's trace as it is made: each transaction has a request and perhaps more.
+/// A line's trace: each transaction has a request and perhaps more frames.
 struct Line {
     explicit Line(const TraceSettings& settings = kSmall) : store(settings) {}
 
@@ -91,7 +91,7 @@ TEST(TraceStore, PagesTransactionsByTheirEnds) {
 }
 
 TEST(TraceStore, ForgetsATransactionWithItsRequest) {
-    Line line({8, 100, 4, 64, 64});  // bytes for five exchanges of eleven
+    Line line({8, 100, 4, 64, 64});  // bytes for five exchanges of eleven bytes
     for (int i = 0; i < 7; ++i) line.exchange();
     const auto all = line.store.transactions(9);
     EXPECT_EQ(ids(all), "3 4 5 6 7");
@@ -99,7 +99,7 @@ TEST(TraceStore, ForgetsATransactionWithItsRequest) {
         EXPECT_EQ(one.request, "11 03 00 00 00 01"_hex);
         EXPECT_EQ(one.reply, "11 03 02 00 07"_hex);
     }
-    Line few({8, 4, 4, 6400, 64});  // frames of two
+    Line few({8, 4, 4, 6400, 64});  // frames for two exchanges
     for (int i = 0; i < 7; ++i) few.exchange();
     EXPECT_EQ(ids(few.store.transactions(9)), "6 7");
 }
@@ -120,9 +120,9 @@ TEST(TraceStore, KeepsDecisionsAsLongAsTheirTextsFit) {
     TraceStore store({4, 10, 4, 64, 16});
     for (std::uint64_t i = 1; i <= 3; ++i)
         store.add(RecordedDecision{i, {}, {}}, "decision " + std::to_string(i));
-    const auto told = store.decisions(9);
-    ASSERT_EQ(told.size(), 1u);
-    EXPECT_EQ(told[0].text, "decision 3");
+    const auto decisions = store.decisions(9);
+    ASSERT_EQ(decisions.size(), 1u);
+    EXPECT_EQ(decisions[0].text, "decision 3");
     EXPECT_EQ(store.decisions_since(2, 9).size(), 1u);
     EXPECT_TRUE(store.decisions_since(3, 9).empty());
 }

@@ -22,7 +22,7 @@ const Bytes kWord = "06 00 64 12 34"_hex;
 const Bytes kWordSent = "10 00 64 00 01 02 12 34"_hex;
 const Bytes kWordReply = "10 00 64 00 01"_hex;
 
-/// Station 17 has no function for single items or inputs; 18 is taken as it is.
+/// Station 17 has no functions for single items or inputs; 18 is not translated.
 class BusTranslatesTest : public testing::Test {
   protected:
     BusTranslatesTest() {
@@ -43,7 +43,7 @@ class BusTranslatesTest : public testing::Test {
         bus->transact({.station = station, .request = test::request_of(pdu), .client = 1},
                       [&answers](Answer answer) { answers.push_back(std::move(answer)); });
     }
-    /// The answer to `pdu` from a panel that replies so.
+    /// Returns the answer to `pdu` when the panel replies with `reply`.
     Answer answer(std::uint8_t station, const Bytes& pdu, const Bytes& reply) {
         if (!bus) make_bus();
         line->reply = reply;
@@ -121,7 +121,7 @@ TEST_F(BusTranslatesTest, P6ReadsOfTheSameItemsByBothFunctionsShareOneTransactio
     make_bus();
     line->reply = "03 02 00 0A"_hex;
     std::vector<Answer> answers;
-    ask(18, "03 00 01 00 01"_hex, answers);  // the line is taken
+    ask(18, "03 00 01 00 01"_hex, answers);  // keeps the line busy
     ask(17, "03 00 64 00 01"_hex, answers);
     ask(17, "04 00 64 00 01"_hex, answers);
     ASSERT_TRUE(test::run_until(io, clock, [&] { return answers.size() == 3; }));

@@ -62,7 +62,7 @@ TEST(Describe, KnowsWhatTheLoaderLooksAtItself) {
 }
 
 TEST(Describe, HasATextForEachKeyAndNoOther) {
-    std::set<std::string> keys{"templates", "lines/stations/template"};  // before the loader's keys
+    std::set<std::string> keys{"templates", "lines/stations/template"};  // resolved before loading
     for (const KeyShape& key : describe().keys)
         EXPECT_TRUE(keys.insert(key.path).second) << key.path;
     std::set<std::string> texts;

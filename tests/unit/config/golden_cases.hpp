@@ -12,10 +12,10 @@
 
 namespace panelgate::config {
 
-/// One configuration and what the user reads of it.
+/// One configuration and its expected messages.
 struct GoldenCase {
     std::string name;
-    bool whole = false;  ///< its lines are the configuration: the prelude is left out
+    bool whole = false;  ///< the configuration is its lines alone, without the prelude
     std::string lines;
     std::string expected;
 };
@@ -36,12 +36,12 @@ struct GoldenFile {
     std::vector<GoldenCase> cases;
 
     std::string configuration_of(const GoldenCase& one) const {
-        static constexpr std::string_view kHole = "<case>\n";
+        static constexpr std::string_view kPlaceholder = "<case>\n";
         if (one.whole || prelude.empty()) return one.lines;
         std::string text = prelude;
-        return text.replace(text.find(kHole), kHole.size(), one.lines);
+        return text.replace(text.find(kPlaceholder), kPlaceholder.size(), one.lines);
     }
-    /// Throws for a name that no case has.
+    /// Throws if no case has this name.
     GoldenCase& at(const std::string& name) {
         const auto found = std::ranges::find(cases, name, &GoldenCase::name);
         if (found == cases.end()) throw std::out_of_range("no case " + name);
@@ -49,7 +49,7 @@ struct GoldenFile {
     }
 };
 
-/// Throws when a text is not of this form: what stands in it must be tested.
+/// Throws if the text does not have this form: all of it must be tested.
 inline GoldenFile parse_golden(const std::string& text) {
     static constexpr std::string_view kCase = "==== ";
     static constexpr std::string_view kWhole = " whole";

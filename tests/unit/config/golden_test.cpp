@@ -59,7 +59,7 @@ std::optional<std::string> environment(const std::string& name) {
     return found == kSet.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// What the user reads: the problems, or the warnings of a valid file.
+/// Returns the messages: the problems, or the warnings of a valid file.
 std::string told(const std::string& configuration) {
     const MemoryFiles files({{"/run/secrets/ops", "  secret-0123456789 \n"},
                              {"/run/secrets/marked", "\xef\xbb\xbfsecret-0123456789\r\n"},
@@ -81,7 +81,7 @@ std::string told(const std::string& configuration) {
 
 class ConfigGolden : public ::testing::TestWithParam<Place> {};
 
-/// With PANELGATE_WRITE_GOLDEN in the environment the texts are written instead: read them well.
+/// With PANELGATE_WRITE_GOLDEN in the environment it writes the texts instead: review them.
 TEST_P(ConfigGolden, SaysExactlyThis) {
     GoldenFile file = parse_golden(read_text(GetParam().file));
     GoldenCase& one = file.at(GetParam().name);
@@ -112,7 +112,7 @@ TEST(ConfigGoldenFolder, HoldsNothingButCasesAndEachNameOnce) {
     EXPECT_GE(names.size(), 116U);
 }
 
-/// Where to put the cursor; and no words of the parser.
+/// Each message has a place, and none of the parser's words.
 TEST(ConfigGoldenFolder, EachCaseBeginsWithAPlace) {
     for (const fs::path& file : files()) {
         for (const GoldenCase& one : parse_golden(read_text(file)).cases) {

@@ -16,11 +16,11 @@ using ::testing::IsEmpty;
 
 const std::string kSimple = "lines:\n  - name: a\n    device: /dev/ttyS0\n";
 const std::string kServe = "modbus_tcp:\n  - listen: 127.0.0.1:0\n";
-/// A line at 38400 8N1; the text goes on inside it.
+/// A line at 38400 8N1, to be continued.
 const std::string kFast =
     "lines:\n  - name: a\n    device: sim\n    serial: {baud: 38400, parity: none}\n";
 
-/// The valid configuration, or a failed test.
+/// Returns the valid configuration, or fails the test.
 Config load_valid(const std::string& text, const Files& files = MemoryFiles({})) {
     yaml::Problems problems("f.yaml");
     std::optional<Config> config = load(text, files, problems);

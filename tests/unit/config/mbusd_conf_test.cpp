@@ -32,7 +32,7 @@ std::string faults(const std::string& text) {
     return problems.text();
 }
 
-TEST(MbusdConf, OfNothingHasTheDefaultsOfMbusd) {
+TEST(MbusdConf, AnEmptyFileHasTheDefaultsOfMbusd) {
     const Imported imported = imported_of("# nothing\n\n   # at all\n");
     const Config config = load(imported);
     EXPECT_EQ(config.lines[0].device.device, "/dev/ttyS0");
@@ -88,7 +88,7 @@ TEST(MbusdConf, SaysWhatHasNoCounterpartInCommentsAndNotes) {
         EXPECT_THAT(imported.yaml, HasSubstr("\n# " + note.substr(note.find(": ") + 2) + '\n'));
 }
 
-TEST(MbusdConf, TellsOfRtsThatTheDriverSwitchesAlreadyInWhicheverOrder) {
+TEST(MbusdConf, NotesRtsThatTheDriverAlreadySwitchesInEitherOrder) {
     const std::string rts = "trx_control = rts_0\n";
     const std::string kernel = "enable_rs485 = yes\n";
     for (const std::string& text : {rts + kernel, kernel + rts}) {
@@ -103,7 +103,7 @@ TEST(MbusdConf, TellsOfRtsThatTheDriverSwitchesAlreadyInWhicheverOrder) {
     EXPECT_THAT(off.notes, IsEmpty());
 }
 
-TEST(MbusdConf, OfASettingThatStandsTwiceTheLastCountsAndTheFirstIsTold) {
+TEST(MbusdConf, OfARepeatedSettingTheLastCountsAndTheFirstIsReported) {
     const Imported imported =
         imported_of("speed = 9600\ntrx_control = rts\nspeed = 38400\ntrx_control = addc\n");
     const Line line = load(imported).lines[0];
@@ -148,7 +148,7 @@ TEST(MbusdConf, TakesFilesOfWindowsAndOfOldMacs) {
     }
 }
 
-TEST(MbusdConf, TellsAllFaultsWithTheirPlaces) {
+TEST(MbusdConf, ReportsAllFaultsWithTheirPlaces) {
     EXPECT_EQ(
         faults("device\nspeed = fast\n  mode = 7n1\nadress = 1\nport =\ntrx_control = gpio\n"),
         "mbusd.conf:1:1: a line must be NAME = VALUE such as speed = 19200, or a comment that "

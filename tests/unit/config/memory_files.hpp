@@ -9,7 +9,7 @@
 
 namespace panelgate::config {
 
-/// Files from a table; directories are what their paths begin with.
+/// Files in a map; directories are path prefixes.
 class MemoryFiles final : public Files {
   public:
     explicit MemoryFiles(std::map<std::string, std::string> texts) : texts_(std::move(texts)) {}
@@ -28,7 +28,7 @@ class MemoryFiles final : public Files {
         return paths;
     }
 
-    /// Those of this folder, and one that a container platform gave.
+    /// True below /public, and for one mounted secret.
     bool is_readable_by_all(const std::string& path) const override {
         return path.starts_with("/public/") || path == "/run/secrets/mounted";
     }

@@ -65,14 +65,14 @@ TEST_F(RealFilesTest, SaysThatReadingFails) {
     EXPECT_EQ(errno, EIO);
 }
 
-TEST_F(RealFilesTest, WaitsForNoWriterOfAPipeForEver) {
+TEST_F(RealFilesTest, DoesNotWaitForeverForAPipeWriter) {
     const std::string pipe = (dir_ / "pipe").string();
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
     EXPECT_EQ(RealFiles::read_any(pipe), std::nullopt);
     EXPECT_EQ(errno, EPIPE);
 }
 
-TEST_F(RealFilesTest, ReadsWhatSomebodyWritesToAPipe) {
+TEST_F(RealFilesTest, ReadsWhatAnotherThreadWritesToAPipe) {
     const std::string pipe = (dir_ / "pipe").string();
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
     std::future<std::optional<std::string>> read =
@@ -89,7 +89,7 @@ TEST_F(RealFilesTest, ReadsAnEmptyPipeWithoutAName) {
     ::close(ends[0]);
 }
 
-TEST_F(RealFilesTest, KnowsWhatEverybodyMayRead) {
+TEST_F(RealFilesTest, KnowsWhichFilesAllUsersMayRead) {
     const std::string path = put("token", "secret");
     fs::permissions(path, fs::perms(0640));
     EXPECT_FALSE(RealFiles().is_readable_by_all(path));

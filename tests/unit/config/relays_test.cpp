@@ -56,7 +56,7 @@ TEST(ConfigRelays, AreReadWithTheirDefaults) {
     EXPECT_TRUE(config->warnings.empty());
 }
 
-TEST(ConfigRelays, ARefreshOfOneThatWritesEveryTurnHasNoEffectAndIsSaid) {
+TEST(ConfigRelays, RefreshWithoutOnChangeHasNoEffectAndIsReported) {
     yaml::Problems problems("relays.yaml");
     const MemoryFiles files({});
     const auto config =
@@ -75,8 +75,7 @@ TEST(ConfigRelays, AChainMayVisitAStationAgainElsewhere) {
               "");
 }
 
-/// Layers of three: one spreads a block to two halves, two bring them together again. There are
-/// 2^60 ways through them.
+/// Layers of three: one copies a block to two places, two merge them again: 2^60 paths.
 TEST(ConfigRelays, ManyWaysThroughTheRelaysAreNotWalkedOneByOne) {
     std::string relays;
     for (unsigned layer = 60; layer-- > 0;) {  // backwards, so that each finds the rest

@@ -11,7 +11,7 @@
 namespace panelgate::config {
 namespace {
 
-/// The problems, and the tree when all is done.
+/// The tree after apply_templates(), and the problems.
 struct Applied {
     yaml::Node tree;
     std::string problems;
@@ -31,7 +31,7 @@ Applied apply(const std::string& text) {
     return applied;
 }
 
-/// "key=value …" of a map; of a list its length.
+/// Returns "key=value …" of a map; the length of a list.
 std::string text_of(const yaml::Node& map) {
     std::string text;
     for (const yaml::Entry& entry : map.entries) {
@@ -47,7 +47,7 @@ std::string text_of(const yaml::Node& map) {
     return text;
 }
 
-/// The only station of this text's only line.
+/// Returns the only station of the only line.
 std::string station_of(const std::string& templates, const std::string& station) {
     const Applied applied =
         apply("templates: " + templates + "\nlines: [{stations: [" + station + "]}]");

@@ -1,4 +1,4 @@
-// Timing of lines and stations: what is inherited, what `auto` means, what may be chosen.
+// Timing of lines and stations: inheritance, `auto`, and allowed values.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -11,7 +11,7 @@
 namespace panelgate::config {
 namespace {
 
-/// The line that `text` gives after its name.
+/// Loads a line with these keys after its name.
 Line line_of(const std::string& text) {
     yaml::Problems problems("f.yaml");
     const std::optional<Config> config =
@@ -40,7 +40,7 @@ TEST(ConfigTiming, P5AFrameGapIsTheOwnersChoiceDownToThreeAndAHalfCharacters) {
     }
 }
 
-TEST(ConfigTiming, TheAutomaticHoleOfAReplyIsWhatTheWayToThePanelsNeeds) {
+TEST(ConfigTiming, TheAutomaticReplyHoleFitsTheTransport) {
     const Line tty = line_of("    device: /dev/ttyS0\n    serial: {baud: 9600}\n");
     EXPECT_EQ(tty.arbiter.reply_hole, 60ms + wire_time(tty.device.serial, 32));
     const Line sim = line_of("    device: sim\n    serial: {baud: 9600}\n");
@@ -52,12 +52,12 @@ TEST(ConfigTiming, TheAutomaticHoleOfAReplyIsWhatTheWayToThePanelsNeeds) {
     EXPECT_EQ(line_of(tcp + "    timing: {reply_hole: 2s}\n").arbiter.reply_hole, Duration(2s));
 }
 
-TEST(ConfigTiming, P1OnlyALineOverTcpMayHoldFramesBack) {
+TEST(ConfigTiming, P1OnlyALineOverTcpMayDelayFrames) {
     EXPECT_TRUE(line_of("    device: tcp://10.0.0.7:4001\n").arbiter.may_stall);
     EXPECT_FALSE(line_of("    device: sim\n").arbiter.may_stall);
 }
 
-TEST(ConfigTiming, WhoRestsAfterATimeoutIsTheOwnersChoice) {
+TEST(ConfigTiming, TheConfigurationChoosesWhatPausesAfterATimeout) {
     using arbiter::Quarantine;
     const auto chosen = [](const std::string& word) {
         return line_of("    device: sim\n    quarantine: " + word + "\n").arbiter.quarantine;
@@ -108,7 +108,7 @@ TEST(ConfigTiming, AStationOverridesTheTimingOfItsLine) {
 }
 
 TEST(ConfigTiming, TheAutomaticFrameGapIsWhatThePanelAsksOrTheStandardWhicheverIsLonger) {
-    // The GT wants 4 characters (ARCT1F501E, 1.1.2): longer than t3.5 up to 19200 bit/s only.
+    // The GT requires 4 characters (ARCT1F501E, 1.1.2): longer than t3.5 only up to 19200 bit/s.
     const std::string gt = "    stations: [{id: 20, profile: panasonic-gt}, {id: 1}]\n";
     const Line slow = line_of("    device: sim\n    serial: {baud: 9600, parity: odd}\n" + gt);
     const SerialFormat& format = slow.device.serial;

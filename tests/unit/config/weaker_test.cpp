@@ -23,7 +23,7 @@ Config loaded(const std::string& text) {
     return std::move(config).value();
 }
 
-/// What is weaker after `next`, and that the way there is not.
+/// Returns what is weaker in `next`; the reverse change must list nothing.
 std::vector<std::string> told(const std::string& running, const std::string& next) {
     EXPECT_THAT(weaker(loaded(next), loaded(running)), IsEmpty()) << "the other way round";
     EXPECT_THAT(weaker(loaded(next), loaded(next)), IsEmpty());
@@ -36,15 +36,15 @@ std::string plant(const std::string& of_line, const std::string& of_station,
            "stations: [{id: 31, name: press" + of_station + "}]}\n" + rest;
 }
 
-const std::string kDoor = "modbus_tcp: [{listen: '127.0.0.1:1502'}]\n";
+const std::string kListener = "modbus_tcp: [{listen: '127.0.0.1:1502'}]\n";
 
-std::string station(const std::string& keys) { return plant("", keys, kDoor); }
-std::string line(const std::string& keys) { return plant(keys, "", kDoor); }
-std::string door(const std::string& listen, const std::string& keys = "") {
+std::string station(const std::string& keys) { return plant("", keys, kListener); }
+std::string line(const std::string& keys) { return plant(keys, "", kListener); }
+std::string endpoint(const std::string& listen, const std::string& keys = "") {
     return plant("", "", "modbus_tcp: [{listen: '" + listen + "'" + keys + "}]\n");
 }
 std::string http(const std::string& keys, const std::string& listen = "127.0.0.1:8080") {
-    return plant("", "", kDoor + "http: {listen: '" + listen + "'" + keys + "}\n");
+    return plant("", "", kListener + "http: {listen: '" + listen + "'" + keys + "}\n");
 }
 
 TEST(Weaker, AccessAndGuardOfAStation) {
@@ -56,7 +56,7 @@ TEST(Weaker, AccessAndGuardOfAStation) {
 
 TEST(Weaker, AStationThatIsNoLongerListedWhereUnlistedOnesPass) {
     const std::string without =
-        "lines: [{name: floor1, device: sim, stations: [{id: 5}]}]\n" + kDoor;
+        "lines: [{name: floor1, device: sim, stations: [{id: 5}]}]\n" + kListener;
     EXPECT_THAT(weaker(loaded(station(", access: read_only")), loaded(without)),
                 ElementsAre("station press: is not listed, so nothing is refused for it"));
     EXPECT_THAT(weaker(loaded(station("")), loaded(without)), IsEmpty());
@@ -72,18 +72,18 @@ TEST(Weaker, UnlistedStationsAndTheModeOfALine) {
 }
 
 TEST(Weaker, AccessAndBroadcastsOfAListener) {
-    EXPECT_THAT(told(door("127.0.0.1:1502", ", access: read_only"), door("127.0.0.1:1502")),
+    EXPECT_THAT(told(endpoint("127.0.0.1:1502", ", access: read_only"), endpoint("127.0.0.1:1502")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: access read_only -> read_write"));
-    EXPECT_THAT(told(door("127.0.0.1:1502", ", broadcast: deny"), door("127.0.0.1:1502")),
+    EXPECT_THAT(told(endpoint("127.0.0.1:1502", ", broadcast: deny"), endpoint("127.0.0.1:1502")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: broadcast deny -> reply"));
-    EXPECT_THAT(told(door("127.0.0.1:1502"), door("127.0.0.1:1502", ", udp: true")),
+    EXPECT_THAT(told(endpoint("127.0.0.1:1502"), endpoint("127.0.0.1:1502", ", udp: true")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: udp false -> true"));
 }
 
 TEST(Weaker, AListenerOnAWiderAddressOrAnotherPort) {
-    EXPECT_THAT(told(door("127.0.0.1:1502"), door("0.0.0.0:1502")),
+    EXPECT_THAT(told(endpoint("127.0.0.1:1502"), endpoint("0.0.0.0:1502")),
                 ElementsAre("modbus_tcp 0.0.0.0:1502: is opened"));
-    EXPECT_THAT(weaker(loaded(door("127.0.0.1:1502")), loaded(door("127.0.0.1:1503"))),
+    EXPECT_THAT(weaker(loaded(endpoint("127.0.0.1:1502")), loaded(endpoint("127.0.0.1:1503"))),
                 ElementsAre("modbus_tcp 127.0.0.1:1503: is opened"));
     EXPECT_THAT(told(http(""), http("", "0.0.0.0:8080")),
                 ElementsAre("http 0.0.0.0:8080: is opened"));
@@ -92,13 +92,13 @@ TEST(Weaker, AListenerOnAWiderAddressOrAnotherPort) {
 
 TEST(Weaker, AllowThatLetsMoreIn) {
     const auto allow = [](const std::string& list) {
-        return door("127.0.0.1:1502", ", allow: [" + list + "]");
+        return endpoint("127.0.0.1:1502", ", allow: [" + list + "]");
     };
     EXPECT_THAT(told(allow("127.0.0.1/32"), allow("127.0.0.0/8")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: allow lets 127.0.0.0/8 in"));
     EXPECT_THAT(told(allow("127.0.0.1/32"), allow("127.0.0.1/32, 10.0.0.5")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: allow lets 10.0.0.5/32 in"));
-    EXPECT_THAT(told(allow("127.0.0.1/32"), door("127.0.0.1:1502")),
+    EXPECT_THAT(told(allow("127.0.0.1/32"), endpoint("127.0.0.1:1502")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: allow lets all addresses in"));
     EXPECT_THAT(told(allow("10.0.0.0/8"), allow("'::/0'")),
                 ElementsAre("modbus_tcp 127.0.0.1:1502: allow lets ::/0 in"));
@@ -113,7 +113,7 @@ TEST(Weaker, HostsThatAreMore) {
                 ElementsAre("http: hosts are all names of this machine"));
 }
 
-TEST(Weaker, RolesOfAnybodyAndOfTokens) {
+TEST(Weaker, RolesOfAnonymousClientsAndOfTokens) {
     EXPECT_THAT(told(http(", anonymous: viewer"), http(", anonymous: operator")),
                 ElementsAre("http: anonymous viewer -> operator"));
     const auto token = [](const std::string& name, const std::string& role,

@@ -4,7 +4,7 @@
 
 namespace panelgate::doctor {
 
-/// Counts of one station, put together as the arbiter would count them.
+/// Counts of one station, as the arbiter would count them.
 class Mix {
   public:
     Mix& answered(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
@@ -22,7 +22,7 @@ class Mix {
         s_.mute_in_a_row += n;
         return *this;
     }
-    /// n silent attempts whose requests were answered when they were asked again.
+    /// n silent attempts whose requests were answered when asked again.
     Mix& lost(std::uint64_t n, std::size_t pause = arbiter::Symptoms::kPauses - 1) {
         silent(n);
         s_.silent_after[pause] += n;
@@ -35,7 +35,7 @@ class Mix {
         s_.long_damaged += n;
         return exact(n, 69, 30, 20, n);
     }
-    /// The right length, those bytes zero that the parity check throws away.
+    /// The right length; bytes dropped by the parity check are zero.
     Mix& zeroed(std::uint64_t n) { return exact(n, 11, 7, 4, 0); }
     /// The right length, no byte right, none zero.
     Mix& strange(std::uint64_t n) { return exact(n, 11, 0, 6, 0); }

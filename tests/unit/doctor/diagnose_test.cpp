@@ -1,4 +1,4 @@
-// Each cause with the figures that show it, and its neighbours that look nearly the same.
+// Each cause with the figures that show it, and similar causes.
 #include "panelgate/doctor/doctor.hpp"
 
 #include <gmock/gmock.h>
@@ -26,7 +26,7 @@ TEST_F(Diagnose, AHealthyLineHasNoFinding) {
     EXPECT_THAT(causes({{1, Mix().answered(100).late(1, 30ms)}}), IsEmpty());
 }
 
-TEST_F(Diagnose, NobodyAndNothingIsHeard) {
+TEST_F(Diagnose, NoStationAndNoByteIsHeard) {
     EXPECT_THAT(causes({{1, Mix().silent(6)}}), ElementsAre("no-answer-at-all"));
     EXPECT_THAT(causes({{1, Mix().silent(6)}, {2, Mix().silent(9)}, {3, {}}}),
                 ElementsAre("no-answer-at-all"));
@@ -119,7 +119,7 @@ TEST_F(Diagnose, SporadicDamageOfEverybodyIsNoise) {
                 IsEmpty());
 }
 
-TEST_F(Diagnose, AFewDamagedRepliesOfOneOfTwoStationsDoNotTellYet) {
+TEST_F(Diagnose, AFewDamagedRepliesOfOneOfTwoStationsAreInconclusive) {
     EXPECT_THAT(causes({{1, Mix().answered(20)}, {2, Mix().answered(20).damaged(3)}}), IsEmpty());
     EXPECT_THAT(causes({{1, Mix().answered(20).damaged(1)}, {2, Mix().answered(20).damaged(3)}}),
                 ElementsAre("noise"));
@@ -140,7 +140,7 @@ TEST_F(Diagnose, DamageOfLongRepliesPointsToTheTermination) {
                 Not(HasSubstr("termination first")));
 }
 
-TEST_F(Diagnose, BytesThatNobodySaidPointToTheBias) {
+TEST_F(Diagnose, UnsolicitedBytesPointToTheBias) {
     const auto found = findings({{1, Mix().answered(60).with(&Symptoms::strays, 20)}});
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].cause, Cause::noise);
@@ -148,7 +148,7 @@ TEST_F(Diagnose, BytesThatNobodySaidPointToTheBias) {
     EXPECT_THAT(causes({{1, Mix().answered(60).with(&Symptoms::strays, 2)}}), IsEmpty());
 }
 
-TEST_F(Diagnose, DamageOrDoubledRepliesOfOneAddressOnly) {
+TEST_F(Diagnose, DamageOrDuplicatesOfOneAddressOnly) {
     const Symptoms fine = Mix().answered(50);
     EXPECT_THAT(causes({{1, fine}, {2, Mix().answered(30).damaged(6)}}),
                 ElementsAre("damaged-replies 2"));
@@ -206,7 +206,7 @@ TEST_F(Diagnose, LateRepliesAreATimeoutTooShortAndNoGap) {
     EXPECT_THAT(causes({{0, Mix().answered(9).late(3, 50ms)}}), ElementsAre("timeout-too-short"));
 }
 
-TEST_F(Diagnose, RequestsOfSomebodyElseAreAnotherMaster) {
+TEST_F(Diagnose, ForeignRequestsAreAnotherMaster) {
     const Symptoms disturbed = Mix().answered(50).with(&Symptoms::requests, 3);
     EXPECT_THAT(causes({{1, disturbed}}), ElementsAre("other-master"));
     EXPECT_THAT(findings({{1, disturbed}})[0].evidence, HasSubstr("3 requests of somebody else"));
@@ -227,7 +227,7 @@ TEST_F(Diagnose, RequestsOfSomebodyElseAreAnotherMaster) {
         << "what it is answered looks late or wrong";
 }
 
-TEST_F(Diagnose, FramesOfStationsThatNobodyAskedAreAnotherMasterToo) {
+TEST_F(Diagnose, FramesOfStationsThatWereNotAskedAreAnotherMasterToo) {
     const Symptoms fine = Mix().answered(50);
     const Symptoms stranger = Mix().with(&Symptoms::unasked, 3);
     EXPECT_THAT(causes({{0, stranger}, {1, fine}}), ElementsAre("other-master"));

@@ -9,12 +9,12 @@ namespace {
 
 using arbiter::Symptoms;
 
-/// Two stations; the clock and the counts go on as the test says.
+/// Two stations; the test sets the clock and the counts.
 class DoctorTest : public testing::Test {
   protected:
     DoctorTest() { doctor.begin(now, counted); }
 
-    /// Five seconds with 20 requests, `damaged` of them in vain.
+    /// Five seconds with 20 requests, `damaged` of them unanswered.
     Doctor::Change pass(std::uint64_t damaged) {
         now += 5s;
         one.answered(20 - damaged).damaged(damaged);
@@ -95,7 +95,7 @@ TEST_F(DoctorTest, ANewLineForgetsTheCountsAndKeepsTheFindingUntilItIsUsed) {
 }
 
 TEST_F(DoctorTest, DamageAlonePersistsAcrossOpeningsAndIsNamed) {
-    for (int i = 0; i < 6; ++i) {  // one damaged reply, then the line is opened anew
+    for (int i = 0; i < 6; ++i) {  // one damaged reply, then the line is reopened
         now += 2s;
         counted.stations[1] = one.with(&Symptoms::damaged_long, 1);
         doctor.begin(now, counted);

@@ -1,4 +1,4 @@
-// One panel that is odd, told as what it is and as nothing else; and lines over TCP.
+// Faults of one panel, reported as such and as nothing else; and lines over TCP.
 #include <gmock/gmock.h>
 
 #include "diagnose_case.hpp"
@@ -12,10 +12,10 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// Right but for the order of the CRC's bytes.
+/// Right except for the order of the CRC's bytes.
 Mix swapped(std::uint64_t n) { return Mix().damaged(n).with(&Symptoms::crc_swapped, n); }
 
-TEST_F(Diagnose, APanelThatWritesInLowerCaseIsToldWhatToSet) {
+TEST_F(Diagnose, ForAPanelThatWritesInLowerCaseTheSettingIsNamed) {
     const Mix panel = Mix().answered(4).damaged(6).with(&Symptoms::lower_case, 6);
     facts.serial.mode = SerialMode::ascii;
     const auto found = findings({{7, panel}, {8, Mix().answered(20)}});
@@ -50,7 +50,7 @@ TEST_F(Diagnose, OneVeryLateReplyGivesNoFigureForTheTimeout) {
     EXPECT_THAT(found[0].evidence, HasSubstr("up to 11300ms after the timeout of 500ms"));
 }
 
-TEST_F(Diagnose, ATimeoutThatTheDeadlineCutsShortIsToldWithIt) {
+TEST_F(Diagnose, ATimeoutThatTheDeadlineCutsShortIsReportedWithIt) {
     facts.deadline = 2s;
     EXPECT_EQ(findings({{1, Mix().lost(6).late(6, 1s)}}).at(0).advice,
               "Set its `timing.response_timeout` to 1880ms.");
@@ -120,7 +120,7 @@ TEST_F(Diagnose, SilenceFromTheStartMayBeTheOrderOfTheCrc) {
     EXPECT_THAT(advice(Mix().silent(9)), Not(HasSubstr("crc_order")));
 }
 
-TEST_F(Diagnose, APanelThatAnswersBroadcastsIsToldByName) {
+TEST_F(Diagnose, APanelThatAnswersBroadcastsIsNamed) {
     broadcasts = 8;
     const Symptoms fine = Mix().answered(50);
     const auto answers = [](std::uint64_t n) {
@@ -176,7 +176,7 @@ TEST_F(Diagnose, BytesBehindMostRepliesAreNoNoise) {
     EXPECT_THAT(causes({{1, Mix().answered(4).with(&Symptoms::trailed, 4)}}), IsEmpty());
 }
 
-TEST_F(Diagnose, ASecondCopyBehindEveryReplyMayBeOnePanelOrTwo) {
+TEST_F(Diagnose, ADuplicateAfterEveryReplyMayBeOnePanelOrTwo) {
     const auto found = findings(
         {{1, Mix().answered(50).with(&Symptoms::doubled, 50).with(&Symptoms::trailed, 50)}});
     ASSERT_EQ(found.size(), 1u);

@@ -83,7 +83,7 @@ TEST_F(Diagnose, EachPlainFaultAloneIsNamedRightlyOrNotAtAll) {
     }
 }
 
-/// Texts and figures are two tellings of the same numbers.
+/// Texts and figures report the same numbers.
 TEST_F(Diagnose, EachFigureStandsInTheWordsToo) {
     for (const bool over_tcp : {false, true}) {
         facts.over_tcp = over_tcp;

@@ -18,7 +18,7 @@ struct Send {
 };
 struct Other {};
 
-/// Wants whatever a test puts in.
+/// Requests what a test sets.
 struct Machine {
     std::optional<std::variant<Send, Other>> poll_action() {
         if (wishes.empty()) return std::nullopt;
@@ -34,15 +34,15 @@ struct Machine {
     std::optional<TimePoint> busy;
 };
 
-/// A device with something in it, and everything that happens, a letter each.
+/// A device with pending input; records every event as a letter.
 class DriveTest : public testing::Test, public Line {
   protected:
     void start(Events&) override {}
     void stop() override {}
     void poll_input() override {
-        story += 'p';
+        event_trace += 'p';
         if (const auto bytes = std::exchange(device, {}); !bytes.empty())
-            drive.hear([&](TimePoint) { story += bytes; });
+            drive.hear([&](TimePoint) { event_trace += bytes; });
     }
     void write(ByteView) override {}
     void hold_input(bool hold) override { held = hold; }
@@ -50,25 +50,25 @@ class DriveTest : public testing::Test, public Line {
 
     struct Host {
         void act(const Send& send) {
-            test->story += send.what;
-            if (send.what == 'f') test->drive.hear([&](TimePoint) { test->story += 'd'; });
+            test->event_trace += send.what;
+            if (send.what == 'f') test->drive.hear([&](TimePoint) { test->event_trace += 'd'; });
         }
-        void act(const Other&) { test->story += 'o'; }
+        void act(const Other&) { test->event_trace += 'o'; }
         void on_deadline(TimePoint now) {
-            test->story += '!';
+            test->event_trace += '!';
             test->machine.deadline.reset();
             test->rang = now;
         }
-        void settled(TimePoint) { test->story += '.'; }
+        void settled(TimePoint) { test->event_trace += '.'; }
         DriveTest* test;
     };
 
     test::ManualClock clock;
     Machine machine;
     Host host{this};
-    std::string device;  ///< has come, and nobody has read it
-    std::string story;
-    bool held = false;  ///< input wakes nobody
+    std::string device;  ///< received and not yet read
+    std::string event_trace;
+    bool held = false;  ///< input is deferred
     TimePoint rang;
     Drive<Machine, Host> drive{clock, *this, machine, host};
 
@@ -76,23 +76,23 @@ class DriveTest : public testing::Test, public Line {
     Counters counters_;
 };
 
-TEST_F(DriveTest, ReadsWhatTheDeviceHoldsBeforeItHandsOnWhatIsAsked) {
+TEST_F(DriveTest, ReadsPendingInputBeforeACall) {
     device = "xy";
     machine.wishes = {Send{'s'}};
-    drive.tell([&](TimePoint) { story += 'v'; });
-    EXPECT_EQ(story, "pxys.v.");
+    drive.tell([&](TimePoint) { event_trace += 'v'; });
+    EXPECT_EQ(event_trace, "pxys.v.");
 }
 
-TEST_F(DriveTest, ReadsWhatTheDeviceHoldsBeforeItLooksAtTheClock) {
+TEST_F(DriveTest, ReadsPendingInputBeforeTheClock) {
     machine.deadline = clock.now() + 5ms;
     drive.tell([](TimePoint) {});
     device = "xy";
-    story.clear();
+    event_trace.clear();
     clock.advance(5ms);
-    EXPECT_EQ(story, "pxy.!.");
+    EXPECT_EQ(event_trace, "pxy.!.");
 }
 
-TEST_F(DriveTest, AVerbIsToldTheTimeBehindTheReading) {
+TEST_F(DriveTest, ACallGetsTheTimeAfterReading) {
     const TimePoint late = clock.now() + 7ms;
     machine.deadline = clock.now() + 5ms;
     drive.tell([](TimePoint) {});
@@ -103,14 +103,14 @@ TEST_F(DriveTest, AVerbIsToldTheTimeBehindTheReading) {
 
 TEST_F(DriveTest, ActsOnAllThatIsWantedBehindEachVerb) {
     machine.wishes = {Send{'a'}, Other{}, Send{'b'}};
-    drive.hear([&](TimePoint) { story += 'v'; });
-    EXPECT_EQ(story, "vaob.");
+    drive.hear([&](TimePoint) { event_trace += 'v'; });
+    EXPECT_EQ(event_trace, "vaob.");
 }
 
 TEST_F(DriveTest, AVerbFromInsideAnActionIsDrainedByTheOuterLoop) {
     machine.wishes = {Send{'f'}, Send{'g'}};
-    drive.hear([&](TimePoint) { story += 'v'; });
-    EXPECT_EQ(story, "vfdg.")
+    drive.hear([&](TimePoint) { event_trace += 'v'; });
+    EXPECT_EQ(event_trace, "vfdg.")
         << "the write failed, the line went down, the rest is still done once";
 }
 
@@ -142,22 +142,22 @@ TEST_F(DriveTest, InputThatChangesNothingWaitsForItsTimeAndIsReadThen) {
     EXPECT_TRUE(held);
     EXPECT_EQ(clock.next(), machine.busy);
     device = "xy";
-    story.clear();
+    event_trace.clear();
     clock.advance(5ms);
-    EXPECT_EQ(story, "pxy.!.");
+    EXPECT_EQ(event_trace, "pxy.!.");
     EXPECT_FALSE(held) << "its time is over: every byte matters again";
 }
 
-TEST_F(DriveTest, HeldInputIsReadBeforeAnyVerb) {
+TEST_F(DriveTest, DeferredInputIsReadBeforeAnyCall) {
     machine.busy = clock.now() + 5ms;
     drive.hear([](TimePoint) {});
     device = "xy";
-    story.clear();
-    drive.tell([&](TimePoint) { story += 'v'; });
-    EXPECT_EQ(story, "pxy.v.");
+    event_trace.clear();
+    drive.tell([&](TimePoint) { event_trace += 'v'; });
+    EXPECT_EQ(event_trace, "pxy.v.");
 }
 
-TEST_F(DriveTest, WhoRestsHoldsNothingBack) {
+TEST_F(DriveTest, RestEndsDeferral) {
     machine.busy = clock.now() + 5ms;
     drive.hear([](TimePoint) {});
     drive.rest();

@@ -21,7 +21,7 @@ serial_struct of_type(int type) {
     return info;
 }
 
-TEST(Driver, APseudoTerminalTellsNothing) {
+TEST(Driver, APseudoTerminalReportsNothing) {
     ScriptedOps ops;
     ops.give(TIOCOUTQ, 5);
     const Driver driver = look_at_driver(kNoDevice, ops);
@@ -30,7 +30,7 @@ TEST(Driver, APseudoTerminalTellsNothing) {
     EXPECT_EQ(unsent_time(kNoDevice, driver, 1ms, ops), Duration::zero());
 }
 
-TEST(Driver, ARealUartTellsItsQueueAndItsShiftRegister) {
+TEST(Driver, ARealUartReportsQueueAndShiftRegister) {
     ScriptedOps ops;
     ops.give(TIOCGSERIAL, of_type(PORT_16550A));
     ops.give(TIOCOUTQ, 5);
@@ -101,8 +101,8 @@ TEST_F(LowLatency, IsWrittenToTheAdaptersTimerBehindEveryLink) {
     EXPECT_EQ(timer_now(), 1);
 }
 
-TEST_F(LowLatency, IsNeverFatalAndSaysWhatToAllow) {
-    // A number that nobody may write, root neither.
+TEST_F(LowLatency, IsNeverFatalAndReportsWhatToAllow) {
+    // A file that not even root may write.
     std::filesystem::create_directories(timer.parent_path());
     std::filesystem::create_symlink("/proc/sys/kernel/cap_last_cap", timer);
     EXPECT_EQ(ask(), "the adapter keeps received bytes for up to " + std::to_string(timer_now()) +
@@ -125,7 +125,7 @@ serial_icounter_struct counts(int frame, int parity, int overrun, int buffer, in
 TEST(UartErrorCount, CountsFromTheFirstOpeningOverAllOthers) {
     ScriptedOps ops;
     UartErrorCount errors;
-    ops.give(TIOCGICOUNT, counts(100, 50, 7, 3, 1));  // before our time
+    ops.give(TIOCGICOUNT, counts(100, 50, 7, 3, 1));  // before this program opened it
     errors.opened(kNoDevice, ops);
     EXPECT_EQ(errors.look(kNoDevice, ops), UartErrors{});
     ops.give(TIOCGICOUNT, counts(101, 52, 8, 5, 5));

@@ -13,16 +13,16 @@
 
 namespace panelgate::line {
 
-/// Opens at once; reading and writing end as a test says.
+/// Opens at once; reading and writing end as a test sets.
 class FailingLine final : public DescriptorLine {
   public:
     FailingLine(const boost::asio::any_io_executor& executor, rt::Clock& clock,
                 const Settings& settings, const Pty& pty)
         : DescriptorLine(executor, clock, settings), pty_(pty) {}
     ~FailingLine() override { stop(); }
-    /// The device says that it has gone.
+    /// The device reports a hang-up.
     void lose() { lost("hang-up"); }
-    /// It brings a byte.
+    /// The device delivers a byte.
     void bring() {
         bytes_ = 1;
         poll_input();
@@ -30,7 +30,7 @@ class FailingLine final : public DescriptorLine {
 
     int read_error = EAGAIN;  ///< 0: end of file
     int write_error = 0;
-    bool closed_for_good = false;  ///< the last closing discarded what had not left
+    bool closed_for_good = false;  ///< the last closing discarded unsent bytes
 
   private:
     void begin_open() override {

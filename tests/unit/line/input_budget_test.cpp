@@ -20,7 +20,7 @@ TEST(InputBudget, TakesABurstAndThenTheRate) {
     EXPECT_NEAR(static_cast<double>(taken), 100 * 1000, 1000 + 2 * 100);
 }
 
-TEST(InputBudget, SaysWhenItAllowsMore) {
+TEST(InputBudget, ReportsWhenItAllowsMore) {
     InputBudget budget(1000);
     while (budget.allows(kStart)) budget.spend(kStart, 100);
     EXPECT_GT(budget.next(), kStart);
@@ -28,7 +28,7 @@ TEST(InputBudget, SaysWhenItAllowsMore) {
     EXPECT_TRUE(budget.allows(budget.next()));
 }
 
-TEST(InputBudget, WhoIsWithinItsRateIsNeverHeldUp) {
+TEST(InputBudget, InputWithinTheRateIsNeverPaused) {
     InputBudget budget(1000);
     for (TimePoint now = kStart; now < kStart + 10s; now += 100ms) {
         ASSERT_TRUE(budget.allows(now));

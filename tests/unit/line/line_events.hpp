@@ -7,7 +7,7 @@
 
 namespace panelgate::line {
 
-/// Remembers what a line has told.
+/// Records the events of a line.
 struct Heard final : Line::Events {
     void on_up() override { ++ups; }
     void on_down(const std::string& why) override { downs.push_back(why); }

@@ -42,7 +42,7 @@ class ListeningTest : public testing::Test {
     const Bytes frame{0x1F, 0x03, 0x00, 0x64};
 };
 
-/// How this process has opened a device, by its access modes.
+/// Access modes with which this process has opened a device.
 std::vector<int> access_modes(const std::string& device) {
     std::vector<int> modes;
     for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -56,7 +56,7 @@ std::vector<int> access_modes(const std::string& device) {
 
 TEST_F(ListeningTest, ADeviceIsOpenedForReadingOnlyAndNothingLeaves) {
     const Pty pty;
-    const auto before = access_modes(pty.path());  // the pty's own hold of it
+    const auto before = access_modes(pty.path());  // the pty's own descriptor
     settings.device = pty.path();
     auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);

@@ -1,4 +1,4 @@
-// P7: every way in which a device says that it has gone.
+// P7: every sign of a lost device.
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
@@ -39,7 +39,7 @@ TEST_P(LostDevice, P7IsNoticedByReadingAndOpenedAgain) {
     EXPECT_TRUE(heard.bytes.empty());
 }
 
-TEST_P(LostDevice, P7IsNoticedByWritingAndSaidOnce) {
+TEST_P(LostDevice, P7IsNoticedByWritingAndReportedOnce) {
     line.start(heard);
     line.write_error = GetParam();
     line.write(Bytes{1, 2, 3});
@@ -47,7 +47,7 @@ TEST_P(LostDevice, P7IsNoticedByWritingAndSaidOnce) {
     EXPECT_EQ(heard.downs.size(), 1u);
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryWay, LostDevice,
+INSTANTIATE_TEST_SUITE_P(EverySign, LostDevice,
                          testing::Values(EIO, ENODEV, ENXIO, EBADF, EPIPE, ENOTCONN));
 
 TEST_F(LostDevice, P7TheEndOfFileOfAHangUpIsNoticed) {

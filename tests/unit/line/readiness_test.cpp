@@ -33,7 +33,7 @@ class ReadinessTest : public testing::Test {
         while (::read(near, room.data(), room.size()) > 0) {
         }
     }
-    /// How often it was said, while the loop has something to do.
+    /// Runs the ready handlers of the loop; returns the number of notifications.
     int turn() {
         said = 0;
         io.restart();
@@ -52,7 +52,7 @@ class ReadinessTest : public testing::Test {
                         }};
 };
 
-TEST_F(ReadinessTest, SaysThatThereIsInput) {
+TEST_F(ReadinessTest, ReportsInput) {
     EXPECT_EQ(turn(), 0);
     say("a");
     EXPECT_EQ(turn(), 1);
@@ -60,7 +60,7 @@ TEST_F(ReadinessTest, SaysThatThereIsInput) {
     EXPECT_EQ(turn(), 1);
 }
 
-TEST_F(ReadinessTest, InputThatNobodyWantsWakesNobody) {
+TEST_F(ReadinessTest, DeferredInputCausesNoWakeUp) {
     readiness.want_input(false);
     turn();
     for (int i = 0; i < 5; ++i) {
@@ -69,7 +69,7 @@ TEST_F(ReadinessTest, InputThatNobodyWantsWakesNobody) {
     }
 }
 
-TEST_F(ReadinessTest, WhatCameMeanwhileIsSaidWhenItIsWantedAgain) {
+TEST_F(ReadinessTest, DeferredInputIsReportedWhenWantedAgain) {
     readiness.want_input(false);
     say("a");
     turn();
@@ -77,7 +77,7 @@ TEST_F(ReadinessTest, WhatCameMeanwhileIsSaidWhenItIsWantedAgain) {
     EXPECT_EQ(turn(), 1);
 }
 
-TEST_F(ReadinessTest, WhatWasReadMeanwhileIsNot) {
+TEST_F(ReadinessTest, DeferredInputThatWasReadIsNotReported) {
     readiness.want_input(false);
     say("a");
     turn();
@@ -86,14 +86,14 @@ TEST_F(ReadinessTest, WhatWasReadMeanwhileIsNot) {
     EXPECT_EQ(turn(), 0);
 }
 
-TEST_F(ReadinessTest, TheLossOfTheDeviceIsSaidThoughNobodyWantsInput) {
+TEST_F(ReadinessTest, LossOfTheDeviceIsReportedWhileInputIsDeferred) {
     readiness.want_input(false);
     turn();
     ::close(std::exchange(far, -1));
     EXPECT_GE(turn(), 1);
 }
 
-TEST_F(ReadinessTest, SaysThatOutputHasRoomWhenThatIsAskedFor) {
+TEST_F(ReadinessTest, ReportsWritableWhenWanted) {
     EXPECT_EQ(turn(), 0);
     readiness.want_output(true);
     EXPECT_EQ(turn(), 1);

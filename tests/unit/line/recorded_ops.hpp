@@ -18,8 +18,8 @@
 
 namespace panelgate::line {
 
-/// A driver that answers as a real one did: tests/kernel/recorded/NAME.txt, whose format
-/// tests/kernel/README.md tells. What was not recorded is -ENOSYS.
+/// Replays the answers of a real driver: tests/kernel/recorded/NAME.txt, whose format is described
+/// in tests/kernel/README.md. What was not recorded is -ENOSYS.
 class RecordedOps final : public PortOps {
   public:
     explicit RecordedOps(const std::string& name) {
@@ -34,11 +34,11 @@ class RecordedOps final : public PortOps {
     int control(int, unsigned long request, void* argument) override {
         switch (request) {
             case TCGETS2:
-                return tell_settings(*static_cast<termios2*>(argument));
+                return report_settings(*static_cast<termios2*>(argument));
             case TCSETS2:
                 return take_settings(*static_cast<termios2*>(argument));
             case TIOCGSERIAL:
-                return tell_driver(*static_cast<serial_struct*>(argument));
+                return report_driver(*static_cast<serial_struct*>(argument));
             case TIOCOUTQ:
                 return tell(row("TIOCOUTQ"), "value", *static_cast<int*>(argument));
             case TIOCSERGETLSR:
@@ -95,7 +95,7 @@ class RecordedOps final : public PortOps {
         if (row.result >= 0) value = static_cast<Value>(row.answer.at(field));
         return row.result;
     }
-    /// The first recorded one; `asked` empty: whatever it asked.
+    /// The first recorded row of a request; an empty `asked` matches any argument.
     const Row& row(const std::string& request, const std::string& asked = {}) const {
         static const Row kNone;
         for (const Row& row : rows_) {
@@ -104,7 +104,7 @@ class RecordedOps final : public PortOps {
         return kNone;
     }
 
-    int tell_settings(termios2& t) const {
+    int report_settings(termios2& t) const {
         const Row& initial = row("TCGETS2");
         const Row* told = &initial;
         for (std::size_t i = 0; i + 1 < rows_.size() && !set_.empty(); ++i) {
@@ -127,7 +127,7 @@ class RecordedOps final : public PortOps {
         set_[set_.find(' ')] = '-';
         return row("TCSETS2", set_).result;
     }
-    int tell_driver(serial_struct& info) const {
+    int report_driver(serial_struct& info) const {
         const Row& told = row("TIOCGSERIAL");
         if (told.result < 0) return told.result;
         info.type = static_cast<int>(told.answer.at("type"));

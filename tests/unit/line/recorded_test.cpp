@@ -1,4 +1,4 @@
-// The serial code on drivers that really answered so (tests/kernel).
+// The serial code on recorded answers of real drivers (tests/kernel).
 #include <gtest/gtest.h>
 
 #include "driver.hpp"
@@ -39,7 +39,7 @@ class Recorded : public testing::TestWithParam<Answers> {
 
 TEST_P(Recorded, IsThere) { EXPECT_FALSE(ops.is_empty()); }
 
-TEST_P(Recorded, TakesItsSettingsOrSaysWhatItDidNotTake) {
+TEST_P(Recorded, TakesItsSettingsOrReportsWhatItDidNotTake) {
     const auto even = set_up_tty(kNoDevice, kEven, ops);
     EXPECT_EQ(even.error, GetParam().error);
     EXPECT_EQ(even.warning, GetParam().even_warning);
@@ -54,14 +54,14 @@ TEST_P(Recorded, CannotSwitchRs485ByItself) {
     EXPECT_NE(result.error.find("use rs485 mode off"), std::string::npos) << result.error;
 }
 
-TEST_P(Recorded, SwitchesRtsOrSaysThatItCannot) {
+TEST_P(Recorded, SwitchesRtsOrReportsThatItCannot) {
     Rs485 settings;
     settings.mode = Rs485::Mode::rts;
     EXPECT_EQ(switch_rts(kNoDevice, settings, true, ops).empty(), GetParam().switches_rts);
     EXPECT_EQ(switch_rts(kNoDevice, settings, false, ops).empty(), GetParam().switches_rts);
 }
 
-TEST_P(Recorded, TellsWhatItCan) {
+TEST_P(Recorded, ReportsItsFeatures) {
     const Driver driver = look_at_driver(kNoDevice, ops);
     EXPECT_EQ(driver.tells_queue, GetParam().tells_queue);
     EXPECT_EQ(driver.tells_empty, GetParam().tells_empty);

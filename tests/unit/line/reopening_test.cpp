@@ -1,4 +1,4 @@
-// When a line that was opened and was of no use is opened again.
+// When a line is reopened whose opening brought no byte.
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
@@ -16,7 +16,7 @@ namespace {
 class Reopening : public testing::Test {
   protected:
     Reopening() { line.start(heard); }
-    /// From the line's going down to its being up again.
+    /// Time from down to up.
     Duration pause() {
         const int ups = heard.ups;
         const TimePoint begin = clock.now();
@@ -68,7 +68,7 @@ TEST_F(Reopening, P7AServerThatAcceptsAndHangsUpIsNotAskedInATightLoop) {
     EXPECT_EQ(all, 7 * settings.reopen_min);
 }
 
-TEST_F(Reopening, AResetSaysWhatAndWhyAndDiscards) {
+TEST_F(Reopening, AResetReportsDeviceAndReasonAndDiscards) {
     line.reset("the request was not taken");
     ASSERT_EQ(heard.downs.size(), 1u);
     EXPECT_EQ(heard.downs[0], "/dev/ttyUSB0 is opened anew: the request was not taken");

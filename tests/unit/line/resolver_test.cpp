@@ -1,4 +1,4 @@
-// P7: a name server that does not answer keeps only those lines waiting that need it.
+// P7: a silent name server delays only the lines that need it.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 #include <netdb.h>
@@ -24,8 +24,8 @@ using GetAddrInfo = int (*)(const char*, const char*, const addrinfo*, addrinfo*
 
 }  // namespace
 
-/// In place of the system's, for this whole program. The server of names that end in ".invalid" is
-/// silent until a test ends; other names are the loopback's.
+/// Replaces the system's, for this whole program. The server of names that end in ".invalid" is
+/// silent until a test ends; other names resolve to the loopback.
 int getaddrinfo(const char* host, const char* port, const addrinfo* hints, addrinfo** found) {
     static const auto real = reinterpret_cast<GetAddrInfo>(::dlsym(RTLD_NEXT, "getaddrinfo"));
     ++asked;
@@ -93,7 +93,7 @@ TEST(Resolver, P7ALineIsGivenUpWhileItsNameServerIsSilent) {
     EXPECT_TRUE(heard.downs.empty());
 }
 
-TEST(Resolver, ALineSaysThatItsNameServerIsSilentAndAsksItOnce) {
+TEST(Resolver, ASilentNameServerIsReportedAndQueriedOnce) {
     Heard heard;
     const Silence silence;
     test::ManualClock clock;

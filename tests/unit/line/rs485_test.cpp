@@ -42,7 +42,7 @@ TEST(Rs485, ALowLevelWhileSendingIsAHighOneElse) {
     EXPECT_EQ(kept.flags, static_cast<std::uint32_t>(SER_RS485_ENABLED | SER_RS485_RTS_AFTER_SEND));
 }
 
-TEST(Rs485, ADriverWithoutItIsAnErrorThatSaysWhatWorks) {
+TEST(Rs485, ADriverWithoutItIsAnErrorThatNamesAlternatives) {
     ScriptedOps ops;  // ENOTTY, as 8250 without RS-485, every USB adapter and a pty answer
     EXPECT_EQ(set_up_rs485(kNoDevice, kernel_mode(), ops).error,
               "its driver cannot switch RS-485 (TIOCSRS485); use rs485 mode off with an adapter "

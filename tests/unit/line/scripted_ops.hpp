@@ -14,8 +14,8 @@
 
 namespace panelgate::line {
 
-/// Answers for a driver: each request as a test says, the others as the kernel does for the pty
-/// behind it, or -ENOTTY with no descriptor.
+/// A scripted driver: answers each request as a test sets it, others as the kernel does for the pty
+/// behind it, or -ENOTTY without a descriptor.
 class ScriptedOps final : public PortOps {
   public:
     using Answer = std::function<int(void* argument)>;
@@ -29,7 +29,7 @@ class ScriptedOps final : public PortOps {
     void refuse(unsigned long request, int error) {
         answers[request] = [error](void*) { return -error; };
     }
-    /// Copies `value` to where the caller wants it.
+    /// Copies `value` into the caller's argument.
     template <class Value>
     void give(unsigned long request, Value value) {
         answers[request] = [value](void* argument) {
@@ -37,7 +37,7 @@ class ScriptedOps final : public PortOps {
             return 0;
         };
     }
-    /// A driver that keeps what it is given and tells it back.
+    /// A driver that stores a value and returns it.
     template <class Value>
     void keep(unsigned long set, unsigned long get, Value& kept) {
         answers[set] = [&kept](void* argument) {

@@ -106,7 +106,7 @@ TEST_F(TcpLineTest, CarriesBytesBothWaysAndConnectsAgain) {
     EXPECT_EQ(ups + downs, 3);
 }
 
-TEST_F(TcpLineTest, P7SaysOnceThatNobodyListensAndGoesOnTrying) {
+TEST_F(TcpLineTest, P7ReportsAClosedPortOnceAndRetries) {
     const std::uint16_t port = acceptor.local_endpoint().port();
     acceptor.close();
     const auto line = make(port);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kNoDevice = -1;
 
-/// A serial driver: it keeps what it is given, but for what a test lets it change.
+/// A serial driver that stores its settings, except for what a test changes.
 class TermiosSetup : public testing::Test {
   protected:
     TermiosSetup() {
@@ -26,7 +26,7 @@ class TermiosSetup : public testing::Test {
         };
     }
     auto set_up(const SerialFormat& format) { return set_up_tty(kNoDevice, format, ops); }
-    /// From now on the driver makes this of every rate.
+    /// From now on the driver sets this instead of every rate.
     void make_rate(speed_t rate) {
         ops.answers[TCSETS2] = [this, rate](void* argument) {
             std::memcpy(&kept, argument, sizeof kept);
@@ -57,7 +57,7 @@ TEST_F(TermiosSetup, EveryFormatIsWhatItSays) {
     const tcflag_t mask = CSIZE | PARENB | PARODD | CSTOPB;
     set_up({9600, 8, Parity::even, 1});
     EXPECT_EQ(kept.c_cflag & mask, static_cast<tcflag_t>(CS8 | PARENB));
-    EXPECT_NE(kept.c_iflag & INPCK, 0u);  // a byte of wrong parity becomes 00, and the CRC judges
+    EXPECT_NE(kept.c_iflag & INPCK, 0u);  // wrong parity becomes 00, which the CRC detects
     set_up({9600, 8, Parity::odd, 1});
     EXPECT_EQ(kept.c_cflag & mask, static_cast<tcflag_t>(CS8 | PARENB | PARODD));
     set_up({9600, 8, Parity::none, 2});

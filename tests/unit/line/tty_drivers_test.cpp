@@ -1,4 +1,4 @@
-// A serial line on drivers that a pseudo-terminal is not: their answers are scripted.
+// A serial line on scripted drivers that a pseudo-terminal cannot imitate.
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
@@ -16,7 +16,7 @@
 namespace panelgate::line {
 namespace {
 
-/// A pty cannot tell when it is empty.
+/// A pty cannot report when it is empty.
 constexpr Duration kBlindMargin = 2ms;
 
 class TtyDrivers : public testing::Test {
@@ -35,7 +35,7 @@ class TtyDrivers : public testing::Test {
     void run_until(const std::function<bool()>& so) {
         ASSERT_TRUE(test::run_until(io, clock, so)) << "nothing is left to happen";
     }
-    /// RTS as a list of levels, and how many bytes had been sent by then.
+    /// Records the levels of RTS, and how many bytes had been sent by then.
     void record_rts() {
         const auto switched = [this](int level) {
             return [this, level](void*) {
@@ -74,7 +74,7 @@ TEST_F(TtyDrivers, KernelModeIsSetAtEachOpening) {
     EXPECT_EQ(line->lead(), Duration(3ms));
 }
 
-TEST_F(TtyDrivers, KernelModeOnADriverWithoutItKeepsTheLineDownAndSaysWhy) {
+TEST_F(TtyDrivers, KernelModeWithoutDriverSupportKeepsTheLineDownAndReportsWhy) {
     settings.rs485.mode = Rs485::Mode::kernel;
     auto line = start();
     EXPECT_EQ(heard.ups, 0);
@@ -114,7 +114,7 @@ TEST_F(TtyDrivers, RtsLeadsByItsDelay) {
     EXPECT_EQ(rts[2].at - rts[1].at, 5ms + wire_time(settings.serial, 3) + kBlindMargin);
 }
 
-TEST_F(TtyDrivers, RtsStaysForWhatTheDriverStillHolds) {
+TEST_F(TtyDrivers, RtsStaysWhileTheDriverHasUnsentBytes) {
     record_rts();
     serial_struct uart{};
     uart.type = PORT_16550A;
@@ -154,7 +154,7 @@ TEST_F(TtyDrivers, P7AnAdapterThatGoesBetweenRtsAndTheFrameTakesTheLineDownOnce)
     EXPECT_EQ(heard.downs.size(), 1u);
 }
 
-TEST_F(TtyDrivers, TellsWhatHasNotLeftYet) {
+TEST_F(TtyDrivers, ReportsUnsentBytes) {
     serial_struct adapter{};  // on USB: PORT_UNKNOWN
     ops.give(TIOCGSERIAL, adapter);
     ops.give(TIOCOUTQ, 4);
@@ -164,7 +164,7 @@ TEST_F(TtyDrivers, TellsWhatHasNotLeftYet) {
     EXPECT_EQ(line->unsent(), std::nullopt);
 }
 
-TEST_F(TtyDrivers, APtyCannotTell) { EXPECT_EQ(start()->unsent(), std::nullopt); }
+TEST_F(TtyDrivers, APtyCannotReportIt) { EXPECT_EQ(start()->unsent(), std::nullopt); }
 
 TEST_F(TtyDrivers, ShowsTheDriversErrorCounters) {
     serial_icounter_struct counts{};
@@ -182,7 +182,7 @@ TEST_F(TtyDrivers, ShowsTheDriversErrorCounters) {
 TEST_F(TtyDrivers, ChangesItsFormatWhileItIsOpen) {
     auto line = start();
     EXPECT_TRUE(line->set_format({115200, 8, Parity::none, 2}));
-    ops.refuse(ops.asked[1], EIO);  // TCGETS2, behind TIOCEXCL: the device has gone
+    ops.refuse(ops.asked[1], EIO);  // TCGETS2, after TIOCEXCL: the device is gone
     EXPECT_FALSE(line->set_format({9600, 8, Parity::none, 1}));
     EXPECT_EQ(heard.downs.size(), 1u);
 }

@@ -32,7 +32,7 @@ class TtyLineTest : public testing::Test {
 
     void plug(const Pty& pty) { std::filesystem::create_symlink(pty.path(), settings.device); }
     void unplug() { std::filesystem::remove(settings.device); }
-    /// Runs the loop until it is so; a test's time limit is ctest's.
+    /// Runs the loop until `so()` is true; ctest limits the time.
     void run_until(const std::function<bool()>& so) {
         while (!so()) io.run_one();
     }
@@ -71,12 +71,12 @@ TEST_F(TtyLineTest, PassesEveryByteValueBothWays) {
     EXPECT_EQ(heard.bytes, all);
 }
 
-TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndSaysOnceWhatIsMissing) {
+TEST_F(TtyLineTest, P7OpensADeviceThatAppearsLaterAndReportsOnceWhatIsMissing) {
     auto line = make_tty_line(io.get_executor(), clock, settings);
     line->start(heard);
     ASSERT_EQ(heard.downs.size(), 1u);
     EXPECT_EQ(heard.downs[0], "cannot open " + settings.device + ": No such file or directory");
-    for (int i = 0; i < 3; ++i) io.run_one();  // further attempts say nothing new
+    for (int i = 0; i < 3; ++i) io.run_one();  // further attempts report nothing new
     EXPECT_EQ(heard.downs.size(), 1u);
     Pty pty;
     plug(pty);

@@ -16,7 +16,7 @@ TEST(TtySpeaks, IsUnderstoodAtItsOwnRateOnly) {
     EXPECT_FALSE(tty_speaks(pty.master(), {57600, 8, Parity::none, 1}));
 }
 
-TEST(TtySpeaks, TellsOddParityButNoneFromEvenAPtyForgets) {
+TEST(TtySpeaks, DetectsOddParityButNotNoneFromEven) {
     const Pty pty;
     set_up_tty(pty.master(), {9600, 8, Parity::odd, 1});
     EXPECT_TRUE(tty_speaks(pty.master(), {9600, 8, Parity::odd, 1}));

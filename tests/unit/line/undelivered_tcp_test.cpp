@@ -1,4 +1,4 @@
-// P1: a server that does not take what was written, and what becomes of that.
+// P1: a server that does not take written bytes, and what happens to them.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -53,12 +53,12 @@ class UndeliveredTcp : public testing::Test {
         begin();
         run_until([&] { return accepted && heard.ups == ups + 1; });
     }
-    /// More than the server's window takes, and less than what this end's socket does.
-    void write_into_the_window() { line->write(Bytes(kMuch, 0x55)); }
-    /// What the server finds when it reads to the end of the connection.
+    /// More than the server's window takes, and less than this end's socket buffer.
+    void write_into_the_window() { line->write(Bytes(kManyBytes, 0x55)); }
+    /// Reads at the server to the end of the connection; returns how it ended.
     error_code read_all() {
         std::optional<error_code> end;
-        got.assign(2 * kMuch, 0);
+        got.assign(2 * kManyBytes, 0);
         boost::asio::async_read(*peer, boost::asio::buffer(got), [&](error_code error, auto count) {
             got.resize(count);
             end = error;
@@ -67,7 +67,7 @@ class UndeliveredTcp : public testing::Test {
         return *end;
     }
 
-    static constexpr std::size_t kMuch = 20'000;
+    static constexpr std::size_t kManyBytes = 20'000;
     boost::asio::io_context io{1};
     rt::AsioClock clock{io.get_executor()};
     tcp::acceptor acceptor{io};
@@ -81,7 +81,7 @@ TEST_F(UndeliveredTcp, WhatTheServersSystemHasTakenIsDelivered) {
     line->write("01 03 00 00 00 01 84 0A"_hex);
     run_until([&] { return peer->available() == 8; });
     EXPECT_FALSE(line->undelivered());
-    // Also when a delayed acknowledgement is over, and nobody has read it.
+    // Also after the time of a delayed acknowledgement, with nothing read.
     const TimePoint over = clock.now() + kDelayedAck + line->latency();
     run_until([&] { return clock.now() > over; });
     EXPECT_FALSE(line->undelivered());
@@ -89,7 +89,7 @@ TEST_F(UndeliveredTcp, WhatTheServersSystemHasTakenIsDelivered) {
 }
 
 TEST_F(UndeliveredTcp, FramesThatAreEachAcknowledgedInTimeAreDelivered) {
-    got.assign(kMuch, 0);
+    got.assign(kManyBytes, 0);
     boost::asio::async_read(*peer, boost::asio::buffer(got), [](error_code, std::size_t) {});
     const TimePoint end = clock.now() + 2 * kDelayedAck;
     TimePoint next{};
@@ -115,7 +115,7 @@ TEST_F(UndeliveredTcp, AServerThatReadsNothingDoesNotDeliverAndSeesTheReset) {
     EXPECT_NE(heard.downs[0].find(" is opened anew: the request was not taken"), std::string::npos);
     EXPECT_FALSE(line->undelivered());
     EXPECT_EQ(read_all(), boost::asio::error::connection_reset);
-    EXPECT_LT(got.size(), kMuch);
+    EXPECT_LT(got.size(), kManyBytes);
 }
 
 TEST_F(UndeliveredTcp, TheNextConnectionCarriesNothingOfTheOneBefore) {
@@ -128,7 +128,7 @@ TEST_F(UndeliveredTcp, TheNextConnectionCarriesNothingOfTheOneBefore) {
     line->write("01 02 03"_hex);
     run_until([&] { return peer->available() == 3; });
     line->stop();
-    EXPECT_EQ(read_all(), boost::asio::error::eof);  // a usual end: nothing was left to drop
+    EXPECT_EQ(read_all(), boost::asio::error::eof);  // a normal close: nothing was left to drop
     EXPECT_EQ(got, "01 02 03"_hex);
 }
 
@@ -150,7 +150,7 @@ TEST_F(UndeliveredTcp, WhatHasNotArrivedIsDroppedWhenTheLineIsStopped) {
     EXPECT_EQ(read_all(), boost::asio::error::connection_reset);
 }
 
-/// Both ends of the connection are in this program: the line's is the one that leads to the server.
+/// Both ends of the connection are in this program: the line's is connected to the server.
 int descriptor_of(const tcp::endpoint& server) {
     for (int fd = 0; fd < 1024; ++fd) {
         sockaddr_in to{};
@@ -173,7 +173,7 @@ TEST_F(UndeliveredTcp, P7TheKernelGivesUpInSecondsAndNotForOneLostProbe) {
     const auto patience = std::chrono::milliseconds(option(TCP_USER_TIMEOUT));
     EXPECT_GE(patience, 2s);
     EXPECT_LE(patience, 10s);
-    // It ends the probing of an idle connection too, whatever the number of probes.
+    // TCP_USER_TIMEOUT ends keep-alive too, whatever the number of probes.
     const int probes = 3;
     EXPECT_LE(std::chrono::seconds(option(TCP_KEEPIDLE) + probes * option(TCP_KEEPINTVL)),
               patience);

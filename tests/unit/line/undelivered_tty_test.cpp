@@ -1,4 +1,4 @@
-// P1: a device that does not take what was written, or keeps it, and what becomes of that.
+// P1: a device that does not take written bytes, or keeps them, and what happens to them.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/serial.h>
@@ -43,8 +43,8 @@ class UndeliveredTty : public testing::Test {
         flushed.clear();
         return line;
     }
-    /// As an adapter on USB.
-    void tell_the_queue() {
+    /// Like a USB adapter.
+    void report_queue() {
         ops.give(TIOCGSERIAL, serial_struct{});
         ops.answers[TIOCOUTQ] = [this](void* argument) {
             *static_cast<int*>(argument) = queue;
@@ -103,7 +103,7 @@ TEST_F(UndeliveredTty, OutputThatWasStoppedIsUndelivered) {
 }
 
 TEST_F(UndeliveredTty, AQueueThatDoesNotEmptyIsUndelivered) {
-    tell_the_queue();
+    report_queue();
     auto line = start();
     EXPECT_FALSE(line->undelivered());
     const TimePoint begin = clock.now();
@@ -119,7 +119,7 @@ TEST_F(UndeliveredTty, AQueueThatDoesNotEmptyIsUndelivered) {
 }
 
 TEST_F(UndeliveredTty, WhatIsBeingSentIsNotUndelivered) {
-    tell_the_queue();
+    report_queue();
     settings.serial.baud = 300;
     auto line = start();
     line->write(Bytes(256, 0x55));  // it takes 8.5 s
@@ -128,7 +128,7 @@ TEST_F(UndeliveredTty, WhatIsBeingSentIsNotUndelivered) {
 }
 
 TEST_F(UndeliveredTty, AQueueThatEmptiesIsDelivered) {
-    tell_the_queue();
+    report_queue();
     auto line = start();
     for (int i = 0; i < 3; ++i) {
         line->write(Bytes(8, 0x55));
@@ -143,7 +143,7 @@ TEST_F(UndeliveredTty, AQueueThatEmptiesIsDelivered) {
 }
 
 TEST_F(UndeliveredTty, FramesThatFollowEachOtherDoNotHideAQueueThatDoesNotEmpty) {
-    tell_the_queue();
+    report_queue();
     auto line = start();
     line->write(Bytes(8, 0x55));
     queue = 8;
@@ -156,8 +156,8 @@ TEST_F(UndeliveredTty, FramesThatFollowEachOtherDoNotHideAQueueThatDoesNotEmpty)
     EXPECT_EQ(heard.downs[0], settings.device + " is opened anew: the device takes nothing");
 }
 
-TEST_F(UndeliveredTty, ADriverThatKeepsWhatItIsToldToDropIsClosedAllTheSame) {
-    tell_the_queue();
+TEST_F(UndeliveredTty, ADriverThatKeepsDiscardedBytesIsStillClosed) {
+    report_queue();
     drops = false;
     auto line = start();
     line->write(Bytes(8, 0x55));
@@ -179,13 +179,13 @@ TEST_F(UndeliveredTty, AResetLeavesTheTransceiverListening) {
     EXPECT_EQ(rts.back(), 0);
 }
 
-TEST(Impatience, EndsACallThatSleepsInTheKernel) {
+TEST(CallInterrupter, EndsACallThatSleepsInTheKernel) {
     int ends[2];
     ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
     char byte = 0;
     ssize_t result = 0;
     {
-        const Impatience impatience(1ms);
+        const CallInterrupter interrupter(1ms);
         result = ::read(ends[0], &byte, 1);
     }
     EXPECT_EQ(result, -1);

@@ -60,7 +60,7 @@ void expect_lines(const std::string& text, std::initializer_list<const char*> li
     for (const char* line : lines) EXPECT_THAT(text, HasSubstr("\n" + std::string(line) + "\n"));
 }
 
-TEST(Exposition, CountsWhatTheHttpServerAnsweredAndWhoGuessed) {
+TEST(Exposition, CountsHttpRepliesAndLoginFailures) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("login_failures")));
     snapshot.http.emplace();
@@ -73,7 +73,7 @@ TEST(Exposition, CountsWhatTheHttpServerAnsweredAndWhoGuessed) {
                                         "panelgate_login_failures_total 3"});
 }
 
-TEST(Exposition, TellsOfTheBrokerWhereThereIsOne) {
+TEST(Exposition, ShowsTheBrokerWhereThereIsOne) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_mqtt")));
     snapshot.mqtt = {true, 5, 100, 7, 2, 3, 4, 1, 6};
@@ -131,7 +131,7 @@ TEST(Exposition, CumulatesTheBucketsOfAHistogram) {
             "panelgate_request_duration_seconds_count{line=\"floor1\",station=\"press\"} 3\n"));
 }
 
-/// The series of requests_total of this station.
+/// Returns the station's series of requests_total.
 std::size_t request_series(const Snapshot& snapshot, const std::string& station) {
     const std::string head =
         "panelgate_requests_total{line=\"floor1\",station=\"" + station + "\",";
@@ -199,7 +199,7 @@ TEST(Exposition, P10LeavesOutTheLastSuccessOfAStationThatNeverAnswered) {
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("last_success")));
 }
 
-TEST(Exposition, P10LeavesOutTheStateOfAStationThatNobodyHasAsked) {
+TEST(Exposition, P10LeavesOutTheStateOfAStationThatWasNeverPolled) {
     Snapshot snapshot = filled();
     snapshot.lines[0].stations[0].up.reset();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_station_up{")));
@@ -255,7 +255,7 @@ TEST(Process, HasNoFiguresForATextThatIsNoStat) {
     EXPECT_FALSE(parse_stat("42 (cut) S 1", {}).cpu_seconds);
 }
 
-TEST(Exposition, P10DriverErrorsAreThereForLinesWhoseDriverCounts) {
+TEST(Exposition, P10DriverErrorsAreShownForLinesWhoseDriverCounts) {
     Snapshot snapshot = filled();
     EXPECT_THAT(exposition(snapshot), Not(HasSubstr("panelgate_framing_errors_total{")));
     snapshot.lines[0].device.uart = line::UartErrors{1, 2, 3, 4};

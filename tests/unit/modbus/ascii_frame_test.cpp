@@ -19,7 +19,7 @@ std::vector<SerialAdu> drain(AsciiFramer& framer) {
     return frames;
 }
 
-/// What is found in characters that come at once.
+/// Frames found in characters that come at once.
 std::vector<SerialAdu> found(std::string_view characters) {
     AsciiFramer framer;
     framer.feed({}, text(characters));

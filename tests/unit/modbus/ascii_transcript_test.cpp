@@ -20,7 +20,7 @@ const Bytes kReadPdu = "03 00 6B 00 03"_hex;
 const Bytes kRead = encode_adu(0x11, kReadPdu);
 constexpr std::string_view kReadText = ":1103006B00037E\r\n";
 
-/// What stands between two ends.
+/// Bytes between two ends.
 struct Part {
     Bytes bytes;
     End end = End::none;
@@ -51,7 +51,7 @@ std::vector<Part> heard(std::string_view characters) {
     return ear.parts;
 }
 
-TEST(AsciiTranscript, AGoodFrameIsWrittenDownAsRtuSaysIt) {
+TEST(AsciiTranscript, AValidFrameIsTranscribedToRtu) {
     EXPECT_EQ(heard(kReadText), (std::vector<Part>{{kRead, End::frame}}));
     EXPECT_EQ(to_ascii(kRead), text(kReadText));
 }
@@ -72,7 +72,7 @@ TEST(AsciiTranscript, TheSameComesOfCharactersOneByOne) {
     EXPECT_EQ(ear.parts, (std::vector<Part>{{kRead, End::frame}}));
 }
 
-TEST(AsciiTranscript, WhoSpeaksIsToldAsSoonAsItIsHeard) {
+TEST(AsciiTranscript, StationAndFunctionAreReturnedAtOnce) {
     Ear ear;
     ear.hear(":11");
     EXPECT_EQ(ear.open, "11"_hex);
@@ -116,7 +116,7 @@ TEST(AsciiTranscript, AColonEndsWhateverWasOpen) {
     EXPECT_EQ(heard(":1103006B0:")[0].bytes, "11 03 00 6B"_hex);
 }
 
-TEST(AsciiTranscript, NoiseIsGivenAsItCame) {
+TEST(AsciiTranscript, NoiseIsPassedOnUnchanged) {
     const std::vector<Part> parts = heard("ab\r\n");
     EXPECT_EQ(parts, (std::vector<Part>{{text("ab\r\n"), End::damage}}));
 }
@@ -142,7 +142,7 @@ TEST(AsciiTranscript, APauseOfOneSecondIsAllowedAndNoLongerOne) {
     EXPECT_EQ(ear.parts.back(), (Part{kRead, End::frame}));
 }
 
-TEST(AsciiTranscript, TheRestOfWhatWasCutIsNoise) {
+TEST(AsciiTranscript, TheRestOfACutFrameIsNoise) {
     Ear ear;
     ear.hear(kReadText.substr(0, 6));
     ear.transcript.cut();

@@ -20,7 +20,7 @@ Bytes swapped(Bytes adu) {
     return adu;
 }
 
-TEST(CrcOrder, TheHighByteFirstIsTheSameCrcTheOtherWayRound) {
+TEST(CrcOrder, HighFirstIsTheSameCrcInReverseOrder) {
     const Bytes old = encode_adu(0x11, kReply, CrcOrder::high_first);
     EXPECT_EQ(old, "11 03 06 02 2B 00 00 00 64 BA C8"_hex);
     EXPECT_EQ(swapped(old), encode_adu(0x11, kReply));
@@ -45,7 +45,7 @@ TEST(CrcOrder, EachAddressOfALineHasItsOwn) {
     EXPECT_FALSE(crc_ok({}, orders));
 }
 
-/// Station 5 is old, 6 is not.
+/// Station 5 has the old order, high byte first; station 6 the standard's.
 class FramerOfBothOrders : public ::testing::Test {
   protected:
     FramerOfBothOrders() { orders.set(5, CrcOrder::high_first); }
@@ -62,7 +62,7 @@ TEST_F(FramerOfBothOrders, P1AReplyCountsInTheOrderOfItsStationOnly) {
     EXPECT_EQ(ReplyFramer(6, kRead, orders).feed(swapped(new_reply)), std::nullopt);
 }
 
-TEST_F(FramerOfBothOrders, P1AFrameOfTheOtherKindInFrontIsSteppedOverWhole) {
+TEST_F(FramerOfBothOrders, P1AFrameOfTheOtherOrderInFrontIsSkippedWhole) {
     for (const auto& [asked, mine, theirs] : {std::tuple(std::uint8_t{6}, new_reply, old_reply),
                                               std::tuple(std::uint8_t{5}, old_reply, new_reply)}) {
         ReplyFramer framer(asked, kRead, orders);

@@ -9,7 +9,7 @@
 namespace panelgate::modbus {
 namespace {
 
-TEST(Exception, TellsTheClientWhatBecameOfItsRequest) {
+TEST(Exception, ReportsTheResultOfItsRequestToTheClient) {
     const std::map<Fault, unsigned> codes = {
         {Fault::denied, 0x01},    {Fault::malformed, 0x03}, {Fault::busy, 0x06},
         {Fault::expired, 0x06},   {Fault::line_down, 0x0A}, {Fault::not_routed, 0x0A},

@@ -16,7 +16,7 @@ Bytes operator+(Bytes a, const Bytes& b) {
     return a;
 }
 
-TEST(Framing, EachHasItsOwnWayOfAnException) {
+TEST(Framing, EachEncodesAnExceptionInItsOwnFormat) {
     EXPECT_EQ(encode_reply(Framing::tcp, 7, 17, "83 0A"_hex), "0007 0000 0003 11 83 0A"_hex);
     EXPECT_EQ(encode_reply(Framing::rtu, 7, 17, "83 0A"_hex), "11 83 0A C0 F2"_hex);
     EXPECT_EQ(encode_reply(Framing::ascii, 7, 17, "83 0A"_hex), encode_ascii(17, "83 0A"_hex));

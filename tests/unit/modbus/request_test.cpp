@@ -287,14 +287,14 @@ TEST(Request, PacksBitsFromTheLowEndAndPadsWithZeros) {
     EXPECT_EQ(pack_bits(std::vector<bool>(9, true)), "FF 01"_hex);
 }
 
-TEST(RequestAduLength, IsToldByFunctionAndByteCount) {
+TEST(RequestAduLength, IsDeterminedByFunctionAndByteCount) {
     EXPECT_EQ(request_adu_length("11 03 00 6B 00 03 76"_hex), 8u);
     EXPECT_EQ(request_adu_length("11 06 00 01 00 03 9A 9B"_hex), 8u);
     EXPECT_EQ(request_adu_length("11 10 00 01 00 02 04 00"_hex), 13u);
     EXPECT_EQ(request_adu_length("11 0F 00 13 00 0A 02 CD"_hex), 11u);
 }
 
-TEST(RequestAduLength, IsUnknownOfOtherFunctionsAndOfTooLittle) {
+TEST(RequestAduLength, IsUnknownForOtherFunctionsAndTooFewBytes) {
     EXPECT_EQ(request_adu_length("11 07 4C 22 00 00 00 00"_hex), 0u);
     EXPECT_EQ(request_adu_length("11 83 02 C1 34 00 00 00"_hex), 0u);
     EXPECT_EQ(request_adu_length("11 10 00 01 00 02"_hex), 0u);

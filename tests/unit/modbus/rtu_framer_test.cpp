@@ -33,7 +33,7 @@ TEST(RtuFramer, GivesTheReplyAtItsLastByteHoweverItIsCut) {
     }
 }
 
-TEST(RtuFramer, TellsHowManyBytesAreMissingIfItIsNoException) {
+TEST(RtuFramer, ReportsMissingBytesIfItIsNoException) {
     ReplyFramer framer(0x11, kRequest);
     EXPECT_EQ(framer.missing_as_asked(), 0);
     framer.feed("11"_hex);
@@ -50,7 +50,7 @@ TEST(RtuFramer, TellsHowManyBytesAreMissingIfItIsNoException) {
     EXPECT_EQ(foreign.missing_as_asked(), 0);
 }
 
-TEST(RtuFramer, TellsHowManyBytesMustComeAtLeast) {
+TEST(RtuFramer, ReportsTheMinimumOfMissingBytes) {
     ReplyFramer framer(0x11, kRequest);
     EXPECT_EQ(framer.missing(), 0);
     framer.feed("11"_hex);
@@ -65,7 +65,7 @@ TEST(RtuFramer, TellsHowManyBytesMustComeAtLeast) {
     EXPECT_EQ(framer.missing(), 0);
 }
 
-TEST(RtuFramer, OfWhatIsNoReplyEveryByteMayTell) {
+TEST(RtuFramer, WithoutAReplyEveryByteMayDecide) {
     ReplyFramer framer(0x11, kRequest);
     framer.feed("22 03 06"_hex);
     EXPECT_EQ(framer.missing(), 0);
@@ -156,7 +156,7 @@ TEST(RtuFramer, NoiseThatLooksLikeAStartDelaysTheReplyOnlyToTheSilence) {
     EXPECT_EQ(*reply, kReplyPdu);
 }
 
-TEST(RtuFramer, P1WhatStandsInTheDataOfAnotherFrameIsNoReply) {
+TEST(RtuFramer, P1DataOfAnotherFrameIsNoReply) {
     const Bytes reply = joined("03 0B"_hex, kReply);
     const std::array others{encode_adu(0x12, reply),  // another station's
                             encode_adu(0x11, reply),  // its own, of another length
@@ -206,7 +206,7 @@ TEST(RtuFramer, ReadsTheTwoByteCountOfReadFifoQueue) {
     EXPECT_TRUE(framer.feed("11 18 00 06 00 02 01 B8 12 84 18 8D"_hex));
 }
 
-TEST(RtuFramer, LetsSilenceJudgeADeviceIdentificationWhoseCountLies) {
+TEST(RtuFramer, SilenceEndsADeviceIdentificationWithAWrongCount) {
     const Bytes pdu =
         "2B 0E 01 01 00 00 03 00 02 41 42 01 01 43"_hex;  // announces 3 objects, has 2
     ReplyFramer framer(0x11, "2B 0E 01 00"_hex);

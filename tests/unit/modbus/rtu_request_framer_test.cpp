@@ -97,7 +97,7 @@ TEST(RtuRequestFramer, P1DataOfAWriteIsNoRequest) {
     EXPECT_EQ(fed(framer, ByteView(bytes).last(1)), std::vector{write});
 }
 
-/// Requests with room for `inside` in their data; whole, but for a good CRC.
+/// Requests with `inside` in their data; complete, but for the CRC.
 std::vector<Bytes> damaged_around(const Bytes& inside) {
     const auto size = static_cast<std::uint8_t>(inside.size());
     const auto sized = [&](Bytes head) {
@@ -181,7 +181,7 @@ TEST(RtuRequestFramer, AGlitchInFrontOfAWriteIsNoDamage) {
     }
 }
 
-TEST(RtuRequestFramer, MoreGoodFramesInARowThanOneCouldHoldAreWhatTheyAre) {
+TEST(RtuRequestFramer, MoreFramesInARowThanOneCouldHoldAreTrusted) {
     Bytes damaged = frame(kRead);
     damaged[4] ^= 0x01;
     Bytes stream = damaged;
@@ -192,7 +192,7 @@ TEST(RtuRequestFramer, MoreGoodFramesInARowThanOneCouldHoldAreWhatTheyAre) {
     EXPECT_EQ(frames, std::vector(40 - 33, kOther)) << "33 of 8 bytes are more than 256";
 }
 
-TEST(RtuRequestFramer, SilenceGivesUpAStartThatHoldsUpAGoodFrame) {
+TEST(RtuRequestFramer, SilenceDiscardsAStartThatBlocksAValidFrame) {
     RtuRequestFramer framer;
     EXPECT_TRUE(fed(framer, "07 10 00 00 00 7B F6"_hex + frame(kRead)).empty()) << "it may be data";
     EXPECT_EQ(after_silence(framer), std::vector{kRead});
@@ -245,7 +245,7 @@ TEST(RtuRequestFramer, ARequestThatIsTooShortEndsBySilence) {
     EXPECT_EQ(after_silence(framer), std::vector{half}) << "its length is judged by others";
 }
 
-TEST(RtuRequestFramer, HoldsNoMoreThanOneFrame) {
+TEST(RtuRequestFramer, BuffersNoMoreThanOneFrame) {
     RtuRequestFramer framer;
     std::size_t given = 0;
     for (int i = 0; i < 100; ++i) given += fed(framer, Bytes(100, 0x41)).size();

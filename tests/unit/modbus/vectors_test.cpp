@@ -26,7 +26,7 @@ bool is_tcp(const Vector& v) { return !v.is_rtu(); }
 
 std::string name_of(const ::testing::TestParamInfo<Vector>& info) { return info.param.name(); }
 
-/// Address and CRC taken off, whatever the CRC.
+/// Strips address and CRC, whatever the CRC.
 Bytes pdu_of(const Bytes& adu) { return Bytes(adu.begin() + 1, adu.end() - 2); }
 
 /// The frame with the right CRC: as printed, or as corrected where the print is wrong.
@@ -65,7 +65,7 @@ TEST_P(ExchangeVector, HasTheLengthsOfTheTable) {
     if (const auto length = v.number("response_len")) {
         EXPECT_EQ(v.bytes("response").value_or(Bytes()).size(), *length);
     }
-    if (!v.number("request_len") || v.kind() == "broadcast") return;  // part 7 predicts nothing
+    if (!v.number("request_len") || v.kind() == "broadcast") return;  // part 7 gives no prediction
     EXPECT_EQ(reply_length_from_request(pdu_of(*v.bytes("request"))),
               v.number("expected_len_from_request"));
 }
@@ -105,7 +105,7 @@ TEST_P(ExchangeVector, HasAReplyThatAnswers) {
     EXPECT_EQ(exception_of(reply).has_value(), (reply[0] & kExceptionBit) != 0);
 }
 
-/// The reply to this request, among what is said in ASCII.
+/// Finds the reply to this request on an ASCII line.
 std::optional<Bytes> found_in_ascii(const Bytes& request, const Bytes& wire) {
     ReplyFramer framer(request[0], pdu_of(request), {}, ReplyFramer::Ends::told);
     AsciiTranscript transcript(HexDigits::upper_only);
@@ -120,7 +120,7 @@ std::optional<Bytes> found_in_ascii(const Bytes& request, const Bytes& wire) {
     return reply;
 }
 
-TEST_P(ExchangeVector, SaysTheSameInAscii) {
+TEST_P(ExchangeVector, IsEquivalentInAscii) {
     const Vector& v = GetParam();
     const Bytes request = good_frame(v, "request");
     AsciiTranscript transcript(HexDigits::upper_only);
@@ -170,8 +170,8 @@ INSTANTIATE_TEST_SUITE_P(Vectors, NegativeVector, ::testing::ValuesIn(vectors_wh
 
 class TcpVector : public ::testing::TestWithParam<Vector> {};
 
-/// What framing and check_request alone answer: nothing, or exceptions 01 and 03. Whatever else the
-/// vector shows is the work of routing, of the queue or of the panel.
+/// Reply of framing and check_request alone: none, or exceptions 01 and 03. Everything else in the
+/// vector is the work of routing, of the queue or of the panel.
 TEST_P(TcpVector, IsFramedAndJudgedAsTheTableSays) {
     const Vector& v = GetParam();
     const std::vector<MbapEvent> events = events_of(*v.bytes("request"));

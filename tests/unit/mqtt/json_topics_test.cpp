@@ -22,7 +22,7 @@ class MqttJson : public ::testing::Test {
   protected:
     Publisher publisher_{settings(), small_plant()};
 
-    /// The one command that comes of it.
+    /// Returns the single command parsed from it.
     Command command(std::string_view topic, std::string_view payload, bool retained = false) {
         const auto commands = publisher_.commands(topic, payload, retained);
         EXPECT_EQ(commands.size(), 1U);
@@ -35,7 +35,7 @@ class MqttJson : public ::testing::Test {
     }
 };
 
-TEST_F(MqttJson, TellsValueQualityUnitAndTime) {
+TEST_F(MqttJson, PublishesValueQualityUnitAndTime) {
     publisher_.offer(2, good(*Decimal::parse("21.5")));
     publisher_.connected();
     const auto all = take_all(publisher_);
@@ -50,7 +50,7 @@ TEST_F(MqttJson, TellsValueQualityUnitAndTime) {
     EXPECT_EQ(all[2].message, all[1].message) << "everything is told at a birth";
 }
 
-TEST_F(MqttJson, TellsLabelsAndThatThereIsNoValue) {
+TEST_F(MqttJson, PublishesLabelsAndMissingValues) {
     State mode = good(std::int64_t{1});
     mode.text = "running";
     publisher_.offer(3, mode);
@@ -66,7 +66,7 @@ TEST_F(MqttJson, TellsLabelsAndThatThereIsNoValue) {
     EXPECT_THAT(all[2].message.payload, HasSubstr(R"({"value":null,"quality":"bad","unit":"")"));
 }
 
-TEST_F(MqttJson, TellsOfLinesAndStations) {
+TEST_F(MqttJson, PublishesLinesAndStations) {
     State line = good(false);
     line.text = "down: no such device";
     publisher_.offer(0, line);
@@ -100,7 +100,7 @@ TEST_F(MqttJson, TakesAValueOrAnObjectThatHasOne) {
               points::Value(true));
 }
 
-TEST_F(MqttJson, SaysWhatIsWrongWithACommand) {
+TEST_F(MqttJson, ReportsWhatIsWrongWithACommand) {
     EXPECT_EQ(refusal("plant/hall/press/nobody/set", "1"), "there is no such point");
     EXPECT_EQ(refusal("plant/hall/a/b/c/set", "1"), "there is no such point");
     EXPECT_THAT(refusal("plant/hall/press/level/set", "{"), HasSubstr("not JSON"));
@@ -122,7 +122,7 @@ TEST_F(MqttJson, OtherTopicsAreNoCommands) {
     EXPECT_THAT(publisher_.commands("plant/hall/press/level/set/result", "1", false), IsEmpty());
 }
 
-TEST_F(MqttJson, WithoutTheSwitchNobodyWrites) {
+TEST_F(MqttJson, WithoutTheSwitchWritesAreIgnored) {
     Settings closed = settings();
     closed.write = false;
     Publisher publisher(closed, small_plant());

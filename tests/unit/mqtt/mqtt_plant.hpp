@@ -54,7 +54,7 @@ inline State station(bool alive, std::string word) {
     return state;
 }
 
-/// Everything that is to be said now; what is a change is in flight then.
+/// Takes all messages due now; changes are then in flight.
 inline std::vector<Publisher::Outgoing> take_all(Publisher& publisher, WallTime now = kNoon) {
     std::vector<Publisher::Outgoing> all;
     while (auto outgoing = publisher.next(now)) all.push_back(std::move(*outgoing));

@@ -27,7 +27,7 @@ TEST(MqttOpenMessages, ABarrierAcknowledgesWhatIsBeforeIt) {
     open.sent(1, false, 11);
     open.sent(2, false, 12);
     EXPECT_TRUE(open.wants_barrier());
-    open.barrier(0);  // it could not be sent
+    open.barrier(0);  // not sent
     EXPECT_TRUE(open.wants_barrier());
     open.barrier(3);
     open.sent(4, false, 13);

@@ -40,22 +40,22 @@ class MqttPublisher : public ::testing::Test {
     }
 };
 
-TEST_F(MqttPublisher, SaysNothingWithoutAConnection) {
+TEST_F(MqttPublisher, SendsNothingWithoutAConnection) {
     count(1, 2);
     EXPECT_THAT(take_all(publisher_), IsEmpty());
     EXPECT_EQ(publisher_.store().size(), 2U);
 }
 
-TEST_F(MqttPublisher, WhatWasBeforeTakesNoRoomAndIsToldByTheBirth) {
+TEST_F(MqttPublisher, InitialStatesTakeNoRoomAndArePublishedByTheBirth) {
     publisher_.know(3, good(std::int64_t{7}));
-    publisher_.know(3, good(std::int64_t{8}));  // that is known better
+    publisher_.know(3, good(std::int64_t{8}));  // a state is already known
     EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{7})));
     EXPECT_EQ(publisher_.store().size(), 0U);
     publisher_.connected();
     EXPECT_THAT(counted(take_all(publisher_)), ElementsAre("7"));
 }
 
-TEST_F(MqttPublisher, TellsChangesOnly) {
+TEST_F(MqttPublisher, PublishesChangesOnly) {
     EXPECT_TRUE(publisher_.offer(3, good(std::int64_t{1})));
     EXPECT_FALSE(publisher_.offer(3, good(std::int64_t{1}, kNoon + std::chrono::seconds(1))));
     State stale = good(std::int64_t{1});
@@ -71,7 +71,7 @@ TEST_F(MqttPublisher, ABirthEndsWithWhatIsNowBehindWhatHasBeen) {
     EXPECT_THAT(counted(all), ElementsAre("1", "2", "3", "3"));
 }
 
-TEST_F(MqttPublisher, WhatIsLostOnItsWayIsToldAgainAndNothingElse) {
+TEST_F(MqttPublisher, OnlyUnacknowledgedMessagesAreSentAgain) {
     publisher_.connected();
     deliver(take_all(publisher_));
     count(1, 3);
@@ -109,7 +109,7 @@ TEST_F(MqttPublisher, AChangeDuringABirthIsNotFollowedByWhatWasBefore) {
 TEST_F(MqttPublisher, RepeatsWhatAWriterHasToSeeAgain) {
     publisher_.connected();
     take_all(publisher_);
-    publisher_.repeat(3);  // nothing is known of it
+    publisher_.repeat(3);  // it has no state
     EXPECT_THAT(take_all(publisher_), IsEmpty());
     count(1, 1);
     deliver(take_all(publisher_));
@@ -121,8 +121,8 @@ TEST_F(MqttPublisher, AnotherPlantTakesOverWhatItHasToo) {
     publisher_.connected();
     take_all(publisher_);
     count(1, 1);
-    take_all(publisher_);                         // on its way
-    publisher_.offer(4, good(std::string("x")));  // of a point that goes
+    take_all(publisher_);                         // in flight
+    publisher_.offer(4, good(std::string("x")));  // of a point that is removed
     count(2, 2);
     Subjects fewer;
     fewer.add_station("oven");
@@ -159,7 +159,7 @@ TEST_F(MqttPublisher, P2WhatWasRefusedTakesNoPlaceFromWhatWasCarriedOut) {
     EXPECT_FALSE(publisher_.has_room_for_answer(0));
 }
 
-TEST_F(MqttPublisher, P2AnAnswerIsToldUntilTheBrokerHasIt) {
+TEST_F(MqttPublisher, P2AResultIsSentUntilTheBrokerHasIt) {
     publisher_.connected();
     take_all(publisher_);
     publisher_.answer({"t/a", "", "{}"}, false);
@@ -186,7 +186,7 @@ TEST_F(MqttPublisher, AnswersThatWaitGoWithTheirSessionToTheNext) {
     EXPECT_THAT(topics(take_all(next)), ElementsAre("t/status", "t/a/result", "t/b/result"));
 }
 
-TEST_F(MqttPublisher, AnotherBrokerIsToldNoAnswersOfThisOne) {
+TEST_F(MqttPublisher, AnotherBrokerGetsNoResultsOfThisOne) {
     publisher_.connected();
     publisher_.answer({"t/a", "", "{}"}, false);
     Settings other = settings();

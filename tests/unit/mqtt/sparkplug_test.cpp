@@ -27,7 +27,7 @@ State with(State state, points::Quality quality) {
     return state;
 }
 
-/// seq of a payload.
+/// Returns a payload's seq.
 std::optional<std::uint64_t> seq_of(const Message& message) {
     std::optional<std::uint64_t> seq;
     ProtobufReader in(message.payload);
@@ -37,7 +37,7 @@ std::optional<std::uint64_t> seq_of(const Message& message) {
 }
 
 bool is_historical(const Message& message) {
-    // is_historical (5) is true: of a metric that is short enough to be told by its bytes.
+    // is_historical (5) is true: the metric is short enough to be recognised by its bytes.
     return message.payload.find("\x28\x01") != message.payload.npos;
 }
 
@@ -55,7 +55,7 @@ class MqttSparkplug : public ::testing::Test {
     }
 };
 
-/// The bytes are those that npm's sparkplug-payload 1.0.3 makes of the same payloads.
+/// Expected bytes were generated with npm's sparkplug-payload 1.0.3.
 TEST_F(MqttSparkplug, BirthsAreByteForByteThoseOfTahu) {
     publisher_.offer(0, good(true));
     publisher_.offer(2, good(*Decimal::parse("21.5")));
@@ -113,7 +113,7 @@ TEST_F(MqttSparkplug, SequenceNumbersGoRoundWithoutAGap) {
 TEST_F(MqttSparkplug, AStationDiesAndIsBornAgain) {
     connect();
     publisher_.offer(1, station(false, "offline"));
-    publisher_.offer(3, good(std::int64_t{1}));  // nobody knows this device now
+    publisher_.offer(3, good(std::int64_t{1}));  // no host knows this device now
     publisher_.offer(1, station(true, "online"));
     publisher_.offer(1, station(true, "suspect"));
     publisher_.offer(3, good(std::int64_t{2}));
@@ -128,7 +128,7 @@ TEST_F(MqttSparkplug, ADeadStationIsNotBornWithItsNode) {
     EXPECT_THAT(topics(connect()), ElementsAre("spBv1.0/g/NBIRTH/n", "spBv1.0/g/DBIRTH/n/oven"));
 }
 
-TEST_F(MqttSparkplug, ARebirthTellsEverythingAgainUnderTheSameDeath) {
+TEST_F(MqttSparkplug, ARebirthPublishesEverythingAgainUnderTheSameDeath) {
     connect();
     publisher_.offer(0, good(false));
     EXPECT_THAT(topics(take_all(publisher_)), ElementsAre("spBv1.0/g/NDATA/n"));
@@ -146,7 +146,7 @@ TEST_F(MqttSparkplug, RebirthsDuringOneAreOneMore) {
     publisher_.connected();
     std::vector<std::string> births;
     for (int i = 0; i < 2; ++i) {
-        publisher_.rebirth();  // at first nothing is told yet
+        publisher_.rebirth();  // at first nothing has been published
         births.push_back(publisher_.next(kNoon)->message.topic);
         publisher_.rebirth();
     }
@@ -198,7 +198,7 @@ TEST_F(MqttSparkplug, AHostWritesByNameOrAlias) {
     EXPECT_EQ(std::get<WriteCommand>(commands[1]).value, points::Value(std::int64_t{-2}));
 }
 
-TEST_F(MqttSparkplug, SaysWhatIsWrongWithACommand) {
+TEST_F(MqttSparkplug, ReportsWhatIsWrongWithACommand) {
     const auto why = [this](std::string_view topic, const std::string& payload,
                             bool retained = false) {
         const auto commands = publisher_.commands(topic, payload, retained);
@@ -229,13 +229,13 @@ TEST_F(MqttSparkplug, WithoutTheSwitchAHostMayOnlyAskForARebirth) {
 }
 
 TEST(MqttSparkplugPayload, WhatAHostSendsMeansWhatItsTypeSays) {
-    HeardMetric heard;
+    ReceivedMetric heard;
     heard.value = std::uint64_t{0xFFFFFFFE};
     heard.is_integer = true;
     EXPECT_EQ(value_of(heard, DataType::int32), points::Value(std::int64_t{-2}));
     EXPECT_EQ(value_of(heard, DataType::uint32), points::Value(std::uint64_t{0xFFFFFFFE}));
     EXPECT_EQ(value_of(heard, DataType::int64), points::Value(std::int64_t{0xFFFFFFFE}));
-    heard.type = 7;  // UInt32, whatever the point is
+    heard.type = 7;  // UInt32, regardless of the point's type
     EXPECT_EQ(value_of(heard, DataType::int32), points::Value(std::uint64_t{0xFFFFFFFE}));
 }
 

@@ -15,7 +15,7 @@ State text(const std::string& word) {
     return state;
 }
 
-/// What is sent from here on, in its order; all of it is in flight then.
+/// Returns all changes sent from now on, in order; they are then in flight.
 std::vector<std::string> send_all(Store& store) {
     std::vector<std::string> sent;
     while (const Change* change = store.next()) {

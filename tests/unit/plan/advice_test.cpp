@@ -26,7 +26,7 @@ class AdviceTest : public testing::Test, protected test::PlantLine {
     static double factor(const Advice& all) {
         return std::stod(all.what.substr(std::string_view("all intervals ").size()));
     }
-    /// The piece that begins like this; an empty one when there is none.
+    /// Returns the advice that starts like this; empty if there is none.
     Advice find(const std::string& start) const {
         for (const Advice& one : advice()) {
             if (one.what.starts_with(start)) return one;
@@ -173,7 +173,7 @@ TEST_F(AdviceTest, AFactorOfManyHundredsIsFoundToo) {
 
 TEST_F(AdviceTest, AGapThatIsSetIsKeptAtAnotherRate) {
     line.serial.baud = 1200;
-    add("press").frame_gap = 20ms;  // below t3.5, as tcp:// lines may have it
+    add("press").frame_gap = 20ms;  // below t3.5, as tcp:// lines may have
     ask(line.stations[0], 0, 4, 50ms);
     const Advice rate = find("serial: {baud: ");
     EXPECT_THAT(rate.what, HasSubstr("{baud: 19200}"));

@@ -1,5 +1,4 @@
-// Advice on many lines, followed as its words say, by somebody who knows nothing of how it came
-// about.
+// Follows advice on many random lines by its words alone, without the planner's internals.
 
 #include <gmock/gmock.h>
 
@@ -20,7 +19,7 @@ constexpr int kLines = 1500;
 
 Duration rounded(Duration every) { return std::chrono::round<std::chrono::microseconds>(every); }
 
-/// A line of any rate and format, busy with polls, points and relays.
+/// A line with any rate and format, with polls, points and relays.
 class AnyLine : private test::PlantLine {
   public:
     explicit AnyLine(unsigned seed) : random_(seed) {
@@ -64,7 +63,7 @@ class AnyLine : private test::PlantLine {
     void add_relay(std::uint32_t index) {
         Relay& relay = copy(index * 4, pick({4u, 4u, 20u}), interval());
         if (number(0, 1) == 0) relay.refresh = pick<Duration>({1s, 2s, 10s, 60s});
-        if (index > 0 && number(0, 1) == 0) {  // so that they go on where another ends
+        if (index > 0 && number(0, 1) == 0) {  // so that they continue one another
             relay.every = line.relays[index - 1].every;
             relay.refresh = line.relays[index - 1].refresh;
         }
@@ -88,7 +87,7 @@ void follow_read(Line& line, const std::smatch& words) {
     const auto station = std::ranges::find(line.stations, words[1].str(), &Station::name);
     const auto first = static_cast<std::uint32_t>(std::stoul(words[2]));
     const auto last = words[3].matched ? static_cast<std::uint32_t>(std::stoul(words[3])) : first;
-    for (Asked& asked : station->asked) {
+    for (PolledItem& asked : station->asked) {
         const std::uint32_t at = asked.want.span.first;
         if (first <= at && at <= last)
             asked.want.every = std::max(asked.want.every, duration_of(words[4]));
@@ -102,7 +101,7 @@ void follow_intervals(Line& line, const std::smatch& words) {
         return rounded(words[2].matched ? std::min<Duration>(made, 24h) : made);
     };
     for (Station& station : line.stations) {
-        for (Asked& asked : station.asked) asked.want.every = longer(asked.want.every);
+        for (PolledItem& asked : station.asked) asked.want.every = longer(asked.want.every);
     }
     for (Relay& relay : line.relays) relay.every = longer(relay.every);
 }
@@ -120,7 +119,7 @@ void follow_merges(Line& line, std::string pairs) {
     }
 }
 
-/// What comes of it.
+/// Returns the line after the change.
 Line followed(const Line& before, const std::string& what) {
     static const std::regex kRate(R"(serial: \{baud: (\d+)\} \(of all panels, too\))");
     static const std::regex kRead(
@@ -149,7 +148,7 @@ void expect_to_hold(const LinePlan& before, const Advice& told, const LinePlan& 
     EXPECT_NEAR(told.most, after.most, 1e-3 * after.most);
     const bool changing = is_high_by_changes(before);
     EXPECT_LE(changing ? after.most : after.load,
-              (changing ? before.most : before.load) - kWorthwhile + 1e-3);
+              (changing ? before.most : before.load) - kMinGain + 1e-3);
     if (told.what.starts_with("read ") || told.what.starts_with("all ")) {
         EXPECT_LE(told.load, kHigh);
         EXPECT_LE(told.most, kFull);

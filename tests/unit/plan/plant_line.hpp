@@ -9,7 +9,7 @@ namespace panelgate::plan::test {
 
 inline constexpr modbus::Table kRegisters = modbus::Table::holding_registers;
 
-/// A line of 9600 8N1 on which nothing is asked yet. Its panels take every rate.
+/// A line at 9600 8N1 without polls. Its panels support every rate.
 class PlantLine {
   public:
     PlantLine() {
@@ -28,7 +28,7 @@ class PlantLine {
         station.asked.push_back({{{kRegisters, first, count}, every}, "R" + std::to_string(first)});
     }
 
-    /// From the first to the second station; both are there.
+    /// A relay from the first to the second station, which both exist.
     Relay& copy(std::uint32_t first, std::uint32_t count, Duration every) {
         Relay& relay = line.relays.emplace_back();
         relay.name = "copy" + std::to_string(first);

@@ -14,15 +14,14 @@ namespace {
 
 Decimal of(const char* text) { return Decimal::parse(text).value(); }
 
-/// "9007199254740993 told 9007199254740.993": the raw number and what it is told as; or the
-/// refusal.
+/// Returns the raw number, followed by the value shown where that differs; or the refusal.
 std::string written(const Point& point, const char* number, Rounding rounding = Rounding::exact) {
     const auto words = encode(point, of(number), rounding);
     if (!words) return words.error().message;
     Point plain = point_of(point.type);
     const std::string raw = to_string(*decode(plain, *words));
-    const std::string told = to_string(*decode(point, *words));
-    return raw == told ? raw : raw + " told " + told;
+    const std::string shown = to_string(*decode(point, *words));
+    return raw == shown ? raw : raw + " told " + shown;
 }
 
 std::string rounded(const Point& point, const char* number) {

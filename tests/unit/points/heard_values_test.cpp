@@ -14,7 +14,7 @@ using testing::IsEmpty;
 
 constexpr TimePoint kStart{1h};
 
-/// Asked so long behind the start, answered 10 ms later.
+/// Requested at this time, answered 10 ms later.
 tap::Transaction heard(Duration at, std::string_view request, std::string_view reply) {
     tap::Transaction made;
     made.station = 5;

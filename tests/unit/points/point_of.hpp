@@ -9,7 +9,7 @@ namespace panelgate::points {
 
 using Words = std::vector<std::uint16_t>;
 
-/// A point "x" at the first register that may be written; a text has six characters.
+/// Returns a writable point "x" at the first register; a text has six characters.
 inline Point point_of(Type type, WordOrder order = WordOrder::abcd) {
     Point point;
     point.name = "x";

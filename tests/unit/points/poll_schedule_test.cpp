@@ -20,8 +20,7 @@ PollSchedule make_schedule(const std::vector<Duration>& intervals, std::size_t o
     return {intervals, kStart, {.max_outstanding = outstanding, .first_within = first_within}};
 }
 
-/// Runs in virtual time; every entry is done `taking` after it began, one after the other. Gives
-/// when each began.
+/// Runs in virtual time; entries run one after the other, `taking` each. Returns the start times.
 std::map<std::size_t, std::vector<Duration>> run(PollSchedule& schedule, Duration until,
                                                  Duration taking = 0ms) {
     std::map<std::size_t, std::vector<Duration>> begun;
@@ -60,8 +59,8 @@ TEST(PollSchedule, KeepsIntervalsThatDivideEachOtherApart) {
 TEST(PollSchedule, ATurnOutOfTurnMovesNoOther) {
     PollSchedule schedule = make_schedule({10s, 10s});
     run(schedule, 10s);
-    schedule.hasten(1, kStart + 11s);
-    schedule.hasten(1, kStart + 11s);
+    schedule.request_extra_turn(1, kStart + 11s);
+    schedule.request_extra_turn(1, kStart + 11s);
     const auto begun = run(schedule, 30s);
     EXPECT_THAT(begun.at(0), ElementsAre(10s, 20s));
     EXPECT_THAT(begun.at(1), ElementsAre(11s, 15s, 25s));
@@ -73,25 +72,26 @@ TEST(PollSchedule, TurnsOutOfTurnComeInTheirOrderAndAreLimited) {
         .max_outstanding = 1, .first_within = 1s, .extra_burst = 2, .extra_every = 1s};
     PollSchedule schedule(std::vector<Duration>(5, 1h), kStart, settings);
     run(schedule, 2s);
-    for (const std::size_t entry : {4u, 0u, 3u, 1u}) schedule.hasten(entry, kStart + 10s);
+    for (const std::size_t entry : {4u, 0u, 3u, 1u})
+        schedule.request_extra_turn(entry, kStart + 10s);
     const auto begun = run(schedule, 1min, 1ms);
     EXPECT_EQ(begun.at(4)[0], 10s);
     EXPECT_EQ(begun.at(0)[0], 10s + 1ms);
     EXPECT_EQ(begun.at(3)[0], 11s);
     EXPECT_EQ(begun.at(1)[0], 12s);
     EXPECT_EQ(begun.count(2), 0u);
-    schedule.hasten(4, kStart + 2h);
-    schedule.hasten(3, kStart + 2h);
+    schedule.request_extra_turn(4, kStart + 2h);
+    schedule.request_extra_turn(3, kStart + 2h);
     EXPECT_EQ(schedule.take_due(kStart + 2h).size(), 1u) << "the burst is there again";
 }
 
 TEST(PollSchedule, OneThatIsUnderWayIsNotHastened) {
     PollSchedule schedule = make_schedule({10s});
     ASSERT_THAT(schedule.take_due(kStart), SizeIs(1));
-    schedule.hasten(0, kStart + 1s);
+    schedule.request_extra_turn(0, kStart + 1s);
     schedule.on_done(0, kStart + 2s);
     EXPECT_EQ(schedule.next_due(), kStart + 10s);
-    schedule.hasten(0, kStart + 2s);
+    schedule.request_extra_turn(0, kStart + 2s);
     EXPECT_EQ(schedule.next_due(), kStart + 2s);
 }
 
@@ -110,7 +110,7 @@ TEST(PollSchedule, DoesNotDriftOverTenThousandPeriods) {
     std::size_t polls = 0;
     while (*schedule.next_due() < kStart + 10'000s) {
         const TimePoint due = *schedule.next_due();
-        now = due + (random() % 300) * 1ms;  // whoever calls comes late
+        now = due + (random() % 300) * 1ms;  // the caller is late
         for (const std::size_t entry : schedule.take_due(now)) {
             ASSERT_EQ((due - kStart) % 1s, entry * 500ms);
             schedule.on_done(entry, now + (random() % 100) * 1ms);
@@ -173,7 +173,7 @@ TEST(PollSchedule, SharesALineThatIsTooSlowFairly) {
     PollSchedule schedule = make_schedule({100ms, 100ms, 100ms, 1s}, 1);
     const auto begun = run(schedule, 100s, 70ms);
     const std::size_t fast = begun.at(0).size();
-    EXPECT_GT(fast, 400u);  // the line does 14 a second, of 31 wanted
+    EXPECT_GT(fast, 400u);  // the line can do 14 a second of 31 wanted
     EXPECT_NEAR(static_cast<double>(begun.at(1).size()), static_cast<double>(fast), 20);
     EXPECT_NEAR(static_cast<double>(begun.at(2).size()), static_cast<double>(fast), 20);
     EXPECT_GE(begun.at(3).size(), 98u);
@@ -206,7 +206,7 @@ TEST(PollSchedule, CallsThatAreEarlyRepeatedOrStrangeAreHarmless) {
     PollSchedule shortest = make_schedule({0s}, 0);
     EXPECT_THAT(shortest.take_due(kStart), ElementsAre(0));
     shortest.on_done(0, kStart);
-    EXPECT_EQ(*shortest.next_due(), kStart + PollSchedule::kShortest);
+    EXPECT_EQ(*shortest.next_due(), kStart + PollSchedule::kMinInterval);
 }
 
 }  // namespace

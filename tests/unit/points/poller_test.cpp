@@ -55,23 +55,23 @@ TEST_F(PollerTest, P10AWriteIsToldAtOnceAndReadAgainFromTheLoop) {
     std::vector<PolledStation> stations(1);
     stations[0] = {5, {{{Table::holding_registers, 100, 1}, 1h}}, limits()};
     poller = std::make_unique<Poller>(clock, bus, std::move(stations));
-    std::vector<Quality> told;
+    std::vector<Quality> qualities;
     poller->on_update([&](std::uint8_t station, const std::vector<std::size_t>&) {
-        told.push_back(quality_of(poller->find(station)->reading(0), 1h, clock.now()));
+        qualities.push_back(quality_of(poller->find(station)->reading(0), 1h, clock.now()));
     });
     const auto listener = poller->write_listener();
     poller->start();
-    ASSERT_TRUE(run_until([&] { return told.size() == 1; }));
+    ASSERT_TRUE(run_until([&] { return qualities.size() == 1; }));
     clock.pass(1s);
     bus::WriteEvent write{0, modbus::Span{Table::holding_registers, 99, 3}, false};
     listener(write);
-    ASSERT_EQ(told.size(), 2u);
-    EXPECT_EQ(told[1], Quality::stale);
+    ASSERT_EQ(qualities.size(), 2u);
+    EXPECT_EQ(qualities[1], Quality::stale);
     write.ended = true;
     listener(write);
     EXPECT_EQ(bus.requests.size(), 1u) << "asked from inside the bus";
-    ASSERT_TRUE(run_until([&] { return told.size() == 3; }));
-    EXPECT_EQ(told[2], Quality::good);
+    ASSERT_TRUE(run_until([&] { return qualities.size() == 3; }));
+    EXPECT_EQ(qualities[2], Quality::good);
     EXPECT_EQ(bus.requests.size(), 2u);
     write.station = 6;
     write.ended = false;
@@ -79,7 +79,7 @@ TEST_F(PollerTest, P10AWriteIsToldAtOnceAndReadAgainFromTheLoop) {
     poller.reset();
     write.station = 0;
     listener(write);
-    EXPECT_EQ(told.size(), 3u) << "another station's, or nobody's any more";
+    EXPECT_EQ(qualities.size(), 3u) << "another station's, or nobody's any more";
 }
 
 TEST_F(PollerTest, TakesBackWhatWaitsWhenItStops) {

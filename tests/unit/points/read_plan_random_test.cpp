@@ -15,7 +15,7 @@ using modbus::Table;
 
 constexpr Table kRegisters = Table::holding_registers;
 
-/// Makes stations: a few wants in a small memory, small limits.
+/// Generates stations: a few wants in a small memory, small limits.
 struct Random {
     explicit Random(unsigned seed) : engine(seed) {}
     std::uint32_t below(std::uint32_t bound) {
@@ -51,13 +51,13 @@ struct Random {
     std::minstd_rand engine;
 };
 
-using Items = std::bitset<160>;  // of one table: random stations have no more
+using Items = std::bitset<160>;  // of one table: random stations use no other
 
 Items items_of(std::uint32_t first, std::uint32_t count) {
     return (~Items() >> (Items().size() - count)) << first;
 }
 
-/// What is in a want or readable.
+/// Returns the items that are in a want or readable.
 Items open_items(Table table, const std::vector<Want>& wants, const PlanLimits& limits) {
     Items open;
     for (const profile::AddressRange& range : limits.of(table).readable)
@@ -77,14 +77,14 @@ bool contains_refused(const modbus::Span& read, const PlanLimits& limits) {
                        [&](const modbus::Span& span) { return read.contains(span); });
 }
 
-/// The items of a want that a read brings.
+/// Returns the items of a want that a read contains.
 modbus::Span part_of(const Want& one, const PlannedRead& read) {
     const std::uint32_t first = std::max(one.span.first, read.span.first);
     const std::uint32_t end = std::min(one.span.end(), read.span.end());
     return {one.span.table, first, end > first ? end - first : 0};
 }
 
-/// What is wrong with a read, or "".
+/// Returns what is wrong with a read, or "".
 std::string judge(const PlannedRead& read, const std::vector<Want>& wants,
                   const PlanLimits& limits) {
     if (read.span.count == 0 || read.span.count > limits.of(read.span.table).max_items)
@@ -128,7 +128,7 @@ TEST(RandomReadPlan, KeepsItsPromisesForAHundredThousandStations) {
     }
 }
 
-/// Least load (share of the wire) over all partitions of the wants into reads, tried one by one.
+/// Finds the minimum load (share of the wire) over all partitions of the wants into reads.
 class ExhaustiveSearch {
   public:
     ExhaustiveSearch(const std::vector<Want>& wants, const PlanLimits& limits)
@@ -152,7 +152,8 @@ class ExhaustiveSearch {
         place(index + 1);
         parts_.pop_back();
     }
-    /// -1 when these may not be read together. A want inside a longer read is no reason to refuse.
+    /// Returns -1 if these may not be read together. A want inside a longer read is no reason to
+    /// refuse.
     double load(const std::vector<Want>& part) const {
         modbus::Span box = part.front().span;
         Duration every = part.front().every;
@@ -190,7 +191,7 @@ double load_of(const std::vector<PlannedRead>& plan, const PlanLimits& limits) {
     return sum;
 }
 
-/// The plan's load over the least load, over random stations.
+/// Ratio of the plan's load to the minimum, over random stations.
 struct Ratios {
     double worst = 1;
 };

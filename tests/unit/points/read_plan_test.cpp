@@ -211,7 +211,7 @@ TEST(Bisect, CutsAtTheWidestHole) {
     EXPECT_EQ(halves->first.span, span(0, 2));
     EXPECT_EQ(halves->second.span, span(5, 4));
     EXPECT_THAT(halves->second.wants, ElementsAre(2, 3, 4));
-    EXPECT_EQ(seam(halves->first, halves->second), span(1, 5));
+    EXPECT_EQ(refused_between(halves->first, halves->second), span(1, 5));
 }
 
 TEST(Bisect, CutsInTheMiddleWhenThereIsNoHole) {
@@ -235,11 +235,11 @@ TEST(Bisect, KnowsNoSeamBetweenHalvesThatOverlap) {
     const std::vector<Want> wants = {want(0, 4), want(2, 4)};
     const auto halves = bisect({{kRegisters, 0, 6}, 1s, {0, 1}, false}, wants);
     ASSERT_TRUE(halves.has_value());
-    EXPECT_FALSE(seam(halves->first, halves->second).has_value());
+    EXPECT_FALSE(refused_between(halves->first, halves->second).has_value());
 }
 
-/// A panel that refuses every read with one of `bad` in it, asked until nothing is refused but
-/// reads that are marked. Gives how many exceptions that took.
+/// Simulates a panel that refuses every read containing one of `bad`, until only reads marked
+/// `refused` are refused. Returns the number of exceptions.
 int learn(const std::vector<Want>& wants, PlanLimits& limits, const std::set<std::uint32_t>& bad) {
     const auto refuses = [&](const PlannedRead& read) {
         const auto first = bad.lower_bound(read.span.first);
@@ -255,7 +255,7 @@ int learn(const std::vector<Want>& wants, PlanLimits& limits, const std::set<std
         if (const auto halves = bisect(read, wants)) {
             todo.push_back(halves->first);
             todo.push_back(halves->second);
-            const auto between = seam(halves->first, halves->second);
+            const auto between = refused_between(halves->first, halves->second);
             if (between && !refuses(halves->first) && !refuses(halves->second))
                 limits.refused.push_back(*between);
         } else {

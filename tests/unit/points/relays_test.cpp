@@ -41,14 +41,14 @@ class RelaysTest : public testing::Test {
     void run_until(const std::function<bool()>& done) {
         ASSERT_TRUE(test::run_until(io, clock, done)) << "nothing is left to happen";
     }
-    /// So many turns are over.
+    /// Waits until this many more turns are over.
     void turns(std::uint64_t more) {
         const std::uint64_t enough = status().reads + more;
         run_until([&] { return status().reads >= enough; });
         io.restart();
         io.poll();
     }
-    /// Somebody writes this register on the target's line.
+    /// Another client writes this register on the target's line.
     void written(std::uint8_t station, std::uint16_t address) {
         const modbus::Span items{modbus::Table::holding_registers, address, 1};
         relays->write_listener()("floor1", {station, items, false, 99});

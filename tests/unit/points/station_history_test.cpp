@@ -35,7 +35,7 @@ class StationHistoryTest : public testing::Test {
         history.record(kStart + at, points[0], reading);
     }
     /// "0:21.5 1:- " at `now`: seconds since kStart, values.
-    std::string told(std::size_t index, Duration now) const {
+    std::string samples_text(std::size_t index, Duration now) const {
         std::string text;
         for (const HistorySample& sample : history.samples(points[index], kStart + now)) {
             text += std::to_string((sample.at - kStart) / 1s) + ':' +
@@ -52,8 +52,8 @@ TEST_F(StationHistoryTest, KeepsOneValueASlotAtTheTimeItWasRead) {
     good(0, Value(21.5), 0s);
     good(0, Value(std::int64_t{22}), 1900ms, 200ms);
     good(0, Value(std::int64_t{23}), 2100ms, 200ms);
-    EXPECT_EQ(told(0, 3s), "0:21.5 1:23 ");
-    EXPECT_EQ(told(1, 3s), "");
+    EXPECT_EQ(samples_text(0, 3s), "0:21.5 1:23 ");
+    EXPECT_EQ(samples_text(1, 3s), "");
 }
 
 TEST_F(StationHistoryTest, P10ABadValueIsAGapAndAStaleOneNothingNew) {
@@ -62,24 +62,24 @@ TEST_F(StationHistoryTest, P10ABadValueIsAGapAndAStaleOneNothingNew) {
     without(Quality::bad, 2s);
     without(Quality::bad, 3s);
     good(0, Value(std::int64_t{4}), 4s);
-    EXPECT_EQ(told(0, 5s), "0:0 2:- 4:4 ");
+    EXPECT_EQ(samples_text(0, 5s), "0:0 2:- 4:4 ");
 }
 
 TEST_F(StationHistoryTest, ASilenceThatMakesBadIsAGap) {
     good(0, Value(std::int64_t{1}), 0s);
     good(0, Value(std::int64_t{2}), 10s);
-    EXPECT_EQ(told(0, 10s), "0:1 10:2 ") << "as old as a stale value may be";
+    EXPECT_EQ(samples_text(0, 10s), "0:1 10:2 ") << "as old as a stale value may be";
     good(0, Value(std::int64_t{3}), 30s);
-    EXPECT_EQ(told(0, 30s), "0:1 10:2 11:- 30:3 ");
-    EXPECT_EQ(told(0, 41s), "0:1 10:2 11:- 30:3 31:- ") << "and it goes on";
+    EXPECT_EQ(samples_text(0, 30s), "0:1 10:2 11:- 30:3 ");
+    EXPECT_EQ(samples_text(0, 41s), "0:1 10:2 11:- 30:3 31:- ") << "and it goes on";
 }
 
 TEST_F(StationHistoryTest, BitsAre0And1AndTextsAreNotKept) {
     good(1, Value(true), 0s);
     good(1, Value(false), 1s);
     good(2, Value(std::string("abc")), 0s);
-    EXPECT_EQ(told(1, 1s), "0:1 1:0 ");
-    EXPECT_EQ(told(2, 1s), "");
+    EXPECT_EQ(samples_text(1, 1s), "0:1 1:0 ");
+    EXPECT_EQ(samples_text(2, 1s), "");
     EXPECT_FALSE(StationHistory::keeps(points[2]));
 }
 

@@ -29,7 +29,7 @@ Want registers(std::uint32_t address, std::uint32_t count = 1, Duration every = 
     return {{Table::holding_registers, address, count}, every};
 }
 
-/// Plays `span` of time; what is read is answered at once.
+/// Runs `span` of time; reads are answered at once.
 template <class Answer>
 std::vector<Bytes> play(StationPolls& polls, TimePoint from, Duration span, const Answer& answer) {
     std::vector<Bytes> asked;

@@ -17,7 +17,7 @@ Want want(std::uint32_t first, std::uint32_t count) {
     return made;
 }
 
-/// A panel that gives 100 registers a read; what is readable and refused is added by each test.
+/// A panel with 100 registers per read; each test adds readable and refused spans.
 class TableMapTest : public ::testing::Test {
   protected:
     TableMapTest() { limits.of(kTable).max_items = kMost; }

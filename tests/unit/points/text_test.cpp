@@ -13,7 +13,7 @@ using Words = std::vector<std::uint16_t>;
 
 const std::string kUnknown = "\xEF\xBF\xBD";  // U+FFFD
 
-/// As a panel would hold them.
+/// As a panel would store them.
 Words words_of(const std::string& bytes) {
     return text_to_words(bytes, static_cast<unsigned>(bytes.size() + 1) / 2);
 }

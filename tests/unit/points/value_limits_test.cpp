@@ -247,7 +247,7 @@ TEST(Value, ScaledValuesRoundTripForEveryWholeTypeAndOrder) {
                     Words words(point.count());
                     for (auto& word : words) word = static_cast<std::uint16_t>(random());
                     const auto value = decode(point, words);
-                    if (!value) continue;  // no BCD
+                    if (!value) continue;  // invalid BCD
                     ASSERT_EQ(*encode(point, *value), words) << label(type) << " scale " << scale;
                 }
             }

@@ -89,7 +89,7 @@ TEST(Value, EveryTypeAndOrderRoundTrips) {
                 Words words(point.count());
                 for (auto& word : words) word = static_cast<std::uint16_t>(random());
                 const auto value = decode(point, words);
-                if (!value) continue;  // no BCD, no finite number
+                if (!value) continue;  // invalid BCD, not a finite number
                 const auto encoded = encode(point, *value);
                 ASSERT_TRUE(encoded.has_value()) << label(type) << encoded.error().message;
                 ASSERT_EQ(*encoded, words) << label(type) << ' ' << label(order);

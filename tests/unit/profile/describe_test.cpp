@@ -18,7 +18,7 @@ const PanelProfile& shipped(std::string_view name) {
     return *catalogue.find(name);
 }
 
-/// The text, or what is wrong.
+/// Returns the text, or the error.
 std::string address(std::string_view profile, std::string_view what) {
     const auto text = describe_address(shipped(profile), what);
     return text ? *text : "error: " + text.error().message;

@@ -15,7 +15,7 @@ constexpr const char* kAreas =
     "areas:\n"
     "  - {name: D, notation: {prefix: D}, table: holding-registers, readable: [0, 99]}\n";
 
-/// Head, functions and areas on lines 1 to 5, then `more` from line 6 on.
+/// Header, functions and areas on lines 1 to 5, then `more` from line 6 on.
 std::string whole(const std::string& more = "") {
     return std::string(kHead) + kFunctions + kAreas + more;
 }
@@ -27,7 +27,7 @@ std::string with_areas(const std::string& areas) {
     return std::string(kHead) + kFunctions + "areas:\n" + areas;
 }
 
-/// What is wrong with it; a profile is there exactly when nothing is.
+/// Returns the problems; a profile is returned exactly if there are none.
 std::string problems_of(const std::string& text) {
     yaml::Problems problems("p.yaml");
     const auto profile = load_profile(text, "p", problems);

@@ -13,7 +13,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::Not;
 
-/// Words 10 to 99, as their bits in coils, and by input registers, too; and coils of their own.
+/// Words 10 to 99, also as bits in coils and as input registers; and separate coils.
 PanelProfile panel() {
     Area words;
     words.name = "UW";

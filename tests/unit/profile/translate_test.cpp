@@ -55,7 +55,7 @@ TEST_F(TranslateTest, InputsStayInputsWhereNothingSaysThatTheMemoryIsTheSame) {
     EXPECT_EQ(sent("panasonic-gt", "02 00 20 00 05"_hex), Bytes{});
 }
 
-/// Words 100 to 199 by 03, shown as input registers too; no function 04.
+/// Words 100 to 199 by 03, also shown as input registers; no function 04.
 PanelProfile panel_with_shared_words() {
     PanelProfile panel;
     panel.functions = {{3, 0, false, ""}};

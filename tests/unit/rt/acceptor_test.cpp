@@ -29,7 +29,7 @@ class AcceptorTest : public ::testing::Test {
                       [](const error_code& why) { FAIL() << why.message(); }};
 };
 
-TEST_F(AcceptorTest, HandsOverWhoeverComes) {
+TEST_F(AcceptorTest, PassesOnEachConnection) {
     ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
     const tcp::socket first = connect(acceptor.port());
     const tcp::socket second = connect(acceptor.port());
@@ -38,7 +38,7 @@ TEST_F(AcceptorTest, HandsOverWhoeverComes) {
     EXPECT_EQ(accepted[1].remote_endpoint(), second.local_endpoint());
 }
 
-TEST_F(AcceptorTest, SaysWhatIsWrongAndStaysClosed) {
+TEST_F(AcceptorTest, ReturnsTheErrorAndStaysClosed) {
     ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
     Acceptor second(io.get_executor(), [](tcp::socket) {}, [](const error_code&) {});
     EXPECT_EQ(second.open("127.0.0.1", acceptor.port()), asio::error::address_in_use);
@@ -46,11 +46,11 @@ TEST_F(AcceptorTest, SaysWhatIsWrongAndStaysClosed) {
     EXPECT_EQ(second.open("no address", 0), asio::error::invalid_argument);
 }
 
-/// As a gateway does that listens on "0.0.0.0:502" and "[::]:502", in this order or the other.
+/// Like a gateway that listens on "0.0.0.0:502" and "[::]:502", in either order.
 TEST_F(AcceptorTest, AllAddressesOfBothKindsHaveRoomOnOnePort) {
     Acceptor six(io.get_executor(), [](tcp::socket) {}, [](const error_code&) {});
     if (six.open("::", 0, true)) GTEST_SKIP() << "no IPv6 here";
-    // Another program may have the same port of the other kind.
+    // Another program may have the port in the other address family.
     for (int i = 0; i < 10 && acceptor.open("0.0.0.0", six.port()); ++i) {
         six.close();
         ASSERT_FALSE(six.open("::", 0, true));
@@ -75,7 +75,7 @@ TEST_F(AcceptorTest, CanBeOpenedOnceItsAddressIsThere) {
     while (accepted.empty()) io.run_one();
 }
 
-TEST_F(AcceptorTest, HandsOverNobodyOnceItIsClosed) {
+TEST_F(AcceptorTest, PassesOnNoConnectionOnceClosed) {
     ASSERT_FALSE(acceptor.open("127.0.0.1", 0));
     const tcp::socket client = connect(acceptor.port());
     acceptor.close();

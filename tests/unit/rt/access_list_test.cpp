@@ -11,7 +11,7 @@ bool allows(const std::vector<Network>& networks, const char* peer) {
     return AccessList(networks).allows(boost::asio::ip::make_address(peer));
 }
 
-TEST(AccessList, AllowsEverybodyWhenItIsEmpty) {
+TEST(AccessList, AllowsEveryPeerWhenEmpty) {
     EXPECT_TRUE(allows({}, "192.0.2.1"));
     EXPECT_TRUE(allows({}, "2001:db8::1"));
 }
@@ -36,7 +36,7 @@ TEST(AccessList, SeesAnIpv4PeerThroughAMappedAddress) {
     EXPECT_FALSE(allows({{"127.0.0.0", 8}}, "::1"));
 }
 
-TEST(AccessList, TakesAPrefixOfZeroAsEverybodyOfThatFamily) {
+TEST(AccessList, APrefixOfZeroMatchesItsAddressFamily) {
     EXPECT_TRUE(allows({{"0.0.0.0", 0}}, "203.0.113.9"));
     EXPECT_FALSE(allows({{"0.0.0.0", 0}}, "2001:db8::1"));
     EXPECT_TRUE(allows({{"::", 0}}, "203.0.113.9"));

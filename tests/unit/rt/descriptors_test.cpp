@@ -19,7 +19,7 @@ TEST(Descriptors, AreSharedInProportionWhenThereAreFewer) {
     EXPECT_EQ(share_descriptors(952, {1024, 256}), (Numbers{761, 190}));
 }
 
-TEST(Descriptors, NobodyIsLeftWithoutAny) {
+TEST(Descriptors, EachShareIsAtLeastOne) {
     EXPECT_EQ(share_descriptors(10, {100000, 1}), (Numbers{9, 1}));
     EXPECT_EQ(share_descriptors(0, {1024, 256}), (Numbers{1, 1}));
 }

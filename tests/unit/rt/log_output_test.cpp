@@ -18,7 +18,7 @@
 namespace panelgate::rt {
 namespace {
 
-/// Both ends of a way to a reader who reads only when told to.
+/// Both ends of a channel to a reader that reads only on request.
 struct Way {
     int reader = -1;
     int writer = -1;
@@ -43,19 +43,19 @@ struct Way {
     }
 };
 
-Way pipe_way() {
+Way pipe_channel() {
     std::array<int, 2> ends{};
     if (::pipe(ends.data()) != 0) std::abort();
     return {ends[0], ends[1]};
 }
 
-Way socket_way() {
+Way socket_channel() {
     std::array<int, 2> ends{};
     if (::socketpair(AF_UNIX, SOCK_STREAM, 0, ends.data()) != 0) std::abort();
     return {ends[0], ends[1]};
 }
 
-Way terminal_way() {
+Way terminal_channel() {
     int master = -1;
     int slave = -1;
     termios raw{};
@@ -81,14 +81,15 @@ class LogOutputTest : public testing::TestWithParam<Way (*)()> {
     Way way_ = GetParam()();
 };
 
-INSTANTIATE_TEST_SUITE_P(Of, LogOutputTest, testing::Values(&pipe_way, &socket_way, &terminal_way),
+INSTANTIATE_TEST_SUITE_P(Of, LogOutputTest,
+                         testing::Values(&pipe_channel, &socket_channel, &terminal_channel),
                          [](const auto& info) {
-                             return info.param == &pipe_way     ? "APipe"
-                                    : info.param == &socket_way ? "ASocket"
-                                                                : "ATerminal";
+                             return info.param == &pipe_channel     ? "APipe"
+                                    : info.param == &socket_channel ? "ASocket"
+                                                                    : "ATerminal";
                          });
 
-TEST_P(LogOutputTest, AReaderWhoStandsStillLosesNoLineThatFitsAndStopsNobody) {
+TEST_P(LogOutputTest, ASlowReaderLosesNoLineThatFitsAndBlocksNoWriter) {
     LogOutput output(way_.writer, 1 << 20);
     std::string wanted;
     for (int i = 0; i < 10000; ++i) {
@@ -100,7 +101,7 @@ TEST_P(LogOutputTest, AReaderWhoStandsStillLosesNoLineThatFitsAndStopsNobody) {
     EXPECT_EQ(output.dropped(), 0u);
 }
 
-TEST_P(LogOutputTest, WhatDoesNotFitIsDroppedCountedAndTold) {
+TEST_P(LogOutputTest, ExcessLinesAreDroppedCountedAndReported) {
     constexpr std::size_t kMost = 1000;
     LogOutput output(way_.writer, kMost);
     output.on_lost([](std::uint64_t lines) { return "lost " + std::to_string(lines) + "\n"; });
@@ -121,7 +122,7 @@ TEST_P(LogOutputTest, WhatDoesNotFitIsDroppedCountedAndTold) {
     EXPECT_EQ(drain(output), "and on\n");
 }
 
-TEST_P(LogOutputTest, SomebodyIsToldWhenLinesBeginToWait) {
+TEST_P(LogOutputTest, CallsOnPendingWhenLinesAreQueued) {
     LogOutput output(way_.writer);
     int told = 0;
     output.on_pending([&] { ++told; });
@@ -131,7 +132,7 @@ TEST_P(LogOutputTest, SomebodyIsToldWhenLinesBeginToWait) {
     EXPECT_EQ(told, 1);
 }
 
-TEST_P(LogOutputTest, AReaderWhoLeftCostsNothing) {
+TEST_P(LogOutputTest, AReaderThatClosedCostsNothing) {
     std::signal(SIGPIPE, SIG_IGN);  // as the program does
     LogOutput output(way_.writer);
     ::close(std::exchange(way_.reader, -1));
@@ -157,7 +158,7 @@ TEST(LogOutput, WhatADeviceRefusesIsCounted) {
     ::close(full);
 }
 
-TEST(LogOutput, InAPlainFileNobodyOverwritesTheOther) {
+TEST(LogOutput, WritersOfOneFileDoNotOverwriteEachOther) {
     FILE* file = std::tmpfile();
     ASSERT_NE(file, nullptr);
     const int descriptor = ::fileno(file);

@@ -10,7 +10,7 @@ constexpr WallTime kWall{1h};
 
 class LogRepeatsTest : public ::testing::Test {
   protected:
-    /// Whether it is told at once.
+    /// True if it is logged at once.
     bool say(TimePoint now, const std::string& place, const std::string& what) {
         const bool again = repeats.is_repeat(now, place, what);
         const WallTime time = kWall + std::chrono::floor<std::chrono::microseconds>(now - kStart);
@@ -20,13 +20,13 @@ class LogRepeatsTest : public ::testing::Test {
     LogRepeats repeats;
 };
 
-TEST_F(LogRepeatsTest, WhatDiffersIsToldEachTimeHoweverOften) {
+TEST_F(LogRepeatsTest, DifferentEventsAreLoggedEachTime) {
     for (int i = 0; i < 10000; ++i)
         EXPECT_TRUE(say(kStart + 1ms * i, "press/100", std::to_string(i)));
     EXPECT_TRUE(repeats.take_due(TimePoint::max()).empty());
 }
 
-TEST_F(LogRepeatsTest, WhatIsTheSameIsOneLineAMinuteThatTellsHowOftenFirstAndLast) {
+TEST_F(LogRepeatsTest, RepeatsAreMergedIntoOneLineAMinuteWithCountAndTimes) {
     EXPECT_TRUE(say(kStart, "press/100", "7"));
     for (int i = 1; i < 60; ++i) EXPECT_FALSE(say(kStart + 1s * i, "press/100", "7"));
     EXPECT_TRUE(repeats.take_due(kStart + 59s).empty());
@@ -39,7 +39,7 @@ TEST_F(LogRepeatsTest, WhatIsTheSameIsOneLineAMinuteThatTellsHowOftenFirstAndLas
     EXPECT_EQ(repeats.take_due(kStart + 2min).size(), 1u);
 }
 
-TEST_F(LogRepeatsTest, TheRepeatsAreToldBeforeWhatFollowsThem) {
+TEST_F(LogRepeatsTest, RepeatsAreLoggedBeforeTheNextEvent) {
     say(kStart, "press/100", "7");
     say(kStart + 1s, "press/100", "7");
     EXPECT_TRUE(say(kStart + 2s, "press/100", "8"));
@@ -49,13 +49,13 @@ TEST_F(LogRepeatsTest, TheRepeatsAreToldBeforeWhatFollowsThem) {
     EXPECT_TRUE(say(kStart + 3s, "press/100", "7")) << "7 again is a change";
 }
 
-TEST_F(LogRepeatsTest, WhatComesBackAfterAMinuteIsToldAtOnce) {
+TEST_F(LogRepeatsTest, ARepeatAfterAMinuteIsLoggedAtOnce) {
     EXPECT_TRUE(say(kStart, "press/100", "7"));
     EXPECT_TRUE(say(kStart + 2min, "press/100", "7"));
     EXPECT_TRUE(say(kStart + 4min, "press/100", "7"));
 }
 
-TEST_F(LogRepeatsTest, MorePlacesThanItRemembersLoseNothing) {
+TEST_F(LogRepeatsTest, MorePlacesThanTheLimitLoseNothing) {
     const int places = 3 * static_cast<int>(LogRepeats::kMostPlaces);
     std::uint64_t told = 0;
     for (int i = 0; i < places; ++i) {

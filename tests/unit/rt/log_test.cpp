@@ -32,7 +32,7 @@ TEST_F(LogTest, SaysNothingBelowItsLevel) {
     EXPECT_EQ(tap.count(""), 0u);
 }
 
-TEST_F(LogTest, LeavesOutWhoRepeatsHimselfWhateverHisPort) {
+TEST_F(LogTest, ThrottlesAClientWhateverItsPort) {
     for (int port = 50000; port < 50100; ++port) {
         log(LogLevel::info, "connection closed",
             {{"listener", "a:502"}, {"client", "10.0.0.7:" + std::to_string(port)}});
@@ -49,7 +49,7 @@ TEST_F(LogTest, TopicsThatChangeDoNotFillTheLog) {
     EXPECT_LE(tap.count("mqtt write refused client"), 70u);
 }
 
-TEST_F(LogTest, AClientWithAnIpv6AddressIsWhoItIs) {
+TEST_F(LogTest, IdentifiesAClientByItsIpv6Address) {
     for (int port = 50000; port < 50100; ++port)
         log(LogLevel::info, "connection closed",
             {{"listener", "a:502"}, {"client", "[::1]:" + std::to_string(port)}});
@@ -60,7 +60,7 @@ TEST_F(LogTest, AClientWithAnIpv6AddressIsWhoItIs) {
     EXPECT_EQ(tap.count("login failed"), 9u) << "none of them is another's port";
 }
 
-TEST_F(LogTest, QuotesASubjectThatChangesItsMindLikeOneThatRepeatsItself) {
+TEST_F(LogTest, ThrottlesASubjectWithChangingFieldsLikeOneThatRepeats) {
     for (int i = 0; i < 30; ++i) {
         for (const char* state : {"ok", "timeout", "damaged"})
             log_about("a to b", LogLevel::warn, "relay", {{"relay", "a to b"}, {"state", state}});

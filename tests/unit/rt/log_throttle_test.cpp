@@ -7,7 +7,7 @@ namespace {
 
 constexpr TimePoint kStart{Duration(1h)};
 
-/// How many of these pass when one comes each second for so long.
+/// Number of lines that pass at one per second for `length`.
 int passed(LogThrottle& throttle, TimePoint from, Duration length, std::string_view subject) {
     int lines = 0;
     for (TimePoint now = from; now < from + length; now += 1s)
@@ -21,7 +21,7 @@ TEST(LogThrottle, WhatRepeatsForAnHourIsAtMostTenLines) {
     EXPECT_EQ(passed(throttle, kStart + 1h, 1h, "floor1 31"), 6);
 }
 
-TEST(LogThrottle, WhatCameLastIsToldWhenNothingFollows) {
+TEST(LogThrottle, TheLastThrottledLineIsReturnedIfNoneFollows) {
     LogThrottle throttle;
     const auto say = [&](TimePoint now, const char* line) {
         if (!throttle.pass(now, "write", "press"))
@@ -29,12 +29,12 @@ TEST(LogThrottle, WhatCameLastIsToldWhenNothingFollows) {
     };
     for (int i = 0; i < LogThrottle::kIncidents.burst; ++i) say(kStart, "passes");
     for (const char* line : {"one", "two", "three"}) say(kStart + 1s, line);
-    EXPECT_TRUE(throttle.take_held(kStart + 1min).empty());
-    const auto held = throttle.take_held(kStart + LogThrottle::kIncidents.interval);
+    EXPECT_TRUE(throttle.take_kept(kStart + 1min).empty());
+    const auto held = throttle.take_kept(kStart + LogThrottle::kIncidents.interval);
     ASSERT_EQ(held.size(), 1u);
     EXPECT_EQ(held[0].line.text, "three");
     EXPECT_EQ(held[0].left_out, 2u);
-    EXPECT_TRUE(throttle.take_held(TimePoint::max()).empty()) << "once";
+    EXPECT_TRUE(throttle.take_kept(TimePoint::max()).empty()) << "once";
 }
 
 TEST(LogThrottle, EachSubjectAndEachEventIsItsOwn) {
@@ -44,7 +44,7 @@ TEST(LogThrottle, EachSubjectAndEachEventIsItsOwn) {
     EXPECT_TRUE(throttle.pass(kStart, "collision", "floor1 31"));
 }
 
-TEST(LogThrottle, TheNextOneThatPassesTellsHowManyWereLeftOut) {
+TEST(LogThrottle, TheNextPassReportsHowManyWereLeftOut) {
     LogThrottle throttle;
     for (int i = 0; i < LogThrottle::kIncidents.burst; ++i)
         EXPECT_EQ(throttle.pass(kStart, "late", "1"), std::optional<std::uint64_t>(0));
@@ -67,15 +67,15 @@ TEST(LogThrottle, AClientThatChangesTheSubjectHasABudgetOfLinesASecond) {
     int lines = 0;
     for (int i = 0; i < 100000; ++i) {
         const TimePoint now = kStart + 100us * i;
-        lines += throttle.pass(now, "write", std::to_string(i), LogThrottle::kDeeds, "10.0.0.7")
+        lines += throttle.pass(now, "write", std::to_string(i), LogThrottle::kActions, "10.0.0.7")
                          .has_value()
                      ? 1
                      : 0;
     }
     EXPECT_LE(lines, LogThrottle::kByClient.burst + 10);
-    EXPECT_TRUE(throttle.pass(kStart + 10s, "write", "1", LogThrottle::kDeeds, "10.0.0.8"))
+    EXPECT_TRUE(throttle.pass(kStart + 10s, "write", "1", LogThrottle::kActions, "10.0.0.8"))
         << "another client has its own";
-    EXPECT_TRUE(throttle.pass(kStart + 10s, "closed", "1", LogThrottle::kDeeds, "10.0.0.7"))
+    EXPECT_TRUE(throttle.pass(kStart + 10s, "closed", "1", LogThrottle::kActions, "10.0.0.7"))
         << "another event, too";
     const auto left_out = throttle.take_left_out(kStart + 2min);
     ASSERT_EQ(left_out.size(), 1u);
@@ -91,7 +91,7 @@ TEST(LogThrottle, AnyNumberOfClientsHasABudgetAndNoLineIsLostWithoutACount) {
     std::uint64_t passed = 0;
     for (int i = 0; i < kLines; ++i) {
         const std::string client = "2001:db8::" + std::to_string(i / 100);
-        if (throttle.pass(kStart + 100us * i, "write", std::to_string(i), LogThrottle::kDeeds,
+        if (throttle.pass(kStart + 100us * i, "write", std::to_string(i), LogThrottle::kActions,
                           client))
             ++passed;
     }
@@ -104,9 +104,9 @@ TEST(LogThrottle, AnyNumberOfClientsHasABudgetAndNoLineIsLostWithoutACount) {
 TEST(LogThrottle, ABudgetComesBackWithTime) {
     LogThrottle throttle;
     for (int i = 0; i < 1000; ++i)
-        throttle.pass(kStart, "write", std::to_string(i), LogThrottle::kDeeds, "10.0.0.7");
+        throttle.pass(kStart, "write", std::to_string(i), LogThrottle::kActions, "10.0.0.7");
     const auto passes = [&](TimePoint now) {
-        return throttle.pass(now, "write", "new", LogThrottle::kDeeds, "10.0.0.7").has_value();
+        return throttle.pass(now, "write", "new", LogThrottle::kActions, "10.0.0.7").has_value();
     };
     EXPECT_FALSE(passes(kStart));
     EXPECT_TRUE(passes(kStart + LogThrottle::kByClient.interval));

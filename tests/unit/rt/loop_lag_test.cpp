@@ -24,7 +24,7 @@ TEST(LoopLag, OfALoopThatComesInTimeIsNothing) {
     EXPECT_EQ(lag.seconds().sum, 0.0);
 }
 
-TEST(LoopLag, IsHowLongALoopWasHeldBeyondItsTimer) {
+TEST(LoopLag, MeasuresHowLongTheLoopWasBlocked) {
     test::ManualClock clock;
     LoopLag lag(clock);
     lag.start();

@@ -17,7 +17,7 @@ SchedAttr attributes() {
     return found;
 }
 
-/// In a thread of its own: what is asked for stays.
+/// Runs in a thread of its own, as the settings stay.
 template <class Body>
 void in_thread(Body body) {
     std::thread(body).join();
@@ -30,7 +30,7 @@ TEST(Punctual, TimersOfTheThreadRingWithoutSlack) {
     });
 }
 
-/// A kernel that does not know of it says 0.
+/// A kernel without it reports 0.
 TEST(Punctual, AsksForShortSlicesAndKeepsItsNiceness) {
     in_thread([] {
         const int nice = attributes().nice;

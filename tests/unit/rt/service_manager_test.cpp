@@ -23,10 +23,10 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-/// What systemd holds the other end of.
+/// systemd's end of the socket.
 class NotifySocket {
   public:
-    /// A path, or an abstract name behind '@'.
+    /// A path, or an abstract name after '@'.
     explicit NotifySocket(std::string name) : socket_(::socket(AF_UNIX, SOCK_DGRAM, 0)) {
         sockaddr_un address{};
         address.sun_family = AF_UNIX;
@@ -41,7 +41,7 @@ class NotifySocket {
     NotifySocket(const NotifySocket&) = delete;
     NotifySocket& operator=(const NotifySocket&) = delete;
 
-    /// What has been told since.
+    /// Messages received since the last call.
     std::vector<std::string> told() const {
         std::vector<std::string> all;
         std::array<char, 4096> part{};
@@ -65,7 +65,7 @@ class ServiceManagerTest : public testing::Test {
     LogTap log;
 };
 
-TEST_F(ServiceManagerTest, IsToldWhenItServesAndWhenTheStatusChanges) {
+TEST_F(ServiceManagerTest, ReportsReadyAndStatusChanges) {
     ServiceManager manager(clock, {.notify_socket = path});
     std::string status = "1 of 2 lines up";
     manager.ready([&] { return status; });
@@ -77,7 +77,7 @@ TEST_F(ServiceManagerTest, IsToldWhenItServesAndWhenTheStatusChanges) {
     EXPECT_THAT(socket.told(), ElementsAre("STATUS=2 of 2 lines up"));
 }
 
-TEST_F(ServiceManagerTest, IsToldOfAReloadWithItsTimeAndOfItsEnd) {
+TEST_F(ServiceManagerTest, ReportsAReloadWithItsTimeAndItsEnd) {
     ServiceManager manager(clock, {.notify_socket = path});
     manager.ready([] { return "fine"; });
     manager.reloading();
@@ -87,7 +87,7 @@ TEST_F(ServiceManagerTest, IsToldOfAReloadWithItsTimeAndOfItsEnd) {
                             "READY=1\nSTATUS=fine"));
 }
 
-TEST_F(ServiceManagerTest, IsToldHowLongTheEndTakesAndNothingElseThen) {
+TEST_F(ServiceManagerTest, ReportsHowLongStoppingTakesAndNothingAfterwards) {
     ServiceManager manager(clock, {.notify_socket = path});
     manager.ready([] { return "fine"; });
     socket.told();
@@ -118,7 +118,7 @@ TEST_F(ServiceManagerTest, AnAbstractSocketIsOneToo) {
     EXPECT_THAT(hidden.told(), ElementsAre("READY=1\nSTATUS=fine"));
 }
 
-TEST_F(ServiceManagerTest, WhoReadsLateIsToldEachChangeOfStateInOrderAndNobodyWaits) {
+TEST_F(ServiceManagerTest, ALateReaderGetsEachStateChangeInOrderWithoutBlocking) {
     const ServiceEnvironment asked{path, "20000", ""};
     ServiceManager manager(clock, asked);
     clock.advance(1min);  // more than the socket keeps
@@ -145,7 +145,7 @@ TEST_F(ServiceManagerTest, WithoutASocketNothingIsTriedAndNoAlarmArmed) {
     EXPECT_EQ(log.count(""), 0u);
 }
 
-TEST_F(ServiceManagerTest, ASocketThatCannotBeUsedIsToldAndEndsNothing) {
+TEST_F(ServiceManagerTest, AnUnusableSocketIsReportedAndNotFatal) {
     for (const std::string& name : {std::string("vsock:2:1234"), '/' + std::string(200, 'x')}) {
         ServiceManager manager(clock, {.notify_socket = name});
         manager.ready([] { return "fine"; });
@@ -156,7 +156,7 @@ TEST_F(ServiceManagerTest, ASocketThatCannotBeUsedIsToldAndEndsNothing) {
     EXPECT_EQ(log.count("warn service manager not told why=\"No such file"), 1u);
 }
 
-TEST(WatchdogInterval, IsForWhomItIsMeantAndANumber) {
+TEST(WatchdogInterval, IgnoresAnotherProcessAndInvalidNumbers) {
     const auto of = [](const char* usec, const char* pid) {
         return watchdog_interval({"/x", usec, pid}, 77);
     };

@@ -51,25 +51,26 @@ TEST(Attempt, WaitsForTheRestOfWhatHasBegunButNotForBabble) {
 
 TEST(Attempt, CountsFurtherRepliesAndTornOnes) {
     EXPECT_EQ(hearing(joined({kReply, kReply})).more, 1u);
-    EXPECT_FALSE(hearing(joined({kReply, kReply})).torn);
-    EXPECT_TRUE(hearing(joined({kReply, "07 03 02 00"_hex})).torn);
-    EXPECT_FALSE(hearing(joined({"00"_hex, kReply, "FF"_hex})).torn) << "a transceiver switches";
+    EXPECT_FALSE(hearing(joined({kReply, kReply})).with_damage);
+    EXPECT_TRUE(hearing(joined({kReply, "07 03 02 00"_hex})).with_damage);
+    EXPECT_FALSE(hearing(joined({"00"_hex, kReply, "FF"_hex})).with_damage)
+        << "a transceiver switches";
 }
 
 TEST(Attempt, TellsADamagedReplyFromNoise) {
     Bytes damaged = kReply;
     damaged[4] ^= 1;
     EXPECT_EQ(hearing(damaged).kind, Outcome::Kind::damaged);
-    EXPECT_TRUE(hearing(damaged).begun);
+    EXPECT_TRUE(hearing(damaged).header_seen);
     EXPECT_EQ(hearing("11 22 33 44 55"_hex).kind, Outcome::Kind::damaged);
-    EXPECT_FALSE(hearing("11 22 33 44 55"_hex).begun);
+    EXPECT_FALSE(hearing("11 22 33 44 55"_hex).header_seen);
     EXPECT_EQ(hearing("00 FF"_hex).kind, Outcome::Kind::silent);
 }
 
 TEST(Attempt, TakesTheEchoOutWholeOrInPart) {
     const Bytes request = make().request().adu();
     EXPECT_EQ(hearing(joined({request, kReply})).kind, Outcome::Kind::replied);
-    EXPECT_FALSE(hearing(joined({request, kReply})).torn);
+    EXPECT_FALSE(hearing(joined({request, kReply})).with_damage);
     EXPECT_EQ(hearing(request).kind, Outcome::Kind::silent);
     EXPECT_EQ(hearing(Bytes(request.begin(), request.begin() + 5)).kind, Outcome::Kind::silent);
     Attempt attempt = make();
@@ -82,9 +83,9 @@ TEST(Attempt, GivesFramesOfOthersAndOfOtherRequests) {
     const Bytes longer = modbus::encode_adu(7, "03 04 00 05 00 06"_hex);
     const Outcome outcome = hearing(joined({other, longer, kReply}));
     EXPECT_EQ(outcome.kind, Outcome::Kind::replied);
-    ASSERT_EQ(outcome.strays.size(), 2u);
-    EXPECT_EQ(outcome.strays[0].station, 8);
-    EXPECT_EQ(outcome.strays[1].pdu.size(), 6u);
+    ASSERT_EQ(outcome.unsolicited.size(), 2u);
+    EXPECT_EQ(outcome.unsolicited[0].station, 8);
+    EXPECT_EQ(outcome.unsolicited[1].pdu.size(), 6u);
 }
 
 }  // namespace

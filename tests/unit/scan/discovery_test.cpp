@@ -23,8 +23,8 @@ constexpr Duration kAnswered = 15ms;
 constexpr Duration kSilence = 40ms;
 const SerialFormat k38400{38400, 8, Parity::none, 1};
 
-/// Simulated panels behind a line that others use, too; a question costs what it costs, and an
-/// answer comes later than that.
+/// Simulated panels on a line shared with clients; each question has a cost, and its answer arrives
+/// later than that.
 class DiscoveryTest : public testing::Test {
   protected:
     void add(const std::string& profile, std::uint8_t station) {
@@ -33,14 +33,14 @@ class DiscoveryTest : public testing::Test {
     Answer ask(const ReadRequest& request) {
         ++questions[request.station()];
         EXPECT_TRUE(modbus::is_pure_read(Bytes(request.pdu().begin(), request.pdu().end())));
-        if (odd) {
-            if (auto answer = odd(request)) return *answer;
+        if (scripted) {
+            if (auto answer = scripted(request)) return *answer;
         }
         const auto panel = panels.find(request.station());
         if (panel == panels.end()) return {Reply::silent, {}, kSilence};
         return {Reply::answered, panel->second.handle(now, 0, request.pdu()), kAnswered};
     }
-    /// Until it is done; what it has cost of the time.
+    /// Runs to the end; returns the share of time used.
     double run(Discovery& discovery) {
         const TimePoint began = now;
         Duration cost{};
@@ -51,7 +51,7 @@ class DiscoveryTest : public testing::Test {
             if (!request) return 1;
             const Answer answer = ask(*request);
             cost += answer.cost;
-            now += answer.cost + 3ms;  // it waited for its turn
+            now += answer.cost + 3ms;  // time in the queue
             discovery.on_answer(now, answer);
         }
         return to_seconds(cost) / to_seconds(std::max(now, discovery.due()) - began);
@@ -67,14 +67,14 @@ class DiscoveryTest : public testing::Test {
 
     std::map<std::uint8_t, sim::Station> panels;
     std::map<std::uint8_t, int> questions;
-    std::function<std::optional<Answer>(const ReadRequest&)> odd;
+    std::function<std::optional<Answer>(const ReadRequest&)> scripted;
     TimePoint now = kStart;
 };
 
 TEST_F(DiscoveryTest, WhomTheLineRefusesToAskWaitsForItsTurnAndIsNotSilent) {
     add("panasonic-gt", 5);
     int refusals = 0;
-    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
         if (request.station() != 5 || refusals == 2) return std::nullopt;
         ++refusals;
         return Answer{Reply::refused, {}, {}};
@@ -89,7 +89,7 @@ TEST_F(DiscoveryTest, WhomTheLineRefusesToAskWaitsForItsTurnAndIsNotSilent) {
 }
 
 TEST_F(DiscoveryTest, WhoIsRefusedEachTimeIsCountedAsNotAsked) {
-    odd = [](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [](const ReadRequest& request) -> std::optional<Answer> {
         if (request.station() % 2 == 0) return std::nullopt;
         return Answer{Reply::refused, {}, {}};
     };
@@ -130,7 +130,7 @@ TEST_F(DiscoveryTest, NeverTakesMoreThanItsShareOfAnyStretchButOneQuestion) {
     add("omron-cp2e", 100);
     Discovery discovery(shipped(), all(), now);
     std::vector<std::pair<TimePoint, Duration>> spent;
-    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
         const Duration cost = request.station() % 50 == 0 ? 500ms : kSilence;
         spent.emplace_back(now, cost);
         return Answer{Reply::silent, {}, cost};
@@ -164,7 +164,7 @@ TEST_F(DiscoveryTest, WhatTheLineCouldNotTakeIsAskedAgain) {
     EXPECT_EQ(discovery.asked(), 0u);
     EXPECT_FALSE(discovery.question(now + 999ms));
     EXPECT_EQ(discovery.question(now + 1s)->station(), 9);
-    odd = [](const ReadRequest&) { return Answer{Reply::unsent}; };
+    scripted = [](const ReadRequest&) { return Answer{Reply::unsent}; };
     run(discovery);
     EXPECT_TRUE(discovery.gave_up());
     EXPECT_EQ(questions[9], 59) << "not for ever";
@@ -172,7 +172,7 @@ TEST_F(DiscoveryTest, WhatTheLineCouldNotTakeIsAskedAgain) {
 
 TEST_F(DiscoveryTest, DamageIsAStationOnlyWhenItComesAgainAndAgain) {
     std::map<std::uint8_t, int> tries;
-    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
         const int nth = ++tries[request.station()];
         if (request.station() == 5 || (request.station() == 6 && nth == 1))
             return Answer{Reply::damaged, {}, kAnswered};
@@ -190,7 +190,7 @@ TEST_F(DiscoveryTest, DamageIsAStationOnlyWhenItComesAgainAndAgain) {
 
 TEST_F(DiscoveryTest, WhoAnswersLateMayBeAskedOnceMore) {
     add("autonics-gplp-s", 31);
-    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
         if (request.station() == 31 && questions[31] > 1) return std::nullopt;
         return Answer{Reply::silent, {}, kSilence};
     };
@@ -211,7 +211,7 @@ TEST_F(DiscoveryTest, WhoAnswersLateMayBeAskedOnceMore) {
 
 TEST_F(DiscoveryTest, WhoGoesAwayWhileLookedAtIsToldByWhatItSaid) {
     add("autonics-gplp-s", 31);
-    odd = [&](const ReadRequest& request) -> std::optional<Answer> {
+    scripted = [&](const ReadRequest& request) -> std::optional<Answer> {
         if (request.station() != 31 || questions[31] < 3) return std::nullopt;
         return Answer{Reply::silent, {}, 1s};
     };

@@ -13,7 +13,7 @@ using ::testing::HasSubstr;
 
 const SerialFormat k38400{38400, 8, Parity::none, 1};
 
-/// Asks a simulated panel everything and gives the candidates.
+/// Answers all probes from a simulated panel and returns the candidates.
 std::vector<Candidate> recognise(const profile::PanelProfile& panel, std::uint8_t station,
                                  const std::optional<SerialFormat>& format, int& asked) {
     sim::Station simulated(panel, station);

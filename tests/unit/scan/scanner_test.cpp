@@ -14,7 +14,7 @@ using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// "31 autonics-gplp-s"; several candidates are joined by '|', a doubled address ends in '!'.
+/// "31 autonics-gplp-s"; several candidates are joined by '|', a duplicate address ends in '!'.
 std::vector<std::string> texts(const Result& result) {
     std::vector<std::string> all;
     for (const StationFinding& finding : result.stations) {
@@ -130,7 +130,7 @@ TEST(Scanner, FindsPanelsThatSpeakAsciiWhenRtuHasFoundNobody) {
 TEST(Scanner, AsksARemoteDeviceInBothModes) {
     VirtualLine line;
     line.add("autonics-gplp-s", 31);
-    line.say_in(SerialMode::ascii);
+    line.set_panel_mode(SerialMode::ascii);
     Settings settings;
     settings.remote = true;
     settings.stations = {31};
@@ -196,8 +196,8 @@ TEST(Scanner, KeepsToTheStationsAndFormatsItWasGiven) {
 TEST(Scanner, SaysNothingWhileAnotherMasterTalks) {
     VirtualLine line;
     add_demo(line);
-    line.say(300ms, modbus::encode_adu(17, "03 00 00 00 05"_hex));
-    line.say(310ms, modbus::encode_adu(17, "03 0A 00 01 00 02 00 03 00 04 00 05"_hex));
+    line.add_foreign(300ms, modbus::encode_adu(17, "03 00 00 00 05"_hex));
+    line.add_foreign(310ms, modbus::encode_adu(17, "03 0A 00 01 00 02 00 03 00 04 00 05"_hex));
     const Result result = line.scan({});
     EXPECT_EQ(result.ending, Result::Ending::another_master);
     EXPECT_TRUE(line.sent.empty());
@@ -208,7 +208,8 @@ TEST(Scanner, SaysNothingWhileAnotherMasterTalks) {
 
 TEST(Scanner, FindsTheFormatInWhichAnotherMasterTalks) {
     VirtualLine line({19200, 8, Parity::even, 1});
-    for (int i = 0; i < 300; ++i) line.say(i * 100ms, modbus::encode_adu(2, "03 00 00 00 05"_hex));
+    for (int i = 0; i < 300; ++i)
+        line.add_foreign(i * 100ms, modbus::encode_adu(2, "03 00 00 00 05"_hex));
     const Result result = line.scan({});
     EXPECT_EQ(result.ending, Result::Ending::another_master);
     EXPECT_EQ(result.format, (SerialFormat{19200, 8, Parity::even, 1}));
@@ -218,7 +219,7 @@ TEST(Scanner, FindsTheFormatInWhichAnotherMasterTalks) {
 TEST(Scanner, ScansAllTheSameWhenTold) {
     VirtualLine line;
     add_demo(line);
-    line.say(300ms, modbus::encode_adu(9, "03 00 00 00 05"_hex));
+    line.add_foreign(300ms, modbus::encode_adu(9, "03 00 00 00 05"_hex));
     Settings settings;
     settings.speak_anyway = true;
     const Result result = line.scan(settings);
@@ -230,7 +231,7 @@ TEST(Scanner, ReportsFramesThatAnswerNothingItHasAsked) {
     VirtualLine line;
     add_demo(line);
     for (int i = 0; i < 5; ++i)
-        line.say(1500ms + i * 3s, modbus::encode_adu(200, "06 00 01 00 02"_hex));
+        line.add_foreign(1500ms + i * 3s, modbus::encode_adu(200, "06 00 01 00 02"_hex));
     const Result result = line.scan({});
     EXPECT_EQ(texts(result), kDemo);
     EXPECT_EQ(result.talk, (Talk{{200, {6}}}));
@@ -240,7 +241,8 @@ TEST(Scanner, IsNotStoppedByNoise) {
     VirtualLine line;
     add_demo(line);
     std::mt19937 chance(5);
-    for (int i = 0; i < 400; ++i) line.say(i * 37ms, Bytes{static_cast<std::uint8_t>(chance())});
+    for (int i = 0; i < 400; ++i)
+        line.add_foreign(i * 37ms, Bytes{static_cast<std::uint8_t>(chance())});
     const Result result = line.scan({});
     EXPECT_EQ(texts(result), kDemo);
     EXPECT_GT(result.noise, 10u);

@@ -35,17 +35,17 @@ class VirtualLine {
         orders_.set(station, profile.crc_order);
         return faults_[station];
     }
-    /// Bytes that somebody else puts on the line, readable in its own format only.
-    void say(Duration at, const Bytes& bytes) {
+    /// Another master's bytes on the line, readable in its own format only.
+    void add_foreign(Duration at, const Bytes& bytes) {
         for (std::size_t i = 0; i < bytes.size(); ++i)
             others_.emplace(start + at + wire_time(format_, i + 1), bytes[i]);
     }
     void garble_other_parities() { garbles_ = true; }
-    /// The far end of a remote line has panels of this mode; nobody sets its format.
-    void say_in(SerialMode mode) { format_.mode = mode; }
+    /// Sets the mode of the panels at a remote line's far end, whose format the scanner cannot set.
+    void set_panel_mode(SerialMode mode) { format_.mode = mode; }
     void seed(unsigned value) { chance_.seed(value); }
     void echo() { echo_ = true; }
-    /// Nobody answers: a function of the request's ADU instead of the stations.
+    /// Answers by a function of the request's ADU instead of the stations.
     void answer_by(std::function<Bytes(const Bytes&)> answer) { answer_ = std::move(answer); }
 
     Result scan(Settings settings, const profile::Catalogue& profiles = shipped()) {
@@ -53,7 +53,7 @@ class VirtualLine {
         run(scanner, start + 1h);
         return scanner.result();
     }
-    /// Until it is done, or the time is up.
+    /// Runs until the scan is done or the time is up.
     void run(Scanner& scanner, TimePoint until) {
         while (!scanner.done()) {
             while (auto action = scanner.poll_action()) act(*action);

@@ -84,7 +84,7 @@ TEST(Conversation, GivesARetryTheAnswerOfTheFirst) {
     EXPECT_EQ(talk.machine.counters().repeated, 1u);
 }
 
-TEST(Conversation, HoldsAReplyWhileTheMasterTalks) {
+TEST(Conversation, DefersAReplyWhileTheMasterTransmits) {
     Talk talk;
     talk.hear(kRequest);
     talk.pass(300ms);
@@ -124,10 +124,10 @@ TEST(Conversation, FindsNoRequestInAnotherUnitsDataBehindAPauseInItsHeader) {
     }
 }
 
-TEST(Conversation, TakesNoTimeForASilenceInWhichNobodyLooked) {
+TEST(Conversation, CountsNoUnobservedTimeAsASilence) {
     for (const Duration late : {10ms, 5000ms}) {
         Talk talk;
-        talk.hear(joined({{0x55, 0xAA}, kRequest}));  // counts behind noise when a silence follows
+        talk.hear(joined({{0x55, 0xAA}, kRequest}));  // valid after noise if a silence follows
         talk.now += late;
         talk.hear({0xC8, 0x57});
         talk.pass(1s);
@@ -173,7 +173,7 @@ TEST(Conversation, SendsNothingBehindTheMastersTimeout) {
     EXPECT_THAT(talk.sent, ElementsAre(kReply));
 }
 
-TEST(Conversation, TellsFailuresByNothing) {
+TEST(Conversation, AnswersFailuresWithSilence) {
     Talk talk;
     talk.hear(kRequest);
     talk.answer(std::nullopt);
@@ -183,7 +183,7 @@ TEST(Conversation, TellsFailuresByNothing) {
     EXPECT_FALSE(talk.machine.busy());
 }
 
-TEST(Conversation, ForwardsABroadcastOnceAndAnswersNobody) {
+TEST(Conversation, ForwardsABroadcastOnceAndSendsNoReply) {
     Talk talk;
     const Bytes write = modbus::encode_write_register(1, 2);
     talk.hear(encode_adu(0, write));

@@ -19,8 +19,8 @@ Talk with(EchoMode mode) {
     return Talk(settings);
 }
 
-/// Of what was sent last, as the wire brings it.
-void come_back(Talk& talk) {
+/// Echoes the last transmission.
+void echo_last(Talk& talk) {
     const Bytes echo = talk.sent.back();
     talk.hear_slowly(echo, 1ms);
 }
@@ -34,7 +34,7 @@ void exchange(Talk& talk, const Bytes& request, const Bytes& reply) {
 TEST(OwnEcho, OfAWriteIsNotARequest) {
     Talk talk = with(EchoMode::automatic);
     exchange(talk, kWrite, kWrite);
-    come_back(talk);
+    echo_last(talk);
     talk.pass(1s);
     EXPECT_THAT(talk.asks, SizeIs(1));
     exchange(talk, kWrite, kWrite);
@@ -45,7 +45,7 @@ TEST(OwnEcho, IsNoFaultAndNoWordOfTheMaster) {
     Talk talk = with(EchoMode::automatic);
     for (int i = 0; i < 3; ++i) {
         exchange(talk, kReadOne, kOneValue);
-        come_back(talk);
+        echo_last(talk);
         talk.pass(100ms);
     }
     EXPECT_THAT(talk.sent, SizeIs(3));
@@ -54,7 +54,7 @@ TEST(OwnEcho, IsNoFaultAndNoWordOfTheMaster) {
 
 TEST(OwnEcho, ThatIsKnownToBeAbsentHidesNoRetry) {
     Talk talk = with(EchoMode::automatic);
-    exchange(talk, kReadOne, kOneValue);  // nothing comes back
+    exchange(talk, kReadOne, kOneValue);  // no echo
     talk.pass(1s);
     exchange(talk, kWrite, kWrite);
     talk.pass(15ms);
@@ -65,7 +65,7 @@ TEST(OwnEcho, ThatIsKnownToBeAbsentHidesNoRetry) {
 TEST(OwnEcho, ThatIsLookedAtLateIsOneStill) {
     Talk talk = with(EchoMode::automatic);
     exchange(talk, kWrite, kWrite);
-    talk.now += 5s;  // the process stood still
+    talk.now += 5s;  // the process was stalled
     talk.hear(talk.sent.back());
     talk.pass(1s);
     EXPECT_THAT(talk.asks, SizeIs(1));
@@ -74,12 +74,12 @@ TEST(OwnEcho, ThatIsLookedAtLateIsOneStill) {
 TEST(OwnEcho, ThatCameDamagedIsNotAbsent) {
     Talk talk = with(EchoMode::automatic);
     exchange(talk, kReadOne, kOneValue);
-    Bytes met = talk.sent.back();  // something that the master said
+    Bytes met = talk.sent.back();  // collided with the master
     for (std::uint8_t& byte : met) byte ^= 0x5A;
     talk.hear_slowly(met, 1ms);
     talk.pass(1s);
     exchange(talk, kWrite, kWrite);
-    come_back(talk);
+    echo_last(talk);
     talk.pass(1s);
     EXPECT_THAT(talk.asks, SizeIs(2));
 }

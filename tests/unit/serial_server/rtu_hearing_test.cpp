@@ -20,7 +20,7 @@ using testing::SizeIs;
 
 const Bytes kRequest = encode_adu(kOurs, kReadOne);
 
-/// The stations of all frames, by their order.
+/// Returns the stations of all frames, in order.
 std::vector<int> heard(RtuHearing& hearing, const Bytes& bytes, bool silence = true) {
     std::vector<int> stations;
     const auto take = [&] {
@@ -128,7 +128,7 @@ TEST(RtuHearing, TakesAWriteBehindAGlitch) {
     }
 }
 
-TEST(RtuHearing, HearsExceptionsAndRefusalsOfOthers) {
+TEST(RtuHearing, HearsExceptionsOfOtherStations) {
     RtuHearing hearing(Talk::served());
     const Bytes no = encode_adu(kOther, Bytes{0x83, 0x02});
     EXPECT_THAT(heard(hearing, joined({encode_adu(kOther, kReadOne), no, kRequest})),

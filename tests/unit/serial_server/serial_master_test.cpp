@@ -34,7 +34,7 @@ Settings with_access(Settings settings) {
     return settings;
 }
 
-/// A master's port before one bus.
+/// A master's port with one bus behind it.
 struct House {
     explicit House(Settings given = Talk::rtu())
         : settings(with_access(std::move(given))),
@@ -59,7 +59,7 @@ struct House {
         io.poll();
         clock.advance(100ms);
     }
-    /// What the master hears of it.
+    /// Returns what the master receives.
     std::vector<Bytes> told(Fault fault) {
         hear(kRequest);
         answer(FakeBus::fault(fault, true));
@@ -84,7 +84,7 @@ TEST(SerialMaster, AsksTheStationBehindTheUnitUnderItsName) {
     EXPECT_THAT(house.wire->written, ElementsAre(encode_adu(kOurs, kOneValue)));
 }
 
-TEST(SerialMaster, AsksNothingOfUnitsThatNobodyListed) {
+TEST(SerialMaster, AsksNothingOfUnlistedUnits) {
     House house;
     house.hear(encode_adu(6, kReadOne));
     EXPECT_THAT(house.bus.requests, IsEmpty());
@@ -96,7 +96,7 @@ TEST(SerialMaster, HearsTheMasterBeforeItAnswersLate) {
     House house;
     house.hear(kRequest);
     house.clock.advance(300ms);
-    house.wire->come(encode_adu(5, kReadOne));  // and nobody has been told
+    house.wire->come(encode_adu(5, kReadOne));  // not processed yet
     house.answer(FakeBus::reply(kOneValue));
     EXPECT_THAT(house.wire->written, IsEmpty());
     EXPECT_THAT(house.bus.cancelled, ElementsAre(house.bus.requests[0].client));
@@ -110,7 +110,7 @@ TEST(SerialMaster, IsSilentWhereTheGatewayHasNoAnswer) {
     EXPECT_EQ(house.master.counters().silent, 8u);
 }
 
-TEST(SerialMaster, OrGivesTheExceptionThatTellsWhy) {
+TEST(SerialMaster, OrReturnsTheExceptionThatStatesTheReason) {
     Settings settings = Talk::rtu();
     settings.on_failure = OnFailure::exception;
     House house(settings);

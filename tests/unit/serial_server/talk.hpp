@@ -21,7 +21,7 @@ inline Bytes joined(std::vector<Bytes> parts) {
     return all;
 }
 
-/// A conversation at 9600 8N1 (t3.5 is 3.65 ms), and what came of it.
+/// A conversation at 9600 8N1 (t3.5 is 3.65 ms) and its results.
 struct Talk {
     explicit Talk(Settings settings = rtu()) : machine(settings, served()) { machine.on_line_up(); }
 
@@ -44,7 +44,7 @@ struct Talk {
         machine.on_rx(now, bytes);
         drain();
     }
-    /// In the pieces of an adapter, `hole` apart.
+    /// Delivers the bytes one at a time, `hole` apart.
     void hear_slowly(const Bytes& bytes, Duration hole) {
         for (const std::uint8_t byte : bytes) {
             hear({byte});
@@ -56,7 +56,7 @@ struct Talk {
         machine.on_answer(now, ticket, pdu);
         drain();
     }
-    /// All deadlines on the way are met.
+    /// Advances the time, serving every deadline.
     void pass(Duration by) {
         const TimePoint end = now + by;
         while (true) {
@@ -70,7 +70,7 @@ struct Talk {
     }
 
     std::vector<Ask> asks;
-    std::vector<Spread> spreads;
+    std::vector<ForwardBroadcast> spreads;
     std::vector<Bytes> sent;
     std::vector<TimePoint> sent_at;
     int withdrawals = 0;
@@ -81,7 +81,7 @@ struct Talk {
     void drain() {
         while (auto action = machine.poll_action()) {
             if (auto* ask = std::get_if<Ask>(&*action)) asks.push_back(*ask);
-            if (auto* spread = std::get_if<Spread>(&*action)) spreads.push_back(*spread);
+            if (auto* spread = std::get_if<ForwardBroadcast>(&*action)) spreads.push_back(*spread);
             if (std::holds_alternative<Withdraw>(*action)) ++withdrawals;
             if (auto* send = std::get_if<Send>(&*action)) {
                 sent.push_back(send->bytes);

@@ -1,5 +1,5 @@
 // A master with other slaves on its line, noise, retries and slow panels behind the gateway, in
-// virtual time: whatever it takes for the answer to a request is one.
+// virtual time: every reply it accepts must be the answer to its request.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -26,7 +26,8 @@ struct Faults {
 
 class World {
   public:
-    World(unsigned seed, Faults faults) : random_(seed), faults_(faults), talk_(settings()) {}
+    World(unsigned seed, Faults faults)
+        : random_(seed), faults_(faults), conversation_(settings()) {}
 
     void run(int exchanges) {
         for (int i = 0; i < exchanges; ++i) {
@@ -43,10 +44,10 @@ class World {
     }
 
     int right = 0;
-    int wrong = 0;        ///< taken for an answer, and none
-    int interrupted = 0;  ///< sent while the master was heard talking, or not yet silent
+    int wrong = 0;        ///< wrongly accepted replies
+    int interrupted = 0;  ///< sent while the master was transmitting, or before silence
     int retries = 0;
-    const Talk& talk() const { return talk_; }
+    const Talk& talk() const { return conversation_; }
 
   private:
     Settings settings() const {
@@ -71,7 +72,7 @@ class World {
         }
     }
 
-    /// Of a slave that has nothing to do with the gateway; its values may look like requests.
+    /// A reply of a slave unrelated to the gateway; its values may look like requests.
     void hear_others() {
         say(modbus::encode_adu(kOther, kReadOne));
         pass(5ms);
@@ -81,7 +82,7 @@ class World {
         say(modbus::encode_adu(kOther, pdu));
     }
 
-    /// As an adapter hands it over.
+    /// Delivers it as an adapter would.
     void say(Bytes frame) {
         if (chance(faults_.damage_percent)) {
             const std::size_t at = random_() % frame.size();
@@ -95,21 +96,21 @@ class World {
         for (std::size_t at = 0; at < frame.size(); at += piece) {
             const std::size_t end = std::min(at + piece, frame.size());
             pass(wire_time(Talk::rtu().device.serial, end - at));
-            talk_.hear({frame.begin() + static_cast<std::ptrdiff_t>(at),
-                        frame.begin() + static_cast<std::ptrdiff_t>(end)});
+            conversation_.hear({frame.begin() + static_cast<std::ptrdiff_t>(at),
+                                frame.begin() + static_cast<std::ptrdiff_t>(end)});
             talking_ = true;
         }
         talking_ = false;
-        silent_since_ = talk_.now;
-        if (chance(10)) talk_.hear({0x00});
+        silent_since_ = conversation_.now;
+        if (chance(10)) conversation_.hear({0x00});
     }
 
     bool hears_answer(std::uint8_t unit, const Bytes& pdu) {
-        const TimePoint until = talk_.now + kTimeout;
-        const std::size_t before = talk_.sent.size();
-        while (talk_.now < until && talk_.sent.size() == before) pass(1ms);
-        if (talk_.sent.size() == before) return false;
-        const auto frame = modbus::decode_adu(talk_.sent.back());
+        const TimePoint until = conversation_.now + kTimeout;
+        const std::size_t before = conversation_.sent.size();
+        while (conversation_.now < until && conversation_.sent.size() == before) pass(1ms);
+        if (conversation_.sent.size() == before) return false;
+        const auto frame = modbus::decode_adu(conversation_.sent.back());
         if (frame->station != unit || !modbus::answers(pdu, frame->pdu)) return false;
         const bool is_write = pdu[0] == modbus::kWriteSingleRegister;
         const bool is_it = is_write || frame->pdu[3] == pdu[2];
@@ -118,28 +119,29 @@ class World {
     }
 
     void pass(Duration by) {
-        const TimePoint end = talk_.now + by;
-        while (talk_.now < end) {
-            talk_.pass(std::min<Duration>(1ms, end - talk_.now));
+        const TimePoint end = conversation_.now + by;
+        while (conversation_.now < end) {
+            conversation_.pass(std::min<Duration>(1ms, end - conversation_.now));
             serve();
         }
     }
 
     /// The panels behind the gateway: each register holds its address.
     void serve() {
-        for (; seen_ < talk_.asks.size(); ++seen_)
-            panel_.push_back({talk_.now + 1ms * (1 + number(350)), talk_.asks[seen_]});
-        while (!panel_.empty() && panel_.front().first <= talk_.now) {
+        for (; seen_ < conversation_.asks.size(); ++seen_)
+            panel_.push_back(
+                {conversation_.now + 1ms * (1 + number(350)), conversation_.asks[seen_]});
+        while (!panel_.empty() && panel_.front().first <= conversation_.now) {
             const Ask ask = panel_.front().second;
             panel_.pop_front();
             const Bytes& pdu = ask.adu.pdu;
             const bool is_write = pdu[0] == modbus::kWriteSingleRegister;
-            talk_.answer_to(ask.ticket, is_write ? pdu : Bytes{pdu[0], 2, 0, pdu[2]});
+            conversation_.answer_to(ask.ticket, is_write ? pdu : Bytes{pdu[0], 2, 0, pdu[2]});
         }
-        for (; judged_ < talk_.sent.size(); ++judged_) {
-            const bool too_early = talk_.sent_at[judged_] < silent_since_ + kSilence;
+        for (; judged_ < conversation_.sent.size(); ++judged_) {
+            const bool too_early = conversation_.sent_at[judged_] < silent_since_ + kSilence;
             interrupted += talking_ || too_early ? 1 : 0;
-            if (faults_.echo) talk_.hear(talk_.sent[judged_]);
+            if (faults_.echo) conversation_.hear(conversation_.sent[judged_]);
         }
     }
 
@@ -147,7 +149,7 @@ class World {
     const Duration kSilence = silent_interval(Talk::rtu().device.serial);
     std::mt19937 random_;
     Faults faults_;
-    Talk talk_;
+    Talk conversation_;
     std::deque<std::pair<TimePoint, Ask>> panel_;
     std::size_t seen_ = 0;
     std::size_t judged_ = 0;

@@ -20,7 +20,7 @@ Bytes twice(const Bytes& bytes) {
     return both;
 }
 
-TEST(Collision, TwoThatSayTheSameAtTheSameTimeAreOne) {
+TEST(Collision, TwoEqualRepliesAtOnceAreOne) {
     const HeardBytes heard = collide(kReply, kReply, 0, k8n1);
     EXPECT_EQ(heard.bytes, kReply);
     EXPECT_EQ(heard.ends.front(), 10u);

@@ -6,7 +6,7 @@
 namespace panelgate::sim {
 namespace {
 
-TEST(Identification, TellsEachSimulatedPanelByItsOwnReads) {
+TEST(Identification, RecognisesEachSimulatedPanelByItsReads) {
     const profile::Catalogue shipped = profile::Catalogue::shipped();
     int identified = 0;
     for (const auto& [name, profile] : shipped.all()) {

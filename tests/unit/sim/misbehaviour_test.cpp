@@ -23,7 +23,7 @@ TEST(Misbehaviour, NoneLeavesTheReplyAsItIs) {
     EXPECT_EQ(once({}).delay, Duration::zero());
 }
 
-TEST(Misbehaviour, EachFaultDoesWhatItsNameSays) {
+TEST(Misbehaviour, EachFaultHasTheEffectOfItsName) {
     Misbehaviour faults;
     faults.dead = true;
     EXPECT_TRUE(once(faults).adu.empty());
@@ -49,7 +49,7 @@ TEST(Misbehaviour, EachFaultDoesWhatItsNameSays) {
     EXPECT_TRUE(modbus::crc_ok(once(faults).adu));
 }
 
-TEST(Misbehaviour, IsSaidInTheModeOfTheLine) {
+TEST(Misbehaviour, IsEncodedInTheModeOfTheLine) {
     const SerialFormat format{9600, 7, Parity::even, 1, SerialMode::ascii};
     std::mt19937 chance(1);
     const Bytes good = modbus::to_ascii(kReply);
@@ -74,7 +74,7 @@ TEST(Misbehaviour, AShareIsOfManyAnswers) {
     EXPECT_NEAR(silent, 2500, 200);
 }
 
-TEST(Misbehaviour, IsGivenAndToldInNumbers) {
+TEST(Misbehaviour, ConvertsFromAndToNumbers) {
     Misbehaviour faults;
     const FaultNumbers numbers{{"dead", 1}, {"slow_ms", 20}, {"late_by_ms", 600}, {"late", 0.5}};
     EXPECT_FALSE(from_numbers(numbers, faults));
@@ -98,10 +98,10 @@ TEST(Misbehaviour, OnlyThePanasonicMindsAPauseOfMoreThan24BitTimes) {
     const SerialFormat format{9600, 8, Parity::none, 1};
     const Duration bits24 = Duration(1s) * 24 / 9600;
     const Station gt(*shipped.find("panasonic-gt"), 20);
-    EXPECT_FALSE(gt.minds_pause(bits24, format));
-    EXPECT_TRUE(gt.minds_pause(bits24 + 1us, format));
+    EXPECT_FALSE(gt.rejects_gap(bits24, format));
+    EXPECT_TRUE(gt.rejects_gap(bits24 + 1us, format));
     const Station gp(*shipped.find("autonics-gplp-s"), 31);
-    EXPECT_FALSE(gp.minds_pause(1s, format));
+    EXPECT_FALSE(gp.rejects_gap(1s, format));
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ Settings settings_38400() {
     return settings;
 }
 
-/// A master at the pty of panels whose time passes when the test says so.
+/// A master at the pty of simulated panels, with a manual clock.
 class SimulatedBusTest : public testing::Test {
   protected:
     ~SimulatedBusTest() override {
@@ -44,7 +44,7 @@ class SimulatedBusTest : public testing::Test {
         master = ::open(bus->device().c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK);
         ASSERT_GE(master, 0);
     }
-    /// The panels have heard its first byte at this moment.
+    /// Sends a request; the panels receive its first byte now.
     void say(std::uint8_t station, ByteView pdu = kReadCounter) {
         const Bytes adu = modbus::encode_adu(station, pdu);
         ASSERT_EQ(::write(master, adu.data(), adu.size()), std::ssize(adu));
@@ -56,12 +56,12 @@ class SimulatedBusTest : public testing::Test {
         const ssize_t n = ::read(master, buffer.data(), buffer.size());
         return n <= 0 ? Bytes{} : Bytes(buffer.begin(), buffer.begin() + n);
     }
-    /// Of whom a good reply is there.
+    /// Station of the valid reply received; 0: none.
     int answered() {
         const Bytes adu = heard();
         return adu.size() >= modbus::kMinAdu && modbus::crc_ok(adu) ? adu[0] : 0;
     }
-    /// ... when a reply to this one has had its time.
+    /// The same, for a request to `station` and after the time of its reply.
     int answered(std::uint8_t station) {
         say(station);
         clock.advance(whole());
@@ -131,7 +131,7 @@ TEST_F(SimulatedBusTest, TwoPanelsThatSpeakAtOnceAreBothDamaged) {
     say(2);
     const Duration before = wire_time(settings.serial, 8) + silent_interval(settings.serial);
     clock.advance(100ms - before + wire_time(settings.serial, 2));
-    say(1);  // is over before the reply begins, and answered two characters behind that
+    say(1);  // ends before the reply begins, and is answered two characters later
     clock.advance(1s);
     EXPECT_EQ(answered(), 0);
     EXPECT_EQ(answered(1), 1);

@@ -19,7 +19,7 @@ const profile::PanelProfile& shipped(std::string_view name) {
     return *catalogue.find(name);
 }
 
-/// A panel, asked in hex and answering in hex.
+/// A panel with requests and replies in hex.
 class Panel {
   public:
     explicit Panel(std::string_view name, std::uint8_t id = 7) : Panel(shipped(name), id) {}
@@ -239,7 +239,7 @@ TEST(Station, ShowsTheTimeInTheClockOfTheGt) {
     EXPECT_EQ(gt.ask("03 23 7D 00 01"), "03 02 00 1a") << "GDT9085: the year's last two digits";
 }
 
-TEST(Station, LetsNobodySetTheClockOfTheGt) {
+TEST(Station, RefusesToSetTheClockOfTheGt) {
     Panel gt("panasonic-gt");
     EXPECT_EQ(gt.ask("06 23 78 00 00"), "86 03");
     EXPECT_EQ(gt.ask("10 23 78 00 01 02 00 00"), "90 03");
@@ -308,7 +308,7 @@ TEST(GenericStation, WritesBeforeItReads) {
     EXPECT_EQ(any.ask("17 FF FF 00 02 00 0E 00 01 02 00 01"), "97 02");
 }
 
-TEST(GenericStation, TellsItsStateAndName) {
+TEST(GenericStation, ReportsItsStateAndName) {
     Panel any("generic", 9);
     EXPECT_EQ(any.ask("07"), "07 00");
     EXPECT_EQ(any.ask("08 00 00 A5 37"), "08 00 00 a5 37");

@@ -80,7 +80,7 @@ TEST_F(StationTest, BitsAreAViewOfTheirWords) {
     EXPECT_EQ(ask(press, "03 00 64 00 01"_hex), "03 02 80 03"_hex);
 }
 
-TEST_F(StationTest, ProtectedWordsRefuseWritesAsTheProfileSays) {
+TEST_F(StationTest, ProtectedWordsRefuseWritesAsTheProfileSpecifies) {
     EXPECT_EQ(ask(press, "10 00 00 00 01 02 00 01"_hex), "90 03"_hex);
     EXPECT_EQ(ask(press, "0F 00 EF 00 02 01 03"_hex), "8F 03"_hex) << "half below UB150";
     EXPECT_EQ(ask(press, "03 00 00 00 01"_hex), "03 02 00 0A"_hex) << "nothing was written";

@@ -14,7 +14,7 @@
 namespace panelgate::sim {
 namespace {
 
-/// The beginning of a vector's name -> the panel of the demo that it is asked of.
+/// Prefix of a vector's name -> the demo panel that it is sent to.
 struct Panel {
     const char* prefix;
     const char* profile;
@@ -50,7 +50,7 @@ Bytes good_frame(const Vector& v, const std::string& key) {
     return v.bytes(key + "_corrected").value_or(*v.bytes(key));
 }
 
-/// A panel as it comes up, `running` after its first request.
+/// Reply of a fresh panel, `running` after its first request.
 Bytes ask(const Vector& v, Duration running) {
     static const profile::Catalogue catalogue = profile::Catalogue::shipped();
     const Panel& panel = panel_of(v);

@@ -16,12 +16,12 @@ inline constexpr SerialFormat kFormat{38400, 8, Parity::none, 1};
 
 inline Bytes pdu(std::string_view hex) { return *from_hex(hex); }
 
-/// A line that is listened to: who says what, when.
+/// A line that the tap listens to: who sends what, when.
 class Line {
   public:
     explicit Line(Settings settings = {kFormat}) : matcher_(settings) {}
 
-    /// A good frame begins so long behind the last byte, and is heard byte by byte.
+    /// A good frame begins this long after the last byte, and is heard byte by byte.
     void say(Duration pause, std::uint8_t station, std::string_view hex) {
         const Bytes adu = modbus::encode_adu(station, pdu(hex));
         wait(pause);

@@ -31,7 +31,7 @@ using testing::IsEmpty;
 
 }  // namespace
 
-TEST(Matcher, PairsARequestWithTheReplyBehindIt) {
+TEST(Matcher, PairsARequestWithTheReplyAfterIt) {
     Line line;
     line.say(10ms, 31, kRead);
     EXPECT_THAT(line.told(), IsEmpty());
@@ -88,7 +88,7 @@ TEST(Matcher, DoesNotTakeTheBeginningOfARequestForAReply) {
     EXPECT_THAT(line.told(), ElementsAre("4: 0302a6000f -> 831e"));
 }
 
-TEST(Matcher, KnowsThatNobodyAnswersABroadcast) {
+TEST(Matcher, KnowsThatABroadcastHasNoAnswer) {
     Line line;
     line.say(10ms, 0, "0600640007");
     EXPECT_THAT(line.told(), ElementsAre("0: 0600640007 -> unasked"));
@@ -96,7 +96,7 @@ TEST(Matcher, KnowsThatNobodyAnswersABroadcast) {
     EXPECT_THAT(line.told(), ElementsAre("5: 0800040000 -> unasked"));
 }
 
-TEST(Matcher, TellsARequestWithoutAReplyWhenTheNextOneComes) {
+TEST(Matcher, ReportsARequestWithoutAReplyWhenTheNextOneComes) {
     Line line;
     line.say(10ms, 31, kRead);
     line.say(500ms, 5, kRead);
@@ -105,7 +105,7 @@ TEST(Matcher, TellsARequestWithoutAReplyWhenTheNextOneComes) {
     EXPECT_THAT(line.told(), ElementsAre("5: 0300640001 -> 03020005"));
 }
 
-TEST(Matcher, TellsItAfterAWhileWhenNoneComes) {
+TEST(Matcher, ReportsItAfterAWhileWhenNoneComes) {
     Line line;
     line.say(10ms, 31, kRead);
     line.wait(9s);
@@ -114,7 +114,7 @@ TEST(Matcher, TellsItAfterAWhileWhenNoneComes) {
     EXPECT_THAT(line.told(), ElementsAre("31: 0300640001 -> silent"));
 }
 
-TEST(Matcher, TellsADamagedReply) {
+TEST(Matcher, ReportsADamagedReply) {
     Line line;
     Bytes reply = adu(31, kReply);
     reply[4] ^= 1;
@@ -207,7 +207,7 @@ TEST(Matcher, IsSureAgainWhenRepliesKeepTheUsualTime) {
                             "31: 0300c80001 -> 030200c8"));
 }
 
-TEST(Matcher, TellsALateReplyAndACopyFromOthers) {
+TEST(Matcher, DistinguishesALateReplyAndADuplicateFromOthers) {
     Line line;
     line.say(10ms, 31, "0300640001");
     line.say(200ms, 31, "0300C80002");
@@ -223,7 +223,7 @@ TEST(Matcher, TellsALateReplyAndACopyFromOthers) {
                             FrameKind::reply, FrameKind::copy, FrameKind::foreign));
 }
 
-TEST(Matcher, KnowsAWriteThatIsSaidAgainFromItsEchoByTheTime) {
+TEST(Matcher, DistinguishesARepeatedWriteFromItsEchoByTheTime) {
     Line line;
     for (int i = 0; i < 3; ++i) {  // this master gives up after 300 ms
         line.say(10ms, 9, kRead);
@@ -237,7 +237,7 @@ TEST(Matcher, KnowsAWriteThatIsSaidAgainFromItsEchoByTheTime) {
     EXPECT_THAT(line.told(), ElementsAre("5: 0600640007 -> silent", "5: 0600640007 -> 0600640007"));
 }
 
-TEST(Matcher, KnowsItByWhatFollowsWhereTheTimeDoesNotTell) {
+TEST(Matcher, DecidesByWhatFollowsWhereTheTimeDoesNot) {
     Line line;
     line.say(10ms, 5, "0600640007");
     line.say(150ms, 5, "0600640007");

@@ -1,4 +1,4 @@
-// What a tap makes of replies when it has seen the master lose its patience.
+// How a tap matches replies after it has learned the master's timeout.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -89,7 +89,7 @@ class Trouble {
     static constexpr std::array<Exchange, 3> kExchanges{
         {{"0300640001", "03020064"}, {"0300C80002", "030400C800C9"}, {"03012C0001", "0302012C"}}};
 
-    /// Not what was asked last: a late reply is another request's.
+    /// Not the last request's: a late reply belongs to another request.
     const Exchange& next() { return kExchanges[last_ = (last_ + 1 + random_() % 2) % 3]; }
     void let_answer(std::string_view reply) {
         const unsigned fate = random_() % 10;

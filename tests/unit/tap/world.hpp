@@ -1,5 +1,5 @@
-// A line in virtual time: a master, panels with faults, and a tap that does not hear everything.
-// Each reply is known with the request that it is to, which the tap has to find out.
+// A line in virtual time: a master, panels with faults, and a tap that misses some frames. Each
+// reply is known with its request, which the tap has to find out.
 #pragma once
 
 #include <algorithm>
@@ -24,14 +24,14 @@ using namespace panelgate;
 /// Chances per request, and what the tap hears of it.
 struct Manner {
     double silent = 0;    ///< the panel does not answer
-    double late = 0;      ///< ... or when its master has given up
+    double late = 0;      ///< ... or answers after its master has given up
     double damaged = 0;   ///< on the wire, for all
     double doubled = 0;   ///< the reply comes twice
-    double slow = 0;      ///< within its master's patience, but slowly
+    double slow = 0;      ///< within its master's timeout, but slowly
     double noise = 0;     ///< in front of the reply
     double misheard = 0;  ///< a frame that only the tap hears damaged
     double unheard = 0;   ///< a frame that the tap does not hear at all
-    Duration latency{};   ///< the tap's adapter hands over each so often
+    Duration latency{};   ///< interval at which the tap's adapter delivers bytes
     Duration give_up = 200ms;
     unsigned seed = 1;
 };
@@ -40,21 +40,21 @@ struct Asked {
     std::uint8_t station = 0;
     Bytes pdu;
     TimePoint begin;
-    std::set<Bytes> replies;     ///< PDUs that its panel has really said to it
-    bool answered_well = false;  ///< its master had them, and nothing was wrong
+    std::set<Bytes> replies;     ///< PDUs that its panel has really sent for it
+    bool answered_well = false;  ///< its master received them, and nothing was wrong
 };
 
 class World {
   public:
     explicit World(const Manner& manner) : manner_(manner), random_(manner.seed) {}
 
-    /// One request and what comes of it, with the pause behind.
+    /// One request and its outcome, with the pause after it.
     void turn() {
         const auto [station, pdu] = choose();
         ask(station, pdu);
     }
     const std::vector<Asked>& asked() const { return asked_; }
-    /// What the tap is handed, in order.
+    /// What the tap receives, in order.
     struct Chunk {
         TimePoint at;
         Bytes bytes;
@@ -109,7 +109,7 @@ class World {
         }
     }
 
-    /// Values differ from one reply to the next, so that each is known by what it says.
+    /// Values differ from one reply to the next, so that each is identifiable.
     Bytes reply_to(const Bytes& pdu) {
         ++said_;
         if (chance(0.02)) return {static_cast<std::uint8_t>(pdu[0] | 0x80), 2};
@@ -134,14 +134,14 @@ class World {
     TimePoint now_{1h};
     unsigned said_ = 0;
     std::vector<Asked> asked_;
-    std::vector<Speech> coming_;              ///< what panels will say, by its time
+    std::vector<Speech> coming_;              ///< what panels will send, by time
     std::map<std::uint8_t, TimePoint> busy_;  ///< panels, until then
     std::multimap<TimePoint, std::uint8_t> heard_;
     TimePoint said_until_{};  ///< on the wire
 };
 
-/// A request leaves, whatever is still on the wire, and its master listens until it has an answer
-/// or gives up.
+/// Sends a request, whatever is still on the wire; its master listens until it has an answer or
+/// gives up.
 inline void World::ask(std::uint8_t station, const Bytes& pdu) {
     const std::size_t which = asked_.size();
     asked_.push_back({station, pdu, now_, {}, false});
@@ -200,7 +200,7 @@ inline std::optional<TimePoint> World::listen(std::size_t which, TimePoint until
     return std::nullopt;
 }
 
-/// Whoever speaks while somebody else does, damages both.
+/// Two simultaneous senders damage both frames.
 inline void World::collide(Speech& speech) {
     if (speech.begin < said_until_) speech.good = false;
     for (Speech& other : coming_) {

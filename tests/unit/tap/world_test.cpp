@@ -21,15 +21,15 @@ namespace {
 
 struct Score {
     std::size_t asked = 0;
-    std::size_t answerable = 0;  ///< to which their panel has said something that the master took
+    std::size_t answerable = 0;  ///< to which the panel has sent a reply that the master took
     std::size_t right = 0;
     std::size_t doubtful = 0;
     std::size_t wrong = 0;
-    std::size_t invented = 0;  ///< told, not in doubt, and never asked
+    std::size_t invented = 0;  ///< reported without doubt, but never asked
     std::string example;
 };
 
-/// Holds what is told against what really was.
+/// Compares what is reported with what really happened.
 class Judge {
   public:
     Judge(const World& world, Duration latency) : world_(world), slack_(latency + 2ms) {}
@@ -57,7 +57,7 @@ class Judge {
     Score score;
 
   private:
-    /// The one that was asked then.
+    /// The request that was asked then.
     const Asked* find(const Transaction& made) {
         const auto& all = world_.asked();
         for (std::size_t i = all.size(); i-- > 0 && made.asked - all[i].begin < 10s;) {
@@ -66,7 +66,7 @@ class Judge {
         }
         return nullptr;
     }
-    /// The very same request before it has this answer, and its values are told as old as that.
+    /// An equal earlier request has this answer, and its values are reported as that old.
     bool answers_same(const Transaction& made) {
         const auto& all = world_.asked();
         for (std::size_t i = all.size(); i-- > 0 && made.asked - all[i].begin < 10s;) {
@@ -168,7 +168,7 @@ TEST(TapWorld, NoPairIsWrongAmongPanelsWithFaults) {
     }
 }
 
-/// What it does not hear at all it cannot miss: then an echo is taken for the request.
+/// A frame that the tap does not hear at all it cannot miss: then an echo is taken for the request.
 TEST(TapWorld, HardlyAPairIsWrongForATapThatMishears) {
     for (const unsigned seed : {1u, 2u}) {
         Manner manner;

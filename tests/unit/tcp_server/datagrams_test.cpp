@@ -12,7 +12,7 @@ namespace {
 
 using asio::ip::udp;
 
-/// Somebody who sends datagrams.
+/// A UDP client.
 class Sender {
   public:
     Sender(asio::io_context& context, std::uint16_t port, const char* own_address = "127.0.0.1",
@@ -26,7 +26,7 @@ class Sender {
     void request(std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
         send(modbus::encode_mbap(transaction, unit, pdu));
     }
-    /// The next datagram, or nothing after far too long.
+    /// Returns the next datagram; nullopt after a generous timeout.
     std::optional<Bytes> receive() {
         Bytes datagram(1024, 0);
         error_code error = asio::error::would_block;
@@ -63,9 +63,9 @@ TEST_F(DatagramsTest, OneDatagramIsOneAduAndItsSenderIsAnswered) {
     Sender first = sender();
     Sender second = sender();
     first.request(1, 1, read_pdu(10));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     second.request(1, 1, read_pdu(20));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.answer(1, reply_to_read(20));
     bus1.answer(0, reply_to_read(10));
     EXPECT_EQ(first.receive(), adu(1, 1, reply_to_read(10)));
@@ -84,7 +84,7 @@ TEST_F(DatagramsTest, ConnectionsAreServedOnTheSamePort) {
     EXPECT_EQ(other.receive(), adu(1, 1, reply_to_read(7)));
 }
 
-TEST_F(DatagramsTest, WithoutTheKeyNobodyListens) {
+TEST_F(DatagramsTest, WithoutTheKeyThereIsNoUdpSocket) {
     settings.udp = false;
     start();
     udp::socket probe(context, udp::endpoint(asio::ip::address_v4::loopback(), listener->port()));
@@ -119,7 +119,7 @@ TEST_F(DatagramsTest, P2ADatagramThatComesTwiceHasOneAnswer) {
     for (int i = 0; i < 3; ++i) client.request(1, 1, read_pdu(7));
     for (int i = 0; i < 3; ++i) client.request(2, 1, "06 0001 0002"_hex);
     client.request(3, 1, read_pdu(8));
-    ASSERT_TRUE(run_until_held(3));
+    ASSERT_TRUE(run_until_pending(3));
     bus1.answer(0, reply_to_read(7));
     bus1.answer(0, "06 0001 0002"_hex);
     bus1.answer(0, reply_to_read(8));
@@ -129,13 +129,13 @@ TEST_F(DatagramsTest, P2ADatagramThatComesTwiceHasOneAnswer) {
     EXPECT_FALSE(client.has_input());
 }
 
-TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsToldSo) {
+TEST_F(DatagramsTest, P9APeerOverItsLimitIsAnsweredBusy) {
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Sender client = sender();
     for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    client.request(4, 1, read_pdu(4));  // waits already, and has one answer
+    client.request(4, 1, read_pdu(4));  // already queued; gets one answer
     for (std::uint16_t i = 5; i < 8; ++i) EXPECT_EQ(client.receive(), adu(i, 1, "83 06"_hex));
     for (std::uint16_t i = 0; i < 5; ++i) {
         ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
@@ -149,7 +149,7 @@ TEST_F(DatagramsTest, P9WhoSendsMoreThanThereIsRoomForIsToldSo) {
     EXPECT_EQ(listener->counters().busy, 3U);
 }
 
-TEST_F(DatagramsTest, P9WhoIsToldSoWaitsForItsTurnAmongOwnAnswers) {
+TEST_F(DatagramsTest, P9BusyAnswersWaitForTheirTurnAmongOwnAnswers) {
     settings.in_flight = 1;
     settings.waiting = 0;
     settings.own_answers = 2;
@@ -181,7 +181,7 @@ TEST_F(DatagramsTest, AnotherFramingIsNamedInTheLog) {
     EXPECT_TRUE(bus1.seen.empty());
 }
 
-TEST_F(DatagramsTest, P9OneAddressHasAFewPlacesAndWhoWaitsForNothingGivesItsUp) {
+TEST_F(DatagramsTest, P9AnAddressHasAFewPeersAndAnIdleOneIsEvicted) {
     settings.udp_peers_per_address = 2;
     start();
     Sender first = sender();
@@ -190,15 +190,15 @@ TEST_F(DatagramsTest, P9OneAddressHasAFewPlacesAndWhoWaitsForNothingGivesItsUp) 
     Sender elsewhere = sender("127.0.0.2");
     first.request(1, 1, read_pdu(1));
     second.request(1, 1, read_pdu(2));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     third.request(1, 1, read_pdu(3));
     EXPECT_EQ(third.receive(), adu(1, 1, "83 06"_hex)) << "both places are taken";
     elsewhere.request(1, 1, read_pdu(4));
-    ASSERT_TRUE(run_until_held(3));
+    ASSERT_TRUE(run_until_pending(3));
     bus1.answer(0, reply_to_read(1));
     EXPECT_EQ(first.receive(), adu(1, 1, reply_to_read(1)));
     third.request(2, 1, read_pdu(3));
-    ASSERT_TRUE(run_until_held(3));
+    ASSERT_TRUE(run_until_pending(3));
     EXPECT_EQ(bus1.cancelled.size(), 1U) << "the first has asked for nothing else";
 }
 
@@ -214,7 +214,7 @@ TEST_F(DatagramsTest, P9AllOfThemTogetherAreBoundedToo) {
     EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
-TEST_F(DatagramsTest, WhoHasBeenIdleIsForgotten) {
+TEST_F(DatagramsTest, AnIdlePeerIsDropped) {
     bus1.instant = reply_to_read(1);
     start();
     Sender first = sender();
@@ -238,7 +238,7 @@ TEST_F(DatagramsTest, TheAddressThatWasAskedAnswers) {
     }
 }
 
-TEST_F(DatagramsTest, WhoIsNotInTheListIsNotAnswered) {
+TEST_F(DatagramsTest, APeerThatIsNotAllowedIsNotAnswered) {
     settings.allow = {{"127.0.0.1", 32}};
     bus1.instant = reply_to_read(1);
     start();
@@ -258,7 +258,7 @@ TEST_F(DatagramsTest, P3WhatIsOutstandingAtTheEndIsAnswered) {
     Sender client = sender();
     client.request(1, 1, read_pdu(1));
     client.request(2, 1, read_pdu(2));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     bool stopped = false;
     listener->stop([&] { stopped = true; });
     context.restart();
@@ -274,13 +274,13 @@ TEST_F(DatagramsTest, P2CutOffItTakesItsRequestsBack) {
     start();
     Sender client = sender();
     client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     listener->close_now();
     EXPECT_EQ(bus1.cancelled.size(), 1U);
     EXPECT_TRUE(bus1.held.empty());
 }
 
-TEST_F(DatagramsTest, APortThatSomebodyElseHasIsToldAndNothingIsOpen) {
+TEST_F(DatagramsTest, APortInUseIsReportedAndNothingIsOpen) {
     start();
     const std::uint16_t port = listener->port();
     listener.reset();

@@ -94,7 +94,7 @@ TEST(Diagnostics, EveryReadInsideSucceedsAndNothingBeyond) {
     EXPECT_EQ(ask("04 ffff 0001"_hex), "84 02"_hex);
 }
 
-TEST(Diagnostics, AnInputForEachUnitSaysWhetherItAnswers) {
+TEST(Diagnostics, AnInputForEachUnitShowsWhetherItAnswers) {
     EXPECT_EQ(ask("02 0000 0010"_hex), "02 02 80 00"_hex);
     EXPECT_EQ(ask("02 0007 0001"_hex), "02 01 01"_hex);
     EXPECT_EQ(ask("02 0000 0100"_hex).size(), 34U);

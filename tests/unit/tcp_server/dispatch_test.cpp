@@ -18,11 +18,11 @@ const Bytes kRead = "03 00 00 00 01"_hex;
 const Bytes kWrite = "06 00 01 00 03"_hex;
 const Bytes kTooMuch = "03 00 00 00 7E"_hex;  // 126 registers
 
-/// A listener of two lines: stations 1 and 2 on "a", 2 of them only to be read; 3 on "b".
+/// A listener with two lines: stations 1 and 2 on "a", 2 read-only; 3 on "b".
 class DispatchTest : public ::testing::Test {
   protected:
     DispatchTest() { bus_a.protect(2); }
-    /// "to a/1", "to everybody on a, b", "itself", or the exception code as "refused 01".
+    /// Returns "to a/1", "to everybody on a, b", "itself", or the exception code as "refused 01".
     std::string decided(std::uint8_t unit, const Bytes& pdu) {
         const UnitMap units(settings, {{"a", &bus_a, {1, 2}, false}, {"b", &bus_b, {3}, false}});
         const Decision decision = decide(unit, pdu, settings, units);
@@ -40,8 +40,8 @@ class DispatchTest : public ::testing::Test {
     std::string name_of(const bus::BusClient* line) const { return line == &bus_a ? "a" : "b"; }
 
     boost::asio::io_context context;
-    HeldBus bus_a{context};
-    HeldBus bus_b{context};
+    ManualBus bus_a{context};
+    ManualBus bus_b{context};
     Settings settings;
 };
 
@@ -64,7 +64,7 @@ TEST_F(DispatchTest, AMalformedReadIsMalformedWhereOnlyReadsAreAllowed) {
     EXPECT_EQ(decided(1, "2B 0D 01"_hex), "refused 01") << "CANopen may write";
 }
 
-TEST_F(DispatchTest, AFunctionThatCannotBeIsRefusedWhoeverIsAsked) {
+TEST_F(DispatchTest, AnImpossibleFunctionIsRefusedForEveryUnit) {
     for (const Bytes& pdu : {"00 00 00"_hex, "80 01"_hex, "83 02"_hex, "FF"_hex}) {
         EXPECT_EQ(decided(1, pdu), "refused 01") << to_hex(pdu);
         EXPECT_EQ(decided(77, pdu), "refused 01") << to_hex(pdu);
@@ -73,7 +73,7 @@ TEST_F(DispatchTest, AFunctionThatCannotBeIsRefusedWhoeverIsAsked) {
     EXPECT_EQ(decided(77, {}), "refused 03");
 }
 
-TEST_F(DispatchTest, AListenerOnlyForReadsRefusesEverythingElseWhoeverIsAsked) {
+TEST_F(DispatchTest, AReadOnlyListenerRefusesEverythingElseForEveryUnit) {
     settings.read_only = true;
     EXPECT_EQ(decided(1, kRead), "to a/1");
     for (const std::uint8_t unit : Bytes{0, 1, 3, 77})
@@ -89,7 +89,7 @@ TEST_F(DispatchTest, AWriteToAStationOnlyForReadsIsRefusedByItsBus) {
     EXPECT_EQ(decided(2, kWrite), "to a/2") << "where it is counted and told";
 }
 
-TEST_F(DispatchTest, WhatIsNotAllowedIsToldBeforeTheRequestIsLookedAt) {
+TEST_F(DispatchTest, MissingRightsAreReportedBeforeTheRequestIsChecked) {
     EXPECT_EQ(decided(1, "06 00"_hex), "refused 03");
     EXPECT_EQ(decided(2, "06 00"_hex), "refused 01");
     EXPECT_EQ(decided(0, "06 00"_hex), "refused 01") << "station 2 is among them";
@@ -98,7 +98,7 @@ TEST_F(DispatchTest, WhatIsNotAllowedIsToldBeforeTheRequestIsLookedAt) {
     EXPECT_EQ(decided(0, "06 00"_hex), "refused 03");
 }
 
-TEST_F(DispatchTest, WhatIsRefusedIsCountedByWhoeverWasAsked) {
+TEST_F(DispatchTest, ARefusalIsCountedByTheTargetBus) {
     const auto asked = [&](std::uint8_t unit, const Bytes& pdu) {
         const UnitMap units(settings, {{"a", &bus_a, {1, 2}, false}, {"b", &bus_b, {3}, false}});
         std::string text;
@@ -119,7 +119,7 @@ TEST_F(DispatchTest, WhatIsRefusedIsCountedByWhoeverWasAsked) {
     EXPECT_EQ(asked(3, kWrite), "b/3 ");
 }
 
-TEST_F(DispatchTest, AUnitThatNobodyHasIsToldBeforeTheRequestIsLookedAt) {
+TEST_F(DispatchTest, AnUnroutedUnitIsReportedBeforeTheRequestIsChecked) {
     EXPECT_EQ(decided(77, kRead), "refused 0a");
     EXPECT_EQ(decided(77, kTooMuch), "refused 0a");
     EXPECT_EQ(decided(248, kWrite), "refused 0a");

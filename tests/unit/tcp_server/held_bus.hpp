@@ -14,14 +14,14 @@
 namespace panelgate::tcp_server {
 
 /// A bus that keeps every request until the test answers it, in any order.
-class HeldBus : public bus::BusClient {
+class ManualBus : public bus::BusClient {
   public:
     struct Held {
         bus::Request request;
         bus::AnswerHandler handler;
     };
 
-    explicit HeldBus(boost::asio::io_context& context) : context_(context) {}
+    explicit ManualBus(boost::asio::io_context& context) : context_(context) {}
 
     void transact(bus::Request request, bus::AnswerHandler handler) override {
         bus::Answer answer;
@@ -54,13 +54,13 @@ class HeldBus : public bus::BusClient {
     std::optional<bus::Refusal> refusal_of_write(std::uint8_t station) const override {
         return rights.judge_write(station);
     }
-    /// From now on this station may only be read.
+    /// Makes this station read-only.
     void protect(std::uint8_t station) {
         rights = bus::Rights({{station, {"protected", bus::Access::read_only, {}}}});
     }
     bus::TracePart trace(std::size_t) const override { return {}; }
 
-    /// Answers the held request at `index`.
+    /// Answers the pending request at `index`.
     void answer(std::size_t index, Result<Bytes> pdu, bool transmitted = true) {
         const Held one = std::move(held.at(index));
         held.erase(held.begin() + static_cast<std::ptrdiff_t>(index));
@@ -74,9 +74,9 @@ class HeldBus : public bus::BusClient {
     std::vector<bus::Request> seen;
     std::vector<bus::ClientId> cancelled;
     std::map<bus::ClientId, std::string> names;
-    std::optional<Bytes> instant;  ///< the reply to everything, without being held
+    std::optional<Bytes> instant;  ///< if set, the immediate reply to every request
     bus::LineStatus line;
-    bus::Rights rights;  ///< to everything, at first
+    bus::Rights rights;  ///< all, initially
 
   private:
     boost::asio::io_context& context_;

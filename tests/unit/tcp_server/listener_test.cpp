@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 
 class ListenerTest : public Loopback {};
 
-TEST_F(ListenerTest, SaysWhichAddressItCannotHave) {
+TEST_F(ListenerTest, ReportsTheAddressItCannotBind) {
     start();
     settings.port = listener->port();
     Listener second(context.get_executor(), clock, settings, UnitMap(settings, lines), {});
@@ -65,18 +65,18 @@ TEST_F(ListenerTest, LetsAnAllowedPeerIn) {
     EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
 }
 
-TEST_F(ListenerTest, P9TellsTheBusesWhoAsksAndFromWhichAddress) {
+TEST_F(ListenerTest, P9PassesTheClientAndItsAddressToTheBuses) {
     bus1.rights = {};
     start();
     Client first = connect();
     Client second = connect();
     Client other(context, listener->port(), 0, "127.0.0.2");
     first.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     second.request(1, 0, "06 0000 0001"_hex);
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     other.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(3));
+    ASSERT_TRUE(run_until_pending(3));
     EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
     EXPECT_EQ(bus1.seen[1].host, bus1.seen[0].host);
     EXPECT_EQ(bus1.seen[2].host, bus::host_of("127.0.0.2"));
@@ -99,7 +99,7 @@ TEST_F(ListenerTest, P9TakesIpv4ForTheSameAddressOnAnIpv6Listener) {
     EXPECT_EQ(bus1.seen[0].host, bus::host_of("127.0.0.1"));
 }
 
-TEST_F(ListenerTest, RefusesTheNewestWhenItIsFullAndNobodyIsIdle) {
+TEST_F(ListenerTest, RefusesTheNewestWhenItIsFullAndNoneIsIdle) {
     settings.max_connections = 2;
     start();
     Client first = connect();
@@ -128,7 +128,7 @@ TEST_F(ListenerTest, TakesNewOnesWhenOneHasLeftAFullHouse) {
     EXPECT_EQ(listener->counters().evicted, 0U);
 }
 
-TEST_F(ListenerTest, P9AnAddressThatLeaksConnectionsLosesItsLongestIdleOneAndLocksOutNobody) {
+TEST_F(ListenerTest, P9AnAddressThatLeaksConnectionsLosesItsLongestIdleOneAndLocksOutNoOther) {
     settings.max_connections = 6;
     settings.max_connections_per_address = 3;
     bus1.instant = reply_to_read(1);
@@ -185,7 +185,7 @@ TEST_F(ListenerTest, AnswersWhatIsOutstandingBeforeItStops) {
     Client idle = connect();
     Client busy = connect();
     busy.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     bool stopped = false;
     listener->stop([&] { stopped = true; });
     EXPECT_TRUE(idle.sees_close());
@@ -201,7 +201,7 @@ TEST_F(ListenerTest, AnswersWhatIsOutstandingBeforeItStops) {
     EXPECT_THROW(connect(), boost::system::system_error);
 }
 
-TEST_F(ListenerTest, StopsLaterButNotInsideTheCallWhenNobodyIsThere) {
+TEST_F(ListenerTest, StopsAsynchronouslyWhenThereAreNoConnections) {
     start();
     bool stopped = false;
     listener->stop([&] { stopped = true; });
@@ -209,11 +209,11 @@ TEST_F(ListenerTest, StopsLaterButNotInsideTheCallWhenNobodyIsThere) {
     EXPECT_TRUE(run_until([&] { return stopped; }));
 }
 
-TEST_F(ListenerTest, CutsHardWhenItIsTold) {
+TEST_F(ListenerTest, CutsConnectionsOnRequest) {
     start();
     Client client = connect();
     client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     bool stopped = false;
     listener->stop([&] { stopped = true; });
     listener->close_now();
@@ -222,11 +222,11 @@ TEST_F(ListenerTest, CutsHardWhenItIsTold) {
     EXPECT_TRUE(run_until([&] { return stopped; }));
 }
 
-TEST_F(ListenerTest, MayEndWhileTheBusStillHoldsRequests) {
+TEST_F(ListenerTest, MayEndWhileRequestsAreOutstanding) {
     start();
     Client client = connect();
     client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     const bus::AnswerHandler late = bus1.held[0].handler;
     listener.reset();
     context.restart();
@@ -238,7 +238,7 @@ TEST_F(ListenerTest, MayEndWhileTheBusStillHoldsRequests) {
 TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
     bus1.instant = reply_to_read(1);
     start();
-    Client client = connect();  // in the backlog: nobody has run the loop yet
+    Client client = connect();  // in the backlog: the loop has not run yet
     rlimit before{};
     ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &before), 0);
     const int next = open("/dev/null", O_RDONLY | O_CLOEXEC);

@@ -27,7 +27,7 @@ namespace asio = boost::asio;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-/// Runs the loop until something is true; false after far too long.
+/// Runs the loop until a condition is true; false after a generous timeout.
 inline bool run_until(asio::io_context& context, const std::function<bool()>& reached) {
     for (int turn = 0; turn < 2000; ++turn) {
         if (reached()) return true;
@@ -42,11 +42,11 @@ inline Bytes operator+(Bytes left, const Bytes& right) {
     return left;
 }
 
-/// A request to read one register of a station, told apart by its address.
+/// A request to read one register of a station, identified by its address.
 inline Bytes read_pdu(std::uint16_t address) { return Writer().u8(3).u16(address).u16(1).take(); }
 inline Bytes reply_to_read(std::uint16_t value) { return Writer().u8(3).u8(2).u16(value).take(); }
 
-/// A client whose socket lives in the same thread: it runs the loop while it waits.
+/// A client in the same thread: it runs the loop while it waits.
 class Client {
   public:
     Client(asio::io_context& context, std::uint16_t port, int receive_buffer = 0,
@@ -63,7 +63,8 @@ class Client {
         socket_.non_blocking(true);
     }
 
-    /// What the socket takes now; the number of bytes, nothing when the connection is gone.
+    /// Sends what the socket accepts now; returns the number of bytes, nullopt if the connection is
+    /// closed.
     std::optional<std::size_t> try_send(ByteView bytes) {
         error_code error;
         const std::size_t n = socket_.write_some(asio::buffer(bytes.data(), bytes.size()), error);
@@ -83,7 +84,7 @@ class Client {
         send(modbus::encode_mbap(transaction, unit, pdu));
     }
 
-    /// The next reply, or nothing: the connection was closed.
+    /// Returns the next reply; nullopt if the connection was closed.
     std::optional<modbus::Adu> receive() {
         std::optional<modbus::Adu> reply;
         run_until(context_, [&] {
@@ -94,12 +95,12 @@ class Client {
         EXPECT_TRUE(reply || closed_) << "neither a reply nor the end came";
         return reply;
     }
-    /// As many bytes have come.
+    /// True once that many bytes have arrived.
     bool has_bytes(std::size_t count) {
         pull();
         return raw_.size() >= count;
     }
-    /// The next bytes as they are, as many; fewer: the connection was closed.
+    /// Returns the next `count` raw bytes; fewer if the connection was closed.
     Bytes receive_bytes(std::size_t count) {
         run_until(context_, [&] { return has_bytes(count) || closed_; });
         const std::size_t given = std::min(count, raw_.size());
@@ -108,7 +109,7 @@ class Client {
         raw_.erase(raw_.begin(), end);
         return bytes;
     }
-    /// Sends a request and gives the PDU of the next reply.
+    /// Sends a request and returns the PDU of the next reply.
     Bytes ask(std::uint8_t unit, const Bytes& pdu) {
         request(++last_transaction_, unit, pdu);
         const auto reply = receive();
@@ -123,9 +124,9 @@ class Client {
             return closed_;
         });
     }
-    /// It was cut off: what was under way to it may be lost.
+    /// True if it was reset: data in transit to it may be lost.
     bool was_reset() const { return reset_; }
-    /// Whether something has come that was not received yet.
+    /// True if there is unread input.
     bool has_input() {
         pull();
         return received_ != 0;
@@ -180,26 +181,26 @@ class Loopback : public ::testing::Test {
     bool run_until(const std::function<bool()>& reached) {
         return tcp_server::run_until(context, reached);
     }
-    /// An alarm is armed: what has come so far starts the time that the rest may take.
+    /// Runs until an alarm is armed: input so far has started the partial-ADU timeout.
     bool run_until_armed(std::size_t count = 1) {
         return run_until([&] { return clock.armed() == count; });
     }
-    bool run_until_held(std::size_t count) {
+    bool run_until_pending(std::size_t count) {
         return run_until([&] { return bus1.held.size() == count; });
     }
-    /// The bus answers one request, and the client gets it.
+    /// Answers one request on the bus and returns the client's reply.
     Bytes ask_bus(Client& client, std::uint8_t unit, const Bytes& pdu, const Result<Bytes>& answer,
                   bool transmitted = true) {
         client.request(7, unit, pdu);
-        EXPECT_TRUE(run_until_held(1));
+        EXPECT_TRUE(run_until_pending(1));
         bus1.answer(0, answer, transmitted);
         const auto reply = client.receive();
         return reply ? reply->pdu : Bytes{};
     }
     asio::io_context context;
-    test::ManualClock clock;  ///< stands still but for a test that moves it
-    HeldBus bus1{context};
-    HeldBus bus2{context};
+    test::ManualClock clock;  ///< moved only by the tests
+    ManualBus bus1{context};
+    ManualBus bus2{context};
     Settings settings;
     std::vector<LineInfo> lines;
     rt::LogTap log;

@@ -24,38 +24,38 @@ class OwnAnswersTest : public testing::Test {
 };
 
 TEST_F(OwnAnswersTest, P5AFewAreGivenAtOnceTheOthersInTheNextPeriods) {
-    EXPECT_TRUE(answers->may_give());
-    EXPECT_TRUE(answers->may_give());
-    EXPECT_FALSE(answers->may_give());
+    EXPECT_TRUE(answers->try_acquire());
+    EXPECT_TRUE(answers->try_acquire());
+    EXPECT_FALSE(answers->try_acquire());
     for (const char name : {'a', 'b', 'c'}) wait(name);
     EXPECT_EQ(given, "");
     clock.advance(1ms);
     EXPECT_EQ(given, "ab");
-    EXPECT_FALSE(answers->may_give()) << "one waits";
+    EXPECT_FALSE(answers->try_acquire()) << "one waits";
     clock.advance(1ms);
     EXPECT_EQ(given, "abc");
-    EXPECT_TRUE(answers->may_give());
+    EXPECT_TRUE(answers->try_acquire());
     EXPECT_EQ(clock.armed(), 0u);
 }
 
-TEST_F(OwnAnswersTest, WhoAsksNowAndThenNeverWaits) {
+TEST_F(OwnAnswersTest, AnOccasionalClientNeverWaits) {
     for (int n = 0; n < 10; ++n) {
-        EXPECT_TRUE(answers->may_give());
+        EXPECT_TRUE(answers->try_acquire());
         clock.pass(1ms);
     }
 }
 
 TEST_F(OwnAnswersTest, P9ClientsThatHaveLeftCostTheOthersNoTurn) {
-    answers->may_give();
-    answers->may_give();
+    answers->try_acquire();
+    answers->try_acquire();
     for (int n = 0; n < 1000; ++n) wait('x', false);
     wait('a');
     clock.advance(1ms);
     EXPECT_EQ(given, "a");
 }
 
-TEST_F(OwnAnswersTest, NobodyIsAskedAfterTheEnd) {
-    answers->may_give();
+TEST_F(OwnAnswersTest, NoAnswerIsRequestedAfterTheEnd) {
+    answers->try_acquire();
     wait('a');
     answers.reset();
     clock.advance(1s);

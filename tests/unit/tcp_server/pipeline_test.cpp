@@ -15,7 +15,7 @@
 namespace panelgate::tcp_server {
 namespace {
 
-// A pipeline of two places and three that wait, with a client that takes replies when it likes.
+// A pipeline with two requests in flight and three queued, whose client takes replies on demand.
 class SmallPipeline : public ::testing::Test {
   protected:
     static Settings small() {
@@ -25,7 +25,7 @@ class SmallPipeline : public ::testing::Test {
         settings.waiting = 3;
         return settings;
     }
-    void take_all_there_is_room_for() {
+    void take_until_full() {
         while (pipeline->has_room()) pipeline->take({++taken, 1, "03 0000 0001"_hex});
     }
     void answer_all() {
@@ -34,7 +34,7 @@ class SmallPipeline : public ::testing::Test {
 
     boost::asio::io_context context;
     test::ManualClock clock;
-    HeldBus bus{context};
+    ManualBus bus{context};
     std::uint16_t taken = 0;
     int told = 0;
     std::shared_ptr<OwnAnswers> own_answers = std::make_shared<OwnAnswers>(clock, 1, 1ms);
@@ -45,7 +45,7 @@ class SmallPipeline : public ::testing::Test {
 };
 
 TEST_F(SmallPipeline, P9WhatTheClientHasNotTakenIsStillInFlight) {
-    take_all_there_is_room_for();
+    take_until_full();
     EXPECT_EQ(taken, 5);
     EXPECT_EQ(bus.held.size(), 2U);
     answer_all();
@@ -55,12 +55,12 @@ TEST_F(SmallPipeline, P9WhatTheClientHasNotTakenIsStillInFlight) {
     pipeline->pop();
     EXPECT_EQ(bus.held.size(), 1U);
     EXPECT_TRUE(pipeline->has_room());
-    take_all_there_is_room_for();
+    take_until_full();
     EXPECT_EQ(taken, 6);
 }
 
 TEST_F(SmallPipeline, P3EverythingIsAnsweredInOrderHoweverSlowlyItIsTaken) {
-    take_all_there_is_room_for();
+    take_until_full();
     for (std::uint16_t next = 1; next <= 5; ++next) {
         answer_all();
         ASSERT_NE(pipeline->front(), nullptr);
@@ -94,7 +94,7 @@ TEST_F(SmallPipeline, P5WhatNeedsNoLineIsAnsweredAFewTimesAMillisecond) {
     EXPECT_TRUE(pipeline->empty());
 }
 
-/// Each is answered when the bus has answered; how many answers come?
+/// Retransmissions: answers() lets the bus answer everything and counts the replies.
 class RepeatedRequests : public SmallPipeline {
   protected:
     RepeatedRequests() {
@@ -123,7 +123,7 @@ TEST_F(RepeatedRequests, P2ARetransmittedWriteGetsTheOneAnswerAndNoSecondFrame) 
     EXPECT_EQ(answers(), 1U);
 }
 
-TEST_F(RepeatedRequests, P9WhoRepeatsWithoutEndIsNotListenedToWithoutEnd) {
+TEST_F(RepeatedRequests, P9EndlessRetransmissionsAreThrottled) {
     for (int i = 0; i < 100 && pipeline->has_room(); ++i) pipeline->take(write);
     EXPECT_FALSE(pipeline->has_room());
     EXPECT_EQ(bus.seen.size(), 1U);
@@ -151,7 +151,7 @@ TEST_F(RepeatedRequests, AnotherIdUnitOrValueIsAnotherRequest) {
     EXPECT_EQ(answers(), 4U);
 }
 
-TEST_F(RepeatedRequests, WhoGivesAllTheSameIdMayWriteOnOffOn) {
+TEST_F(RepeatedRequests, AClientThatReusesOneIdMayWriteOnOffOn) {
     pipeline->take(write);
     pipeline->take({7, 1, "06 0001 0000"_hex});
     pipeline->take(write);
@@ -171,7 +171,7 @@ TEST_F(RepeatedRequests, ReadsAreAnsweredEachUnlessTheyAreToBeJoined) {
 
 TEST_F(RepeatedRequests, P6AReadThatIsRepeatedBehindAWriteOfItsItemsIsAskedAgain) {
     shared->settings.retransmissions = Retransmissions::join;
-    for (const std::size_t places : {8u, 1u}) {  // on the bus, and waiting
+    for (const std::size_t places : {8u, 1u}) {  // in flight and queued
         shared->settings.in_flight = places;
         for (const Bytes& over : {"06 0000 0002"_hex, "0F 0000 0001 01 01"_hex, "41 01"_hex}) {
             pipeline->take(read);

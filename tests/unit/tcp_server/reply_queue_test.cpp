@@ -13,7 +13,7 @@ namespace {
 
 using Ticket = ReplyQueue::Ticket;
 
-/// The next reply, which leaves; nothing when its turn has not come.
+/// Pops and returns the next reply; nothing if its turn has not come.
 std::optional<Bytes> take(ReplyQueue& queue) {
     const Bytes* front = queue.front();
     if (front == nullptr) return std::nullopt;

@@ -17,7 +17,7 @@ TEST_F(SessionBroadcast, AnswersABroadcastAsSoonAsItHasLeft) {
     start();
     Client client = connect();
     client.request(1, 0, kWrite);
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     EXPECT_EQ(bus1.held[0].request.station, 0);
     EXPECT_FALSE(bus1.held[0].request.request.is_read());
     bus1.answer(0, kWritten);
@@ -49,7 +49,7 @@ TEST_F(SessionBroadcast, WaitsForTheLastOfSeveralLines) {
     EXPECT_EQ(client.receive()->pdu, kWritten) << "a line that is down stops nobody";
 }
 
-TEST_F(SessionBroadcast, TellsWhenNoLineCouldTransmitABroadcast) {
+TEST_F(SessionBroadcast, ReportsThatNoLineCouldTransmitABroadcast) {
     settings.lines = {"floor1", "floor2"};
     for (const BroadcastMode mode : {BroadcastMode::reply, BroadcastMode::silent}) {
         settings.broadcast = mode;
@@ -63,7 +63,7 @@ TEST_F(SessionBroadcast, TellsWhenNoLineCouldTransmitABroadcast) {
     }
 }
 
-TEST_F(SessionBroadcast, TellsWhenABroadcastMayHaveLeft) {
+TEST_F(SessionBroadcast, ReportsThatABroadcastMayHaveBeenSent) {
     settings.lines = {"floor1", "floor2"};
     start();
     Client client = connect();
@@ -81,7 +81,7 @@ TEST_F(SessionBroadcast, KeepsSilentWhenItIsAskedTo) {
     Client client = connect();
     client.request(1, 0, kWrite);
     client.request(2, 1, read_pdu(2));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.answer(1, reply_to_read(2));
     bus1.answer(0, kWritten);
     EXPECT_EQ(client.receive(), (modbus::Adu{2, 1, reply_to_read(2)}));
@@ -89,7 +89,7 @@ TEST_F(SessionBroadcast, KeepsSilentWhenItIsAskedTo) {
     EXPECT_EQ(client.ask(0, read_pdu(0)), "83 01"_hex);
     client.request(3, 1, read_pdu(3));
     client.request(4, 1, read_pdu(4));
-    EXPECT_TRUE(run_until_held(2)) << "the silent one's place is free again";
+    EXPECT_TRUE(run_until_pending(2)) << "the silent one's place is free again";
 }
 
 TEST_F(SessionBroadcast, DeniesBroadcastsWhenItIsAskedTo) {

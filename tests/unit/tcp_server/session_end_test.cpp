@@ -7,10 +7,10 @@ namespace {
 
 using ::testing::ElementsAre;
 
-// Clients that leave, and clients that do not read.
+// Clients that disconnect, and clients that do not read.
 class SessionEnd : public Loopback {
   protected:
-    /// More than the session takes before it stops reading; the addresses tell them apart.
+    /// More than the session takes before it stops reading; identified by their addresses.
     void send_hundred_reads(Client& client) {
         Bytes stream;
         for (std::uint16_t i = 0; i < 100; ++i) {
@@ -31,7 +31,7 @@ TEST_F(SessionEnd, TakesItsRequestsBackWhenTheClientIsReset) {
     start();
     Client client = connect();
     client.request(1, 1, read_pdu(1));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     const bus::ClientId id = bus1.held[0].request.client;
     client.socket().set_option(asio::socket_base::linger(true, 0));
     client.socket().close();
@@ -45,7 +45,7 @@ TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatTheClientHasClosed) {
     start();
     Client client = connect();
     for (std::uint16_t i = 0; i < 3; ++i) client.request(i, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_held(3));
+    ASSERT_TRUE(run_until_pending(3));
     client.socket().close();
     bus1.answer(0, reply_to_read(0));
     ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
@@ -56,7 +56,7 @@ TEST_F(SessionEnd, P2NoticesAResetAlsoWhileItDoesNotRead) {
     start();
     Client client = connect();
     send_hundred_reads(client);
-    ASSERT_TRUE(run_until_held(16));
+    ASSERT_TRUE(run_until_pending(16));
     client.socket().set_option(asio::socket_base::linger(true, 0));
     client.socket().close();
     ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
@@ -68,7 +68,7 @@ TEST_F(SessionEnd, P2NoticesAfterTheFirstReplyThatAClientHasClosedWhileItDidNotR
     start();
     Client client = connect();
     send_hundred_reads(client);
-    ASSERT_TRUE(run_until_held(16));
+    ASSERT_TRUE(run_until_pending(16));
     client.socket().close();
     bus1.answer(0, reply_to_read(0));
     ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
@@ -107,7 +107,7 @@ TEST_F(SessionEnd, P2AResetAfterTheFinTakesWhatWaitsAway) {
     send_hundred_reads(client);
     answer_and_receive(client, 0, 60);
     client.socket().shutdown(tcp::socket::shutdown_send);
-    ASSERT_TRUE(run_until_held(16));
+    ASSERT_TRUE(run_until_pending(16));
     client.socket().set_option(asio::socket_base::linger(true, 0));
     client.socket().close();
     ASSERT_TRUE(run_until([&] { return listener->counters().connections == 0; }));
@@ -121,7 +121,7 @@ TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {
     client.request(1, 1, read_pdu(1));
     client.request(2, 1, read_pdu(2));
     client.socket().shutdown(tcp::socket::shutdown_send);
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.answer(1, reply_to_read(2));
     bus1.answer(0, reply_to_read(1));
     EXPECT_EQ(client.receive(), (modbus::Adu{1, 1, reply_to_read(1)}));
@@ -130,7 +130,7 @@ TEST_F(SessionEnd, AnswersAClientThatHasOnlyClosedItsSendingSide) {
     EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
-TEST_F(SessionEnd, ClosesAClientThatTakesNothingForLongAndNobodyElseNotices) {
+TEST_F(SessionEnd, ClosesAClientThatReadsNothingForLongAndAffectsNoOther) {
     settings.retransmissions = Retransmissions::pass;  // all requests are the same
     bus1.instant = "41"_hex + Bytes(252, 0);
     start();
@@ -138,7 +138,8 @@ TEST_F(SessionEnd, ClosesAClientThatTakesNothingForLongAndNobodyElseNotices) {
     Client slow(context, listener->port(), 4096);
     const Bytes request = modbus::encode_mbap(1, 1, "41"_hex);
     std::size_t offset = 0;
-    // Until neither end moves: the session waits for the client, and so takes no more requests.
+    // Until neither side progresses: the session waits for the client, and so takes no more
+    // requests.
     for (int idle = 0; idle < 20;) {
         const auto n = slow.try_send(ByteView(request).subspan(offset));
         offset = (offset + n.value_or(0)) % request.size();
@@ -158,7 +159,7 @@ TEST_F(SessionEnd, ASlowClientThatTakesSomethingInEachPeriodStays) {
     for (int i = 0; i < 5; ++i) {
         EXPECT_EQ(client.ask(1, read_pdu(1)), reply_to_read(1));
         context.restart();
-        context.poll();  // that it was written is known, too
+        context.poll();  // handle the write completion, too
         clock.advance(settings.output_timeout);
     }
     EXPECT_EQ(log.count("does not read"), 0U);

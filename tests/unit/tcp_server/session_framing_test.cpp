@@ -68,7 +68,7 @@ TEST_F(SessionFraming, DoesNotLetDribblingBytesStretchTheTime) {
     client.send("0001 0000 00fe 01"_hex);
     ASSERT_TRUE(run_until_armed());
     const auto end = clock.next();
-    // The rest of the 260 bytes would take far longer than the time that an ADU has.
+    // Sending all 260 bytes would take far longer than an ADU is allowed.
     for (int i = 0; i < 9; ++i) {
         client.send("41"_hex);
         context.restart();
@@ -90,7 +90,7 @@ TEST_F(SessionFraming, TheNextAduHasATimeOfItsOwn) {
     ASSERT_TRUE(run_until_armed());
     const auto first = clock.next();
     clock.advance(1ms);
-    client.send("0006 01 03 0000 0001 0002"_hex);  // its rest, and the next one's beginning
+    client.send("0006 01 03 0000 0001 0002"_hex);  // its rest and the start of the next
     EXPECT_EQ(client.receive()->pdu, reply_to_read(1));
     ASSERT_TRUE(clock.next());
     EXPECT_EQ(*clock.next() - *first, 1ms);

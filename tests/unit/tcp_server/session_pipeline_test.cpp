@@ -8,10 +8,11 @@
 namespace panelgate::tcp_server {
 namespace {
 
-// Clients that ask without waiting for the answers: PIP-01 to PIP-07.
+// Clients that pipeline requests: PIP-01 to PIP-07.
 class SessionPipeline : public Loopback {
   protected:
-    /// The addresses tell the requests apart; one segment, so the server has all of it or nothing.
+    /// Requests are identified by their addresses; one segment, so the server has all or none of
+    /// it.
     static Bytes reads(std::uint16_t count) {
         Bytes stream;
         for (std::uint16_t i = 0; i < count; ++i) {
@@ -19,7 +20,7 @@ class SessionPipeline : public Loopback {
         }
         return stream;
     }
-    /// The bus answers one after the other, and each answer is the next that the client gets.
+    /// The bus answers in turn, and each answer is the client's next reply.
     void expect_values(Client& client, std::uint16_t first, std::uint16_t end) {
         for (std::uint16_t i = first; i < end; ++i) {
             ASSERT_TRUE(run_until([&] { return !bus1.held.empty(); }));
@@ -45,7 +46,7 @@ TEST_F(SessionPipeline, P3P9AnswersThirtyPipelinedReadsWithSixteenOfThemOnTheBus
     start();
     Client client = connect();
     client.send(reads(30));
-    ASSERT_TRUE(run_until_held(16));
+    ASSERT_TRUE(run_until_pending(16));
     expect_values(client, 0, 30);
     EXPECT_EQ(bus1.seen.size(), 30U);
 }
@@ -54,7 +55,7 @@ TEST_F(SessionPipeline, P9TakesEightyRequestsAndThenNoMore) {
     start();
     Client client = connect();
     client.send(reads(100));
-    ASSERT_TRUE(run_until_held(16));
+    ASSERT_TRUE(run_until_pending(16));
     bool stopped = false;
     listener->stop([&] { stopped = true; });
     expect_values(client, 0, 16);
@@ -64,13 +65,13 @@ TEST_F(SessionPipeline, P9TakesEightyRequestsAndThenNoMore) {
     EXPECT_EQ(bus1.seen.size(), 16U);
 }
 
-TEST_F(SessionPipeline, ReadsWhatNobodyWillAnswerSoThatTheLastRepliesArrive) {
+TEST_F(SessionPipeline, ReadsUnansweredInputSoThatTheLastRepliesArrive) {
     settings.in_flight = 1;
     settings.waiting = 1;
     start();
     Client client = connect();
-    client.send(reads(1000));  // more than one read, so some of it is left in the kernel
-    ASSERT_TRUE(run_until_held(1));
+    client.send(reads(1000));  // more than one read(), so some of it stays in the kernel
+    ASSERT_TRUE(run_until_pending(1));
     listener->stop([] {});
     do_all_that_is_due();
     expect_values(client, 0, 1);
@@ -79,7 +80,7 @@ TEST_F(SessionPipeline, ReadsWhatNobodyWillAnswerSoThatTheLastRepliesArrive) {
     EXPECT_FALSE(client.was_reset());
 }
 
-TEST_F(SessionPipeline, P9LetsTheKernelHoldUpAClientThatAsksTooMuch) {
+TEST_F(SessionPipeline, P9LetsTcpThrottleAClientThatAsksTooMuch) {
     settings.retransmissions = Retransmissions::pass;  // all of them are the same
     start();
     Client client = connect();
@@ -113,14 +114,14 @@ TEST_F(SessionPipeline, P9LetsTheKernelHoldUpAClientThatAsksTooMuch) {
     EXPECT_EQ(listener->counters().protocol_errors, 0U);
 }
 
-TEST_F(SessionPipeline, ASlowPanelHoldsUpNoOtherUntilEightyAnswersAreMissing) {
+TEST_F(SessionPipeline, ASlowPanelDelaysNoOtherUntilEightyAnswersAreOutstanding) {
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Client client = connect();
     client.send(reads(8));
     for (std::uint16_t i = 1; i < 5; ++i) {
-        ASSERT_TRUE(run_until_held(2));
+        ASSERT_TRUE(run_until_pending(2));
         ASSERT_EQ(bus1.held[1].request.request.pdu(), read_pdu(i));
         bus1.answer(1, reply_to_read(i));
     }
@@ -138,10 +139,10 @@ TEST_F(SessionPipeline, RefusalsAndItsOwnRegistersKeepTheirPlaces) {
     client.send(reads(2) + modbus::encode_mbap(2, 248, read_pdu(2)) +
                 modbus::encode_mbap(3, 255, "03 0005 0001"_hex) +
                 modbus::encode_mbap(4, 1, "03 00"_hex) + modbus::encode_mbap(5, 1, read_pdu(5)));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.line.queue_depth = 7;
     bus1.answer(1, reply_to_read(1));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.line.queue_depth = 9;
     bus1.answer(1, reply_to_read(5));
     do_all_that_is_due();
@@ -163,7 +164,7 @@ TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
     Client client = connect();
     client.send(reads(2) + modbus::encode_mbap(2, 0, "06 0000 0001"_hex) +
                 modbus::encode_mbap(3, 1, read_pdu(3)));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     EXPECT_TRUE(bus2.seen.empty());
     bus1.answer(0, reply_to_read(0));
     ASSERT_TRUE(run_until([&] { return bus2.held.size() == 1; }));
@@ -179,14 +180,14 @@ TEST_F(SessionPipeline, ABroadcastWaitsForItsTurnAndKeepsItsPlace) {
     EXPECT_EQ(client.receive(), (modbus::Adu{3, 1, reply_to_read(3)}));
 }
 
-TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatNobodyReads) {
+TEST_F(SessionPipeline, DoesNotBlameAClientForAnAduThatIsNotRead) {
     settings.in_flight = 2;
     settings.waiting = 3;
     start();
     Client client = connect();
     const Bytes half = "0005 0000 0006 01"_hex;
     client.send(reads(5) + half);
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     Client bystander = connect();
     bystander.send(half);
     ASSERT_TRUE(run_until_armed());
@@ -203,7 +204,7 @@ TEST_F(SessionPipeline, LimitsTheTimeOfAHalfSentAduOnceItReadsAgain) {
     start();
     Client client = connect();
     client.send(reads(5) + "0005 0000 0006 01"_hex);
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     EXPECT_EQ(clock.next(), std::nullopt) << "nobody reads it";
     expect_values(client, 0, 5);
     ASSERT_TRUE(run_until_armed()) << "the half-sent ADU";

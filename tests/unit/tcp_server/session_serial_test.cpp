@@ -12,7 +12,8 @@ namespace {
 
 using modbus::Framing;
 
-/// Clients that speak RTU or ASCII over TCP: no transaction ids, so the order is all there is.
+/// Clients using RTU or ASCII over TCP: without transaction ids, only the order matches replies to
+/// requests.
 class SessionSerial : public Loopback, public ::testing::WithParamInterface<Framing> {
   protected:
     SessionSerial() { settings.framing = GetParam(); }
@@ -37,7 +38,7 @@ TEST_P(SessionSerial, P3PipelinedRequestsAreAnsweredInTheirOrder) {
     Bytes stream;
     for (std::uint16_t i = 0; i < 30; ++i) stream = stream + adu(1, read_pdu(i));
     client.send(stream);
-    ASSERT_TRUE(run_until_held(settings.in_flight));
+    ASSERT_TRUE(run_until_pending(settings.in_flight));
     bus1.answer(1, reply_to_read(1));
     bus1.answer(0, reply_to_read(0));
     for (std::uint16_t i = 2; i < 30; ++i) {
@@ -52,7 +53,7 @@ TEST_P(SessionSerial, AFaultIsAnExceptionInTheSameForm) {
     start();
     Client client = connect();
     client.send(adu(1, read_pdu(0)));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     bus1.answer(0, Fault::timeout);
     expect_next(client, adu(1, "83 0b"_hex));
     client.send(adu(248, read_pdu(0)));
@@ -63,18 +64,18 @@ TEST_P(SessionSerial, AFaultIsAnExceptionInTheSameForm) {
     expect_next(client, adu(1, "83 03"_hex));
 }
 
-TEST_P(SessionSerial, NobodyAnswersABroadcastWhateverBecomesOfIt) {
+TEST_P(SessionSerial, ABroadcastGetsNoReplyWhateverItsOutcome) {
     bus1.rights = {};
     start();
     Client client = connect();
     client.send(adu(0, "06 0000 0001"_hex) + adu(0, read_pdu(0)) + adu(1, read_pdu(1)));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     EXPECT_EQ(bus1.held[0].request.station, 0);
     bus1.answer(0, "06 0000 0001"_hex);
     bus1.answer(0, reply_to_read(1));
     expect_next(client, adu(1, reply_to_read(1)));
     client.send(adu(0, "06 0000 0001"_hex));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     bus1.answer(0, Fault::line_down, false);
     client.send(adu(255, "03 0001 0001"_hex));
     expect_next(client, adu(255, "03 02 0001"_hex));
@@ -114,7 +115,7 @@ TEST_P(SessionSerial, ADamagedRequestIsNotAnsweredAndClosesNothing) {
     EXPECT_EQ(listener->counters().connections, 1U);
 }
 
-TEST_P(SessionSerial, P9WhoSendsNothingButGarbageIsClosed) {
+TEST_P(SessionSerial, P9AClientThatSendsOnlyGarbageIsClosed) {
     bus1.instant = reply_to_read(1);
     start();
     Client bystander = connect();
@@ -126,12 +127,12 @@ TEST_P(SessionSerial, P9WhoSendsNothingButGarbageIsClosed) {
     expect_next(bystander, adu(1, reply_to_read(1)));
 }
 
-TEST_P(SessionSerial, P3WhoHasOnlyClosedItsSendingSideGetsItsAnswers) {
+TEST_P(SessionSerial, P3AHalfClosedClientGetsItsAnswers) {
     start();
     Client client = connect();
     client.send(adu(1, read_pdu(0)) + adu(1, read_pdu(1)));
     client.socket().shutdown(tcp::socket::shutdown_send);
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     bus1.answer(0, reply_to_read(0));
     bus1.answer(0, reply_to_read(1));
     expect_next(client, adu(1, reply_to_read(0)));
@@ -139,19 +140,19 @@ TEST_P(SessionSerial, P3WhoHasOnlyClosedItsSendingSideGetsItsAnswers) {
     EXPECT_TRUE(client.sees_close());
 }
 
-TEST_P(SessionSerial, P2WhoLeavesTakesItsRequestsAlong) {
+TEST_P(SessionSerial, P2AClientThatLeavesCancelsItsRequests) {
     start();
     {
         Client client = connect();
         client.send(adu(1, "06 0000 0001"_hex));
-        ASSERT_TRUE(run_until_held(1));
+        ASSERT_TRUE(run_until_pending(1));
         client.socket().set_option(asio::socket_base::linger(true, 0));
         client.socket().close();
     }
     EXPECT_TRUE(run_until([&] { return bus1.cancelled.size() == 1; }));
 }
 
-TEST_P(SessionSerial, OneThatSpeaksModbusTcpIsToldWhichListenerItNeeds) {
+TEST_P(SessionSerial, TheLogNamesTheListenerAModbusTcpClientNeeds) {
     start();
     Client client = connect();
     client.request(1, 1, read_pdu(10));
@@ -165,11 +166,11 @@ class SessionRtu : public Loopback {
     SessionRtu() { settings.framing = Framing::rtu; }
 };
 
-TEST_F(SessionRtu, AStrayByteStallsNobody) {
+TEST_F(SessionRtu, AStrayByteDoesNotStallTheConnection) {
     bus1.instant = reply_to_read(7);
     start();
     Client client = connect();
-    // To a stray byte in front of it unit 16 is a function: a write as long as its data say.
+    // After a stray byte, unit 16 looks like a function code: a write whose length its data gives.
     const Bytes request = modbus::encode_adu(16, read_pdu(7));
     const Bytes reply = modbus::encode_adu(16, reply_to_read(7));
     for (unsigned stray = 0; stray < 256; ++stray) {
@@ -218,7 +219,7 @@ TEST_F(SessionRtu, AVendorsFunctionEndsByASilence) {
     EXPECT_EQ(bus1.seen.at(0).request.pdu(), "41 01 02"_hex);
 }
 
-TEST_F(SessionRtu, P3TheEndOfWhatAClientSaysIsASilence) {
+TEST_F(SessionRtu, P3TheEndOfInputCountsAsASilence) {
     bus1.instant = "41 07"_hex;
     start();
     Client client = connect();
@@ -313,7 +314,7 @@ INSTANTIATE_TEST_SUITE_P(Framings, AnyListener,
                          ::testing::Values(Framing::tcp, Framing::rtu, Framing::ascii),
                          [](const auto& one) { return std::string(modbus::label(one.param)); });
 
-TEST_P(AnyListener, WhoSpeaksHttpIsClosedAndNamed) {
+TEST_P(AnyListener, AnHttpClientIsClosedAndNamedInTheLog) {
     constexpr std::string_view kRequest = "GET /api/v1/lines HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
     settings.framing = GetParam();
     start();

@@ -13,7 +13,7 @@ TEST_F(Session, EchoesTransactionAndUnit) {
     start();
     Client client = connect();
     client.request(0xBEEF, 101, read_pdu(5));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     EXPECT_EQ(bus1.held[0].request.station, 1);
     EXPECT_EQ(bus1.held[0].request.request.pdu(), read_pdu(5));
     EXPECT_NE(bus1.held[0].request.client, 0U);
@@ -25,7 +25,7 @@ TEST_F(Session, KeepsTheOrderWhenTheBusDoesNot) {
     start();
     Client client = connect();
     for (std::uint16_t i = 0; i < 8; ++i) client.request(i, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_held(8));
+    ASSERT_TRUE(run_until_pending(8));
     for (std::uint16_t i = 8; i-- > 1;) bus1.answer(i, reply_to_read(i));
     context.restart();
     context.poll();
@@ -40,7 +40,7 @@ TEST_F(Session, DoesNotMindRepeatedTransactionIds) {
     start();
     Client client = connect();
     for (std::uint16_t i = 0; i < 4; ++i) client.request(0, 1, read_pdu(i));
-    ASSERT_TRUE(run_until_held(4));
+    ASSERT_TRUE(run_until_pending(4));
     for (const std::uint8_t value : Bytes{3, 2, 1, 0}) bus1.answer(value, reply_to_read(value));
     for (std::uint16_t i = 0; i < 4; ++i) {
         EXPECT_EQ(client.receive(), (modbus::Adu{0, 1, reply_to_read(i)}));
@@ -52,9 +52,9 @@ TEST_F(Session, KeepsTwoClientsWithEqualTransactionIdsApart) {
     Client first = connect();
     Client second = connect();
     first.request(1, 1, read_pdu(10));
-    ASSERT_TRUE(run_until_held(1));
+    ASSERT_TRUE(run_until_pending(1));
     second.request(1, 1, read_pdu(20));
-    ASSERT_TRUE(run_until_held(2));
+    ASSERT_TRUE(run_until_pending(2));
     EXPECT_NE(bus1.held[0].request.client, bus1.held[1].request.client);
     bus1.answer(1, reply_to_read(20));
     bus1.answer(0, reply_to_read(10));
@@ -80,7 +80,7 @@ TEST_F(Session, TakesAdusByteByByteAndManyAtOnce) {
 TEST_F(Session, AnswersTheSameHoweverTheStreamIsCut) {
     bus1.instant = reply_to_read(9);
     settings.in_flight = 1000;
-    settings.own_answers = 2000;  // the clock stands still
+    settings.own_answers = 2000;  // the clock does not advance
     start();
     std::mt19937 chance(20261121);
     Bytes stream;
@@ -117,7 +117,7 @@ TEST_F(Session, RefusesFunctionsThatNoRequestMayCarry) {
     EXPECT_TRUE(bus1.seen.empty());
 }
 
-TEST_F(Session, RefusesUnitsThatNobodyHas) {
+TEST_F(Session, RefusesUnroutedUnits) {
     settings.diagnostics_unit.reset();
     start();
     Client client = connect();
@@ -182,7 +182,7 @@ TEST_F(Session, HandsReadsAndWritesOverAsTheyAreAndNeverAsPolls) {
     for (const bus::Request& seen : bus1.seen) EXPECT_FALSE(seen.poll);
 }
 
-TEST_F(Session, LetsNobodyWriteThroughAReadOnlyListener) {
+TEST_F(Session, RefusesWritesThroughAReadOnlyListener) {
     settings.read_only = true;
     bus1.instant = reply_to_read(0);
     start();
@@ -195,7 +195,7 @@ TEST_F(Session, LetsNobodyWriteThroughAReadOnlyListener) {
     EXPECT_EQ(client.ask(1, read_pdu(0)), reply_to_read(0));
 }
 
-TEST_F(Session, LetsNobodyWriteAReadOnlyStation) {
+TEST_F(Session, RefusesWritesToAReadOnlyStation) {
     bus1.instant = reply_to_read(0);
     start();
     Client client = connect();

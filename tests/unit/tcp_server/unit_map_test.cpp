@@ -19,8 +19,8 @@ class UnitMapTest : public ::testing::Test {
     UnitMap map() const { return UnitMap(settings, lines); }
 
     boost::asio::io_context context;
-    HeldBus bus1{context};
-    HeldBus bus2{context};
+    ManualBus bus1{context};
+    ManualBus bus2{context};
     std::vector<LineInfo> lines;
     Settings settings;
 };
@@ -33,7 +33,7 @@ TEST_F(UnitMapTest, RoutesListedStationsToTheirLine) {
     EXPECT_EQ(units.route(11)->station, 11);
 }
 
-TEST_F(UnitMapTest, RoutesNobodyWhoIsOnTwoLines) {
+TEST_F(UnitMapTest, RoutesNoStationThatIsOnTwoLines) {
     settings.lines = {"floor1", "floor2"};
     settings.units[102] = {"floor2", 2};
     const UnitMap units = map();

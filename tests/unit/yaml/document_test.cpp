@@ -62,7 +62,7 @@ TEST(Document, LeavesScalarsAsTheyWereWritten) {
     EXPECT_EQ(value(root, "f").scalar, "off");
 }
 
-TEST(Document, TellsQuotedFromPlain) {
+TEST(Document, DistinguishesQuotedFromPlain) {
     const Node root = read("a: 1\nb: '1'\nc: \"1\"\nd: |\n  1\ne: ''\n").root;
     EXPECT_FALSE(value(root, "a").quoted);
     for (const char* key : {"b", "c", "d", "e"}) EXPECT_TRUE(value(root, key).quoted) << key;
@@ -135,7 +135,7 @@ TEST(Document, TurnsASyntaxErrorIntoOneProblemAtItsCause) {
     EXPECT_EQ(read("a: b: c\n").root.kind, Node::Kind::null);
 }
 
-TEST(Document, SaysInOwnWordsWhatNoLintExplains) {
+TEST(Document, RewordsParserErrorsThatNoLintExplains) {
     EXPECT_EQ(read("a: |0\n  b\n").problems,
               "f.yaml:1:6: 0 cannot follow | or >; leave it out\n"
               "  a: |0\n"
@@ -152,12 +152,12 @@ TEST(Document, AForgottenQuoteTakesNothingAlong) {
     EXPECT_THAT(read("a: \"one\n  text\"\nb: 1\n").problems, IsEmpty());
 }
 
-TEST(Document, AnItemWithoutItsDashIsToldOnce) {
+TEST(Document, AnItemWithoutItsDashIsReportedOnce) {
     EXPECT_EQ(read("- id: 1\n  name: a\n  id: 2\n  name: b\n").problems,
               "f.yaml:3:3: duplicate key 'id', already on line 1; is a '- ' missing before it?\n");
 }
 
-TEST(Document, ADecimalCommaInsideBracketsIsKeptForWhoReadsTheValue) {
+TEST(Document, ADecimalCommaInsideBracketsIsKeptForTheReader) {
     const Parsed parsed = read("{scale: 0,1, every: 1,5s, b: 2}\n");
     EXPECT_THAT(parsed.problems, IsEmpty());
     EXPECT_EQ(value(parsed.root, "scale").scalar, "0,1");

@@ -81,7 +81,7 @@ TEST(Encoding, AControlCharacterDoesNotEndTheFile) {
     EXPECT_THAT(decode("a:\t1\r\n\u0085").bad, IsEmpty());
 }
 
-TEST(Encoding, TellsOfAFewLinesOnly) {
+TEST(Encoding, ReportsAFewLinesOnly) {
     std::string text;
     for (int i = 0; i < 1000; ++i) text += "\xFF\xFF\n";
     EXPECT_EQ(decode("a\n" + text).bad.size(), 50U);

@@ -30,8 +30,8 @@ std::string traps(std::string text) {
     return told(source, find_traps(Scanned(source)));
 }
 
-/// What people write that is good YAML.
-constexpr const char* kGood[] = {
+/// Valid YAML as users write it.
+constexpr const char* kValid[] = {
     "a: 1\nb:\n- x\n- y\nc: [1, {d: 2}]\n",
     "a:\n  - b: 1\n    c:\n      - 1\n  - b: 2\n",
     "- - a: 1\n    b: 2\n  - c\n-\n  d: 3\n",
@@ -50,7 +50,7 @@ constexpr const char* kGood[] = {
 };
 
 TEST(Lint, FindsNothingInGoodText) {
-    for (const char* text : kGood) {
+    for (const char* text : kValid) {
         EXPECT_THAT(causes(text), IsEmpty()) << text;
         EXPECT_THAT(traps(text), IsEmpty()) << text;
     }
@@ -64,7 +64,7 @@ TEST(Lint, AForgottenQuoteIsATrapWhereItOpens) {
     EXPECT_EQ(traps("a: \"b\n\n  c\""), "");
 }
 
-/// Files of other programs have every key and text in quotes.
+/// Other programs write every key and text in quotes.
 constexpr const char* kQuoted[] = {
     R"({
   "a": [
@@ -96,7 +96,7 @@ constexpr const char* kQuoted[] = {
   - "o": "p:502"
 )"};
 
-TEST(Lint, AQuoteThatIsMissingIsToldOnItsLineFirst) {
+TEST(Lint, AMissingQuoteIsReportedFirstOnItsLine) {
     for (const char mark : {'"', '\''}) {
         for (std::string all : kQuoted) {
             std::ranges::replace(all, '"', mark);
@@ -112,7 +112,7 @@ TEST(Lint, AQuoteThatIsMissingIsToldOnItsLineFirst) {
     }
 }
 
-TEST(Lint, WhatAnotherProgramTypesForADashIsATrap) {
+TEST(Lint, ADashOfAnotherProgramIsATrap) {
     EXPECT_EQ(traps("a:\n  \u2013 b: 1\n    c: 2\n  \u2014 b: 2\n"), "2:3 4:3 ");
     EXPECT_EQ(traps("a:\n  * b: 1\n    c: 2\n"), "2:3 ");
     EXPECT_EQ(causes("a:\n  \u2022 b: 1\n    c: 2\n"), "2:3 ");
@@ -124,7 +124,7 @@ TEST(Lint, AQuoteOfAWordProcessorIsATrap) {
     EXPECT_EQ(traps("a: \u2019s b\nc: d \u201Ce\u201D\n"), "");
 }
 
-TEST(Lint, ADashThatWasMovedIsToldWhereItStands) {
+TEST(Lint, AMisplacedDashIsReportedAtItsPlace) {
     EXPECT_EQ(causes("a:\n   - b: 1\n    c: 2\n"), "2:4 ");
     EXPECT_EQ(causes("a:\n - b: 1\n    c: 2\n    d: 3\n"), "2:2 ");
     EXPECT_EQ(causes("a:\n  -  b: 1\n    c: 2\nd: 3\n"), "2:3 ");
@@ -133,7 +133,7 @@ TEST(Lint, ADashThatWasMovedIsToldWhereItStands) {
     EXPECT_EQ(causes("a:\n  - b: 1\n     c: 2\n  - b: 2\n"), "3:6 ");
 }
 
-TEST(Lint, WhatSurroundedTheTextOnAPageIsToldAtItsPlace) {
+TEST(Lint, TextCopiedFromAroundAFileIsReportedAtItsPlace) {
     EXPECT_EQ(causes("```yaml\na: 1\n```\n"), "1:1 3:1 ");
     EXPECT_EQ(causes("$ cat a.yaml\na:\n  - b\n"), "1:1 ");
     EXPECT_EQ(causes("a:\n&nbsp;&nbsp;b: 1\n"), "2:1 ");
@@ -141,7 +141,7 @@ TEST(Lint, WhatSurroundedTheTextOnAPageIsToldAtItsPlace) {
     EXPECT_EQ(causes("{\n  // a\n  a: 1\n}\n"), "2:3 ");
 }
 
-TEST(Lint, AnOddBlankIsATrapOnlyWhereABlankHasAMeaning) {
+TEST(Lint, AWrongBlankIsATrapOnlyWhereABlankIsSignificant) {
     EXPECT_EQ(traps("\u00A0a: 1\n"), "1:1 ");
     EXPECT_EQ(traps("a:\u00A01\n"), "1:3 ");
     EXPECT_EQ(traps("a: 5\u00A0\u00B0C\nb: x:\u00A0y\n"), "");
@@ -149,13 +149,13 @@ TEST(Lint, AnOddBlankIsATrapOnlyWhereABlankHasAMeaning) {
 
 TEST(Lint, OneCauseForEachLine) { EXPECT_EQ(causes("a:b\nc: %\n  \td: e\n"), "1:3 2:4 3:3 "); }
 
-TEST(Lint, ABracketIsToldWhereItOpens) {
+TEST(Lint, ABracketIsReportedWhereItOpens) {
     EXPECT_EQ(causes("a: {b: 1\nc: [2\nd: 3\n"), "1:4 2:4 ");
     EXPECT_EQ(causes("a: [{b: 1]\n"), "1:5 ");
     EXPECT_EQ(causes("a: [b]]\n"), "1:7 ");
 }
 
-TEST(Lint, ShiftedLinesAreToldOnce) {
+TEST(Lint, ShiftedLinesAreReportedOnce) {
     EXPECT_EQ(causes("a:\n  - b: 1\n   c: 2\n   d: 3\n  - b: 2\n    c: 3\n"), "3:4 ");
     EXPECT_EQ(causes("a:\n  b: 1\n    c: 2\n    d: 3\n  e: 4\n"), "3:5 ");
 }

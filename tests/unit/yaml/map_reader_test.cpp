@@ -17,7 +17,7 @@ enum class Fruit { apple, pear };
 constexpr std::array<std::pair<std::string_view, Fruit>, 2> kFruits{
     {{"apple", Fruit::apple}, {"pear", Fruit::pear}}};
 
-/// A reader over its own document.
+/// A reader with its own document.
 class Subject {
   public:
     explicit Subject(std::string_view text) : node_(parse(text, problems_)) {}
@@ -48,7 +48,7 @@ TEST(MapReader, RefusesTextThatIsEmptyOrNoScalar) {
               "f:3:4: c must be a text, not a list\n");
 }
 
-TEST(MapReader, TellsWhichRequiredKeyIsMissing) {
+TEST(MapReader, ReportsWhichRequiredKeyIsMissing) {
     Subject s("  a: 1\n");
     EXPECT_EQ(s.read().required_text("name"), std::nullopt);
     EXPECT_EQ(s.read().required_integer("id", 1, 9), std::nullopt);
@@ -57,7 +57,7 @@ TEST(MapReader, TellsWhichRequiredKeyIsMissing) {
     EXPECT_EQ(s.problems(), "f:1:3: thing needs 'name'\nf:1:3: thing needs 'id'\n");
 }
 
-TEST(MapReader, TellsWhatIsMissingAlsoWhereAKeyLookedLikeIt) {
+TEST(MapReader, ReportsAMissingKeyDespiteASimilarOne) {
     Subject s("node: 1\n");
     EXPECT_EQ(s.read().required_text("mode"), std::nullopt);
     EXPECT_EQ(s.read().text("node"), "1");
@@ -228,7 +228,7 @@ TEST(MapReader, ListsTheKnownKeysWhenNoneIsNear) {
               "stop_bits\n");
 }
 
-TEST(MapReader, TellsOnceThatANodeIsNoMap) {
+TEST(MapReader, ReportsOnceThatANodeIsNoMap) {
     Subject s("[1, 2]\n");
     EXPECT_EQ(s.read().required_text("name"), std::nullopt);
     EXPECT_EQ(s.read().integer("id", 1, 2), std::nullopt);

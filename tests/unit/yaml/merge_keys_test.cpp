@@ -7,7 +7,7 @@
 namespace panelgate::yaml {
 namespace {
 
-/// "key=value …" of the map under `m`, or the problems.
+/// Returns "key=value …" of the map under `m`, or the problems.
 std::string merged(const std::string& text) {
     Problems problems("f");
     Node tree = parse(text, problems);

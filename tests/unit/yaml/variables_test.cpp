@@ -20,7 +20,7 @@ std::optional<std::string> environment(const std::string& name) {
     return found->second;
 }
 
-/// The value of `a` in a text such as "a: ${X}", or the problems.
+/// Returns the value of `a` in a text such as "a: ${X}", or the problems.
 std::string read(const std::string& text) {
     Problems problems("f");
     Node tree = parse(text, problems);

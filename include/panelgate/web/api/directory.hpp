@@ -29,40 +29,40 @@ struct LineEntry {
     std::string device;             ///< as configured
     bus::BusClient* bus = nullptr;  ///< never null; outlives the directory
     bool pass_unlisted_stations = true;
-    Duration deadline = 2s;                     ///< of a request, from its arrival to its answer
-    SerialFormat serial{};                      ///< what a read costs follows from it
-    const bus::LineHistory* history = nullptr;  ///< null: nothing is kept; outlives the directory
+    Duration deadline = 2s;  ///< longest time from a request's arrival to its answer
+    SerialFormat serial{};   ///< needed to compute the bus time of a read
+    const bus::LineHistory* history = nullptr;  ///< null: no history; outlives the directory
 };
 
-/// The faults of a simulated panel, in numbers by name.
+/// Reads and sets the simulated faults of a panel, by name.
 struct SimulatedPanel {
     std::function<std::map<std::string, double>()> faults;
-    /// What is not named is off. Nothing, or what is wrong.
+    /// Faults that are not named are switched off. Returns the error, or nothing on success.
     std::function<std::optional<std::string>(const std::map<std::string, double>&)> set_faults;
 };
 
 struct StationEntry : bus::StationRef {
     const profile::PanelProfile* profile = nullptr;  ///< never null; outlives the directory
-    /// Nobody has said what panel it is: `profile` is `generic`, and not shown as the panel's.
+    /// The panel type is unknown: `profile` is `generic` and is not shown as the panel's own.
     bool unknown_panel = false;
     bool read_only = false;
-    std::optional<int> unit;  ///< the unit id that Modbus/TCP clients use, when there is one
-    const points::StationPoints* points = nullptr;    ///< null without any; outlives the directory
-    const points::StationHistory* history = nullptr;  ///< of them; null where nothing is kept
+    std::optional<int> unit;  ///< the unit id that Modbus/TCP clients use, if any
+    const points::StationPoints* points = nullptr;  ///< null if it has none; outlives the directory
+    const points::StationHistory* history = nullptr;  ///< of its points; null if no history is kept
     std::shared_ptr<const SimulatedPanel> simulated;  ///< null for a real panel
 };
 
-/// What the API serves: the view that it needs of the plant. Constant; a changed plant has another
-/// one.
+/// The part of the plant that the API needs. Immutable; a changed plant gets a new one.
 struct Directory {
-    const profile::PanelProfile* generic = nullptr;  ///< of stations that nobody has listed
+    const profile::PanelProfile* generic = nullptr;  ///< for unlisted stations
     std::vector<LineEntry> lines;
     std::vector<StationEntry> stations;
 
     const LineEntry* find_line(std::string_view name) const;
-    /// Of a station that has a bus, whose line is always there.
+    /// The line of a station; the station must have a bus.
     const LineEntry& line_of(const StationEntry& station) const;
-    /// By name or as LINE:ID; an unlisted id (1..247) is found where its line passes those.
+    /// Finds a station by name or as LINE:ID. An unlisted id (1..247) is found if its line passes
+    /// unlisted stations.
     std::optional<StationEntry> find_station(std::string_view name) const;
 };
 

@@ -17,10 +17,10 @@ std::string point_event(const bus::StationRef& station, const points::Point& poi
                         const points::PointReading& reading);
 std::string line_event(std::string_view line, std::string_view state, std::string_view why);
 std::string station_event(std::string_view line, std::string_view station, std::string_view what);
-/// How far a search for stations on a line is; "running", or how it has ended.
+/// Progress of a discovery; `state` is "running" or how it ended.
 std::string discovery_event(std::string_view line, std::string_view state, std::size_t asked,
                             std::size_t of, std::size_t found);
-/// `station` "" is a broadcast.
+/// An empty `station` means a broadcast.
 std::string transaction_event(std::string_view line, std::string_view station,
                               std::uint8_t function, std::string_view outcome, Duration took);
 

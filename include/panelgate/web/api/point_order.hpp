@@ -10,25 +10,26 @@
 
 namespace panelgate::web {
 
-// A write of a point: the checks and the words of PUT .../points/{point}, also for those who do not
-// come by HTTP.
+// Writes of a point: the checks and messages of PUT .../points/{point}, also for clients other than
+// HTTP.
 
-/// What goes out, and what the point is when it is confirmed.
+/// The request to send, and the point's value once the panel has confirmed it.
 struct PointOrder {
     bus::Request request;
     points::PointWrite write;
 };
 
-/// 400 and 422 of a value that the point cannot be, 403 and 409 where nobody may write.
+/// Plans a write. 400 or 422 for a value that the point cannot take, 403 or 409 where writing is
+/// not allowed.
 Parsed<PointOrder> order_of(const bus::BusClient& bus, std::uint8_t station,
                             const profile::PanelProfile& profile, const points::Point& point,
                             const points::Value& value);
-/// What is told of it when it is over: {"transmitted","confirmed","value"}, or why it is not.
-Parsed<boost::json::object> told(const PointOrder& order, const bus::Answer& answer,
-                                 const profile::PanelProfile& profile);
-/// {"transmitted": true, "confirmed": true} with what the point has become.
+/// The result of a finished write: {"transmitted","confirmed","value"}, or why it failed.
+Parsed<boost::json::object> write_result(const PointOrder& order, const bus::Answer& answer,
+                                         const profile::PanelProfile& profile);
+/// {"transmitted": true, "confirmed": true} with the new value of the point.
 boost::json::object confirmed(const points::PointWrite& write);
-/// What is wrong with the value, as a problem. `more`: what would help against too many digits.
+/// The refusal as a problem. `more` is a hint added where the value has too many digits.
 Problem problem_of(const points::WriteRefusal& refusal, const char* more);
 
 }  // namespace panelgate::web

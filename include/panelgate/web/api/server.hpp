@@ -28,52 +28,52 @@ class KeyBook;
 class ReloadSource;
 struct Site;
 
-/// What the server shows besides the directory. The functions are called in the one thread.
+/// What the server shows besides the directory. All functions are called from the loop's thread.
 struct Providers {
     MetricsSource* metrics = nullptr;      ///< never null; outlives the server
     std::string metrics_type;              ///< the content type of its text
-    std::function<bool()> ready;           ///< do configuration and listeners stand?
-    std::function<std::string()> missing;  ///< what does not stand yet, in words
+    std::function<bool()> ready;           ///< configuration applied and all listeners open
+    std::function<std::string()> missing;  ///< what is not open yet, in words
     std::string version;
-    std::string commit;                            ///< it was built from
+    std::string commit;                            ///< the commit that it was built from
     std::string compiler;                          ///< "clang 19.1.7"
-    std::map<std::string, std::string> libraries;  ///< by name, their versions
+    std::map<std::string, std::string> libraries;  ///< name to version
     std::function<TimePoint()> now;                ///< the machine's monotonic clock
-    std::function<WallTime()> wall;                ///< what the clock on the wall shows
+    std::function<WallTime()> wall;                ///< the current wall-clock time
     std::function<std::vector<points::RelayStatus>()> relays;
     EventHub* events = nullptr;            ///< never null; outlives the server
-    DiscoverySource* discovery = nullptr;  ///< null only where there are no lines; outlives it
-    ReloadSource* reload = nullptr;  ///< null: the configuration cannot be read again; outlives it
-    SharedText configuration;        ///< in force, a JSON object without secrets; null: not shown
+    DiscoverySource* discovery = nullptr;  ///< null only without lines; outlives the server
+    ReloadSource* reload = nullptr;        ///< null: reload is not available; outlives the server
+    SharedText configuration;  ///< the active one, a JSON object without secrets; null: not shown
     ApiSettings settings{};
 };
 
-/// Who is served: the gateway, or simulated panels alone, whose directory may be without buses.
+/// What is served: the gateway, or only simulated panels, whose directory may have no buses.
 enum class Surface : std::uint8_t { gateway, simulator };
 
-/// HTTP/1.1: probes, metrics and the REST API. Lives in the one thread that runs the executor.
+/// HTTP/1.1 server: probes, metrics and the REST API. Lives in the thread that runs the executor.
 class Server {
   public:
     Server(boost::asio::any_io_executor executor, Settings settings,
            std::shared_ptr<const Directory> directory, Providers providers,
            Surface surface = Surface::gateway);
-    /// Ends everything that stop() would let finish; answers still owed are not sent.
+    /// Closes everything at once, unlike stop(); outstanding answers are not sent.
     ~Server();
     Server(const Server&) = delete;
     Server& operator=(const Server&) = delete;
 
-    /// Opens the listener. On an error (address in use, not an address…) nothing is open.
+    /// Opens the listener. On an error (address in use, invalid address…) nothing is open.
     boost::system::error_code start();
-    /// Serves these from the next request on, for HttpListener::apply(); what runs ends on what was
-    /// there when it came, and keeps it until then.
+    /// Serves these from the next request on, see HttpListener::apply(). Running requests keep the
+    /// settings and the directory that they started with.
     void apply(Settings settings, std::shared_ptr<const Directory> directory,
                SharedText configuration);
-    /// The port that is listened on; 0 before start().
+    /// The port that it listens on; 0 before start().
     std::uint16_t port() const;
-    /// Closes the listener and idle connections; running requests are answered, then closed. A
-    /// client has no longer than `reading` to take an answer.
+    /// Closes the listener and idle connections; running requests are answered, then their
+    /// connections are closed. A client has at most `reading` to read its answer.
     void stop(Duration reading = 10s);
-    /// Connections open now; after stop() it falls to 0.
+    /// Number of open connections; falls to 0 after stop().
     std::size_t connections() const;
     const Counters& counters() const;
 

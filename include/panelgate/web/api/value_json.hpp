@@ -11,10 +11,10 @@ namespace panelgate::web {
 /// A point's value in JSON, with every digit; for json_text().
 boost::json::value json_of(const points::Value& value);
 
-/// Any JSON text; 400 with line and column of what is wrong, a member that comes twice included, at
-/// any depth.
+/// Parses any JSON text. 400 with line and column of the error; a duplicate member is an error,
+/// too, at any depth.
 Parsed<boost::json::value> parse_json(std::string_view text);
-/// What a client wants a point to be.
+/// The new value of a point, as the client has sent it.
 Parsed<points::Value> value_of(const boost::json::value& value);
 
 }  // namespace panelgate::web

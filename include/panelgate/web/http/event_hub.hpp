@@ -15,16 +15,16 @@
 
 namespace panelgate::web {
 
-/// What an event is about. "" where it names none.
+/// What an event is about; "" if not applicable.
 struct EventTopic {
-    std::string type;  ///< the word behind `event:`
+    std::string type;  ///< the value of `event:`
     std::string line;
     std::string station;
     std::string point;
 };
 
-/// Which events somebody wants. What is empty allows all; otherwise an event has to name one of
-/// them, so one that names no station passes no filter of stations.
+/// Which events a client wants. An empty set allows all; otherwise the event must match an entry,
+/// so an event without a station passes no station filter.
 struct EventFilter {
     std::set<std::string> types;
     std::set<std::string> lines;
@@ -34,56 +34,55 @@ struct EventFilter {
     bool passes(const EventTopic& topic) const;
 };
 
-/// Server-sent events: the last ones of each type, in order of their numbers, and those who listen.
-/// Every listener is a place in that order, so it costs nothing to be slow, and who comes back is
-/// given what it has missed. What is no longer there when its turn comes is lost, and a note says
-/// how much. An id is "EPOCH-NUMBER": one of another life of the program is not mistaken. One
-/// thread.
+/// Server-sent events: the latest of each type, numbered, and their listeners. A listener is a
+/// position in that order, so a slow one costs nothing and a returning one gets what it missed.
+/// Events discarded before it read them are lost, and a note gives their number. An id is
+/// "EPOCH-NUMBER", so ids of a previous run are recognised. Single-threaded.
 class EventHub {
   public:
     static constexpr std::size_t kListeners = 64;
-    /// What is kept of each type: events, and bytes of their texts.
+    /// Kept per type: events, and bytes of their texts.
     static constexpr std::size_t kKept = 4096;
     static constexpr std::size_t kKeptBytes = 1024 * 1024;
-    /// Bytes, or events looked at, after which take() lets others have their turn.
-    static constexpr std::size_t kTaken = 64 * 1024;
-    static constexpr std::size_t kLookedAt = 2000;
-    /// After a break clients are to wait so long before they come again; some will be many.
+    /// Bytes, or events examined, after which take() yields to others.
+    static constexpr std::size_t kTakeBytes = 64 * 1024;
+    static constexpr std::size_t kTakeExamined = 2000;
+    /// Delay before clients reconnect; after an outage many do at once.
     static constexpr int kRetryMs = 2000;
 
     class Listener;
 
-    /// `epoch`: a word without blanks, another one in each life of the program.
+    /// `epoch`: a word without blanks, different in each run of the program.
     explicit EventHub(std::string epoch = "0") : epoch_(std::move(epoch)) {}
     ~EventHub();
     EventHub(const EventHub&) = delete;
     EventHub& operator=(const EventHub&) = delete;
 
-    /// Nothing when too many listen already. It listens while it lives, from now on; with the id of
-    /// the last event that it has got, from there.
+    /// Adds a listener, removed when destroyed; null if there are too many. It starts now, or after
+    /// the event `last_id`.
     std::shared_ptr<Listener> listen(EventFilter filter, std::string_view last_id = {});
-    /// Something of this type happens. True: publish() it. Otherwise nobody listens, and nobody who
-    /// has left could be given it: it is counted, as lost to whoever comes back.
+    /// An event of this type occurs. True: call publish(). False: there is no listener and it could
+    /// not be kept for one that returns; it is counted as lost.
     bool announce(std::string_view type);
-    /// `json` is one line. After announce().
+    /// `json` is one line. Requires announce().
     void publish(EventTopic topic, std::string_view json);
-    /// Nobody listens now.
+    /// True if there are no listeners.
     bool is_idle();
-    /// The server stops: everybody is given what waits and sent home.
+    /// Ends all listeners after their pending events: the server stops.
     void end();
 
   private:
     struct Event {
         std::uint64_t number = 0;
         EventTopic topic;
-        std::string text;  ///< in the wire format
+        std::string text;  ///< in wire format
     };
-    /// Of one type.
+    /// The events of one type.
     struct Ring {
         std::deque<Event> events;
         std::size_t bytes = 0;
-        std::uint64_t gone = 0;   ///< the number of the last that is no longer here
-        std::size_t unheard = 0;  ///< events since somebody has listened
+        std::uint64_t gone = 0;   ///< number of the last one discarded
+        std::size_t unheard = 0;  ///< events since there was a listener
     };
 
     std::string id_of(std::uint64_t number) const { return epoch_ + '-' + std::to_string(number); }
@@ -93,29 +92,29 @@ class EventHub {
     std::uint64_t missed(const Listener& listener) const;
 
     std::string epoch_;
-    std::map<std::string, Ring, std::less<>> rings_;  ///< by type: as many as there are words
+    std::map<std::string, Ring, std::less<>> rings_;  ///< by type; bounded by the number of types
     std::vector<std::weak_ptr<Listener>> listeners_;
     std::uint64_t last_ = 0;
-    bool was_heard_ = false;  ///< by anybody, ever
+    bool was_heard_ = false;  ///< there has been a listener
 };
 
 class EventHub::Listener {
   public:
-    /// Called when events wait that it wants, and at the end.
+    /// Called when matching events are pending, and at the end.
     std::function<void()> wake;
-    /// What waits, or some of it, in the wire format; "" when nothing does.
+    /// Returns pending events, or some of them, in wire format; "" if there are none.
     std::string take();
-    /// The same, never "": where nothing waits, what shows that this end is there, and moves the
-    /// place from which the client would come again.
+    /// The same, but never "": without events, a comment that keeps the connection alive and
+    /// advances the position for a reconnect.
     std::string heartbeat();
     bool ended() const { return ended_; }
 
   private:
     friend class EventHub;
-    EventHub* hub_ = nullptr;  ///< null: it is no more
+    EventHub* hub_ = nullptr;  ///< null: the hub is gone
     EventFilter filter_;
-    std::string opening_;      ///< what comes before the first event
-    std::uint64_t place_ = 0;  ///< all up to this number have been given, passed over or lost
+    std::string opening_;      ///< sent before the first event
+    std::uint64_t place_ = 0;  ///< all up to this number were sent, skipped or lost
     std::uint64_t lost_ = 0;
     bool ended_ = false;
 };

@@ -6,13 +6,13 @@
 
 namespace panelgate::web {
 
-/// Would whoever sent this Accept-Encoding take gzip? (RFC 9110 12.5.3; "" is no.)
+/// True if this Accept-Encoding allows gzip (RFC 9110 12.5.3; "" does not).
 bool accepts_gzip(std::string_view accept_encoding);
 
-/// The text of a body in the content coding gzip that a Gzip made, or gzip(1); "" of anything else.
+/// Decompresses a body made by Gzip or gzip(1); "" for anything else.
 std::string unpacked(std::string_view body);
 
-/// Makes a body of the content coding gzip (RFC 1952) of a text that comes in pieces. Pure.
+/// Compresses text, given in pieces, to content coding gzip (RFC 1952). Pure.
 class Gzip {
   public:
     Gzip();
@@ -21,7 +21,7 @@ class Gzip {
     Gzip& operator=(const Gzip&) = delete;
 
     void add(std::string_view piece);
-    /// The whole body. Nothing may follow.
+    /// Returns the complete body; no calls may follow.
     std::string finish();
 
   private:

@@ -7,15 +7,15 @@
 
 namespace panelgate::web {
 
-/// JSON for people and programs, in one line: numbers by number_text(), what is not finite is null.
-/// The one way from a value to a body, an event or a message.
+/// Serializes to one line of JSON: numbers by number_text(), non-finite ones as null. The only way
+/// from a value to a body, event or message.
 std::string json_text(const boost::json::value& value);
-/// A number with more digits than a double has, for json_text() alone: to boost::json it is a text
-/// that no JSON can hold.
+/// Returns a number with more digits than a double, for json_text() only: boost::json sees a string
+/// that no JSON can contain.
 boost::json::value exact_number(std::string_view digits);
-/// Its digits; nothing for any other value.
+/// Returns its digits; nullopt for any other value.
 std::optional<std::string_view> exact_digits(const boost::json::value& value);
-/// A text (UTF-8) for a message: cut where it is long.
+/// Returns a text (UTF-8) for a message, truncated if long.
 std::string excerpt(std::string text);
 
 }  // namespace panelgate::web

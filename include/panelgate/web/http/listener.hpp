@@ -18,37 +18,37 @@ namespace panelgate::web {
 class HttpSession;
 struct Shared;
 
-/// Accepts connections and owns their sessions. Lives in the one thread that runs the executor.
+/// Accepts connections and owns their sessions. Runs in the executor's single thread.
 class HttpListener : public std::enable_shared_from_this<HttpListener> {
   public:
-    /// Throws std::invalid_argument for an `allow` that is none.
+    /// Throws std::invalid_argument for an invalid `allow`.
     HttpListener(boost::asio::any_io_executor executor, std::shared_ptr<const Site> site);
 
-    /// On an error (address in use, not an address…) nothing is open.
+    /// Opens the port. On an error (address in use, invalid address…) nothing is open.
     boost::system::error_code open();
-    /// Serves this from the next request on; what runs ends on the one before. Who may not be
-    /// connected any more gets its answer and is closed, and streams of events end where tokens are
-    /// others: their clients come again. Only with settings.is_same_door().
+    /// Serves `site` from the next request on; running requests finish on the previous one. Clients
+    /// no longer allowed get their reply and are closed; event streams end if tokens changed, and
+    /// their clients reconnect. Requires settings.is_same_door().
     void apply(std::shared_ptr<const Site> site);
-    /// The port that is listened on; 0 before open().
+    /// Returns the bound port; 0 before open().
     std::uint16_t port() const;
     /// Closes the listener and idle connections; running requests are answered, then closed. A
-    /// client has no longer than `reading` to take an answer.
+    /// client has at most `reading` to take a reply.
     void stop(Duration reading);
-    /// Closes everything; answers still owed are not sent.
+    /// Closes everything; outstanding replies are not sent.
     void abandon();
     std::size_t connections() const { return sessions_.size(); }
     const Counters& counters() const;
 
   private:
     void take(boost::asio::ip::tcp::socket socket);
-    /// May it ask only for what is free?
+    /// True if it gets one of the places for probes only.
     bool make_room(const Caller& caller);
 
     std::shared_ptr<Shared> shared_;
     rt::AccessList allowed_;
     rt::Acceptor acceptor_;
-    std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by their callers' ids
+    std::map<std::uint64_t, std::shared_ptr<HttpSession>> sessions_;  ///< by caller id
 };
 
 }  // namespace panelgate::web

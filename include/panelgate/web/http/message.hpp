@@ -18,51 +18,49 @@
 
 namespace panelgate::web {
 
-/// Who asks over one connection. Shared by the session and by what works for it; one thread.
+/// The client of one connection. Shared by the session and its handlers; single-threaded.
 class Caller {
   public:
-    /// `id` is of this connection alone; `address` has no port, "" when it is not known.
+    /// `id` is unique to this connection; `address` has no port, "" if unknown.
     Caller(std::uint64_t id, std::string address) : id_(id), address_(std::move(address)) {}
 
     std::uint64_t id() const { return id_; }
     const std::string& address() const { return address_; }
-    /// What people are told of it: "http 10.0.0.9", "http 10.0.0.9 token ops".
+    /// Returns its display name: "http 10.0.0.9", "http 10.0.0.9 token ops".
     std::string name() const {
         std::string text = "http";
         if (!address_.empty()) text += ' ' + address_;
         if (!token_.empty()) text += " token " + token_;
         return text;
     }
-    /// The name of the token that its request of now carries; "" for none.
+    /// Sets the name of the current request's token; "" for none.
     void uses_token(std::string token) { token_ = std::move(token); }
     const std::string& token() const { return token_; }
-    /// The connection is over: nobody waits for an answer, and what the site is made of may be
-    /// gone.
+    /// True once the connection is over: no reply is wanted, and the site's objects may be gone.
     bool has_left() const { return left_; }
-    /// What is called once when the connection is over. Of several for one `whom` the first counts;
-    /// was this the first? Nothing may be asked of a caller that has left.
+    /// Registers a callback for the connection's end; of several for one `whom` only the first
+    /// counts. True if this is the first. Must not be called on a caller that has left.
     bool at_leaving(const void* whom, std::function<void()> farewell) {
-        return farewells_.emplace(whom, std::move(farewell)).second;
+        return leave_handlers_.emplace(whom, std::move(farewell)).second;
     }
-    void forget(const void* whom) { farewells_.erase(whom); }
-    /// Whoever is to be told when this one leaves is told when the other one does.
-    void hand_over(Caller& to) { to.farewells_.merge(farewells_); }
+    void forget(const void* whom) { leave_handlers_.erase(whom); }
+    /// Moves its callbacks to another caller.
+    void hand_over(Caller& to) { to.leave_handlers_.merge(leave_handlers_); }
     void leave() {
         left_ = true;
         hang_up();
     }
-    /// Nobody waits for an answer, but what has begun is still wanted to its end: nothing that has
-    /// not yet begun is.
+    /// No reply is wanted any more: what has begun is completed, nothing new is started.
     void hang_up() {
         hung_up_ = true;
-        for (const auto& [whom, farewell] : std::exchange(farewells_, {})) farewell();
+        for (const auto& [whom, farewell] : std::exchange(leave_handlers_, {})) farewell();
     }
     bool has_hung_up() const { return hung_up_; }
-    /// Something came, or may have come, of what it asked for: asked again, it could come twice.
+    /// Its request has, or may have, taken effect: repeating it could apply it twice.
     void take_effect() { has_effect_ = true; }
     bool has_effect() const { return has_effect_; }
-    /// A transaction was made for its request of now, by this line. Bounded: the first kMostCosts
-    /// are known.
+    /// A bus transaction made for its current request, by this line. Only the first kMostCosts are
+    /// recorded.
     struct Cost {
         const void* line = nullptr;
         std::uint64_t transaction = 0;
@@ -72,7 +70,7 @@ class Caller {
     void add_cost(const Cost& cost) {
         if (costs_.size() < kMostCosts) costs_.push_back(cost);
     }
-    /// Of its request of now, in their order; the next one begins with none.
+    /// Returns and clears those of the current request, in order.
     std::vector<Cost> take_costs() { return std::exchange(costs_, {}); }
 
   private:
@@ -83,68 +81,68 @@ class Caller {
     bool hung_up_ = false;
     bool has_effect_ = false;
     std::vector<Cost> costs_;
-    std::map<const void*, std::function<void()>> farewells_;
+    std::map<const void*, std::function<void()>> leave_handlers_;
 };
 
-/// A request as handlers see it; nothing of Beast.
+/// A request as seen by handlers, independent of Beast.
 struct HttpRequest {
     std::string method;
     std::string host;                               ///< lower case; empty: HTTP/1.0 without one
-    std::string port;                               ///< of the Host; empty where it names none
+    std::string port;                               ///< of the Host; empty if none
     std::vector<std::string> path;                  ///< segments, percent-decoded
-    std::multimap<std::string, std::string> query;  ///< decoded, repetitions included
-    std::map<std::string, std::string> headers;     ///< those that are read, names in lower case
+    std::multimap<std::string, std::string> query;  ///< decoded, repeated names kept
+    std::map<std::string, std::string> headers;     ///< those read, names in lower case
     std::string body;
-    std::vector<std::string> arguments;  ///< what the route's {} stood for
+    std::vector<std::string> arguments;  ///< segments matched by the route's {}
     std::shared_ptr<Caller> caller;
-    Role role = Role::none;  ///< of whoever asks
+    Role role = Role::none;  ///< of the client
 };
-/// The request headers that anything here looks at; each may come once.
+/// The request headers that are read; each may occur once.
 inline constexpr const char* kHeadersRead[] = {
     "authorization",  "origin",         "content-type",    "content-encoding", "sec-fetch-site",
     "sec-fetch-mode", "sec-fetch-dest", "idempotency-key", "last-event-id"};
-/// … and those that are lists: of several fields the values follow each other (RFC 9110 5.3).
+/// … and list headers: repeated fields are joined (RFC 9110 5.3).
 inline constexpr const char* kListsRead[] = {"accept", "accept-encoding", "if-none-match",
                                              "prefer"};
 
-/// A body that several are sent, so that it is in memory once.
+/// A body shared by several responses, in memory once.
 using SharedText = std::shared_ptr<const std::string>;
 
 struct HttpResponse {
     unsigned status = 200;
     std::string content_type = "application/json";
     std::string body;
-    SharedText shared_body;  ///< not null: sent in place of `body`
-    std::size_t made = 0;    ///< bytes that were packed to make it
-    bool probe = false;      ///< of the program's health: waits for nothing
-    std::vector<std::pair<std::string, std::string>> headers;  ///< further ones
-    /// Not null: there is no body, events follow for as long as the client listens.
+    SharedText shared_body;                                    ///< if set, sent instead of `body`
+    std::size_t made = 0;                                      ///< bytes compressed to make it
+    bool probe = false;                                        ///< a health check: not rate limited
+    std::vector<std::pair<std::string, std::string>> headers;  ///< additional headers
+    /// If set, there is no body: events are streamed while the client listens.
     std::shared_ptr<EventHub::Listener> events;
 };
 
 using Handling = boost::asio::awaitable<HttpResponse>;
 
-/// A path, what may be done there, by whom, and who does it.
+/// A path with its method, required role and handler.
 struct Route {
-    std::string_view verb;     ///< "GET" stands for HEAD, too
-    std::string_view pattern;  ///< {} stands for any one segment
-    Role needed = Role::none;  ///< none: free to all who may connect and call us by our name
+    std::string_view verb;     ///< "GET" includes HEAD
+    std::string_view pattern;  ///< {} matches any one segment
+    Role needed = Role::none;  ///< none: public, but allow list and host name still apply
     std::function<Handling(HttpRequest)> handler;
-    std::vector<std::string_view> queries{};  ///< that it understands; any other is refused
-    bool probe = false;  ///< answered to any name, with any query, and when all else is barred
+    std::vector<std::string_view> queries{};  ///< supported; any other is refused
+    bool probe = false;  ///< answered for any host name and query, even when all else is barred
 };
 
-/// What a server serves. Shared by its sessions; the first route that fits is taken.
+/// What a server serves. Shared by its sessions; the first matching route is used.
 struct Site {
     Settings settings;
-    std::string product;  ///< of the header Server: "name/1.2.3"
+    std::string product;  ///< for the Server header: "name/1.2.3"
     std::vector<Route> routes;
-    std::function<std::uint64_t()> next_caller;  ///< numbers connections
-    std::function<TimePoint()> now;              ///< needed where a route is not free
+    std::function<std::uint64_t()> next_caller;  ///< returns connection ids
+    std::function<TimePoint()> now;              ///< required unless all routes are public
 };
 
-/// One line of the log at info about what a client did or was refused: its name (address, token)
-/// first, as `client`. Texts of the client are cut where they are long.
+/// Logs at info what a client did or was refused: its name (address, token) first, as `client`.
+/// Long texts from the client are truncated.
 void log_client(const Caller& caller, std::string_view event,
                 std::initializer_list<std::pair<std::string_view, std::string>> fields);
 

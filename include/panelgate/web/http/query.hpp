@@ -12,7 +12,7 @@
 
 namespace panelgate::web {
 
-/// The whole text as a number of this base, without sign, or nothing. Number: unsigned.
+/// Parses the whole text as an unsigned number of this base; nullopt on failure.
 template <class Number = unsigned>
 std::optional<Number> to_number(std::string_view text, int base = 10) {
     Number number = 0;
@@ -21,15 +21,15 @@ std::optional<Number> to_number(std::string_view text, int base = 10) {
     return number;
 }
 
-/// 400 for a query that is not one of these, or that is given twice: what was meant nobody knows.
+/// Returns 400 for an unknown or repeated query.
 std::optional<Problem> check_queries(const HttpRequest& request,
                                      std::span<const std::string_view> known);
 
-/// A query value as a whole number in [low, high]; `fallback` when it is not given.
+/// Returns a query value as an integer in [low, high]; `fallback` if absent.
 Parsed<unsigned> query_number(const HttpRequest& request, const std::string& name, unsigned low,
                               unsigned high, unsigned fallback);
 
-/// A query that is true or false; false when it is not given.
+/// Returns a boolean query value; false if absent.
 Parsed<bool> query_flag(const HttpRequest& request, const std::string& name);
 
 }  // namespace panelgate::web

@@ -10,7 +10,7 @@ using ::testing::HasSubstr;
 
 constexpr const char* kRead = "/api/v1/stations/press/holding-registers/1";
 
-/// A server with six places, three of them an address, and two more for probes.
+/// A server with six connections, three per address, and two more for probes.
 class Crowd : public HttpRig {
   protected:
     Crowd() {
@@ -18,14 +18,14 @@ class Crowd : public HttpRig {
         settings.max_connections_per_address = 3;
         settings.probe_places = 2;
     }
-    /// Connections that ask nothing.
+    /// Connections without a request.
     void come(std::size_t count) {
         for (std::size_t i = 0; i < count; ++i) {
             crowd.push_back(connect());
             io.poll();
         }
     }
-    /// All places of the address have a request that is not answered.
+    /// Fills all connections of the address with unanswered requests.
     void keep_busy() {
         bus.script = [](const bus::Request&) { return std::nullopt; };
         for (std::size_t i = 0; i < settings.max_connections_per_address; ++i) {

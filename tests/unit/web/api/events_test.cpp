@@ -31,8 +31,8 @@ class ApiEvents : public HttpRig {
     void tell(EventTopic topic, std::string_view json) {
         if (events.announce(topic.type)) events.publish(std::move(topic), json);
     }
-    /// What a listener of this query is sent when press's point, press, an unlisted station and
-    /// floor2 have had an event each.
+    /// The events that a listener with this query gets when press's point, press, an unlisted
+    /// station and floor2 have had one event each.
     std::string told(const std::string& query) {
         Client client = connect();
         client.send("GET /api/v1/events?" + query + " HTTP/1.1\r\nHost: x\r\n\r\n");

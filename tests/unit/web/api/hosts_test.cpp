@@ -5,7 +5,7 @@
 namespace panelgate::web {
 namespace {
 
-/// What a browser or a script writes, whole.
+/// A whole request, as a browser or a script sends it.
 class Hosts : public HttpRig {
   protected:
     Reply say(const std::string& text) {

@@ -58,7 +58,7 @@ inline profile::PanelProfile test_profile() {
     return profile;
 }
 
-/// The same text for everybody; `null` when it is told so.
+/// Serves the same text to all callers, or null if `text` is null.
 class FixedMetrics final : public MetricsSource {
   public:
     explicit FixedMetrics(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
@@ -66,7 +66,7 @@ class FixedMetrics final : public MetricsSource {
     void scrape(std::uint64_t caller, bool gzip, Handler handler) override {
         waiting[caller] = std::move(handler);
         asked_gzip = gzip;
-        if (!held) hand_over(caller, text);
+        if (!deferred) hand_over(caller, text);
     }
     void cancel(std::uint64_t caller) override {
         ++cancelled;
@@ -75,7 +75,7 @@ class FixedMetrics final : public MetricsSource {
 
     SharedText text = std::make_shared<const std::string>("up 1\n");
     std::map<std::uint64_t, Handler> waiting;
-    bool held = false;  ///< nobody gets anything yet
+    bool deferred = false;  ///< true: answers wait
     bool asked_gzip = false;
     int cancelled = 0;
 
@@ -87,9 +87,8 @@ class FixedMetrics final : public MetricsSource {
     boost::asio::any_io_executor executor_;
 };
 
-/// A server on loopback with a line floor1: press (31, with test_profile), meter (5, read-only, of
-/// which nobody knows what panel it is). Line floor2 has the same bus and refuses unlisted
-/// stations.
+/// A server on loopback with line floor1: press (31, with test_profile) and meter (5, read-only,
+/// panel type unknown). Line floor2 has the same bus and refuses unlisted stations.
 class HttpRig : public ::testing::Test {
   protected:
     HttpRig() : bus(io.get_executor()), panel(test_profile()) {
@@ -111,7 +110,7 @@ class HttpRig : public ::testing::Test {
         io.poll();
     }
 
-    /// The rig's own, which tests change.
+    /// The rig's own directory, which tests change.
     std::shared_ptr<const Directory> shown() const { return {std::shared_ptr<void>(), &directory}; }
     void add_meter() {
         StationEntry meter;

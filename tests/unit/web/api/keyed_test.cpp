@@ -8,14 +8,14 @@ using ::testing::HasSubstr;
 
 class Keys : public ::testing::Test {
   protected:
-    enum class Said { fresh, answer, in_flight, other, full };
-    Said begin(const std::string& client, const std::string& key, std::uint64_t request = 1) {
+    enum class Outcome { fresh, answer, in_flight, other, full };
+    Outcome begin(const std::string& client, const std::string& key, std::uint64_t request = 1) {
         const auto begun = book.begin(now, {client, key}, request, std::make_shared<Caller>(1, ""));
-        if (std::holds_alternative<KeyBook::Fresh>(begun)) return Said::fresh;
+        if (std::holds_alternative<KeyBook::Fresh>(begun)) return Outcome::fresh;
         const auto* refused = std::get_if<Problem>(&begun);
-        if (refused == nullptr) return Said::answer;
-        if (refused->status == 409) return Said::in_flight;
-        return refused->status == 422 ? Said::other : Said::full;
+        if (refused == nullptr) return Outcome::answer;
+        if (refused->status == 409) return Outcome::in_flight;
+        return refused->status == 422 ? Outcome::other : Outcome::full;
     }
     void end(const std::string& client, const std::string& key) {
         HttpResponse answer;
@@ -30,45 +30,45 @@ class Keys : public ::testing::Test {
 };
 
 TEST_F(Keys, AreOfOneRequestOfOneClient) {
-    EXPECT_EQ(begin("a", "k"), Said::fresh);
-    EXPECT_EQ(begin("a", "k"), Said::in_flight);
-    EXPECT_EQ(begin("b", "k"), Said::fresh);
+    EXPECT_EQ(begin("a", "k"), Outcome::fresh);
+    EXPECT_EQ(begin("a", "k"), Outcome::in_flight);
+    EXPECT_EQ(begin("b", "k"), Outcome::fresh);
     end("a", "k");
-    EXPECT_EQ(begin("a", "k"), Said::answer);
-    EXPECT_EQ(begin("a", "k", 2), Said::other);
-    EXPECT_EQ(begin("b", "k"), Said::in_flight);
+    EXPECT_EQ(begin("a", "k"), Outcome::answer);
+    EXPECT_EQ(begin("a", "k", 2), Outcome::other);
+    EXPECT_EQ(begin("b", "k"), Outcome::in_flight);
 }
 
 TEST_F(Keys, AreForgottenWhenTheirTimeIsOverAndNotBefore) {
     begin("a", "k");
     end("a", "k");
     now += 10min - 1ns;
-    EXPECT_EQ(begin("a", "k"), Said::answer);
+    EXPECT_EQ(begin("a", "k"), Outcome::answer);
     now += 1ns;
-    EXPECT_EQ(begin("a", "k", 2), Said::fresh);
+    EXPECT_EQ(begin("a", "k", 2), Outcome::fresh);
     EXPECT_EQ(book.size(), 1u);
 }
 
 TEST_F(Keys, OfWhatHadNoEffectMayBeUsedAgain) {
     begin("a", "k");
     book.drop({"a", "k"});
-    EXPECT_EQ(begin("a", "k", 2), Said::fresh);
+    EXPECT_EQ(begin("a", "k", 2), Outcome::fresh);
 }
 
 TEST_F(Keys, OfOneClientLeaveRoomForOthers) {
-    for (const char* key : {"1", "2", "3"}) EXPECT_EQ(begin("a", key), Said::fresh);
-    EXPECT_EQ(begin("a", "4"), Said::full);
-    EXPECT_EQ(begin("b", "4"), Said::fresh);
-    EXPECT_EQ(begin("c", "4"), Said::full);
+    for (const char* key : {"1", "2", "3"}) EXPECT_EQ(begin("a", key), Outcome::fresh);
+    EXPECT_EQ(begin("a", "4"), Outcome::full);
+    EXPECT_EQ(begin("b", "4"), Outcome::fresh);
+    EXPECT_EQ(begin("c", "4"), Outcome::full);
     book.drop({"a", "1"});
-    EXPECT_EQ(begin("c", "4"), Said::fresh);
+    EXPECT_EQ(begin("c", "4"), Outcome::fresh);
 }
 
 TEST_F(Keys, AreBoundedByTheBytesOfTheirAnswersToo) {
     for (const char* key : {"1", "2", "3"}) begin("a", key), end("a", key);
-    EXPECT_EQ(begin("b", "4"), Said::full);
+    EXPECT_EQ(begin("b", "4"), Outcome::full);
     now += 10min;
-    EXPECT_EQ(begin("b", "4"), Said::fresh);
+    EXPECT_EQ(begin("b", "4"), Outcome::fresh);
 }
 
 TEST_F(Keys, TheirWorkersLeaveWhenTheyAreDismissed) {
@@ -146,7 +146,7 @@ TEST_F(ApiKeyed, AKeyUnderWayIsAConflict) {
 
 TEST_F(ApiKeyed, P2WhoComesBackForALostAnswerGetsIt) {
     bus.script = [](const bus::Request&) { return std::nullopt; };
-    bus.completes_on_cancel = false;  // it is on the wire
+    bus.completes_on_cancel = false;  // the request is on the wire
     {
         Client lost = connect();
         lost.send(raw_put("k"));

@@ -156,7 +156,7 @@ TEST_F(ApiLines, AListOfManyStationsLetsOthersHaveTheirTurn) {
     const Reply reply = client.receive();
     EXPECT_EQ(reply.at("stations").as_array().size(), 1001u);
     EXPECT_GT(std::exchange(turns, 10'000u), 30u);
-    io.poll();  // the turn that waits is the last
+    io.poll();  // the pending turn is the last
 }
 
 TEST_F(ApiLines, AListWhoseCallerLeavesIsNotMadeToItsEnd) {

@@ -25,9 +25,9 @@ TEST_F(LoginAttempts, AreCountedAndLoggedWhenTheyFail) {
     const rt::LogTap log;
     EXPECT_EQ(status("right"), 200u);
     EXPECT_EQ(status("wrong"), 401u);
-    EXPECT_EQ(get("/api/v1/lines").status(), 401u);       // nobody tried
-    EXPECT_EQ(status("wrong", "/healthz"), 200u);         // nobody looks
-    EXPECT_EQ(status("wrong", "/api/v1/nothing"), 404u);  // nobody looks
+    EXPECT_EQ(get("/api/v1/lines").status(), 401u);       // no token was sent
+    EXPECT_EQ(status("wrong", "/healthz"), 200u);         // the token is not checked
+    EXPECT_EQ(status("wrong", "/api/v1/nothing"), 404u);  // the token is not checked
     EXPECT_EQ(ask("GET", "/api/v1/lines", "", "Authorization: Basic b3BzOnJpZ2h0\r\n").status(),
               401u)
         << "no token, no guess";

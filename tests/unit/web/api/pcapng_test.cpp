@@ -1,4 +1,4 @@
-// The files are held against the format byte by byte: draft-ietf-opsawg-pcapng.
+// The files are compared with the format byte by byte: draft-ietf-opsawg-pcapng.
 #include "pcapng.hpp"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ struct Block {
     std::uint32_t type = 0;
     std::string body;
 };
-/// Fails where a block has no good length.
+/// Fails if a block has a wrong length.
 std::vector<Block> blocks_of(std::string_view file) {
     std::vector<Block> blocks;
     while (!file.empty()) {
@@ -47,7 +47,7 @@ std::vector<Block> blocks_of(std::string_view file) {
 }
 
 using Options = std::vector<std::pair<std::uint32_t, std::string>>;
-/// Those behind the fixed part; each is padded with zeros, and the last one ends them.
+/// The options after the fixed part; each is padded with zeros, and the last one ends them.
 Options options_of(std::string_view body, std::size_t from) {
     Options options;
     for (std::size_t at = from; at + 4 <= body.size();) {

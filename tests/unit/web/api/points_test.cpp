@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 constexpr const char* kOil = "/api/v1/stations/press/points/oil";
 
-/// press has a point oil (UW7, writable, 0 to 100) and a point serial that only reads.
+/// press has a point oil (UW7, writable, 0 to 100) and a read-only point serial.
 class ApiPoints : public HttpRig {
   protected:
     ApiPoints() {

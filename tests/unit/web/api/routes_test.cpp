@@ -34,7 +34,7 @@ struct RoleCase {
     Role anonymous;
     const char* token;
     unsigned read;
-    unsigned write;  ///< 200 stands for what the request gives when it may
+    unsigned write;  ///< 200: whatever the request returns when it is allowed
 };
 class AccessMatrix : public Access, public ::testing::WithParamInterface<RoleCase> {};
 

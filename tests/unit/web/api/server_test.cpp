@@ -138,7 +138,7 @@ TEST_F(WebServer, P2ForgetsTheRequestsOfAClientThatIsReset) {
     bus.script = [](const bus::Request&) { return std::nullopt; };
     Client client = connect();
     const std::string ask = std::string("GET ") + kRead + " HTTP/1.1\r\nHost: x\r\n\r\n";
-    client.send(ask + ask);  // what is unread hides nothing
+    client.send(ask + ask);  // unread input hides nothing
     while (bus.open() == 0) io.run_one();
     client.socket().set_option(boost::asio::socket_base::linger(true, 0));
     client.socket().close();
@@ -334,7 +334,7 @@ TEST_F(WebServer, RefusesMetricsWhenTooManyAreUnderWay) {
 }
 
 TEST_F(WebServer, TellsTheMetricsOfACallerThatLeaves) {
-    metrics.held = true;
+    metrics.deferred = true;
     {
         Client client = connect();
         client.send("GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n");

@@ -41,7 +41,7 @@ TEST(StationPath, TakesAnAddressInDecimalOrHex) {
     }
 }
 
-/// A line floor1 with press (31; words UW to 999) and whoever else is asked for.
+/// Line floor1 with press (31; words UW to 999) and the given further stations.
 class Paths : public ::testing::Test {
   protected:
     Paths() : bus(io.get_executor()) {

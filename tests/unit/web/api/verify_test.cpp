@@ -33,7 +33,7 @@ TEST(Verification, OfAMaskLooksAtItsBitsOnly) {
     EXPECT_FALSE(bit.holds(std::vector<std::uint16_t>{0xfff0}));
 }
 
-/// Panels that keep what is written to them: registers by station and address.
+/// Panels that store what is written to them: registers by station and address.
 class ApiVerify : public HttpRig {
   protected:
     ApiVerify() {

@@ -23,17 +23,17 @@ HttpRequest asking(const std::string& authorization, const std::string& method =
     return request;
 }
 
-/// The status of the refusal; 0: it may.
+/// Returns the status of the refusal; 0 if allowed.
 unsigned refusal(const HttpRequest& request, Role needed, Role anonymous) {
     const auto refused = check_access(request, needed, with_tokens(anonymous));
     return refused ? refused->status : 0;
 }
 
-TEST(Access, AsksNobodyForWhatEverybodyMay) {
+TEST(Access, NeedsNoTokenForPublicRoutes) {
     EXPECT_EQ(refusal(asking("Bearer wrong"), Role::none, Role::none), 0u);
 }
 
-TEST(Access, GivesWhoHasNoTokenTheAnonymousRole) {
+TEST(Access, GivesARequestWithoutATokenTheAnonymousRole) {
     EXPECT_EQ(refusal(asking(""), Role::viewer, Role::none), 401u);
     EXPECT_EQ(refusal(asking(""), Role::viewer, Role::viewer), 0u);
     EXPECT_EQ(refusal(asking(""), Role::operator_, Role::viewer), 401u);
@@ -47,7 +47,7 @@ TEST(Access, GivesATokenItsOwnRoleEvenWhereAnonymousMayDoMore) {
     EXPECT_EQ(refusal(asking("Bearer wrong"), Role::viewer, Role::operator_), 401u);
 }
 
-TEST(Access, TellsTheRoleOfWhoAsks) {
+TEST(Access, ReturnsTheRoleOfTheClient) {
     const Settings settings = with_tokens(Role::viewer);
     EXPECT_EQ(role_of(asking(""), settings), Role::viewer);
     EXPECT_EQ(role_of(asking("Bearer let-me"), settings), Role::operator_);

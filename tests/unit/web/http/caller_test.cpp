@@ -5,7 +5,7 @@
 namespace panelgate::web {
 namespace {
 
-TEST(Caller, TellsWhoeverWorksForItOnceThatItHasLeft) {
+TEST(Caller, NotifiesEachHandlerOnceThatItHasLeft) {
     Caller caller(7, "10.0.0.7");
     int first = 0;
     int second = 0;

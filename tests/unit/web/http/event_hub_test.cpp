@@ -19,7 +19,7 @@ EventFilter of_type(const std::string& type) {
     return filter;
 }
 
-/// A hub of the epoch "a"; what happens there is announced first, as it has to be.
+/// A hub with epoch "a"; announces each event before publishing it.
 class EventHubTest : public testing::Test {
   protected:
     bool tell(EventTopic topic, std::string_view json = "{}") {
@@ -30,7 +30,7 @@ class EventHubTest : public testing::Test {
     bool tell(const std::string& type, std::string_view json = "{}") {
         return tell(EventTopic{type, "floor1", "press", {}}, json);
     }
-    /// One that has had its opening.
+    /// Returns a listener whose opening was read.
     std::shared_ptr<EventHub::Listener> listen(EventFilter filter = {}) {
         auto listener = hub.listen(std::move(filter));
         listener->take();
@@ -59,13 +59,13 @@ TEST_F(EventHubTest, GivesEachListenerWhatItWants) {
     EXPECT_EQ(all->take(), "");
 }
 
-TEST_F(EventHubTest, TellsANewListenerWhereItBeginsAndWhenToComeAgain) {
+TEST_F(EventHubTest, SendsANewListenerItsPositionAndRetryTime) {
     EXPECT_EQ(hub.listen({})->take(), "retry: 2000\nid: a-0\n\n");
     tell("point");
     EXPECT_EQ(hub.listen({})->take(), "retry: 2000\nid: a-1\n\n");
 }
 
-TEST_F(EventHubTest, GivesWhoComesBackWhatItHasMissed) {
+TEST_F(EventHubTest, GivesAReturningListenerWhatItHasMissed) {
     const auto stays = listen();
     for (int i = 0; i < 3; ++i) tell("point");
     EXPECT_EQ(hub.listen({}, "a-1")->take(),
@@ -75,26 +75,26 @@ TEST_F(EventHubTest, GivesWhoComesBackWhatItHasMissed) {
     EXPECT_EQ(hub.listen({}, "a-3")->take(), "retry: 2000\n\n");
 }
 
-TEST_F(EventHubTest, KeepsWhatHappensWhileNobodyListensForWhoeverComesBack) {
+TEST_F(EventHubTest, KeepsEventsForAReturningListener) {
     listen();
     EXPECT_TRUE(tell("point", R"({"a":1})"));
     EXPECT_THAT(hub.listen({}, "a-0")->take(), HasSubstr(R"(data: {"a":1})"));
 }
 
-TEST_F(EventHubTest, MakesNothingForNobody) {
+TEST_F(EventHubTest, MakesNothingWithoutListeners) {
     EXPECT_FALSE(tell("point"));
     listen();
     for (std::size_t i = 0; i < EventHub::kKept; ++i) EXPECT_TRUE(tell("point"));
     EXPECT_FALSE(tell("point"));
     EXPECT_TRUE(tell("station")) << "what is rare is kept for longer";
-    // Exactly that many have gone, and this is told.
+    // Exactly that many were lost, and reported.
     const auto back = hub.listen(of_type("point"), "a-0");
     EXPECT_EQ(back->take(), "retry: 2000\n\nevent: lost\ndata: {\"events\":" +
                                 std::to_string(EventHub::kKept + 1) + ",\"exact\":false}\n\n");
     EXPECT_TRUE(tell("point"));
 }
 
-TEST_F(EventHubTest, TellsASlowListenerHowMuchItHasLost) {
+TEST_F(EventHubTest, ReportsToASlowListenerHowMuchItHasLost) {
     const auto slow = listen();
     const auto other = listen(of_type("line"));
     for (std::size_t i = 0; i < EventHub::kKept + 3; ++i) tell("point");
@@ -122,7 +122,7 @@ TEST_F(EventHubTest, AChattyTypeDrivesOutNoRareOne) {
     EXPECT_EQ(slow->take(), "id: a-1\nevent: station\ndata: {}\n\n");
 }
 
-TEST_F(EventHubTest, SaysHowMuchIsBeyondTheRing) {
+TEST_F(EventHubTest, ReportsHowMuchIsBeyondTheRing) {
     const auto stays = listen();
     for (std::size_t i = 0; i < EventHub::kKept + 10; ++i) tell("point");
     const std::string text = hub.listen(of_type("point"), "a-2")->take();
@@ -171,7 +171,7 @@ TEST_F(EventHubTest, HandsOutMuchInPieces) {
     const std::string some(1000, ' ');
     for (int i = 0; i < 200; ++i) tell("point", some);
     const std::string first = listener->take();
-    EXPECT_LT(first.size(), EventHub::kTaken + 2000);
+    EXPECT_LT(first.size(), EventHub::kTakeBytes + 2000);
     std::string all = first;
     for (std::string more = listener->take(); !more.empty(); more = listener->take()) all += more;
     EXPECT_THAT(all, HasSubstr("id: a-200\n"));
@@ -181,7 +181,7 @@ TEST_F(EventHubTest, ALongWayWithoutAnythingWantedIsGoneInPieces) {
     const auto stays = listen();
     EventFilter of_oven;
     of_oven.stations = {{"floor1", "oven"}};
-    for (std::size_t i = 0; i < 2 * EventHub::kLookedAt; ++i) tell("point");
+    for (std::size_t i = 0; i < 2 * EventHub::kTakeExamined; ++i) tell("point");
     tell(EventTopic{"point", "floor1", "oven", ""});
     const auto back = hub.listen(of_oven, "a-0");
     EXPECT_EQ(back->take(), "retry: 2000\n\n");

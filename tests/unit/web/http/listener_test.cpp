@@ -15,7 +15,7 @@ namespace {
 
 using test::Client;
 
-/// Tells who asks.
+/// Replies with the client's name.
 Handling whoami(HttpRequest request) {
     HttpResponse response;
     response.content_type = "text/plain";
@@ -23,7 +23,7 @@ Handling whoami(HttpRequest request) {
     co_return response;
 }
 
-/// A site of one path that has nothing to do with panels.
+/// A site with a single path, unrelated to panels.
 class HttpServer : public ::testing::Test {
   protected:
     HttpServer() {
@@ -69,7 +69,7 @@ TEST_F(HttpServer, NumbersConnectionsAndNotRequests) {
     EXPECT_EQ(listener->connections(), 2u);
 }
 
-TEST_F(HttpServer, TellsThatACallerHasLeft) {
+TEST_F(HttpServer, ReportsThatACallerHasLeft) {
     {
         Client client(io, listener->port());
         client.ask("GET", "/whoami");

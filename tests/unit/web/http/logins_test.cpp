@@ -20,12 +20,12 @@ class LoginsTest : public ::testing::Test {
     TimePoint now{1h};
 };
 
-TEST_F(LoginsTest, HoldUpNobodyForAFewMistakes) {
+TEST_F(LoginsTest, ThrottleNoAddressForAFewMistakes) {
     fail(settings.free);
     EXPECT_FALSE(held());
 }
 
-TEST_F(LoginsTest, HoldUpAnAddressThatGuesses) {
+TEST_F(LoginsTest, ThrottleAnAddressThatGuesses) {
     fail(settings.free + 1);
     EXPECT_EQ(logins.hold(now, "a"), settings.hold);
     EXPECT_FALSE(held("b"));
@@ -35,7 +35,7 @@ TEST_F(LoginsTest, LookAtAnAddressThatGuessesNoFasterThanItsGuessesAreAnswered) 
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
     fail(settings.free + 1);
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero()) << "the first is looked at at once";
-    const Duration pause = Duration(1s) / settings.a_second;
+    const Duration pause = Duration(1s) / settings.checks_per_second;
     EXPECT_EQ(logins.turn(now, "a"), pause);
     EXPECT_EQ(logins.turn(now, "a"), 2 * pause) << "whether the one before has hung up or not";
     for (int i = 0; i < 1000; ++i) EXPECT_LE(logins.turn(now, "a"), settings.longest_turn);
@@ -44,13 +44,13 @@ TEST_F(LoginsTest, LookAtAnAddressThatGuessesNoFasterThanItsGuessesAreAnswered) 
     EXPECT_EQ(logins.turn(now, "a"), Duration::zero());
 }
 
-TEST_F(LoginsTest, LeaveTurnsForWhatIsRightAmongFortyWhoGuessWithoutPause) {
+TEST_F(LoginsTest, LeaveTurnsForRightTokensAmongFortyGuessers) {
     fail(settings.remembered);
-    const auto held = settings.hold / (Duration(1s) / settings.a_second);
+    const auto held = settings.hold / (Duration(1s) / settings.checks_per_second);
     EXPECT_GT(held, 40 + 10) << "so many turns pass while each of them waits for its answer";
 }
 
-TEST_F(LoginsTest, ARightTokenTakesNobodysTurn) {
+TEST_F(LoginsTest, ARightTokenUsesUpNoTurn) {
     fail(settings.free + 10);
     for (int i = 0; i < 5; ++i) {
         EXPECT_EQ(logins.turn(now, "a"), Duration::zero());

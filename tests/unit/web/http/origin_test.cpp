@@ -14,7 +14,7 @@ class Origin : public ::testing::Test {
         request.method = "GET";
         request.host = "gateway";
     }
-    /// The status of the refusal; 0: it may.
+    /// Returns the status of the refusal; 0 if allowed.
     unsigned refusal() const {
         Settings settings;
         settings.hosts = {"gateway"};

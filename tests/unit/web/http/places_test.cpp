@@ -17,7 +17,7 @@ class PlacesTest : public ::testing::Test {
         settings.max_connections = 3;
         settings.max_connections_per_address = 2;
         settings.max_streams_per_address = 2;
-        settings.max_held = 2;
+        settings.max_throttled = 2;
         settings.probe_places = 2;
         places.emplace(settings);
     }
@@ -38,7 +38,7 @@ TEST_F(PlacesTest, HasRoomUpToItsLimit) {
     }
 }
 
-TEST_F(PlacesTest, TakesThePlaceOfWhoHasBeenIdleForLongest) {
+TEST_F(PlacesTest, TakesThePlaceOfTheLongestIdleOne) {
     come(1, "a");
     come(2, "b");
     come(3, "c");
@@ -58,7 +58,7 @@ TEST_F(PlacesTest, LetsAnAddressWithManyConnectionsDisplaceOnlyItsOwn) {
     EXPECT_FALSE(arrival.probes_only);
 }
 
-TEST_F(PlacesTest, DisplacesNobodyWhoHasARequest) {
+TEST_F(PlacesTest, DisplacesNoneThatHasARequest) {
     fill_and_keep_busy();
     for (const auto& arrival : {come(4, "a"), come(5, "c")}) {
         EXPECT_TRUE(arrival.probes_only);
@@ -73,7 +73,7 @@ TEST_F(PlacesTest, GivesThePlaceOfAWrongTokenAndLeavesItItsConnection) {
     come(2, "a");
     for (const Id id : {1u, 2u}) places->busy(id);
     places->wrong(2);
-    EXPECT_TRUE(places->is_held(2));
+    EXPECT_TRUE(places->is_throttled(2));
     const auto arrival = come(3, "a");
     EXPECT_FALSE(arrival.leaves);
     EXPECT_FALSE(arrival.probes_only);
@@ -81,13 +81,13 @@ TEST_F(PlacesTest, GivesThePlaceOfAWrongTokenAndLeavesItItsConnection) {
     EXPECT_TRUE(come(4, "a").probes_only) << "the place is taken once";
 }
 
-TEST_F(PlacesTest, HoldsSoManyWrongTokensOfAnAddressAndThenLetsTheFirstOfThemGo) {
+TEST_F(PlacesTest, ThrottlesALimitedNumberPerAddressAndThenDropsTheOldest) {
     for (const Id id : {1u, 2u}) {
         come(id, "a");
         places->wrong(id);
     }
     EXPECT_EQ(come(3, "a").leaves, 1u);
-    EXPECT_FALSE(places->is_held(1));
+    EXPECT_FALSE(places->is_throttled(1));
     places->wrong(3);
     EXPECT_FALSE(come(4, "b").leaves);
 }
@@ -128,7 +128,7 @@ TEST_F(PlacesTest, HasAlwaysAPlaceForAProbe) {
     }
 }
 
-TEST_F(PlacesTest, HasThePlaceAgainOfWhoLeft) {
+TEST_F(PlacesTest, ReusesThePlaceOfAClosedConnection) {
     fill_and_keep_busy();
     places->leave(1);
     EXPECT_FALSE(come(4, "a").probes_only);
@@ -139,8 +139,8 @@ TEST_F(PlacesTest, HasThePlaceAgainOfWhoLeft) {
     EXPECT_TRUE(come(5, "a").probes_only);
 }
 
-/// A proxy is one address, and a tab holds a stream all day.
-TEST_F(PlacesTest, WhoStreamsEventsTakesNoPlaceOfItsAddress) {
+/// A proxy is one address, and each tab keeps a stream open all day.
+TEST_F(PlacesTest, AnEventStreamTakesNoPlaceOfItsAddress) {
     for (Id id = 1; id <= 2; ++id) {
         come(id, "a");
         places->busy(id);

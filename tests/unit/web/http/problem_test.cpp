@@ -9,7 +9,7 @@
 namespace panelgate::web {
 namespace {
 
-TEST(Problem, IsToldAsRfc9457HasIt) {
+TEST(Problem, IsFormattedAsInRfc9457) {
     const HttpResponse response = to_response(problem(404, "there is no line 'x'"));
     EXPECT_EQ(response.status, 404u);
     EXPECT_EQ(response.content_type, "application/problem+json");

@@ -28,7 +28,7 @@ TEST(Query, GivesAValueWithinItsBounds) {
     EXPECT_FALSE(query_number(request, "last", 0, 10, 5));
 }
 
-TEST(Query, WhatNobodyKnowsOrIsGivenTwiceIsRefused) {
+TEST(Query, UnknownAndRepeatedQueriesAreRefused) {
     const std::string_view known[] = {"count", "type"};
     HttpRequest request;
     EXPECT_FALSE(check_queries(request, {}));

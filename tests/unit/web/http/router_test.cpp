@@ -14,7 +14,7 @@
 namespace panelgate::web {
 namespace {
 
-/// Answers with its name and what the pattern's {} stood for.
+/// Replies with its name and the segments matched by the pattern's {}.
 Handling echo(std::string name, HttpRequest request) {
     HttpResponse response;
     response.body = std::move(name);
@@ -94,7 +94,7 @@ TEST_F(Router, AsksForTheRoleOfTheRouteAndOnlyThen) {
     EXPECT_EQ(ask("PUT", {"b"}).status, 404u);
 }
 
-TEST_F(Router, TellsWhatAPathCanBeAsked) {
+TEST_F(Router, ReturnsTheMethodsOfAPath) {
     add("GET", "/a/{}", Role::viewer);
     add("PUT", "/a/{}", Role::operator_);
     add("POST", "/b");
@@ -108,7 +108,7 @@ TEST_F(Router, TellsWhatAPathCanBeAsked) {
     EXPECT_EQ(ask("OPTIONS", {"c"}).status, 404u);
 }
 
-TEST_F(Router, AnswersOnlyProbesToWhoIsBarred) {
+TEST_F(Router, AnswersABarredClientOnlyProbes) {
     add("GET", "/healthz");
     site.routes.back().probe = true;
     add("GET", "/page");
