@@ -11,7 +11,7 @@ deploy/install_packages.sh build run try
 say "2/3 building (the first time takes some minutes)"
 log=build/demo-build.log
 mkdir -p build
-if ! { cmake --preset release && cmake --build --preset release --target panelgate; } >$log 2>&1; then
+if ! { cmake --preset release -DPANELGATE_UNITY=ON && cmake --build --preset release --target panelgate; } >$log 2>&1; then
     tail -n 30 $log >&2
     echo "demo: the build failed, all of it is in $PWD/$log" >&2
     exit 1

@@ -1,14 +1,17 @@
 #!/usr/bin/env bash
-# tests/run.sh [--quick]: installs what is missing, builds, runs every test, says what was seen.
-# --quick leaves out the second build with AddressSanitizer and UndefinedBehaviorSanitizer.
+# tests/run.sh [--quick | --nightly]: installs what is missing, builds, tests, says what was seen.
+# Two builds: what users get runs the system tests, the scenarios and the explorer; the one with
+# AddressSanitizer and UndefinedBehaviorSanitizer the unit tests, shorter scenarios, the fuzzers' replays and
+# a system test of each face. --quick: the first build alone, with the unit tests. --nightly: all of it in
+# both, and what needs real time to prove what the scenarios prove in virtual time.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/.."
 
-quick=no
+mode=usual
 case "${1-}" in
     "") ;;
-    --quick) quick=yes ;;
-    *) echo "usage: tests/run.sh [--quick]" >&2; exit 64 ;;
+    --quick | --nightly) mode=${1#--} ;;
+    *) echo "usage: tests/run.sh [--quick | --nightly]" >&2; exit 64 ;;
 esac
 
 logs=$PWD/build/test-logs
@@ -44,8 +47,12 @@ must() {
     failed=$before
 }
 
-build() { cmake --preset "$1" -DPANELGATE_TEST_PCH=ON -DPANELGATE_WERROR=ON && cmake --build --preset "$1"; }
-run_tests() { env "${@:2}" ctest --preset "$1" -j "$jobs"; }
+# build PRESET UNIT_TESTS
+build() {
+    cmake --preset "$1" -DPANELGATE_UNIT_TESTS="$2" -DPANELGATE_UNITY=ON -DPANELGATE_TEST_PCH=ON \
+        -DPANELGATE_WERROR=ON && cmake --build --preset "$1"
+}
+run_tests() { ctest --preset "$1" -j "$jobs" "${@:2}"; }
 check_format() {
     find src include tests -name '*.[ch]pp' -print0 | xargs -0 clang-format-19 --dry-run -Werror
 }
@@ -65,13 +72,18 @@ finish() {
 
 must "packages" deploy/install_packages.sh build run test try
 step "format" check_format
-must "build release" build release
+units=OFF
+[ $mode = usual ] || units=ON
+which=(-LE nightly)
+[ $mode != nightly ] || which=()
+must "build release" build release $units
 step "headers stand alone" cmake --build --preset release --target all_verify_interface_header_sets
-step "tests release" run_tests release
+step "tests release" run_tests release "${which[@]}"
 step "deploy/demo.sh" /usr/bin/python3 -B tests/system/demo_script.py
-if [ $quick = no ]; then
-    export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19
-    must "build asan" build asan
-    step "tests asan" run_tests asan PANELGATE_SANITIZED=1
+if [ $mode != quick ]; then
+    export ASAN_SYMBOLIZER_PATH=/usr/bin/llvm-symbolizer-19 PANELGATE_SANITIZED=1
+    [ $mode = nightly ] || which=(-L "unit|scenario|fuzz|sanitized")
+    must "build asan" build asan ON
+    step "tests asan" run_tests asan "${which[@]}"
 fi
 finish

@@ -19,7 +19,7 @@ constexpr const char* kName = "discovery";
 constexpr int kHundred = 100;
 /// The initial timeout of a scan: most panels answer sooner. A slower panel's reply falls into the
 /// next transaction and may or may not be recognized there.
-constexpr Duration kPatience = 100ms;
+constexpr Duration kScanPatience = 100ms;
 
 using Reply = scan::Discovery::Reply;
 
@@ -84,7 +84,7 @@ void LineDiscovery::ask(const scan::ReadRequest& request) {
         .request = *modbus::Request::make(std::move(pdu), modbus::QuantityCheck::wide),
         .client = client_,
         .poll = true,
-        .patience = kPatience,
+        .patience = kScanPatience,
         .search = true};
     asked_ = clock_.now();
     paid_ = used();

@@ -31,12 +31,12 @@ constexpr std::string_view kBlank = " \t";
 
 bool is_one_of(std::string_view set, char c) { return set.find(c) != std::string_view::npos; }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_indent(std::string_view text) {
     return text.substr(std::min(text.find_first_not_of(kBlank), text.size()));
 }
 
 std::string_view without_comment(std::string_view line) {
-    if (trimmed(line).starts_with('#')) return {};
+    if (without_indent(line).starts_with('#')) return {};
     return line.substr(0, line.find(" #"));
 }
 
@@ -52,7 +52,7 @@ std::vector<std::string_view> lines_of(std::string_view text) {
 
 /// The value after a key, without quotes.
 std::string value_in(std::string_view text) {
-    text = trimmed(text);
+    text = without_indent(text);
     const bool quoted = text.starts_with('"') || text.starts_with('\'');
     const std::string_view ends = quoted ? text.substr(0, 1) : std::string_view(" \t,}");
     if (quoted) text.remove_prefix(1);
@@ -76,7 +76,7 @@ std::optional<std::string> in_braces(std::string_view line) {
 std::optional<std::string> in_block(const std::vector<std::string_view>& lines, std::size_t first) {
     std::optional<std::size_t> indent;
     for (std::size_t i = first; i < lines.size(); ++i) {
-        const std::string_view key = trimmed(lines[i]);
+        const std::string_view key = without_indent(lines[i]);
         if (key.empty()) continue;
         const std::size_t here = lines[i].size() - key.size();
         if (here == 0) break;
@@ -95,7 +95,7 @@ std::string http_listen_in(std::string_view text) {
     std::set<std::string> found;
     for (std::size_t i = 0; i < lines.size(); ++i) {
         if (!lines[i].starts_with(kHttp)) continue;
-        const std::string_view rest = trimmed(lines[i].substr(kHttp.size()));
+        const std::string_view rest = without_indent(lines[i].substr(kHttp.size()));
         found.insert((rest.empty() ? in_block(lines, i + 1) : in_braces(rest)).value_or(""));
     }
     return found.size() == 1 ? *found.begin() : "";

@@ -4,11 +4,12 @@
 #include <iterator>
 #include <utility>
 
+#include "rules.hpp"
+
 namespace panelgate::arbiter {
 
 namespace {
 
-constexpr std::uint8_t kBroadcast = 0;
 constexpr auto kWrite = static_cast<std::size_t>(PriorityClass::write);
 constexpr auto kRead = static_cast<std::size_t>(PriorityClass::read);
 constexpr auto kPoll = static_cast<std::size_t>(PriorityClass::poll);

@@ -269,4 +269,10 @@ std::string nearest(std::string_view typed, std::span<const std::string_view> ca
     return std::string(best);
 }
 
+std::string_view trimmed(std::string_view text) {
+    constexpr std::string_view kBlank = " \t";
+    const std::size_t begin = std::min(text.find_first_not_of(kBlank), text.size());
+    return text.substr(begin, text.find_last_not_of(kBlank) + 1 - begin);
+}
+
 }  // namespace panelgate

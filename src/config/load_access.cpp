@@ -63,7 +63,8 @@ namespace {
 using yaml::MapReader;
 using yaml::Node;
 
-/// HTTP headers cannot carry them; in an encoding of two bytes a character every second one may be zero.
+/// HTTP headers cannot carry them; in an encoding of two bytes a character every second one may be
+/// zero.
 bool has_control_character(std::string_view text) {
     return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
 }
@@ -109,21 +110,22 @@ std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
     return secret;
 }
 
-constexpr std::string_view kExample = "{name: ops, role: operator, file: /run/secrets/ops}";
+constexpr std::string_view kTokenExample = "{name: ops, role: operator, file: /run/secrets/ops}";
 
 constexpr std::string_view kInFile =
     "a secret never stands in the configuration: write it to a file that this program alone may "
     "read, and here file: with its path";
-constexpr std::array<yaml::Elsewhere, 4> kElsewhere{{{"token", {}, {}, kInFile},
-                                                     {"secret", {}, {}, kInFile},
-                                                     {"password", {}, {}, kInFile},
-                                                     {"value", {}, {}, kInFile}}};
+constexpr std::array<yaml::Elsewhere, 4> kTokenKeysElsewhere{{{"token", {}, {}, kInFile},
+                                                              {"secret", {}, {}, kInFile},
+                                                              {"password", {}, {}, kInFile},
+                                                              {"value", {}, {}, kInFile}}};
 
 web::Token load_token(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a token", kExample);
-    in.elsewhere(kElsewhere);
+    MapReader in(node, loading.problems, "a token", kTokenExample);
+    in.elsewhere(kTokenKeysElsewhere);
     const bool elsewhere = std::ranges::any_of(node.entries, [](const yaml::Entry& entry) {
-        return std::ranges::find(kElsewhere, entry.key, &yaml::Elsewhere::key) != kElsewhere.end();
+        return std::ranges::find(kTokenKeysElsewhere, entry.key, &yaml::Elsewhere::key) !=
+               kTokenKeysElsewhere.end();
     });
     web::Token token;
     token.name = in.required_text("name").value_or("");

@@ -202,14 +202,14 @@ arbiter::Quarantine load_quarantine(MapReader& in) {
 }
 
 constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}";
-constexpr std::string_view kListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
+constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
 constexpr std::string_view kAtTheTop =
     "it stands at the top of the file, in the column of 'lines', not inside a line";
 
 /// Keys that users write beside `device`.
 constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};
-constexpr std::array<yaml::Elsewhere, 30> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 30> kLineKeysElsewhere{
     {{"baud", "serial", {}},
      {"data_bits", "serial", {}},
      {"parity", "serial", {}, {}, kParities},
@@ -252,7 +252,7 @@ void warn_of_unused_keys(Loading& loading, MapReader& in, const Line& line) {
 
 Line load_line(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a line", kLineExample);
-    in.elsewhere(kElsewhere);
+    in.elsewhere(kLineKeysElsewhere);
     Line line;
     line.name = load_name(in, true).value_or("");
     if (!line.name.empty() && std::ranges::count(loading.config.lines, line.name, &Line::name) > 0)
@@ -307,11 +307,11 @@ bool load_port(Loading& loading, MapReader& in, line::Settings& port, SerialMode
 void refuse_no_lines(Loading& loading, MapReader& root) {
     loading.problems.add(root.mark("lines"),
                          "a configuration needs at least one line in 'lines', such as lines: " +
-                             std::string(kListExample));
+                             std::string(kLineListExample));
 }
 
 void load_lines(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("lines", kListExample);
+    const Node* list = root.sequence("lines", kLineListExample);
     root.needed("lines");
     root.may_be_null("lines", false);
     root.entries("lines", 1, 0);

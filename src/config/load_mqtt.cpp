@@ -16,22 +16,22 @@ namespace {
 
 using yaml::MapReader;
 
-constexpr std::string_view kExample = "{broker: mqtt://HOST:1883, topic: plant/panelgate}";
+constexpr std::string_view kMqttExample = "{broker: mqtt://HOST:1883, topic: plant/panelgate}";
 constexpr std::string_view kBroker = "write it into the broker, such as broker: mqtt://HOST:1883";
 constexpr std::string_view kSecret =
     "a secret never stands in the configuration: write it to a file that this program alone may "
     "read, and here password_file: with its path";
 constexpr std::string_view kTls =
     "write broker: mqtts://HOST:8883; ca, certificate and key stand beside it";
-constexpr std::array<yaml::Elsewhere, 9> kElsewhere{{{"host", {}, {}, kBroker},
-                                                     {"port", {}, {}, kBroker},
-                                                     {"url", {}, {}, kBroker},
-                                                     {"server", {}, {}, kBroker},
-                                                     {"password", {}, {}, kSecret},
-                                                     {"secret", {}, {}, kSecret},
-                                                     {"token", {}, {}, kSecret},
-                                                     {"tls", {}, {}, kTls},
-                                                     {"ssl", {}, {}, kTls}}};
+constexpr std::array<yaml::Elsewhere, 9> kMqttKeysElsewhere{{{"host", {}, {}, kBroker},
+                                                             {"port", {}, {}, kBroker},
+                                                             {"url", {}, {}, kBroker},
+                                                             {"server", {}, {}, kBroker},
+                                                             {"password", {}, {}, kSecret},
+                                                             {"secret", {}, {}, kSecret},
+                                                             {"token", {}, {}, kSecret},
+                                                             {"tls", {}, {}, kTls},
+                                                             {"ssl", {}, {}, kTls}}};
 
 /// Parses "mqtt://HOST:PORT", "mqtts://HOST"; false for anything else.
 bool parse_broker(std::string_view text, mqtt::Settings& settings) {
@@ -182,10 +182,10 @@ void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& setti
 }  // namespace
 
 void load_mqtt(Loading& loading, MapReader& root) {
-    const yaml::Node* node = root.map("mqtt", kExample);
+    const yaml::Node* node = root.map("mqtt", kMqttExample);
     if (node == nullptr) return;
-    MapReader in(*node, loading.problems, "mqtt", kExample);
-    in.elsewhere(kElsewhere);
+    MapReader in(*node, loading.problems, "mqtt", kMqttExample);
+    in.elsewhere(kMqttKeysElsewhere);
     mqtt::Settings settings;
     load_broker(in, settings);
     load_format(in, settings);

@@ -90,8 +90,9 @@ using serial_server::OnFailure;
 using serial_server::Settings;
 using tcp_server::BroadcastMode;
 
-constexpr std::string_view kExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
-constexpr std::string_view kListExample = "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
+constexpr std::string_view kMasterExample = "{name: plc, device: /dev/ttyUSB1, lines: [floor1]}";
+constexpr std::string_view kMasterListExample =
+    "[{name: plc, device: /dev/ttyUSB1, lines: [floor1]}]";
 
 void load_policies(MapReader& in, Settings& settings) {
     constexpr std::array<std::pair<std::string_view, Framing>, 2> kFramings{
@@ -209,13 +210,13 @@ SerialMode mode_of(const Node& master) {
 }
 
 /// Keys that users write as on a line.
-constexpr std::array<yaml::Elsewhere, 2> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 2> kMasterKeysElsewhere{
     {{"mode", {}, {}, "its mode is its framing: write framing: ascii, or leave it out for RTU"},
      {"baud", "serial", {}}}};
 
 Settings load_master(Loading& loading, const Node& node) {
-    MapReader in(node, loading.problems, "a serial master", kExample);
-    in.elsewhere(kElsewhere);
+    MapReader in(node, loading.problems, "a serial master", kMasterExample);
+    in.elsewhere(kMasterKeysElsewhere);
     Settings settings;
     settings.access.diagnostics_unit.reset();
     settings.name = load_name(in, true).value_or("");
@@ -236,7 +237,7 @@ Settings load_master(Loading& loading, const Node& node) {
 }  // namespace
 
 void load_serial_masters(Loading& loading, MapReader& root) {
-    const Node* list = root.sequence("serial_masters", kListExample);
+    const Node* list = root.sequence("serial_masters", kMasterListExample);
     if (list == nullptr) return;
     for (const Node& node : list->items)
         loading.config.serial_masters.push_back(load_master(loading, node));

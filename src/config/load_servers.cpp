@@ -333,7 +333,7 @@ void refuse_tls(MapReader& in) {
 }
 
 /// Keys that users write as for the serial lines of other programs.
-constexpr std::array<yaml::Elsewhere, 5> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 5> kServerKeysElsewhere{
     {{"type", {}, {}, "remove it: serial lines stand in 'lines'"},
      {"method", {}, {}, "remove it: serial lines stand in 'lines'"},
      {"device", {}, "a line, one of 'lines'"},
@@ -342,7 +342,7 @@ constexpr std::array<yaml::Elsewhere, 5> kElsewhere{
 
 tcp_server::Settings load_listener(Loading& loading, const Node& node) {
     MapReader in(node, loading.problems, "a modbus_tcp listener", "{listen: 127.0.0.1:502}");
-    in.elsewhere(kElsewhere);
+    in.elsewhere(kServerKeysElsewhere);
     tcp_server::Settings settings;
     load_listen(in, settings);
     load_access(loading, in, settings);

@@ -203,7 +203,7 @@ StationSettings load_body(Loading& loading, MapReader& in, const LineContext& wo
 }
 
 /// Keys that users write beside `id`.
-constexpr std::array<yaml::Elsewhere, 9> kElsewhere{
+constexpr std::array<yaml::Elsewhere, 9> kStationKeysElsewhere{
     {{"response_timeout", "timing", {}},
      {"frame_gap", "timing", {}},
      {"late_window", "timing", {}},
@@ -216,7 +216,7 @@ constexpr std::array<yaml::Elsewhere, 9> kElsewhere{
 
 Station load_station(Loading& loading, const Node& node, const LineContext& work) {
     MapReader in(node, loading.problems, "a station", "{id: 31, name: press}");
-    in.elsewhere(kElsewhere);
+    in.elsewhere(kStationKeysElsewhere);
     in.has("template");  // known, though apply_templates() has removed it
     Station station;
     station.id = load_id(in, work.line);

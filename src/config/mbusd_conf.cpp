@@ -278,9 +278,9 @@ class Reader {
     void speed() { mbusd_.speed = integer(mbusd_.speed, 50, 4'000'000); }
     void mode() {
         const std::string& typed = line_->value;
-        constexpr std::string_view kParities = "nNeEoO";
+        constexpr std::string_view kParityLetters = "nNeEoO";
         const bool right = typed.size() == 3 && typed[0] == '8' &&
-                           kParities.find(typed[1]) != kParities.npos &&
+                           kParityLetters.find(typed[1]) != kParityLetters.npos &&
                            (typed[2] == '1' || typed[2] == '2');
         if (right)
             mbusd_.mode = typed;

@@ -12,11 +12,11 @@ namespace {
 
 using Kind = RequestLength::Kind;
 
-RequestLength known(std::size_t length) { return {Kind::known, length}; }
+RequestLength known_length(std::size_t length) { return {Kind::known, length}; }
 
 /// Returns `overhead` plus the value of the byte at `count`.
 RequestLength counted(ByteView b, std::size_t count, std::size_t overhead) {
-    return b.size() <= count ? RequestLength{} : known(overhead + b[count]);
+    return b.size() <= count ? RequestLength{} : known_length(overhead + b[count]);
 }
 
 bool is_frame(ByteView b) { return b.size() >= kMinAdu && b.size() <= kMaxRtuAdu && crc_ok(b); }
@@ -50,16 +50,16 @@ RequestLength request_length(ByteView b) {
         case kReadInputRegisters:
         case kWriteSingleCoil:
         case kWriteSingleRegister:
-            return known(kReadRequestAdu);
+            return known_length(kReadRequestAdu);
         case kReadExceptionStatus:
         case kGetCommEventCounter:
         case kGetCommEventLog:
         case kReportServerId:
-            return known(kMinAdu);
+            return known_length(kMinAdu);
         case kDiagnostics:
             if (b.size() < 4) return {};
             return b[2] == 0 && b[3] == 0 ? RequestLength{Kind::by_silence, 0}
-                                          : known(kReadRequestAdu);
+                                          : known_length(kReadRequestAdu);
         case kWriteMultipleCoils:
         case kWriteMultipleRegisters:
             return counted(b, 6, 9);
@@ -67,14 +67,15 @@ RequestLength request_length(ByteView b) {
         case kWriteFileRecord:
             return counted(b, 2, 5);
         case kMaskWriteRegister:
-            return known(10);
+            return known_length(10);
         case kReadWriteMultipleRegisters:
             return counted(b, 10, 13);
         case kReadFifoQueue:
-            return known(6);
+            return known_length(6);
         case kEncapsulatedInterface:
             if (b.size() < 3) return {};
-            return b[2] == kMeiDeviceIdentification ? known(7) : RequestLength{Kind::by_silence, 0};
+            return b[2] == kMeiDeviceIdentification ? known_length(7)
+                                                    : RequestLength{Kind::by_silence, 0};
         default:
             return {Kind::by_silence, 0};
     }
@@ -84,7 +85,7 @@ RequestLength usual_request_length(ByteView frame) {
     constexpr std::size_t kUsual = kReadRequestAdu;
     const bool is_usual =
         frame.size() >= kUsual && frame[1] == kDiagnostics && crc_ok(frame.first(kUsual));
-    return is_usual ? known(kUsual) : request_length(frame);
+    return is_usual ? known_length(kUsual) : request_length(frame);
 }
 
 SerialAdu serial_adu_of(ByteView frame) {

@@ -12,7 +12,6 @@ namespace {
 
 using modbus::Table;
 
-constexpr std::uint32_t kBitsPerWord = 16;
 constexpr unsigned kMostBits = 2040;  // the byte count is one byte: 255 data bytes
 constexpr unsigned kMostWords = 127;
 

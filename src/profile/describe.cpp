@@ -20,7 +20,6 @@ constexpr std::array<std::pair<Table, std::string_view>, 4> kSingular{
      {Table::discrete_inputs, "discrete input"},
      {Table::input_registers, "input register"},
      {Table::holding_registers, "holding register"}}};
-constexpr std::uint32_t kBitsPerWord = 16;
 
 std::string singular(Table table) {
     return std::string(kSingular[static_cast<std::size_t>(table)].second);

@@ -23,8 +23,6 @@ std::string notation_hint(const PanelProfile& profile, std::string_view typed);
 
 namespace {
 
-constexpr unsigned kBitsPerWord = 16;
-
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
 
@@ -189,7 +187,7 @@ bool is_number(std::string_view text) {
     return !text.empty() && text.find_first_not_of(kDigits) == text.npos;
 }
 
-std::optional<std::uint32_t> number(std::string_view text, int base = 10) {
+std::optional<std::uint32_t> parse_number(std::string_view text, int base = 10) {
     std::uint32_t value = 0;
     const char* end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data(), end, value, base);
@@ -277,7 +275,8 @@ std::string reference_hint(const PanelProfile& profile, const std::string& typed
     if (text.size() > 2 && text[1] == 'X' && text[0] != '0') text.erase(1, 1);
     const bool crossed = text.size() < typed.size();
     const auto table = table_of_digit(text.empty() ? ' ' : text[0]);
-    const auto item = number(std::string_view(text).substr(std::min<std::size_t>(1, text.size())));
+    const auto item =
+        parse_number(std::string_view(text).substr(std::min<std::size_t>(1, text.size())));
     const bool sized = crossed || text.size() == 5 || text.size() == 6;
     if (!is_number(text) || !table || !sized || !item || *item == 0) return "";
     return write(at(profile, *table, static_cast<std::int64_t>(*item) - 1));
@@ -285,7 +284,7 @@ std::string reference_hint(const PanelProfile& profile, const std::string& typed
 
 /// 100: an item of an area whose prefix has letters; otherwise a holding register.
 std::string number_hint(const PanelProfile& profile, const std::string& text) {
-    const auto value = number(text);
+    const auto value = parse_number(text);
     if (!value) return "";
     std::string choice;
     for (const Area& area : profile.areas) {
@@ -307,7 +306,7 @@ std::string word_hint(const PanelProfile& profile, const std::string& text) {
     const std::size_t letters = std::min(text.find_first_of(kDigits), text.size());
     const auto word =
         std::ranges::find(kWords, std::string_view(text).substr(0, letters), &Word::word);
-    const auto address = number(std::string_view(text).substr(letters));
+    const auto address = parse_number(std::string_view(text).substr(letters));
     if (word == kWords.end() || !address) return "";
     return write(at(profile, word->table, *address), ", where the first is 0");
 }
@@ -316,7 +315,8 @@ std::string word_hint(const PanelProfile& profile, const std::string& text) {
 std::string hex_hint(const PanelProfile& profile, std::string_view text) {
     const bool suffixed = text.size() > 1 && text.ends_with('H');
     if (!text.starts_with("0X") && !suffixed) return "";
-    const auto address = number(suffixed ? text.substr(0, text.size() - 1) : text.substr(2), 16);
+    const auto address =
+        parse_number(suffixed ? text.substr(0, text.size() - 1) : text.substr(2), 16);
     if (!address) return "";
     return write(at(profile, Table::holding_registers, *address),
                  " for holding register " + std::to_string(*address) + ", where the first is 0");

@@ -62,8 +62,6 @@ std::optional<modbus::Request> translate(const PanelProfile& profile,
 
 namespace {
 
-constexpr std::uint32_t kBitsPerWord = 16;
-
 /// Returns the items that lie in the area, through any of its tables.
 std::optional<modbus::Span> intersection(const Area& area, const modbus::Span& items) {
     if (!area.reaches(items.table)) return std::nullopt;

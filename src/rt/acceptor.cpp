@@ -63,7 +63,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 namespace {
-constexpr auto kPause = std::chrono::milliseconds(100);
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 }  // namespace
 
 struct Acceptor::State : std::enable_shared_from_this<Acceptor::State> {
@@ -92,7 +92,7 @@ void Acceptor::State::on_accept(const error_code& error, tcp::socket socket) {
         // Without descriptors the next attempt would fail at once: without a pause the loop would
         // spin.
         if (!std::exchange(fails, true)) failing(error);
-        pause.expires_after(kPause);
+        pause.expires_after(kAcceptPause);
         pause.async_wait([self = shared_from_this()](const error_code& stopped) {
             if (!stopped && self->acceptor.is_open()) self->accept();
         });

@@ -7,11 +7,7 @@
 
 namespace panelgate::sim {
 
-namespace {
-
-constexpr std::uint32_t kBitsPerWord = 16;
-
-}  // namespace
+namespace {}  // namespace
 
 Memory::Memory(const profile::PanelProfile& profile) : profile_(&profile) {
     for (const profile::Area& area : profile.areas) {
@@ -23,8 +19,8 @@ Memory::Memory(const profile::PanelProfile& profile) : profile_(&profile) {
 std::uint16_t Memory::get(const profile::Area& area, std::uint32_t address) const {
     if (area.view_of.empty()) return words_.at(area.name)[address - area.readable.first];
     const profile::Area& words = *profile_->find_area(std::string_view(area.view_of));
-    const unsigned word = get(words, address / kBitsPerWord);
-    return static_cast<std::uint16_t>(word >> (address % kBitsPerWord) & 1u);
+    const unsigned word = get(words, address / profile::kBitsPerWord);
+    return static_cast<std::uint16_t>(word >> (address % profile::kBitsPerWord) & 1u);
 }
 
 void Memory::set(const profile::Area& area, std::uint32_t address, std::uint16_t value) {
@@ -35,9 +31,9 @@ void Memory::set(const profile::Area& area, std::uint32_t address, std::uint16_t
         return;
     }
     const profile::Area& words = *profile_->find_area(std::string_view(area.view_of));
-    const unsigned mask = 1u << (address % kBitsPerWord);
-    const unsigned old = get(words, address / kBitsPerWord);
-    set(words, address / kBitsPerWord,
+    const unsigned mask = 1u << (address % profile::kBitsPerWord);
+    const unsigned old = get(words, address / profile::kBitsPerWord);
+    set(words, address / profile::kBitsPerWord,
         static_cast<std::uint16_t>(value != 0 ? old | mask : old & ~mask));
 }
 

@@ -390,7 +390,7 @@ constexpr std::string_view kDirective = "a directive (%...) has no meaning here;
 constexpr std::string_view kHex =
     "what follows this backslash is no character; write \\xNN or \\uNNNN, or \\\\ for a backslash";
 
-constexpr std::array<Words, 30> kWords{{
+constexpr std::array<Words, 30> kLibraryMessages{{
     {"end of map flow", kBracket},
     {"end of sequence flow", kBracket},
     {"illegal flow end", kBracket},
@@ -429,7 +429,7 @@ constexpr std::array<Words, 30> kWords{{
 }  // namespace
 
 std::string reword_error(std::string_view refusal) {
-    for (const Words& words : kWords) {
+    for (const Words& words : kLibraryMessages) {
         if (refusal.starts_with(words.refusal)) return std::string(words.ours);
     }
     return "this is not YAML (" + std::string(refusal) + "); put texts in quotes";

@@ -18,7 +18,7 @@ namespace panelgate::yaml {
 
 namespace {
 
-constexpr std::string_view kDigits = "0123456789";
+constexpr std::string_view kDecimalDigits = "0123456789";
 
 char lower_of(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -32,7 +32,7 @@ struct Word {
     std::string_view word;
     Duration length;
 };
-constexpr std::array<Word, 25> kWords{
+constexpr std::array<Word, 25> kDurationUnits{
     {{"us", 1us},           {"\xC2\xB5s", 1us}, {"usec", 1us},    {"ms", 1ms},
      {"msec", 1ms},         {"msecs", 1ms},     {"millis", 1ms},  {"millisecond", 1ms},
      {"milliseconds", 1ms}, {"s", 1s},          {"sec", 1s},      {"secs", 1s},
@@ -58,8 +58,8 @@ std::optional<Duration> take_part(std::string_view& text) {
     text = trim(text.substr(number));
     const std::size_t unit = std::min(text.find_first_of("0123456789 "), text.size());
     const std::string name = lower(text.substr(0, unit));
-    const auto word = std::ranges::find(kWords, std::string_view(name), &Word::word);
-    if (word == kWords.end()) return std::nullopt;
+    const auto word = std::ranges::find(kDurationUnits, std::string_view(name), &Word::word);
+    if (word == kDurationUnits.end()) return std::nullopt;
     text = trim(text.substr(unit));
     const double exact = value * static_cast<double>(word->length.count());
     constexpr double kMost = 1e18;  // of the 9.2e18 ns that a Duration holds
@@ -90,7 +90,7 @@ std::optional<std::string> hexadecimal(std::string_view text) {
 
 /// 600 of 9,600
 bool is_group(std::string_view text) {
-    return text.size() == 3 && text.find_first_not_of(kDigits) == text.npos;
+    return text.size() == 3 && text.find_first_not_of(kDecimalDigits) == text.npos;
 }
 
 /// Expands 9.6k, 38k4 and 9600 kBd; returns nothing for anything else.
@@ -98,7 +98,7 @@ std::optional<std::string> kilo(std::string_view text) {
     const std::size_t k = std::min(text.find_first_of("kK"), text.size());
     const std::string_view thousands = text.substr(0, text.find_last_not_of(' ', k - 1) + 1);
     const std::string_view behind = text.substr(std::min(k + 1, text.size()));
-    const bool has_digit = !behind.empty() && kDigits.find(behind[0]) != kDigits.npos;
+    const bool has_digit = !behind.empty() && kDecimalDigits.find(behind[0]) != kDecimalDigits.npos;
     double value = 0;
     const std::string digits =
         std::string(thousands) + (has_digit ? '.' + std::string(behind) : "");
@@ -114,7 +114,7 @@ std::optional<std::string> kilo(std::string_view text) {
 /// Removes a plus, leading zeros, group separators and a unit; uses a decimal point.
 std::string bare(std::string_view text, bool whole) {
     std::string all;
-    const std::size_t unit = text.find_last_of(kDigits);
+    const std::size_t unit = text.find_last_of(kDecimalDigits);
     text = text.substr(0, unit == text.npos ? text.size() : unit + 1);
     for (std::size_t i = 0; i < text.size(); ++i) {
         const bool is_point = text[i] == ',' || text[i] == '.';
@@ -124,7 +124,8 @@ std::string bare(std::string_view text, bool whole) {
     }
     if (all.starts_with('+')) all.erase(0, 1);
     const std::size_t sign = all.starts_with('-') ? 1 : 0;
-    while (all.size() > sign + 1 && all[sign] == '0' && kDigits.find(all[sign + 1]) != kDigits.npos)
+    while (all.size() > sign + 1 && all[sign] == '0' &&
+           kDecimalDigits.find(all[sign + 1]) != kDecimalDigits.npos)
         all.erase(sign, 1);
     return all;
 }
@@ -228,7 +229,7 @@ std::string variable_hint(std::string_view text) {
     std::string name;
     for (const char c : text) {
         const bool word = c == '_' || (lower_of(c) >= 'a' && lower_of(c) <= 'z') ||
-                          (!name.empty() && kDigits.find(c) != kDigits.npos);
+                          (!name.empty() && kDecimalDigits.find(c) != kDecimalDigits.npos);
         if (word) name += c;
     }
     return write("${" + (name.empty() ? "NAME" : name) + "} for a variable of the environment");

@@ -194,11 +194,12 @@ namespace {
 
 using Kind = Token::Kind;
 
-constexpr std::size_t kLongest = 60;  ///< of a text that is shown whole
+constexpr std::size_t kLongestQuoted = 60;  ///< of a text that is shown whole
 
 /// Suggests the corrected text; `inside` the quotes.
 std::string closed(char mark, std::string_view inside) {
-    if (inside.empty() || inside.size() > kLongest) return std::string("a ") + mark + " is missing";
+    if (inside.empty() || inside.size() > kLongestQuoted)
+        return std::string("a ") + mark + " is missing";
     return "write " + std::string(1, mark) + std::string(inside) + mark;
 }
 

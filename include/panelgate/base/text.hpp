@@ -25,6 +25,9 @@ std::size_t byte_order_mark(std::string_view text);
 /// Replaces every byte that belongs to no character with U+FFFD.
 std::string as_utf8(std::string_view bytes);
 
+/// Without the spaces and tabs at both ends (OWS, RFC 9110, 5.6.3).
+std::string_view trimmed(std::string_view text);
+
 /// Returns the candidate that `typed` most likely means: same letters and digits ("Panasonic GT"),
 /// a synonym (baudrate, float), or the nearest by edit distance; "" if none is near (more than 2
 /// edits, or more than a third of the longer word).

@@ -17,6 +17,8 @@
 
 namespace panelgate::profile {
 
+inline constexpr std::uint32_t kBitsPerWord = 16;  ///< of areas that show bits of registers
+
 /// How a notation writes the bit number.
 enum class BitDigits : std::uint8_t {
     none,     ///< the number is the item: UW100, GDT108, 400001

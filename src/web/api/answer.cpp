@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "conduct.hpp"
+#include "panelgate/base/text.hpp"
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/web/http/gzip.hpp"
 #include "panelgate/web/http/json_text.hpp"
@@ -152,12 +153,6 @@ std::string upper_hex(ByteView bytes, std::string_view separator) {
 }
 
 namespace {
-
-std::string_view trimmed(std::string_view text) {
-    while (text.starts_with(' ')) text.remove_prefix(1);
-    while (text.ends_with(' ')) text.remove_suffix(1);
-    return text;
-}
 
 /// Removes and returns the part before the separator; the rest stays in `text`.
 std::string_view next(std::string_view& text, char separator) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "panelgate/base/text.hpp"
 #include "panelgate/web/http/query.hpp"
 
 namespace panelgate::web {
@@ -99,13 +100,7 @@ void KeyBook::erase(std::map<Key, Entry>::iterator entry) {
 
 namespace {
 
-constexpr unsigned kLongest = 86400;  ///< s: a longer wait is cut to the line's deadline anyway
-
-std::string_view trimmed(std::string_view text) {
-    while (text.starts_with(' ') || text.starts_with('\t')) text.remove_prefix(1);
-    while (text.ends_with(' ') || text.ends_with('\t')) text.remove_suffix(1);
-    return text;
-}
+constexpr unsigned kLongestWait = 86400;  ///< s: a longer wait is cut to the line's deadline anyway
 
 std::string_view unquoted(std::string_view text) {
     if (text.size() < 2 || !text.starts_with('"') || !text.ends_with('"')) return text;
@@ -124,7 +119,7 @@ std::optional<Duration> wait_of(std::string_view prefer) {
         if (equals == preference.npos || trimmed(preference.substr(0, equals)) != "wait") continue;
         const auto seconds = to_number(unquoted(trimmed(preference.substr(equals + 1))));
         if (!seconds) return std::nullopt;
-        return std::chrono::seconds(std::min(*seconds, kLongest));
+        return std::chrono::seconds(std::min(*seconds, kLongestWait));
     }
     return std::nullopt;
 }

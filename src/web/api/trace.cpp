@@ -39,10 +39,10 @@ TracePage trace_since(const bus::BusClient& bus, std::uint64_t since, std::size_
 
 /// Trace entries as JSON. Instants are seconds of the gateway's monotonic clock; `time` is
 /// wall-clock time.
-boost::json::object describe(const bus::TraceFrame& frame);
-boost::json::object describe(const bus::TraceDecision& decision);
-boost::json::object describe(const bus::TraceTransaction& transaction);
-boost::json::object describe(const bus::IncidentHead& incident);
+boost::json::object trace_json(const bus::TraceFrame& frame);
+boost::json::object trace_json(const bus::TraceDecision& decision);
+boost::json::object trace_json(const bus::TraceTransaction& transaction);
+boost::json::object trace_json(const bus::IncidentHead& incident);
 
 /// Adds the three lists of the part as members, yielding to the loop. Both pointers must stay valid
 /// until it has finished.
@@ -132,7 +132,7 @@ asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
                                const std::vector<Entry>* entries) {
     body->begin_list(name);
     for (const Entry& entry : *entries) {
-        body->add(describe(entry));
+        body->add(trace_json(entry));
         if (!body->is_turn_over()) continue;
         asio::awaitable<void> turn = yield_turn();
         co_await std::move(turn);
@@ -142,7 +142,7 @@ asio::awaitable<void> add_list(LongAnswer* body, std::string_view name,
 
 }  // namespace
 
-json::object describe(const bus::TraceFrame& frame) {
+json::object trace_json(const bus::TraceFrame& frame) {
     json::object object;
     object["sequence"] = frame.sequence;
     object["time"] = rfc3339(frame.time);
@@ -157,7 +157,7 @@ json::object describe(const bus::TraceFrame& frame) {
     return object;
 }
 
-json::object describe(const bus::TraceDecision& decision) {
+json::object trace_json(const bus::TraceDecision& decision) {
     json::object object;
     object["sequence"] = decision.sequence;
     object["time"] = rfc3339(decision.time);
@@ -166,7 +166,7 @@ json::object describe(const bus::TraceDecision& decision) {
     return object;
 }
 
-json::object describe(const bus::TraceTransaction& transaction) {
+json::object trace_json(const bus::TraceTransaction& transaction) {
     json::object object;
     object["id"] = transaction.id;
     object["sequence"] = transaction.first;
@@ -191,7 +191,7 @@ json::object describe(const bus::TraceTransaction& transaction) {
     return object;
 }
 
-json::object describe(const bus::IncidentHead& incident) {
+json::object trace_json(const bus::IncidentHead& incident) {
     json::object object;
     object["id"] = incident.id;
     object["time"] = rfc3339(incident.time);
@@ -412,7 +412,8 @@ Handling get_incidents(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     json::array list;
-    for (const bus::IncidentHead& head : (*line)->bus->incidents()) list.push_back(describe(head));
+    for (const bus::IncidentHead& head : (*line)->bus->incidents())
+        list.push_back(trace_json(head));
     co_return json_response(200, json::object{{"incidents", std::move(list)}});
 }
 
@@ -433,7 +434,7 @@ Handling get_incident(HttpRequest request, const Api* api) {
         co_return pcapng_response(std::move(body), name + '-' + request.arguments[1]);
     }
     LongAnswer body;
-    for (const auto& [member, value] : describe(found->head)) body.member(member, value);
+    for (const auto& [member, value] : trace_json(found->head)) body.member(member, value);
     boost::asio::awaitable<void> all = add_part(&body, &found->part);
     co_await std::move(all);
     co_return body.response();

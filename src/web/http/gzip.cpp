@@ -1,4 +1,5 @@
 #include "panelgate/web/http/gzip.hpp"
+#include "panelgate/base/text.hpp"
 
 #include <zlib.h>
 
@@ -17,13 +18,6 @@ constexpr int kGzipWindow = 15 + 16;
 /// For text as repetitive as /metrics: 9 would take four times as long to save a third.
 constexpr int kLevel = 1;
 constexpr int kMemory = 8;  // zlib's default
-
-std::string_view trimmed(std::string_view text) {
-    const auto is_blank = [](char c) { return c == ' ' || c == '\t'; };
-    while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-    while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
-    return text;
-}
 
 bool same_word(std::string_view a, std::string_view b) {
     return std::ranges::equal(a, b, [](char x, char y) {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::app {
+namespace panelgate::app::address_families_test {
 namespace {
 
 class AddressFamilies : public testing::Test {
@@ -45,4 +45,4 @@ TEST_F(AddressFamilies, AnyFreePortIsNeverTheSame) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::address_families_test

@@ -7,7 +7,7 @@
 #include "panelgate/config/real_files.hpp"
 #include "panelgate/yaml/document.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::capacity_test {
 namespace {
 
 using testing::HasSubstr;
@@ -101,4 +101,4 @@ TEST(Capacity, TellsWhatIsTooMuchAndWhatWouldHelp) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::capacity_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::app {
+namespace panelgate::app::connection_limits_test {
 namespace {
 
 class ConnectionLimits : public testing::Test {
@@ -39,4 +39,4 @@ TEST_F(ConnectionLimits, LetSomebodyInEvenWithHardlyAny) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::connection_limits_test

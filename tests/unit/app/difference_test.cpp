@@ -9,7 +9,7 @@
 
 #include "unit/config/memory_files.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::difference_test {
 namespace {
 
 using testing::ElementsAre;
@@ -167,4 +167,4 @@ TEST(MovedUnits, IsSilentWhereTheyReachNobodyOrAreNamed) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::difference_test

@@ -9,7 +9,7 @@
 #include "support/fake_bus.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::discoveries_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -175,4 +175,4 @@ TEST_F(DiscoveriesTest, SaysWhatIsWrongWithAList) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::discoveries_test

@@ -16,7 +16,7 @@
 #include "support/yaml_text.hpp"
 #include "unit/config/memory_files.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::every_key_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -215,4 +215,4 @@ TEST(EveryKey, MeansItsDefaultWhereItIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::every_key_test

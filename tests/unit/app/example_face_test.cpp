@@ -9,7 +9,7 @@
 #include "support/fake_bus.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::example_face_test {
 namespace {
 
 using namespace test;
@@ -91,4 +91,4 @@ TEST_F(ExampleFaceTest, WhatIsNotAllowedOrNotAnsweredHasItsWordsAlready) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::example_face_test

@@ -7,7 +7,7 @@
 #include "panelgate/bus/bus.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::line_histories_test {
 namespace {
 
 /// A line that counts how often it is sampled.
@@ -66,4 +66,4 @@ TEST(LineHistories, OfManyLinesHaveWiderSlots) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::line_histories_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::app {
+namespace panelgate::app::listen_in_text_test {
 namespace {
 
 TEST(ListenInText, IsFoundInATextThatIsNoYaml) {
@@ -47,4 +47,4 @@ TEST(ListenInText, AByteOrderMarkIsSkipped) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::listen_in_text_test

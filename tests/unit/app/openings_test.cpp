@@ -7,7 +7,7 @@
 #include "panelgate/rt/log.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::openings_test {
 namespace {
 
 namespace errc = boost::system::errc;
@@ -109,4 +109,4 @@ TEST_F(OpeningsTest, AdviceIsGivenOnlyWhereItHelps) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::openings_test

@@ -8,7 +8,7 @@
 #include "support/fake_bus.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::plant_test {
 namespace {
 
 config::Station station(std::uint8_t id, const char* name) {
@@ -114,4 +114,4 @@ TEST_F(PlantTest, ASimulatedLineHasNoDevice) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::plant_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::app {
+namespace panelgate::app::run_loop_test {
 namespace {
 
 TEST(Ending, P3WaitsForTheLongestAnswerAndForTenSecondsAtLeast) {
@@ -15,4 +15,4 @@ TEST(Ending, P3WaitsForTheLongestAnswerAndForTenSecondsAtLeast) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::run_loop_test

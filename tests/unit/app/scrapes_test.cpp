@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace panelgate::app {
+namespace panelgate::app::scrapes_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -180,4 +180,4 @@ TEST_F(ScrapesTest, MayEndInTheMiddle) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::scrapes_test

@@ -8,7 +8,7 @@
 
 #include "support/fake_bus.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::showing_test {
 namespace {
 
 using ::testing::AllOf;
@@ -186,4 +186,4 @@ TEST_F(ShowingTest, TellsWhatHasBecomeOfPointsAndNotOfPollBlocks) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::showing_test

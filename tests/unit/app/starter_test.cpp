@@ -7,7 +7,7 @@
 
 #include "unit/config/memory_files.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::starter_test {
 namespace {
 
 using testing::HasSubstr;
@@ -111,4 +111,4 @@ TEST(Starter, TakesAnyPathAsItIs) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::starter_test

@@ -12,7 +12,7 @@
 
 #include "panelgate/line/pty.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::tcp_bridge_test {
 namespace {
 
 namespace asio = boost::asio;
@@ -58,4 +58,4 @@ TEST_F(TcpBridgeTest, WhatNobodyTakesFromTheLineIsLost) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::tcp_bridge_test

@@ -13,7 +13,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::app {
+namespace panelgate::app::wiring_test {
 namespace {
 
 /// press 31 is guarded, meter 5 is read-only; both have the profile `generic`.
@@ -119,4 +119,4 @@ TEST_F(WiringTest, ARelayGoesFromStationToStation) {
 }
 
 }  // namespace
-}  // namespace panelgate::app
+}  // namespace panelgate::app::wiring_test

@@ -1,6 +1,6 @@
 #include "arbiter_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::apply_test {
 namespace {
 
 /// New settings for a running arbiter.
@@ -186,4 +186,4 @@ TEST(IsSameWire, OfTimesAndStationsButNotOfWhatIsOnTheWire) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::apply_test

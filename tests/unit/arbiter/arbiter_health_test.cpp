@@ -8,7 +8,7 @@
 
 #include "arbiter_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_health_test {
 namespace {
 
 /// Takes station 17 offline.
@@ -200,4 +200,4 @@ TEST_F(ArbiterTest, P4APanelThatAlwaysAnswersLateTakesAtMostAFifthOfTheLine) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_health_test

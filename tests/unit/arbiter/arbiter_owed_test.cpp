@@ -7,7 +7,7 @@
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_owed_test {
 namespace {
 
 TEST_F(ArbiterTest, OtherStationsAreAskedBetweenTheAttemptsWhenOnlyTheStationIsQuarantined) {
@@ -230,4 +230,4 @@ TEST_F(ArbiterTest, P1WhereALineStallsAReplyThatMayBeAnOlderOnesProvesNoMoreThan
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_owed_test

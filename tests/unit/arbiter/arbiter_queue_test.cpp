@@ -5,7 +5,7 @@
 
 #include "arbiter_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_queue_test {
 namespace {
 
 TEST_F(ArbiterTest, P9WhatHasWaitedLongGoesAheadButAWriteStartsWithinTwoTransactions) {
@@ -67,4 +67,4 @@ TEST_F(ArbiterTest, P9RefusesAtOnceWhenAQueueIsFull) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_queue_test

@@ -7,7 +7,7 @@
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_return_test {
 namespace {
 
 /// A device server that hangs still accepts connections: its kernel does.
@@ -173,4 +173,4 @@ TEST_F(AfterAReset, P1TheAnswerOfAnotherStationProvesTheTransport) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_return_test

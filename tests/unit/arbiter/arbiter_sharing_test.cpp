@@ -6,7 +6,7 @@
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_sharing_test {
 namespace {
 
 TEST_F(ArbiterTest, P6IdenticalReadsShareOneTransaction) {
@@ -123,4 +123,4 @@ TEST_F(ArbiterTest, P6AClientNeverReadsOlderThanItsOwnWrite) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_sharing_test

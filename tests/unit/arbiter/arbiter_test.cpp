@@ -6,7 +6,7 @@
 #include "arbiter_fixture.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_test {
 namespace {
 
 TEST_F(ArbiterTest, HandsTheReplyOnAtItsLastByte) {
@@ -254,4 +254,4 @@ TEST_F(ArbiterTest, EndlessNoiseEndsInATimeoutNotInAHang) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_test

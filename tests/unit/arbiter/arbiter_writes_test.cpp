@@ -8,7 +8,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::arbiter_writes_test {
 namespace {
 
 TEST_F(ArbiterTest, P2NeverRepeatsAWrite) {
@@ -177,4 +177,4 @@ TEST_F(ArbiterTest, P2ACancelledClientsQueueNeverReachesTheWire) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::arbiter_writes_test

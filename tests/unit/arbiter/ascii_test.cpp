@@ -10,7 +10,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::ascii_test {
 namespace {
 
 Bytes text(std::string_view characters) { return Bytes(characters.begin(), characters.end()); }
@@ -297,4 +297,4 @@ TEST_F(AsciiLine, TheTraceHasTheFramesInRtuForm) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::ascii_test

@@ -6,7 +6,7 @@
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::attempt_pace_test {
 namespace {
 
 using test::group_of;
@@ -235,4 +235,4 @@ TEST_F(AttemptPaceTest, AnEchoIsLookedAtWhenItCanHaveComeBack) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::attempt_pace_test

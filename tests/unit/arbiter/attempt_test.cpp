@@ -8,7 +8,7 @@
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::attempt_test {
 namespace {
 
 using modbus::encode_adu;
@@ -160,4 +160,4 @@ TEST_F(AttemptTest, P6NoReadJoinsARepeatedOne) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::attempt_test

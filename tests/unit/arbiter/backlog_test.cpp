@@ -8,7 +8,7 @@
 
 #include "support/queue_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::backlog_test {
 namespace {
 
 constexpr TimePoint kStart{1h};
@@ -144,4 +144,4 @@ TEST_F(BacklogTest, P7GivesEverythingWhenItIsCleared) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::backlog_test

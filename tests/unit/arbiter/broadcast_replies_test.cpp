@@ -7,7 +7,7 @@
 #include "arbiter_fixture.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::broadcast_replies_test {
 namespace {
 
 const Bytes kToAll = "10 00 64 00 02 04 00 0A 01 02"_hex;
@@ -135,4 +135,4 @@ TEST(BroadcastReplies, AreRememberedOfTheLastOnesAndConcernNoReads) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::broadcast_replies_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::client_names_test {
 namespace {
 
 TEST(ClientNames, TheLastNameCountsUntilTheClientHasGone) {
@@ -25,4 +25,4 @@ TEST(ClientNames, P9AreBoundedAndAKnownClientMayChangeItsName) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::client_names_test

@@ -4,7 +4,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::copy_guard_test {
 namespace {
 
 const Bytes kRequest = "03 00 6B 00 01"_hex;
@@ -206,4 +206,4 @@ TEST_F(DuplicateGuardTest, ADuplicateIsOfTheLatestReplyThatItRepeats) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::copy_guard_test

@@ -15,7 +15,7 @@
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::costs_test {
 namespace {
 
 using test::BusScript;
@@ -245,4 +245,4 @@ TEST(Costs, P4BeforeADearRetryEachStationThatSomethingWaitsForHasATurn) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::costs_test

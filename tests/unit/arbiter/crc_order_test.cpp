@@ -5,7 +5,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::crc_order_test {
 namespace {
 
 using modbus::CrcOrder;
@@ -84,4 +84,4 @@ TEST_F(BothOrders, ABroadcastHasTheStandardsUnlessAllAreOld) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::crc_order_test

@@ -5,7 +5,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::debt_test {
 namespace {
 
 const Bytes kThree = "03 00 64 00 03"_hex;
@@ -100,4 +100,4 @@ TEST(OutstandingReplies, ForgetsTheOldestOfTooMany) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::debt_test

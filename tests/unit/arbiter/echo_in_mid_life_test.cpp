@@ -7,7 +7,7 @@
 #include "panelgate/arbiter/reply_times.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
-namespace panelgate::arbiter::echo {
+namespace panelgate::arbiter::echo::echo_in_mid_life_test {
 namespace {
 
 /// A line without an echo, whose station has answered; then a write, and its very frame comes back
@@ -73,4 +73,4 @@ TEST_F(EchoInMidLife, P2ARefusedReadDecidesAsWellAndTheWriteIsNotRepeated) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter::echo
+}  // namespace panelgate::arbiter::echo::echo_in_mid_life_test

@@ -10,7 +10,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter::echo {
+namespace panelgate::arbiter::echo::echo_test {
 namespace {
 
 using Expect = EchoFilter::Expect;
@@ -340,4 +340,4 @@ TEST_F(Echo, P8TheEchoOfAnUnansweredRequestIsNoSignOfLife) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter::echo
+}  // namespace panelgate::arbiter::echo::echo_test

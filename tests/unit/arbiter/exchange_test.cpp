@@ -7,7 +7,7 @@
 #include "arbiter_fixture.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::exchange_test {
 namespace {
 
 class ExchangeTest : public testing::Test {
@@ -132,4 +132,4 @@ TEST_F(ExchangeTest, NothingIsReportedWithoutExplain) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::exchange_test

@@ -9,7 +9,7 @@
 #include "support/hex.hpp"
 #include "support/queue_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::job_queue_limits_test {
 namespace {
 
 using test::any;
@@ -256,4 +256,4 @@ TEST(JobQueueFlood, P9APoliteClientOfTheFloodingHostIsNotRefusedEither) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::job_queue_limits_test

@@ -16,7 +16,7 @@
 #include "support/read_span.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::job_queue_model_test {
 namespace {
 
 class Model {
@@ -301,4 +301,4 @@ TEST_F(JobQueueModel, HoldsThousandsOfHundredsOfClients) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::job_queue_model_test

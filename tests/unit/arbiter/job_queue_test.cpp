@@ -8,7 +8,7 @@
 
 #include "support/queue_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::job_queue_test {
 namespace {
 
 using testing::ElementsAre;
@@ -225,4 +225,4 @@ TEST_F(JobQueueTest, KnowsTheEarliestMomentAtWhichOneIsTooLate) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::job_queue_test

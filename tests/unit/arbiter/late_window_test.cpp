@@ -4,7 +4,7 @@
 
 #include <optional>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::late_window_test {
 namespace {
 
 constexpr Duration kTimeout = 100ms;
@@ -79,4 +79,4 @@ TEST(LateWindow, AHabitIsForgivenAfterManyRepliesInTimeAndItsWorstWithIt) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::late_window_test

@@ -12,7 +12,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::ledger_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 01"_hex;
@@ -156,4 +156,4 @@ TEST_F(OutboxTest, ReasonsAreOnlyPutIntoWordsWithExplain) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::ledger_test

@@ -3,7 +3,7 @@
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::memory_test {
 namespace {
 
 using test::BusScript;
@@ -164,4 +164,4 @@ TEST(Shares, P9TheTimeOfASharedTransactionIsSharedOut) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::memory_test

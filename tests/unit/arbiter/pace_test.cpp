@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::pace_test {
 namespace {
 
 constexpr bool kEarly = true;
@@ -62,4 +62,4 @@ TEST(Pace, IsNoPaceAtAllAfterSomeEarlyRepliesInARow) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::pace_test

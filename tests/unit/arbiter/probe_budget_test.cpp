@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::probe_budget_test {
 namespace {
 
 constexpr TimePoint kStart{1h};
@@ -64,4 +64,4 @@ TEST(ProbeBudget, IsFreeAgainWhenItIsCleared) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::probe_budget_test

@@ -5,7 +5,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::questions_test {
 namespace {
 
 using modbus::encode_adu;
@@ -42,4 +42,4 @@ TEST(ForeignRequests, ForgetTheOldestOfTooMany) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::questions_test

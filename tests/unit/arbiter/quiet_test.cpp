@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::quiet_test {
 namespace {
 
 constexpr Duration kLongest = 100ms;
@@ -99,4 +99,4 @@ TEST_F(QuietTest, ReportsOnceHowMuchOfAQuarantineHasPassed) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::quiet_test

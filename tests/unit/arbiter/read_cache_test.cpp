@@ -8,7 +8,7 @@
 #include "support/read_span.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::read_cache_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -101,4 +101,4 @@ TEST(ReadCache, BitsOfAWiderReadAreCutOut) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::read_cache_test

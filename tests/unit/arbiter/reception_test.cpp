@@ -8,7 +8,7 @@
 #include "support/read_span.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::reception_test {
 namespace {
 
 constexpr TimePoint kNow{1h};
@@ -122,4 +122,4 @@ TEST_F(AdmissionTest, P6MemoryAnswersOnlyReadsOfClientsAndWhereTheStationAllowsI
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::reception_test

@@ -12,7 +12,7 @@
 #include "support/bus_script_replay.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::replay_test {
 namespace {
 
 using test::BusScript;
@@ -232,4 +232,4 @@ TEST(BusScript, PlaysWhatItRecorded) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::replay_test

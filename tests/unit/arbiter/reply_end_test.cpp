@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::reply_end_test {
 namespace {
 
 struct ReplyEnd {
@@ -60,4 +60,4 @@ TEST(ReplyEnd, IsNeverFarFromWhatTheRateSays) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::reply_end_test

@@ -12,7 +12,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::schedule_test {
 namespace {
 
 constexpr std::array<std::uint8_t, 3> kIds{1, 2, 3};
@@ -261,4 +261,4 @@ TEST_F(ScheduleTest, PartsOfAJoinedReadGoAgainExceptForClientsThatHaveLeft) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::schedule_test

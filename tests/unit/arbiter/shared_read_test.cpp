@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::shared_read_test {
 namespace {
 
 constexpr modbus::Table kRegisters = modbus::Table::holding_registers;
@@ -77,4 +77,4 @@ TEST(SharedRead, ReadsOfAnotherStationOrTableHaveNothingInCommon) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::shared_read_test

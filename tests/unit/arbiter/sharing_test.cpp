@@ -9,7 +9,7 @@
 #include "support/hex.hpp"
 #include "support/queue_fixture.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::sharing_test {
 namespace {
 
 Bytes registers(unsigned address, unsigned count) {
@@ -145,4 +145,4 @@ TEST_F(SharingTest, P6EachGetsItsPartAndAllGetTheException) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::sharing_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::slowest_test {
 namespace {
 
 TEST(Slowest, KnowsNothingAtFirst) { EXPECT_EQ(Slowest().value(), std::nullopt); }
@@ -23,4 +23,4 @@ TEST(Slowest, RemembersForAWindowAndForgetsAfterTwo) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::slowest_test

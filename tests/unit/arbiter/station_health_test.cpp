@@ -4,7 +4,7 @@
 
 #include "panelgate/base/words.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::station_health_test {
 namespace {
 
 class StationHealthTest : public testing::Test {
@@ -146,4 +146,4 @@ TEST(StationHealth, P4SilentWritesAloneTakeNoStationOfflineThatAnswersReads) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::station_health_test

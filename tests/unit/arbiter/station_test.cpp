@@ -8,7 +8,7 @@
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::station_test {
 namespace {
 
 using test::group_of;
@@ -298,4 +298,4 @@ TEST_F(StationTest, OnlyAnUnheardStationIsForgottenWhenNotAskedForAMinute) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::station_test

@@ -7,7 +7,7 @@
 #include "support/attempts.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::stations_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 01"_hex;
@@ -128,4 +128,4 @@ TEST_F(StationsTest, AnUnheardStationIsWaitedForAsLongAsTheKnownNeedUnlessItsCli
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::stations_test

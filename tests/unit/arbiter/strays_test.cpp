@@ -9,7 +9,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::strays_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 01"_hex;
@@ -147,4 +147,4 @@ TEST_F(UnsolicitedFramesTest, TheTrailBelongsToTheStationThatAnsweredLast) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::strays_test

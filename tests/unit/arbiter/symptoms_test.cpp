@@ -7,7 +7,7 @@
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::symptoms_test {
 namespace {
 
 using test::BusScript;
@@ -224,4 +224,4 @@ TEST_F(SymptomsTest, WhatComesLongAfterABroadcastDoesNotAnswerIt) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::symptoms_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::trail_test {
 namespace {
 
 class TrailTest : public testing::Test {
@@ -75,4 +75,4 @@ TEST_F(TrailTest, IsUnlearnedAsSoonAsItStops) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::trail_test

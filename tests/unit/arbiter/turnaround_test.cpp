@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::turnaround_test {
 namespace {
 
 TEST(Turnaround, KnowsTheQuantilesOfTheLastReplies) {
@@ -59,4 +59,4 @@ TEST(DriftAlarm, ReportsOnceUntilTheStationHasRecovered) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::turnaround_test

@@ -12,7 +12,7 @@
 #include "support/read_span.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::waiting_reads_test {
 namespace {
 
 using Counts = std::map<Client, int>;
@@ -150,4 +150,4 @@ TEST_F(WaitingReadsTest, AnyOrderOfComingAndGoingCountsTheSame) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::waiting_reads_test

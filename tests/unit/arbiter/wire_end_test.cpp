@@ -6,7 +6,7 @@
 #include "support/bus_script.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::arbiter {
+namespace panelgate::arbiter::wire_end_test {
 namespace {
 
 using test::BusScript;
@@ -110,4 +110,4 @@ TEST_F(WireEnd, ALineThatCannotReportTheEndIsNotAsked) {
 }
 
 }  // namespace
-}  // namespace panelgate::arbiter
+}  // namespace panelgate::arbiter::wire_end_test

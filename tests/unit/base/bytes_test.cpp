@@ -4,7 +4,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate {
+namespace panelgate::bytes_test {
 namespace {
 
 TEST(Reader, ReadsBigEndian) {
@@ -90,4 +90,4 @@ TEST(Bytes, AreAppendedUpToALimit) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::bytes_test

@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace panelgate {
+namespace panelgate::decimal_test {
 namespace {
 
 Decimal of(const char* text) { return Decimal::parse(text).value(); }
@@ -92,4 +92,4 @@ TEST(Decimal, OfVeryManyDigitsKnowsThatThereIsMore) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::decimal_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate {
+namespace panelgate::endpoint_text_test {
 namespace {
 
 TEST(WithoutPort, CutsThePortOfAConnectionAndNothingElse) {
@@ -16,4 +16,4 @@ TEST(WithoutPort, CutsThePortOfAConnectionAndNothingElse) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::endpoint_text_test

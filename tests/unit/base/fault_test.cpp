@@ -5,7 +5,7 @@
 #include <set>
 #include <stdexcept>
 
-namespace panelgate {
+namespace panelgate::fault_test {
 namespace {
 
 TEST(Fault, HasAWordOfItsOwn) {
@@ -37,4 +37,4 @@ TEST(Fault, ThrowsWhenAValueIsAskedForThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::fault_test

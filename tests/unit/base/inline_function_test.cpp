@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace panelgate {
+namespace panelgate::inline_function_test {
 namespace {
 
 using Ask = InlineFunction<int(int), 32>;
@@ -76,4 +76,4 @@ TEST(InlineFunction, RefersToItselfWhenItIsGivenToItself) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::inline_function_test

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace panelgate {
+namespace panelgate::number_text_test {
 namespace {
 
 TEST(NumberText, IsTheShortestDecimal) {
@@ -43,4 +43,4 @@ TEST(NumberText, WhatIsNotFiniteHasNoText) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::number_text_test

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace panelgate {
+namespace panelgate::pool_test {
 namespace {
 
 TEST(Pool, GivesABlockThatCameBackToTheNextOfItsSize) {
@@ -76,4 +76,4 @@ TEST(Pool, ContainersGrowAndShrinkInIt) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::pool_test

@@ -5,7 +5,7 @@
 #include <ostream>
 #include <string>
 
-namespace panelgate {
+namespace panelgate::serial_format_test {
 namespace {
 
 SerialFormat even(int baud) { return {baud, 8, Parity::even, 1}; }
@@ -103,4 +103,4 @@ TEST(SerialFormat, AsciiLeavesTimeToTurnRoundOnly) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::serial_format_test

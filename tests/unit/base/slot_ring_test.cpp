@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace panelgate {
+namespace panelgate::slot_ring_test {
 namespace {
 
 using Told = std::vector<std::pair<Duration, double>>;
@@ -88,4 +88,4 @@ TEST(SlotWidth, IsTheNarrowestThatStaysBelowTheLimit) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::slot_ring_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate {
+namespace panelgate::suggest_test {
 namespace {
 
 constexpr std::string_view kKeys[] = {"baud", "parity", "stop_bits", "reply_timeout", "retries"};
@@ -54,4 +54,4 @@ TEST(Suggest, KnowsSynonymsOfOtherIndustries) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::suggest_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate {
+namespace panelgate::utf8_test {
 namespace {
 
 TEST(Utf8, KnowsWhatIsText) {
@@ -33,4 +33,4 @@ TEST(Utf8, PutsASignForEveryByteThatIsNoText) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::utf8_test

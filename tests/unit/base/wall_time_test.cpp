@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate {
+namespace panelgate::wall_time_test {
 namespace {
 
 using namespace std::chrono;
@@ -22,4 +22,4 @@ TEST(WallTime, OfAMomentIsCountedBackFromNow) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::wall_time_test

@@ -4,7 +4,7 @@
 
 #include "panelgate/base/words.hpp"
 
-namespace panelgate {
+namespace panelgate::words_test {
 namespace {
 
 /// Labels of the first `count` enumerators, in order, separated by commas.
@@ -55,4 +55,4 @@ TEST(OutcomeCounts, CountEachOutcomeByItself) {
 }
 
 }  // namespace
-}  // namespace panelgate
+}  // namespace panelgate::words_test

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-namespace panelgate::bus {
+namespace panelgate::bus::answers_test {
 namespace {
 
 class AnswersTest : public testing::Test {
@@ -89,4 +89,4 @@ TEST_F(AnswersTest, MayEndWhileItGives) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::answers_test

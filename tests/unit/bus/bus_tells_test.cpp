@@ -16,7 +16,7 @@
 #include "support/memory_line.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::bus_tells_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -167,4 +167,4 @@ TEST_F(BusReportsTest, CountsHowOftenAStationMayHaveBeenRestarted) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::bus_tells_test

@@ -17,7 +17,7 @@
 #include "support/memory_line.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::bus_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -395,4 +395,4 @@ TEST_F(BusTest, P10CountsByConfiguredNamesOnly) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::bus_test

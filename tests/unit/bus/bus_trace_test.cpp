@@ -14,7 +14,7 @@
 #include "support/memory_line.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::bus_trace_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -226,4 +226,4 @@ TEST_F(BusTrace, ALongIncidentKeepsItsBeginning) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::bus_trace_test

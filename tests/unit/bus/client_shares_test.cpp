@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::bus {
+namespace panelgate::bus::client_shares_test {
 namespace {
 
 constexpr TimePoint kNow{1h};
@@ -166,4 +166,4 @@ TEST(ClientShares, AnAddressIsInTheNameOfAServersClient) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::client_shares_test

@@ -10,7 +10,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::flight_recorder_test {
 namespace {
 
 TraceDecision decision(std::uint64_t sequence) {
@@ -110,4 +110,4 @@ TEST(ByteRing, KeepsTheBeginningOfWhatIsLongerThanIt) {
 TEST(Recorder, OneThatKeepsNothingStaysEmpty) { EXPECT_EQ(summary_of(with(0, 5).last(8)), ""); }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::flight_recorder_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::bus {
+namespace panelgate::bus::line_history_test {
 namespace {
 
 constexpr TimePoint kStart{100s};
@@ -83,4 +83,4 @@ TEST_F(LineHistoryTest, AMissedSlotIsAGap) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::line_history_test

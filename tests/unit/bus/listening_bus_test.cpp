@@ -14,7 +14,7 @@
 #include "support/memory_line.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::listening_bus_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -181,4 +181,4 @@ TEST_F(ListeningBusTest, KeepsWhatHappenedAroundASilence) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::listening_bus_test

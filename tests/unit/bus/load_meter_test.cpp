@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::bus {
+namespace panelgate::bus::load_meter_test {
 namespace {
 
 constexpr TimePoint kStart{1h};
@@ -80,4 +80,4 @@ TEST_F(LoadMeterTest, IsNeverAboveAllOfIt) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::load_meter_test

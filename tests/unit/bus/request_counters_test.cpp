@@ -10,7 +10,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::request_counters_test {
 namespace {
 
 Answer answer(Result<Bytes> pdu, bool transmitted = true) {
@@ -128,4 +128,4 @@ TEST_F(RequestCountersTest, TheLastSuccessIsThatOfItsStation) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::request_counters_test

@@ -7,7 +7,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::rights_test {
 namespace {
 
 const Bytes kRead = "03 0000 0001"_hex;
@@ -94,4 +94,4 @@ TEST(Rights, TellOfEveryWriteWhatTheyTellOfEach) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::rights_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::bus {
+namespace panelgate::bus::station_settings_test {
 namespace {
 
 TEST(StationSettings, AStationIsCalledByItsNameAndAStrangerByItsId) {
@@ -22,4 +22,4 @@ TEST(StationSettings, ARuleIsToldInAStableWord) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::station_settings_test

@@ -9,7 +9,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::trace_store_test {
 namespace {
 
 constexpr TraceSettings kSmall{4, 10, 4, 64, 64};
@@ -161,4 +161,4 @@ TEST(TraceStore, TakesNoMoreMemoryThanIsSaid) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::trace_store_test

@@ -15,7 +15,7 @@
 #include "support/memory_line.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::translation_test {
 namespace {
 
 const Bytes kWord = "06 00 64 12 34"_hex;
@@ -131,4 +131,4 @@ TEST_F(BusTranslatesTest, P6ReadsOfTheSameItemsByBothFunctionsShareOneTransactio
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::translation_test

@@ -5,7 +5,7 @@
 #include "panelgate/rt/clock.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::bus {
+namespace panelgate::bus::wall_test {
 namespace {
 
 TEST(Wall, ShowsInstantsAsFarApartAsTheyAre) {
@@ -28,4 +28,4 @@ TEST(Wall, AsksAgainNowAndThen) {
 }
 
 }  // namespace
-}  // namespace panelgate::bus
+}  // namespace panelgate::bus::wall_test

@@ -4,7 +4,7 @@
 
 #include "panelgate/base/serial_format.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::client_timeout_test {
 namespace {
 
 Line line_at(int baud, int retries = 1) {
@@ -58,4 +58,4 @@ TEST(ClientTimeout, ASlowWireTakesShorterReadsOrNone) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::client_timeout_test

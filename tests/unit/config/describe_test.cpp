@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::config {
+namespace panelgate::config::describe_test {
 namespace {
 
 using testing::ElementsAre;
@@ -72,4 +72,4 @@ TEST(Describe, HasATextForEachKeyAndNoOther) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::describe_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::config {
+namespace panelgate::config::endpoint_test {
 namespace {
 
 TEST(Endpoint, ReadsBothFamilies) {
@@ -63,4 +63,4 @@ TEST(Endpoint, AnAddressIsInANetworkWhateverTheirSpelling) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::endpoint_test

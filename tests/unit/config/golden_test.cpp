@@ -17,7 +17,7 @@
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::golden_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -143,4 +143,4 @@ TEST(ConfigGoldenFolder, ALineOfNoCaseIsRefused) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::golden_test

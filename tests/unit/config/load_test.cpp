@@ -8,7 +8,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/real_files.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::load_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -279,4 +279,4 @@ TEST(ShippedDemo, HasTheFivePanelsOfTheContract) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::load_test

@@ -6,7 +6,7 @@
 
 #include "memory_files.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::mbusd_conf_test {
 namespace {
 
 using testing::HasSubstr;
@@ -169,4 +169,4 @@ TEST(MbusdConf, ReportsAllFaultsWithTheirPlaces) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::mbusd_conf_test

@@ -6,7 +6,7 @@
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::points_test {
 namespace {
 
 std::optional<Config> load_station(const std::string& keys) {
@@ -114,4 +114,4 @@ TEST(ConfigPoints, MorePointsThanTheLimitAreRefusedAtOnce) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::points_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::config {
+namespace panelgate::config::reachable_test {
 namespace {
 
 TEST(Reachable, AllAddressesOfTheMachineAreReachedOnLoopback) {
@@ -17,4 +17,4 @@ TEST(Reachable, OneAddressIsReachedAtItself) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::reachable_test

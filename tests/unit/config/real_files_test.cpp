@@ -14,7 +14,7 @@
 
 #include "support/temp_dir.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::real_files_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -106,4 +106,4 @@ TEST_F(RealFilesTest, ListsTheYamlFilesOfADirectorySorted) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::real_files_test

@@ -5,7 +5,7 @@
 #include "memory_files.hpp"
 #include "panelgate/config/config.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::relays_test {
 namespace {
 
 std::string with_relays(const std::string& relays) {
@@ -89,4 +89,4 @@ TEST(ConfigRelays, ManyWaysThroughTheRelaysAreNotWalkedOneByOne) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::relays_test

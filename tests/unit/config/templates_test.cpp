@@ -8,7 +8,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/config/settings.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::templates_test {
 namespace {
 
 /// The tree after apply_templates(), and the problems.
@@ -110,4 +110,4 @@ TEST(ConfigTemplates, LongTextsAreBoundedToo) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::templates_test

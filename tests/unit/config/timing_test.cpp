@@ -8,7 +8,7 @@
 #include "panelgate/base/serial_format.hpp"
 #include "panelgate/config/config.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::timing_test {
 namespace {
 
 /// Loads a line with these keys after its name.
@@ -122,4 +122,4 @@ TEST(ConfigTiming, TheAutomaticFrameGapIsWhatThePanelAsksOrTheStandardWhicheverI
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::timing_test

@@ -8,7 +8,7 @@
 
 #include "memory_files.hpp"
 
-namespace panelgate::config {
+namespace panelgate::config::weaker_test {
 namespace {
 
 using testing::ElementsAre;
@@ -152,4 +152,4 @@ TEST(Weaker, WritesOfABroker) {
 }
 
 }  // namespace
-}  // namespace panelgate::config
+}  // namespace panelgate::config::weaker_test

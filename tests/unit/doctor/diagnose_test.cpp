@@ -5,7 +5,7 @@
 
 #include "diagnose_case.hpp"
 
-namespace panelgate::doctor {
+namespace panelgate::doctor::diagnose_test {
 namespace {
 
 using arbiter::Symptoms;
@@ -280,4 +280,4 @@ TEST_F(Diagnose, EveryFindingSaysWhatToDoAndWhy) {
 }
 
 }  // namespace
-}  // namespace panelgate::doctor
+}  // namespace panelgate::doctor::diagnose_test

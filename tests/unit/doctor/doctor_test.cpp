@@ -4,7 +4,7 @@
 
 #include "case.hpp"
 
-namespace panelgate::doctor {
+namespace panelgate::doctor::doctor_test {
 namespace {
 
 using arbiter::Symptoms;
@@ -128,4 +128,4 @@ TEST_F(DoctorTest, TheLikeliestAndWidestCauseIsFirst) {
 }
 
 }  // namespace
-}  // namespace panelgate::doctor
+}  // namespace panelgate::doctor::doctor_test

@@ -3,7 +3,7 @@
 
 #include "diagnose_case.hpp"
 
-namespace panelgate::doctor {
+namespace panelgate::doctor::panel_rules_test {
 namespace {
 
 using arbiter::Symptoms;
@@ -266,4 +266,4 @@ TEST_F(DiagnoseOverTcp, AdviceIsAboutTheServerAndNotAboutWires) {
 }
 
 }  // namespace
-}  // namespace panelgate::doctor
+}  // namespace panelgate::doctor::panel_rules_test

@@ -3,7 +3,7 @@
 
 #include "diagnose_case.hpp"
 
-namespace panelgate::doctor {
+namespace panelgate::doctor::plain_faults_test {
 namespace {
 
 using arbiter::Symptoms;
@@ -100,4 +100,4 @@ TEST_F(Diagnose, EachFigureStandsInTheWordsToo) {
 }
 
 }  // namespace
-}  // namespace panelgate::doctor
+}  // namespace panelgate::doctor::plain_faults_test

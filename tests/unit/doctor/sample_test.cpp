@@ -4,7 +4,7 @@
 
 #include "case.hpp"
 
-namespace panelgate::doctor {
+namespace panelgate::doctor::sample_test {
 namespace {
 
 using arbiter::Symptoms;
@@ -59,4 +59,4 @@ TEST(Sample, ADriverThatBeganToCountCountsFromZero) {
 }
 
 }  // namespace
-}  // namespace panelgate::doctor
+}  // namespace panelgate::doctor::sample_test

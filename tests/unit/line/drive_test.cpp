@@ -10,7 +10,7 @@
 
 #include "support/manual_clock.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::drive_test {
 namespace {
 
 struct Send {
@@ -166,4 +166,4 @@ TEST_F(DriveTest, RestEndsDeferral) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::drive_test

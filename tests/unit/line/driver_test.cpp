@@ -10,7 +10,7 @@
 #include "scripted_ops.hpp"
 #include "support/temp_dir.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::driver_test {
 namespace {
 
 constexpr int kNoDevice = -1;
@@ -156,4 +156,4 @@ TEST(UartErrorCount, IsNothingWhereTheDriverDoesNotCount) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::driver_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::line {
+namespace panelgate::line::input_budget_test {
 namespace {
 
 constexpr TimePoint kStart{1h};
@@ -46,4 +46,4 @@ TEST(InputBudget, RepliesAreNoFlood) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::input_budget_test

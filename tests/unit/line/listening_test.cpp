@@ -18,7 +18,7 @@
 #include "panelgate/line/tty_line.hpp"
 #include "panelgate/rt/asio_clock.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::listening_test {
 namespace {
 
 class ListeningTest : public testing::Test {
@@ -91,4 +91,4 @@ TEST_F(ListeningTest, AConnectionIsOnlyRead) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::listening_test

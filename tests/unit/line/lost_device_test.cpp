@@ -12,7 +12,7 @@
 #include "panelgate/line/pty.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::lost_device_test {
 namespace {
 
 class LostDevice : public testing::TestWithParam<int> {
@@ -66,4 +66,4 @@ TEST_F(LostDevice, AnInterruptedCallIsNoLoss) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::lost_device_test

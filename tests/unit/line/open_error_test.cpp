@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <string>
 
-namespace panelgate::line {
+namespace panelgate::line::open_error_test {
 namespace {
 
 TEST(OpenError, OfARefusalNamesTheGroupAndTheFlagForDocker) {
@@ -30,4 +30,4 @@ TEST(OpenError, OfARefusalNamesTheGroupAndTheFlagForDocker) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::open_error_test

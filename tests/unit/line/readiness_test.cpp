@@ -10,7 +10,7 @@
 #include <cstring>
 #include <utility>
 
-namespace panelgate::line {
+namespace panelgate::line::readiness_test {
 namespace {
 
 class ReadinessTest : public testing::Test {
@@ -109,4 +109,4 @@ TEST_F(ReadinessTest, ForgetsAndTakesAnother) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::readiness_test

@@ -6,7 +6,7 @@
 #include "recorded_ops.hpp"
 #include "rs485.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::recorded_test {
 namespace {
 
 constexpr int kNoDevice = -1;
@@ -75,4 +75,4 @@ INSTANTIATE_TEST_SUITE_P(Drivers, Recorded, testing::ValuesIn(kRecorded),
                          [](const auto& test) { return std::string(test.param.driver); });
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::recorded_test

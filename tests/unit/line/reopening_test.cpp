@@ -10,7 +10,7 @@
 #include "panelgate/line/pty.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::reopening_test {
 namespace {
 
 class Reopening : public testing::Test {
@@ -103,4 +103,4 @@ TEST_F(Reopening, P1AtMostOneFrameIsEverUnsent) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::reopening_test

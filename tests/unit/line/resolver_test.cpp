@@ -35,7 +35,7 @@ int getaddrinfo(const char* host, const char* port, const addrinfo* hints, addri
     return EAI_AGAIN;
 }
 
-namespace panelgate::line {
+namespace panelgate::line::resolver_test {
 namespace {
 
 using boost::asio::ip::tcp;
@@ -149,4 +149,4 @@ TEST(Resolver, ANumberInBracketsNeedsNoneEither) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::resolver_test

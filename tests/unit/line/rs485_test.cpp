@@ -4,7 +4,7 @@
 
 #include "scripted_ops.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::rs485_test {
 namespace {
 
 constexpr int kNoDevice = -1;
@@ -114,4 +114,4 @@ TEST(Rs485, RtsFollowsItsPolarity) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::rs485_test

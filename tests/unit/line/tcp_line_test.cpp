@@ -13,7 +13,7 @@
 #include "panelgate/rt/asio_clock.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::tcp_line_test {
 namespace {
 
 using boost::asio::ip::tcp;
@@ -131,4 +131,4 @@ TEST_F(TcpLineTest, CanBeStoppedWhileItConnects) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::tcp_line_test

@@ -5,7 +5,7 @@
 
 #include "scripted_ops.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::termios_setup_test {
 namespace {
 
 constexpr int kNoDevice = -1;
@@ -104,4 +104,4 @@ TEST_F(TermiosSetup, ARefusalIsAnErrorWithItsReason) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::termios_setup_test

@@ -13,7 +13,7 @@
 #include "scripted_ops.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::tty_drivers_test {
 namespace {
 
 /// A pty cannot report when it is empty.
@@ -188,4 +188,4 @@ TEST_F(TtyDrivers, ChangesItsFormatWhileItIsOpen) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::tty_drivers_test

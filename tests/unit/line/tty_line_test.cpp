@@ -18,7 +18,7 @@
 #include "panelgate/rt/asio_clock.hpp"
 #include "support/temp_dir.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::tty_line_test {
 namespace {
 
 class TtyLineTest : public testing::Test {
@@ -184,4 +184,4 @@ TEST(Reopen, DoublesItsPausesUpToTheLimitAndStartsAnewAfterSuccess) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::tty_line_test

@@ -3,7 +3,7 @@
 #include "panelgate/line/pty.hpp"
 #include "panelgate/line/termios_setup.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::tty_speaks_test {
 namespace {
 
 TEST(TtySpeaks, IsUnderstoodAtItsOwnRateOnly) {
@@ -27,4 +27,4 @@ TEST(TtySpeaks, DetectsOddParityButNotNoneFromEven) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::tty_speaks_test

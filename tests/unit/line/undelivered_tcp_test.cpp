@@ -19,7 +19,7 @@
 #include "panelgate/rt/asio_clock.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::undelivered_tcp_test {
 namespace {
 
 using boost::asio::ip::tcp;
@@ -180,4 +180,4 @@ TEST_F(UndeliveredTcp, P7TheKernelGivesUpInSecondsAndNotForOneLostProbe) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::undelivered_tcp_test

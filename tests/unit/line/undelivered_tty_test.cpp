@@ -19,7 +19,7 @@
 #include "support/manual_clock.hpp"
 #include "tty_trouble.hpp"
 
-namespace panelgate::line {
+namespace panelgate::line::undelivered_tty_test {
 namespace {
 
 constexpr std::uintptr_t kOutput = 1;  // TCOFLUSH: <termios.h> clashes with <asm/termios.h>
@@ -195,4 +195,4 @@ TEST(CallInterrupter, EndsACallThatSleepsInTheKernel) {
 }
 
 }  // namespace
-}  // namespace panelgate::line
+}  // namespace panelgate::line::undelivered_tty_test

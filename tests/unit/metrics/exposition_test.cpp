@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace panelgate::metrics {
+namespace panelgate::metrics::exposition_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -266,4 +266,4 @@ TEST(Exposition, P10DriverErrorsAreShownForLinesWhoseDriverCounts) {
 }
 
 }  // namespace
-}  // namespace panelgate::metrics
+}  // namespace panelgate::metrics::exposition_test

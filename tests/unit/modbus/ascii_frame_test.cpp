@@ -8,7 +8,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::ascii_frame_test {
 namespace {
 
 Bytes text(std::string_view characters) { return Bytes(characters.begin(), characters.end()); }
@@ -141,4 +141,4 @@ TEST(AsciiFramer, EveryByteThatIsWrittenIsReadAgain) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::ascii_frame_test

@@ -9,7 +9,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::ascii_transcript_test {
 namespace {
 
 using End = AsciiTranscript::Piece::End;
@@ -174,4 +174,4 @@ TEST(AsciiTranscript, EveryByteCanBeSaid) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::ascii_transcript_test

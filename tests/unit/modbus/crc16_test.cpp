@@ -6,7 +6,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::crc16_test {
 namespace {
 
 /// The procedure of serial line V1.02, 6.2.2, a bit at a time.
@@ -43,4 +43,4 @@ TEST(Crc16, AgreesWithTheBitwiseProcedure) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::crc16_test

@@ -9,7 +9,7 @@
 #include "panelgate/modbus/rtu_framer.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::crc_order_test {
 namespace {
 
 const Bytes kRead = "03 00 6B 00 03"_hex;
@@ -85,4 +85,4 @@ TEST_F(FramerOfBothOrders, TheWrongOrderIsDamage) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::crc_order_test

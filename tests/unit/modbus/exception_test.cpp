@@ -6,7 +6,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::exception_test {
 namespace {
 
 TEST(Exception, ReportsTheResultOfItsRequestToTheClient) {
@@ -55,4 +55,4 @@ TEST(Exception, CallsTheOthersByTheirNumber) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::exception_test

@@ -8,7 +8,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::framing_test {
 namespace {
 
 Bytes operator+(Bytes a, const Bytes& b) {
@@ -102,4 +102,4 @@ TEST(OtherFraming, TheWordsAreThoseOfTheConfiguration) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::framing_test

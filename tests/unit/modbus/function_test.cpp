@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::function_test {
 namespace {
 
 TEST(Function, KnowsTheNineteenOfTheStandard) {
@@ -48,4 +48,4 @@ TEST(Function, NamesTablesAsThePathsDo) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::function_test

@@ -7,7 +7,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::mbap_test {
 namespace {
 
 const Bytes kRead = "00 10 00 00 00 06 11 03 00 6B 00 03"_hex;
@@ -126,4 +126,4 @@ TEST(MbapFramer, GivesTheSameForEverySplit) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::mbap_test

@@ -4,7 +4,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::request_test {
 namespace {
 
 bool passes(const Bytes& pdu, QuantityCheck check = QuantityCheck::fit) {
@@ -302,4 +302,4 @@ TEST(RequestAduLength, IsUnknownForOtherFunctionsAndTooFewBytes) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::request_test

@@ -6,7 +6,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::response_test {
 namespace {
 
 using Random = std::mt19937;
@@ -246,4 +246,4 @@ TEST(AnswersProperty, AnyBytesAreJudgedWithoutHarm) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::response_test

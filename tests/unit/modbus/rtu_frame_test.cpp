@@ -4,7 +4,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::rtu_frame_test {
 namespace {
 
 TEST(RtuFrame, SendsTheLowByteOfTheCrcFirst) {
@@ -47,4 +47,4 @@ TEST(RtuFrame, HasNoUpperLimitOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::rtu_frame_test

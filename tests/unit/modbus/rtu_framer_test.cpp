@@ -8,7 +8,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::rtu_framer_test {
 namespace {
 
 const Bytes kRequest = "03 00 6B 00 03"_hex;
@@ -222,4 +222,4 @@ TEST(RtuFramer, TakesTheLongFramesOfPanelsThatHaveThem) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::rtu_framer_test

@@ -9,7 +9,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::rtu_request_framer_test {
 namespace {
 
 Bytes operator+(Bytes a, const Bytes& b) {
@@ -256,4 +256,4 @@ TEST(RtuRequestFramer, BuffersNoMoreThanOneFrame) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::rtu_request_framer_test

@@ -6,7 +6,7 @@
 #include <set>
 #include <vector>
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::span_test {
 namespace {
 
 std::set<std::uint32_t> items(const Span& span) {
@@ -56,4 +56,4 @@ TEST(Span, MayReachTheEndOfTheTable) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::span_test

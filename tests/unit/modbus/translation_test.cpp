@@ -7,7 +7,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::translation_test {
 namespace {
 
 Bytes sent_for(const Bytes& asked) {
@@ -69,4 +69,4 @@ TEST(Translation, WhatComesBackAnswersWhatWasAsked) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::translation_test

@@ -10,7 +10,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "panelgate/modbus/rtu_framer.hpp"
 
-namespace panelgate::modbus {
+namespace panelgate::modbus::vectors_test {
 namespace {
 
 std::vector<Vector> vectors_where(bool (*wanted)(const Vector&)) {
@@ -230,4 +230,4 @@ TEST(Vectors, AreAllThere) {
 }
 
 }  // namespace
-}  // namespace panelgate::modbus
+}  // namespace panelgate::modbus::vectors_test

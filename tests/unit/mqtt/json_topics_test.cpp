@@ -4,7 +4,7 @@
 
 #include "mqtt_plant.hpp"
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::json_topics_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -143,4 +143,4 @@ TEST_F(MqttJson, ResultsSayWhichWriteTheyAreOf) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::json_topics_test

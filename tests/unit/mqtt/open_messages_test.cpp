@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::open_messages_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -39,4 +39,4 @@ TEST(MqttOpenMessages, ABarrierAcknowledgesWhatIsBeforeIt) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::open_messages_test

@@ -7,7 +7,7 @@
 
 #include "mqtt_plant.hpp"
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::protobuf_test {
 namespace {
 
 TEST(MqttProtobuf, WritesWhatTheEncodingGuideShows) {
@@ -46,4 +46,4 @@ TEST(MqttProtobuf, WhatIsBrokenEndsThere) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::protobuf_test

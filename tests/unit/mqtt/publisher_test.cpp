@@ -4,7 +4,7 @@
 
 #include "mqtt_plant.hpp"
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::publisher_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -245,4 +245,4 @@ TEST_F(MqttPublisher, WhatIsNotClearedYetIsClearedByTheNextUnlessItIsBack) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::publisher_test

@@ -5,7 +5,7 @@
 #include "mqtt_plant.hpp"
 #include "sparkplug_payload.hpp"
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::sparkplug_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -272,4 +272,4 @@ TEST(MqttSparkplugPayload, HasALimitOfMetrics) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::sparkplug_test

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace panelgate::mqtt {
+namespace panelgate::mqtt::store_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -77,4 +77,4 @@ TEST(MqttStore, AcknowledgementsOfNothingMeanNothing) {
 }
 
 }  // namespace
-}  // namespace panelgate::mqtt
+}  // namespace panelgate::mqtt::store_test

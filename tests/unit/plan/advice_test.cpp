@@ -9,7 +9,7 @@
 
 #include "plant_line.hpp"
 
-namespace panelgate::plan {
+namespace panelgate::plan::advice_test {
 namespace {
 
 using test::kRegisters;
@@ -259,4 +259,4 @@ TEST_F(AdviceTest, NothingIsToldThatBringsNothing) {
 }
 
 }  // namespace
-}  // namespace panelgate::plan
+}  // namespace panelgate::plan::advice_test

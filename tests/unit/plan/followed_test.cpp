@@ -12,7 +12,7 @@
 #include "panelgate/plan/line_plan.hpp"
 #include "plant_line.hpp"
 
-namespace panelgate::plan {
+namespace panelgate::plan::followed_test {
 namespace {
 
 constexpr int kLines = 1500;
@@ -186,4 +186,4 @@ TEST(FollowedTest, TheHighestRateIsFineAndTheNextIsNot) {
 }
 
 }  // namespace
-}  // namespace panelgate::plan
+}  // namespace panelgate::plan::followed_test

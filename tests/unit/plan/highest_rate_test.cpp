@@ -4,7 +4,7 @@
 
 #include "plant_line.hpp"
 
-namespace panelgate::plan {
+namespace panelgate::plan::highest_rate_test {
 namespace {
 
 class HighestRateTest : public testing::Test, protected test::PlantLine {
@@ -61,4 +61,4 @@ TEST_F(HighestRateTest, ReadingAgainStopsAtItsLimit) {
 }
 
 }  // namespace
-}  // namespace panelgate::plan
+}  // namespace panelgate::plan::highest_rate_test

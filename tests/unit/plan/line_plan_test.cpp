@@ -4,7 +4,7 @@
 
 #include "plant_line.hpp"
 
-namespace panelgate::plan {
+namespace panelgate::plan::line_plan_test {
 namespace {
 
 using test::kRegisters;
@@ -190,4 +190,4 @@ TEST_F(LinePlanTest, OtherIntervalsLeaveTheRefreshAndEndAtADay) {
 }
 
 }  // namespace
-}  // namespace panelgate::plan
+}  // namespace panelgate::plan::line_plan_test

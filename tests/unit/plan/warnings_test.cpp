@@ -4,7 +4,7 @@
 
 #include "plant_line.hpp"
 
-namespace panelgate::plan {
+namespace panelgate::plan::warnings_test {
 namespace {
 
 using testing::AllOf;
@@ -101,4 +101,4 @@ TEST_F(WarningsTest, PointsThatAreReadTogetherCannotBeFewer) {
 }
 
 }  // namespace
-}  // namespace panelgate::plan
+}  // namespace panelgate::plan::warnings_test

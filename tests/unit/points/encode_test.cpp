@@ -6,7 +6,7 @@
 #include "panelgate/points/value.hpp"
 #include "point_of.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::encode_test {
 namespace {
 
 Point scaled(Type type, double scale) {
@@ -93,4 +93,4 @@ TEST(Encode, WholeNumbersStayExactWithAScaleToo) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::encode_test

@@ -9,7 +9,7 @@
 #include "panelgate/points/value.hpp"
 #include "point_of.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::exact_numbers_test {
 namespace {
 
 Decimal of(const char* text) { return Decimal::parse(text).value(); }
@@ -137,4 +137,4 @@ TEST(ExactNumbers, AConfiguredLimitIsJudgedOnWhatIsWritten) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::exact_numbers_test

@@ -5,7 +5,7 @@
 
 #include <string_view>
 
-namespace panelgate::points {
+namespace panelgate::points::heard_values_test {
 namespace {
 
 using modbus::Table;
@@ -119,4 +119,4 @@ TEST_F(HeardValuesTest, WhatContradictsItselfChangesNothing) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::heard_values_test

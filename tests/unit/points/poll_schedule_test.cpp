@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-namespace panelgate::points {
+namespace panelgate::points::poll_schedule_test {
 namespace {
 
 using testing::ElementsAre;
@@ -210,4 +210,4 @@ TEST(PollSchedule, CallsThatAreEarlyRepeatedOrStrangeAreHarmless) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::poll_schedule_test

@@ -7,7 +7,7 @@
 #include "support/fake_bus.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::poller_test {
 namespace {
 
 using modbus::Table;
@@ -127,4 +127,4 @@ TEST_F(PollerTest, P10WhatIsKnownOfItemsThatAreStillWantedStaysKnown) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::poller_test

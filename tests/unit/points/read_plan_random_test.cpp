@@ -8,7 +8,7 @@
 
 #include "panelgate/points/read_plan.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::read_plan_random_test {
 namespace {
 
 using modbus::Table;
@@ -220,4 +220,4 @@ TEST(RandomReadPlan, IsTheBestPlanOfFewWantsWhereIntervalsDiffer) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::read_plan_random_test

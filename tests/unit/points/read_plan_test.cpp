@@ -4,7 +4,7 @@
 
 #include <set>
 
-namespace panelgate::points {
+namespace panelgate::points::read_plan_test {
 namespace {
 
 using modbus::Table;
@@ -281,4 +281,4 @@ TEST(Bisect, FindsWhatAPanelRefusesInALogarithmOfRequests) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::read_plan_test

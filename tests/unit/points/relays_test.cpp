@@ -8,7 +8,7 @@
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::relays_test {
 namespace {
 
 class RelaysTest : public testing::Test {
@@ -258,4 +258,4 @@ TEST_F(RelaysTest, P2ARelayThatStaysWritesNothingAgainWhenAnotherComes) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::relays_test

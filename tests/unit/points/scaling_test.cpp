@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-namespace panelgate::points {
+namespace panelgate::points::scaling_test {
 namespace {
 
 TEST(Scaling, ValuesAreTheDoublesOfTheirDecimals) {
@@ -73,4 +73,4 @@ TEST(Scaling, DigitsThatLieTooFarApartAreRoundedAsDoublesAre) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::scaling_test

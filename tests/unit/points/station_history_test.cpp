@@ -7,7 +7,7 @@
 
 #include "panelgate/points/station_polls.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::station_history_test {
 namespace {
 
 constexpr TimePoint kStart{7200s};
@@ -118,4 +118,4 @@ TEST_F(StationHistoryTest, ThePastOfPointsThatAreTheSameGoesOn) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::station_history_test

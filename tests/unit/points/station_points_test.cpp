@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::points {
+namespace panelgate::points::station_points_test {
 namespace {
 
 TEST(StationPoints, ShowsValuesWithQualityAndAge) {
@@ -61,4 +61,4 @@ TEST(StationPoints, ShowsValuesWithQualityAndAge) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::station_points_test

@@ -4,7 +4,7 @@
 
 #include "panelgate/base/bytes.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::station_polls_test {
 namespace {
 
 using modbus::Table;
@@ -219,4 +219,4 @@ TEST(StationPolls, BitsAreZeroOrOne) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::station_polls_test

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace panelgate::points {
+namespace panelgate::points::table_map_test {
 namespace {
 
 constexpr auto kTable = modbus::Table::holding_registers;
@@ -111,4 +111,4 @@ TEST(IsPlannable, AWantHasItemsOfTheTableAndAnInterval) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::table_map_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::points {
+namespace panelgate::points::text_test {
 namespace {
 
 using Words = std::vector<std::uint16_t>;
@@ -75,4 +75,4 @@ TEST(Text, ACharacterThatTheLengthCutsIsNotHalfShown) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::text_test

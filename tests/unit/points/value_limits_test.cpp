@@ -8,7 +8,7 @@
 #include "panelgate/points/value.hpp"
 #include "point_of.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::value_limits_test {
 namespace {
 
 Point text_of_five() {
@@ -256,4 +256,4 @@ TEST(Value, ScaledValuesRoundTripForEveryWholeTypeAndOrder) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::value_limits_test

@@ -8,7 +8,7 @@
 
 #include "point_of.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::value_test {
 namespace {
 
 struct Vector {
@@ -163,4 +163,4 @@ TEST(Value, ABitOfAWord) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::value_test

@@ -9,7 +9,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "point_of.hpp"
 
-namespace panelgate::points {
+namespace panelgate::points::write_request_test {
 namespace {
 
 const profile::Catalogue& shipped() {
@@ -194,4 +194,4 @@ TEST(Interpretations, ShowOneBlockInEveryWay) {
 }
 
 }  // namespace
-}  // namespace panelgate::points
+}  // namespace panelgate::points::write_request_test

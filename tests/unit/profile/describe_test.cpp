@@ -7,7 +7,7 @@
 
 #include "panelgate/profile/load_profile.hpp"
 
-namespace panelgate::profile {
+namespace panelgate::profile::describe_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -119,4 +119,4 @@ TEST(Describe, HasALineForEveryFunctionAndAreaOfEveryShippedProfile) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::describe_test

@@ -6,7 +6,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::profile {
+namespace panelgate::profile::judge_test {
 namespace {
 
 struct Case {
@@ -69,4 +69,4 @@ TEST(Judge, KnowsWhatCanBeReadAndNotWritten) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::judge_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::profile {
+namespace panelgate::profile::load_profile_test {
 namespace {
 
 constexpr const char* kHead =
@@ -302,4 +302,4 @@ TEST(LoadProfile, LeavesTheProblemsOfOthersAlone) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::load_profile_test

@@ -8,7 +8,7 @@
 
 #include "panelgate/profile/load_profile.hpp"
 
-namespace panelgate::profile {
+namespace panelgate::profile::notation_test {
 namespace {
 
 using modbus::Table;
@@ -270,4 +270,4 @@ TEST(Notation, TakesTheSecondAreaOfAPrefixWhenTheFirstDoesNotReachTheItem) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::notation_test

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace panelgate::profile {
+namespace panelgate::profile::panel_profile_test {
 namespace {
 
 using modbus::Table;
@@ -96,4 +96,4 @@ TEST(PanelProfile, TheFirstAreaThatReachesAnItemIsItsArea) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::panel_profile_test

@@ -8,7 +8,7 @@
 
 #include "panelgate/profile/load_profile.hpp"
 
-namespace panelgate::profile {
+namespace panelgate::profile::shipped_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -156,4 +156,4 @@ TEST(Catalogue, LetsAUserReplaceAndAdd) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::shipped_test

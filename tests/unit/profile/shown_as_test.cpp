@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace panelgate::profile {
+namespace panelgate::profile::shown_as_test {
 namespace {
 
 using modbus::Span;
@@ -63,4 +63,4 @@ TEST(ShownAs, OnlyWhatLiesInAnAreaIsShownElsewhere) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::shown_as_test

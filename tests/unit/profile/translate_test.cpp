@@ -9,7 +9,7 @@
 #include "support/hex.hpp"
 #include "support/request.hpp"
 
-namespace panelgate::profile {
+namespace panelgate::profile::translate_test {
 namespace {
 
 using modbus::Table;
@@ -96,4 +96,4 @@ TEST_F(TranslateTest, NoReadBecomesAWrite) {
 }
 
 }  // namespace
-}  // namespace panelgate::profile
+}  // namespace panelgate::profile::translate_test

@@ -7,7 +7,7 @@
 #include <system_error>
 #include <vector>
 
-namespace panelgate::rt {
+namespace panelgate::rt::acceptor_test {
 namespace {
 
 namespace asio = boost::asio;
@@ -85,4 +85,4 @@ TEST_F(AcceptorTest, PassesOnNoConnectionOnceClosed) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::acceptor_test

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-namespace panelgate::rt {
+namespace panelgate::rt::access_list_test {
 namespace {
 
 bool allows(const std::vector<Network>& networks, const char* peer) {
@@ -53,4 +53,4 @@ TEST(AccessList, RefusesWhatIsNotANetwork) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::access_list_test

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-namespace panelgate::rt {
+namespace panelgate::rt::asio_clock_test {
 namespace {
 
 class AsioClockTest : public testing::Test {
@@ -133,4 +133,4 @@ TEST_F(AsioClockTest, AHandlerMayArmItsOwnAlarm) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::asio_clock_test

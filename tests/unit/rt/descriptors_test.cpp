@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
-namespace panelgate::rt {
+namespace panelgate::rt::descriptors_test {
 namespace {
 
 using Numbers = std::vector<std::size_t>;
@@ -41,4 +41,4 @@ TEST_F(DescriptorLimit, IsRaisedAsFarAsItMayBe) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::descriptors_test

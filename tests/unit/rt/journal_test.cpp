@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::rt {
+namespace panelgate::rt::journal_test {
 namespace {
 
 TEST(Journal, NamesFieldsAfterThoseOfTheEvent) {
@@ -66,4 +66,4 @@ TEST(Journal, TakesEachEntryAsOneDatagramAndWhatItDoesNotTakeWaits) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::journal_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::rt {
+namespace panelgate::rt::lead_time_test {
 namespace {
 
 TEST(LeadTime, FollowsWhatTwoOfThreeAreLate) {
@@ -43,4 +43,4 @@ TEST(LeadTime, ALongRestSavesNoMoreThanAMoment) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::lead_time_test

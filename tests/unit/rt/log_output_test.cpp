@@ -15,7 +15,7 @@
 #include <string>
 #include <utility>
 
-namespace panelgate::rt {
+namespace panelgate::rt::log_output_test {
 namespace {
 
 /// Both ends of a channel to a reader that reads only on request.
@@ -173,4 +173,4 @@ TEST(LogOutput, WritersOfOneFileDoNotOverwriteEachOther) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::log_output_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::rt {
+namespace panelgate::rt::log_repeats_test {
 namespace {
 
 constexpr TimePoint kStart{Duration(1h)};
@@ -67,4 +67,4 @@ TEST_F(LogRepeatsTest, MorePlacesThanTheLimitLoseNothing) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::log_repeats_test

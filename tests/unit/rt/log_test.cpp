@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace panelgate::rt {
+namespace panelgate::rt::log_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -71,4 +71,4 @@ TEST_F(LogTest, ThrottlesASubjectWithChangingFieldsLikeOneThatRepeats) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::log_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::rt {
+namespace panelgate::rt::log_throttle_test {
 namespace {
 
 constexpr TimePoint kStart{Duration(1h)};
@@ -114,4 +114,4 @@ TEST(LogThrottle, ABudgetComesBackWithTime) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::log_throttle_test

@@ -6,7 +6,7 @@
 
 #include "support/manual_clock.hpp"
 
-namespace panelgate::rt {
+namespace panelgate::rt::loop_lag_test {
 namespace {
 
 std::uint64_t samples(const LoopLag& lag) {
@@ -45,4 +45,4 @@ TEST(LoopLag, IsNotTakenBeforeTheStartNorAfterTheEnd) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::loop_lag_test

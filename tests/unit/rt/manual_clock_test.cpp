@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::test {
+namespace panelgate::test::manual_clock_test {
 namespace {
 
 class ManualClockTest : public testing::Test {
@@ -61,4 +61,4 @@ TEST_F(ManualClockTest, TimeMayPassUnnoticed) {
 }
 
 }  // namespace
-}  // namespace panelgate::test
+}  // namespace panelgate::test::manual_clock_test

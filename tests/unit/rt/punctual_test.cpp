@@ -8,7 +8,7 @@
 
 #include <thread>
 
-namespace panelgate::rt {
+namespace panelgate::rt::punctual_test {
 namespace {
 
 SchedAttr attributes() {
@@ -43,4 +43,4 @@ TEST(Punctual, AsksForShortSlicesAndKeepsItsNiceness) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::punctual_test

@@ -17,7 +17,7 @@
 #include "support/manual_clock.hpp"
 #include "support/temp_dir.hpp"
 
-namespace panelgate::rt {
+namespace panelgate::rt::service_manager_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -170,4 +170,4 @@ TEST(WatchdogInterval, IgnoresAnotherProcessAndInvalidNumbers) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::service_manager_test

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace panelgate::rt {
+namespace panelgate::rt::worker_test {
 namespace {
 
 TEST(Worker, WorksInAnotherThreadAndIsDoneInTheLoop) {
@@ -57,4 +57,4 @@ TEST(Worker, ItsEndWaitsForTheJobThatRuns) {
 }
 
 }  // namespace
-}  // namespace panelgate::rt
+}  // namespace panelgate::rt::worker_test

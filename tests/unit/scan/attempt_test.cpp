@@ -5,7 +5,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::attempt_test {
 namespace {
 
 const SerialFormat k9600{9600, 8, Parity::none, 1};
@@ -89,4 +89,4 @@ TEST(Attempt, GivesFramesOfOthersAndOfOtherRequests) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::attempt_test

@@ -10,7 +10,7 @@
 #include "panelgate/modbus/request.hpp"
 #include "virtual_line.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::discovery_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -230,4 +230,4 @@ TEST_F(DiscoveryTest, HasNothingToAskWhereEverybodyIsKnown) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::discovery_test

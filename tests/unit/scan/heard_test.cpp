@@ -10,7 +10,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::heard_test {
 namespace {
 
 const Bytes kReply = modbus::encode_adu(7, "03 02 00 05"_hex);
@@ -71,4 +71,4 @@ TEST(TakeApart, EveryByteIsInAFrameOrDamaged) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::heard_test

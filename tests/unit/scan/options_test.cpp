@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace panelgate::scan {
+namespace panelgate::scan::options_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -38,4 +38,4 @@ TEST(ScanOptions, SayWhatWouldBeRightAndLeaveTheSettingsAlone) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::options_test

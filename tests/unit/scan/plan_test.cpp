@@ -6,7 +6,7 @@
 
 #include "virtual_line.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::plan_test {
 namespace {
 
 using ::testing::Each;
@@ -104,4 +104,4 @@ TEST(SearchPlan, CostsAboutAMinuteWhenNothingAnswersAtAll) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::plan_test

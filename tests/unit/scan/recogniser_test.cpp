@@ -6,7 +6,7 @@
 #include "support/hex.hpp"
 #include "virtual_line.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::recogniser_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -104,4 +104,4 @@ TEST(Recogniser, LearnsNothingFromSilenceAndFromABusyPanel) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::recogniser_test

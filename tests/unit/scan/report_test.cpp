@@ -5,7 +5,7 @@
 #include "panelgate/config/config.hpp"
 #include "panelgate/scan/progress.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::report_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -165,4 +165,4 @@ TEST(ScanProgress, FitsItsWidth) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::report_test

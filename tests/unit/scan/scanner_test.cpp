@@ -7,7 +7,7 @@
 #include "support/hex.hpp"
 #include "virtual_line.hpp"
 
-namespace panelgate::scan {
+namespace panelgate::scan::scanner_test {
 namespace {
 
 using ::testing::Contains;
@@ -354,4 +354,4 @@ TEST(Scanner, TellsWhatItKnowsBeforeItIsDone) {
 }
 
 }  // namespace
-}  // namespace panelgate::scan
+}  // namespace panelgate::scan::scanner_test

@@ -6,7 +6,7 @@
 #include "panelgate/modbus/ascii.hpp"
 #include "talk.hpp"
 
-namespace panelgate::serial_server::test {
+namespace panelgate::serial_server::test::conversation_test {
 namespace {
 
 using modbus::encode_adu;
@@ -258,4 +258,4 @@ TEST(Conversation, WantsNothingWhenNothingHappens) {
 }
 
 }  // namespace
-}  // namespace panelgate::serial_server::test
+}  // namespace panelgate::serial_server::test::conversation_test

@@ -3,7 +3,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 
-namespace panelgate::serial_server::test {
+namespace panelgate::serial_server::test::echo_test {
 namespace {
 
 using modbus::encode_adu;
@@ -104,4 +104,4 @@ TEST(OwnEcho, OnlyBegunLeavesTheMastersRequestWhole) {
 }
 
 }  // namespace
-}  // namespace panelgate::serial_server::test
+}  // namespace panelgate::serial_server::test::echo_test

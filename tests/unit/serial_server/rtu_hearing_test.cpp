@@ -8,7 +8,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 
-namespace panelgate::serial_server::test {
+namespace panelgate::serial_server::test::rtu_hearing_test {
 namespace {
 
 using modbus::encode_adu;
@@ -177,4 +177,4 @@ TEST(RtuHearing, KeepsLittleWhateverComes) {
 }
 
 }  // namespace
-}  // namespace panelgate::serial_server::test
+}  // namespace panelgate::serial_server::test::rtu_hearing_test

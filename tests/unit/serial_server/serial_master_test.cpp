@@ -12,7 +12,7 @@
 #include "support/memory_line.hpp"
 #include "talk.hpp"
 
-namespace panelgate::serial_server::test {
+namespace panelgate::serial_server::test::serial_master_test {
 namespace {
 
 using modbus::encode_adu;
@@ -195,4 +195,4 @@ TEST(SerialMaster, OutlivesAPortThatGoesWhileItReplies) {
 }
 
 }  // namespace
-}  // namespace panelgate::serial_server::test
+}  // namespace panelgate::serial_server::test::serial_master_test

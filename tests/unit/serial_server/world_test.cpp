@@ -15,7 +15,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "talk.hpp"
 
-namespace panelgate::serial_server::test {
+namespace panelgate::serial_server::test::world_test {
 namespace {
 
 struct Faults {
@@ -178,4 +178,4 @@ TEST(World, OfAMasterThatIsHeardBadly) {
 }
 
 }  // namespace
-}  // namespace panelgate::serial_server::test
+}  // namespace panelgate::serial_server::test::world_test

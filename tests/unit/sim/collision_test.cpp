@@ -7,7 +7,7 @@
 #include "panelgate/modbus/rtu_frame.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::collision_test {
 namespace {
 
 const SerialFormat k8n1{38400, 8, Parity::none, 1};
@@ -63,4 +63,4 @@ TEST(Collision, ADuplicatePanelComesTwiceADamagedOrASingleTime) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::collision_test

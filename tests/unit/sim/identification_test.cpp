@@ -3,7 +3,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/sim/station.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::identification_test {
 namespace {
 
 TEST(Identification, RecognisesEachSimulatedPanelByItsReads) {
@@ -25,4 +25,4 @@ TEST(Identification, RecognisesEachSimulatedPanelByItsReads) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::identification_test

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace panelgate::sim {
+namespace panelgate::sim::memory_test {
 namespace {
 
 using modbus::Table;
@@ -74,4 +74,4 @@ TEST_F(MemoryTest, WritingABitOfAViewLeavesTheOthersOfItsWord) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::memory_test

@@ -8,7 +8,7 @@
 #include "panelgate/sim/station.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::misbehaviour_test {
 namespace {
 
 const Bytes kReply = modbus::encode_adu(20, "03 02 00 07"_hex);
@@ -105,4 +105,4 @@ TEST(Misbehaviour, OnlyThePanasonicMindsAPauseOfMoreThan24BitTimes) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::misbehaviour_test

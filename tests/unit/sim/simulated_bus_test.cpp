@@ -18,7 +18,7 @@
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::simulated_bus_test {
 namespace {
 
 const Bytes kReadCounter = "03 00 00 00 01"_hex;
@@ -138,4 +138,4 @@ TEST_F(SimulatedBusTest, TwoPanelsThatSpeakAtOnceAreBothDamaged) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::simulated_bus_test

@@ -9,7 +9,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::station_rules_test {
 namespace {
 
 constexpr std::int64_t kWall = 1795244523;  // Saturday 2026-11-21 07:02:03
@@ -372,4 +372,4 @@ TEST(Station, KeepsItsMemoryWhenItIsMoved) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::station_rules_test

@@ -5,7 +5,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::station_test {
 namespace {
 
 const profile::PanelProfile& shipped(std::string_view name) {
@@ -131,4 +131,4 @@ TEST_F(StationTest, TheGenericPanelMasksAndReadsAndWritesInOne) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::station_test

@@ -11,7 +11,7 @@
 #include "panelgate/profile/load_profile.hpp"
 #include "panelgate/sim/station.hpp"
 
-namespace panelgate::sim {
+namespace panelgate::sim::vectors_test {
 namespace {
 
 /// Prefix of a vector's name -> the demo panel that it is sent to.
@@ -105,4 +105,4 @@ TEST(FramesOfTheManuals, AreAllThere) {
 }
 
 }  // namespace
-}  // namespace panelgate::sim
+}  // namespace panelgate::sim::vectors_test

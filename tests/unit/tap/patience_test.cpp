@@ -12,7 +12,7 @@
 
 #include "heard_line.hpp"
 
-namespace panelgate::tap::test {
+namespace panelgate::tap::test::patience_test {
 namespace {
 
 using testing::ElementsAre;
@@ -128,4 +128,4 @@ TEST(Patience, BelievesSlowRepliesAgainWhateverTroubleThereWas) {
 }
 
 }  // namespace
-}  // namespace panelgate::tap::test
+}  // namespace panelgate::tap::test::patience_test

@@ -7,7 +7,7 @@
 #include "panelgate/modbus/ascii.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::datagrams_test {
 namespace {
 
 using asio::ip::udp;
@@ -291,4 +291,4 @@ TEST_F(DatagramsTest, APortInUseIsReportedAndNothingIsOpen) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::datagrams_test

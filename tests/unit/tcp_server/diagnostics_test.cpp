@@ -12,7 +12,7 @@
 #include "panelgate/tcp_server/register_map_text.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::diagnostics_test {
 namespace {
 
 /// Two lines, and station 31 of the second as unit 7.
@@ -207,4 +207,4 @@ TEST(Diagnostics, ThePrintedMapNamesWhatIsThere) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::diagnostics_test

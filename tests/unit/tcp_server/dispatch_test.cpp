@@ -11,7 +11,7 @@
 #include "held_bus.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::dispatch_test {
 namespace {
 
 const Bytes kRead = "03 00 00 00 01"_hex;
@@ -163,4 +163,4 @@ TEST_F(DispatchTest, WhereBroadcastsAreDeniedNoRequestToAllIsLookedAt) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::dispatch_test

@@ -10,7 +10,7 @@
 
 #include "loopback.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::listener_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -258,4 +258,4 @@ TEST_F(ListenerTest, RestsWhileThereAreNoDescriptors) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::listener_test

@@ -6,7 +6,7 @@
 
 #include "support/manual_clock.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::own_answers_test {
 namespace {
 
 class OwnAnswersTest : public testing::Test {
@@ -63,4 +63,4 @@ TEST_F(OwnAnswersTest, NoAnswerIsRequestedAfterTheEnd) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::own_answers_test

@@ -12,7 +12,7 @@
 #include "support/hex.hpp"
 #include "support/manual_clock.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::pipeline_test {
 namespace {
 
 // A pipeline with two requests in flight and three queued, whose client takes replies on demand.
@@ -203,4 +203,4 @@ TEST_F(RepeatedRequests, WithoutTransactionIdsNoneIsKnownAgain) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::pipeline_test

@@ -8,7 +8,7 @@
 
 #include "support/hex.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::reply_queue_test {
 namespace {
 
 using Ticket = ReplyQueue::Ticket;
@@ -79,4 +79,4 @@ TEST(ReplyQueue, StepsOverWhatGetsNoReply) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::reply_queue_test

@@ -1,7 +1,7 @@
 #include "loopback.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_broadcast_test {
 namespace {
 
 // TBC-02 to TBC-06.
@@ -121,4 +121,4 @@ TEST_F(SessionBroadcast, TreatsAMappedUnitZeroAsItsStation) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_broadcast_test

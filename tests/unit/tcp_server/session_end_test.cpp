@@ -2,7 +2,7 @@
 
 #include "loopback.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_end_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -167,4 +167,4 @@ TEST_F(SessionEnd, ASlowClientThatTakesSomethingInEachPeriodStays) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_end_test

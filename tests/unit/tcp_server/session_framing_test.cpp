@@ -1,6 +1,6 @@
 #include "loopback.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_framing_test {
 namespace {
 
 // Framing errors: MBAP-05 to MBAP-07.
@@ -97,4 +97,4 @@ TEST_F(SessionFraming, TheNextAduHasATimeOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_framing_test

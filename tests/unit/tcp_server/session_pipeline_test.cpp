@@ -5,7 +5,7 @@
 
 #include "loopback.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_pipeline_test {
 namespace {
 
 // Clients that pipeline requests: PIP-01 to PIP-07.
@@ -249,4 +249,4 @@ TEST_F(SessionPipeline, P3P9AClientThatDoesNotReadIsNotAskedForAndGetsEverything
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_pipeline_test

@@ -7,7 +7,7 @@
 #include "panelgate/modbus/framing.hpp"
 #include "panelgate/modbus/rtu_frame.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_serial_test {
 namespace {
 
 using modbus::Framing;
@@ -326,4 +326,4 @@ TEST_P(AnyListener, AnHttpClientIsClosedAndNamedInTheLog) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_serial_test

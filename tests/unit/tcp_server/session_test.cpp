@@ -3,7 +3,7 @@
 
 #include "loopback.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::session_test {
 namespace {
 
 class Session : public Loopback {};
@@ -227,4 +227,4 @@ TEST_F(Session, PrefersAnAliasToTheDiagnosticsUnit) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::session_test

@@ -7,7 +7,7 @@
 
 #include "held_bus.hpp"
 
-namespace panelgate::tcp_server {
+namespace panelgate::tcp_server::unit_map_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -89,4 +89,4 @@ TEST_F(UnitMapTest, RefusesALineThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace panelgate::tcp_server
+}  // namespace panelgate::tcp_server::unit_map_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::document_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -293,4 +293,4 @@ TEST(Problems, AreSortedByPlaceWithOtherFilesLast) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::document_test

@@ -7,7 +7,7 @@
 
 #include "panelgate/yaml/document.hpp"
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::encoding_test {
 namespace {
 
 using namespace std::string_view_literals;
@@ -108,4 +108,4 @@ TEST(Encoding, ACrAloneEndsALine) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::encoding_test

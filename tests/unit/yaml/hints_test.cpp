@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::hints_test {
 namespace {
 
 TEST(Hints, WriteADurationAsItIsRead) {
@@ -57,4 +57,4 @@ TEST(Hints, FindTheBlankThatIsMissing) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::hints_test

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::lint_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -185,4 +185,4 @@ TEST(Lint, EndsOnAnyText) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::lint_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::map_reader_test {
 namespace {
 
 using ::testing::IsEmpty;
@@ -299,4 +299,4 @@ TEST(TextForms, FormatDurationsInTheLargestExactUnit) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::map_reader_test

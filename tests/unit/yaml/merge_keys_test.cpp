@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::merge_keys_test {
 namespace {
 
 /// Returns "key=value …" of the map under `m`, or the problems.
@@ -50,4 +50,4 @@ TEST(YamlMergeKeys, WantMaps) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::merge_keys_test

@@ -5,7 +5,7 @@
 #include <map>
 #include <string>
 
-namespace panelgate::yaml {
+namespace panelgate::yaml::variables_test {
 namespace {
 
 std::optional<std::string> environment(const std::string& name) {
@@ -117,4 +117,4 @@ TEST(YamlVariables, WhatTheyBringIsBounded) {
 }
 
 }  // namespace
-}  // namespace panelgate::yaml
+}  // namespace panelgate::yaml::variables_test

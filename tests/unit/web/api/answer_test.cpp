@@ -6,7 +6,7 @@
 
 #include "support/fake_bus.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::answer_test {
 namespace {
 
 boost::json::object told(const Problem& problem) {
@@ -114,4 +114,4 @@ TEST(Answer, WritesBytesInCapitals) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::answer_test

@@ -11,7 +11,7 @@
 
 #include "support/fake_bus.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::ask_test {
 namespace {
 
 class Ask : public ::testing::Test {
@@ -85,4 +85,4 @@ TEST_F(Ask, SendsNothingForACallerThatHasLeft) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::ask_test

@@ -1,7 +1,7 @@
 #include "http_rig.hpp"
 #include "panelgate/points/station_polls.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::batch_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -197,4 +197,4 @@ TEST_F(ApiBatch, P2WhoeverLeavesTakesWhatWaitsAlong) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::batch_test

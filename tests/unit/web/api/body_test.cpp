@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::body_test {
 namespace {
 
 Parsed<std::vector<std::uint16_t>> cells_of(std::string_view body, modbus::Table table) {
@@ -180,4 +180,4 @@ TEST(Body, GivesMembersOfTheirKind) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::body_test

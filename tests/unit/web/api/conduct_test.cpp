@@ -3,7 +3,7 @@
 #include "answer.hpp"
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::conduct_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -95,4 +95,4 @@ TEST(Csv, QuotesWhatHasCommasQuotesOrLines) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::conduct_test

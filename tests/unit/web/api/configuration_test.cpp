@@ -3,7 +3,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::configuration_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -32,4 +32,4 @@ TEST_F(Configuration, IsNotShownByAProgramWithout) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::configuration_test

@@ -3,7 +3,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::crowd_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -87,4 +87,4 @@ TEST_F(Crowd, EndsAConnectionThatNeverAsks) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::crowd_test

@@ -3,7 +3,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::discover_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -119,4 +119,4 @@ TEST_F(ApiDiscover, NeedsALineThatIsUp) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::discover_test

@@ -9,7 +9,7 @@
 #include "page.hpp"
 #include "routes.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::docs_test {
 namespace {
 
 namespace json = boost::json;
@@ -131,4 +131,4 @@ TEST_F(ApiDocs, AreServedByTheProgramItself) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::docs_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::event_text_test {
 namespace {
 
 TEST(EventText, TellsAPointAsRestDoesAndWhoseItIs) {
@@ -47,4 +47,4 @@ TEST(EventText, TellsHowFarADiscoveryIs) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::event_text_test

@@ -5,7 +5,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::events_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -117,4 +117,4 @@ TEST_F(ApiEvents, HaveRoomForSomeListenersOnly) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::events_test

@@ -4,7 +4,7 @@
 #include "panelgate/bus/line_history.hpp"
 #include "panelgate/points/station_points.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::history_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -120,4 +120,4 @@ TEST_F(ApiHistory, IsNotOfTextsAndNotOfWhatThereIsNot) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::history_test

@@ -2,7 +2,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::hosts_test {
 namespace {
 
 /// A whole request, as a browser or a script sends it.
@@ -79,4 +79,4 @@ TEST_F(Hosts, NeverHearTheirBytesRaw) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::hosts_test

@@ -1,7 +1,7 @@
 #include "http_rig.hpp"
 #include "key_book.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::keyed_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -215,4 +215,4 @@ TEST_F(ApiKeyed, ReadsHaveNone) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::keyed_test

@@ -6,7 +6,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::lines_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -323,4 +323,4 @@ TEST_F(ApiLines, RefusesRawRequestsThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::lines_test

@@ -4,7 +4,7 @@
 #include "http_rig.hpp"
 #include "panelgate/rt/log.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::logins_test {
 namespace {
 
 class LoginAttempts : public HttpRig {
@@ -131,4 +131,4 @@ TEST_F(LoginAttempts, FromWhereNobodyMayAreClosedWithoutAByte) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::logins_test

@@ -6,7 +6,7 @@
 #include "http_rig.hpp"
 #include "panelgate/web/http/gzip.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::page_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -81,4 +81,4 @@ TEST_F(Page, NamesNothingOfThePlant) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::page_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::panel_limits_test {
 namespace {
 
 using modbus::Table;
@@ -64,4 +64,4 @@ TEST_F(PanelLimits, TakeATablePathAtItsWord) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::panel_limits_test

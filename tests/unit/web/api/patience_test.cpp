@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::patience_test {
 namespace {
 
 TEST(Patience, IsTheLessOfWhatTheLineAndItsClientHave) {
@@ -31,4 +31,4 @@ TEST(Patience, WhatIsNoWaitIsNoWish) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::patience_test

@@ -15,7 +15,7 @@
 #include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::pcapng_test {
 namespace {
 
 std::uint32_t number(std::string_view text, std::size_t at, std::size_t bytes = 4) {
@@ -251,4 +251,4 @@ TEST(TracePcapng, SaysInCommentsWhatWasThrownAwayAndDecided) {
 TEST(TracePcapng, OneWithoutFramesIsAFileAllTheSame) { EXPECT_TRUE(shown({}).empty()); }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::pcapng_test

@@ -2,7 +2,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::plan_test {
 namespace {
 
 using Plan = HttpRig;
@@ -62,4 +62,4 @@ TEST_F(Plan, OfAnUnknownPanelHasNoNotations) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::plan_test

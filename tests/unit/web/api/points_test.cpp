@@ -5,7 +5,7 @@
 #include "http_rig.hpp"
 #include "panelgate/points/station_polls.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::points_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -184,4 +184,4 @@ TEST_F(ApiPoints, OfManyVaryWithBothHeadersThatTheyHeed) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::points_test

@@ -1,6 +1,6 @@
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::read_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -272,4 +272,4 @@ INSTANTIATE_TEST_SUITE_P(Bus, ApiFault,
                                            FaultCase{Fault::cancelled, false, 503, 10}));
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::read_test

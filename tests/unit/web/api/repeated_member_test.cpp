@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::repeated_member_test {
 namespace {
 
 TEST(RepeatedMember, IsFoundAtAnyDepth) {
@@ -33,4 +33,4 @@ TEST(RepeatedMember, WhatIsNoJsonHasNoneBehindItsFault) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::repeated_member_test

@@ -1,6 +1,6 @@
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::routes_test {
 namespace {
 
 class Access : public HttpRig {
@@ -126,4 +126,4 @@ TEST_F(Access, AQueryThatNobodyKnowsIsRefusedOnEveryPath) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::routes_test

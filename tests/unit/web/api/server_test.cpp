@@ -2,7 +2,7 @@
 
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::server_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -346,4 +346,4 @@ TEST_F(WebServer, TellsTheMetricsOfACallerThatLeaves) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::server_test

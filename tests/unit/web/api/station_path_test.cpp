@@ -9,7 +9,7 @@
 
 #include "support/fake_bus.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::station_path_test {
 namespace {
 
 using modbus::Table;
@@ -127,4 +127,4 @@ TEST_F(Paths, KnowNoNotationOfAPanelThatNobodyKnows) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::station_path_test

@@ -6,7 +6,7 @@
 #include "panelgate/bus/trace.hpp"
 #include "support/hex.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::trace_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -259,4 +259,4 @@ TEST_F(ApiCosts, AnEndlessListIsCut) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::trace_test

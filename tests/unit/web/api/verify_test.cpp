@@ -3,7 +3,7 @@
 #include "http_rig.hpp"
 #include "writing.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::verify_test {
 namespace {
 
 using modbus::Request;
@@ -126,4 +126,4 @@ TEST_F(ApiVerify, OfABroadcastAsksEachStation) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::verify_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::write_plan_test {
 namespace {
 
 using modbus::Table;
@@ -94,4 +94,4 @@ TEST(WriteFunctions, AreThePreferredOneFirst) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::write_plan_test

@@ -1,6 +1,6 @@
 #include "http_rig.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::write_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -166,4 +166,4 @@ TEST_F(ApiWrite, GivesAPanelsExceptionToAWrite) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::write_test

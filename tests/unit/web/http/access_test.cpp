@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::access_test {
 namespace {
 
 Settings with_tokens(Role anonymous) {
@@ -125,4 +125,4 @@ TEST(Access, TakesNoFormFromAForeignPage) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::access_test

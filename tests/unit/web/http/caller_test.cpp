@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::caller_test {
 namespace {
 
 TEST(Caller, NotifiesEachHandlerOnceThatItHasLeft) {
@@ -43,4 +43,4 @@ TEST(Caller, IsCalledByItsAddressAndTheTokenOfItsLastRequest) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::caller_test

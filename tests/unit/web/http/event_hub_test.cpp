@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::web {
+namespace panelgate::web::event_hub_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -213,4 +213,4 @@ TEST_F(EventHubTest, AListenerMayOutliveTheHub) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::event_hub_test

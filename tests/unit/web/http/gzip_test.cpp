@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::gzip_test {
 namespace {
 
 std::string gunzip(std::string body) {
@@ -58,4 +58,4 @@ TEST(AcceptsGzip, WhereItIsNamedAndNotRefused) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::gzip_test

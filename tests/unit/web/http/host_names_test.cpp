@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::host_names_test {
 namespace {
 
 using boost::asio::ip::make_address;
@@ -71,4 +71,4 @@ TEST(MachineNames, AreFoundWithoutANameServer) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::host_names_test

@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::json_text_test {
 namespace {
 
 namespace json = boost::json;
@@ -38,4 +38,4 @@ TEST(JsonText, AnExcerptIsShortAndCutsNoCharacterInTwo) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::json_text_test

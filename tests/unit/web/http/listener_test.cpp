@@ -10,7 +10,7 @@
 
 #include "support/http_client.hpp"
 
-namespace panelgate::web {
+namespace panelgate::web::listener_test {
 namespace {
 
 using test::Client;
@@ -80,4 +80,4 @@ TEST_F(HttpServer, ReportsThatACallerHasLeft) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::listener_test

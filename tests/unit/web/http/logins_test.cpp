@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::logins_test {
 namespace {
 
 class LoginsTest : public ::testing::Test {
@@ -89,4 +89,4 @@ TEST_F(LoginsTest, RememberSoManyAddressesAndForgetTheOneThatFailedLongestAgo) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::logins_test

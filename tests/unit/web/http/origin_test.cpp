@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace panelgate::web {
+namespace panelgate::web::origin_test {
 namespace {
 
 class Origin : public ::testing::Test {
@@ -95,4 +95,4 @@ TEST_F(Origin, MayBeALinkOfAnotherSiteToAPage) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::origin_test

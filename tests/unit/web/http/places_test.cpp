@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-namespace panelgate::web {
+namespace panelgate::web::places_test {
 namespace {
 
 using Id = Places::Id;
@@ -155,4 +155,4 @@ TEST_F(PlacesTest, AnEventStreamTakesNoPlaceOfItsAddress) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::places_test

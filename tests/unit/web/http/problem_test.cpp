@@ -6,7 +6,7 @@
 #include <set>
 #include <string_view>
 
-namespace panelgate::web {
+namespace panelgate::web::problem_test {
 namespace {
 
 TEST(Problem, IsFormattedAsInRfc9457) {
@@ -56,4 +56,4 @@ TEST(Problem, HasATypeOfItsOwnForEachKindOfError) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::problem_test

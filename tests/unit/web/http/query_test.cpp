@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::query_test {
 namespace {
 
 TEST(Query, TakesANumberWholeOrNotAtAll) {
@@ -48,4 +48,4 @@ TEST(Query, UnknownAndRepeatedQueriesAreRefused) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::query_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace panelgate::web {
+namespace panelgate::web::ration_test {
 namespace {
 
 constexpr TimePoint kStart{1h};
@@ -45,4 +45,4 @@ TEST(RateLimiter, NoClientOfABusyAddressWaitsForever) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::ration_test

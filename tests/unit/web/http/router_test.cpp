@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace panelgate::web {
+namespace panelgate::web::router_test {
 namespace {
 
 /// Replies with its name and the segments matched by the pattern's {}.
@@ -123,4 +123,4 @@ TEST_F(Router, AnswersABarredClientOnlyProbes) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::router_test

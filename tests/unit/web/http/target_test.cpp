@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace panelgate::web {
+namespace panelgate::web::target_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -56,4 +56,4 @@ TEST(Target, UnderstandsTheAbsoluteForm) {
 }
 
 }  // namespace
-}  // namespace panelgate::web
+}  // namespace panelgate::web::target_test
