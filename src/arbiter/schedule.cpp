@@ -271,7 +271,7 @@ void Schedule::let_others_go_first(TimePoint now) {
         others_.insert(job.station);
         return false;
     });
-    constexpr Duration kDear = 100ms;
+    constexpr Duration kDear = 200ms;
     turns_ = patience_ > kDear ? others_.size() : 1;
 }
 
