@@ -150,8 +150,8 @@ void add_moved(const config::Config& after, const tcp_server::Settings& listener
         all.push_back("unit " + std::to_string(station.id) + " of " + listener.name() + " was '" +
                       station.name + "' of line " + lost.name + " and now goes to line " +
                       other->name +
-                      ": a write to it may reach another panel; say unlisted_stations: refuse "
-                      "there, or tell its clients first");
+                      ": a write to it may reach another panel; set unlisted_stations: refuse "
+                      "there, or inform its clients first");
     }
 }
 

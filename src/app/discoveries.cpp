@@ -207,7 +207,7 @@ void Discoveries::report_progress(const std::string& line) const {
 
 void Discoveries::stop(std::string_view line) {
     const auto found = by_line_.find(line);
-    if (found != by_line_.end()) found->second->stop("somebody has ended it");
+    if (found != by_line_.end()) found->second->stop("it was ended by a request");
 }
 
 void Discoveries::stop_all() {

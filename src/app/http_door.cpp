@@ -146,7 +146,7 @@ std::variant<config::Endpoint, NoHttpEndpoint> endpoint_of(const std::string& fi
     if (config->http && config->http->port != 0)
         return config::Endpoint{config->http->address, config->http->port};
     return no_http_endpoint(file + (config->http ? " lets http listen on any free port"
-                                                 : " has no http, so nobody can be asked"));
+                                                 : " has no http, so the gateway cannot be asked"));
 }
 
 }  // namespace

@@ -321,7 +321,7 @@ std::string text_of(const serial_server::Settings& master) {
                        (master.access.framing == modbus::Framing::rtu ? ", rtu:" : ":");
     for (const std::string& line : master.access.lines) text += ' ' + line;
     const bool silent = master.on_failure == serial_server::OnFailure::silence;
-    text += ", " + rights(master.access.read_only) + ", told of failures by " +
+    text += ", " + rights(master.access.read_only) + ", failures reported by " +
             (silent ? "silence" : "exceptions") + '\n';
     return text + text_of(master.access.units);
 }

@@ -41,7 +41,7 @@ Loaded read_file(const std::string& path) {
     const auto text = config::RealFiles::read_any(path);
     if (!text) {
         const std::string why =
-            errno == EPIPE ? "nobody writes to this pipe" : std::strerror(errno);
+            errno == EPIPE ? "no program writes to this pipe" : std::strerror(errno);
         return {std::nullopt, kNoInput, {{path, {0, 0}, std::string(kCannotRead) + why}}, {}};
     }
     return read_text(*text, path);

@@ -57,13 +57,13 @@ std::string usage_fault(const CLI::ParseError& error) {
     if (kind == "RequiredError") return text.substr(0, text.find(" is required")) + " is missing";
     if (kind == "ArgumentMismatch")
         return option + (text.find("At Most") != text.npos ? " may be given once"
-                                                           : " needs a value behind it");
+                                                           : " needs a value after it");
     if (kind == "ConversionError") return "an option that takes no value was given one";
     if (kind == "RequiresError") return text;  // "--weaker requires --rollback"
     if (kind == "ValidationError") return wrong_choice(text, option);
     const int extras =
         static_cast<int>(CLI::ExitCodes::ExtrasError);  // its kind is the command's name
-    if (error.get_exit_code() == extras) return "nothing is to stand behind '--'";
+    if (error.get_exit_code() == extras) return "nothing may follow '--'";
     return "these options cannot be understood";
 }
 
@@ -349,7 +349,7 @@ class CommandLine {
                        "guard, roles)")
             ->needs("--rollback");
         command->footer(
-            "Exit codes: 0 it serves the file, or did already; 1 nobody could be asked, or a "
+            "Exit codes: 0 it serves the file, or did already; 1 no gateway could be asked, or a "
             "rollback\nwould protect less; 69 valid, but something could not be opened; 78 the "
             "file has faults.\nAfter 1, 69 and 78 nothing has changed.");
         command->callback([this] { code_ = reload(reload_); });

@@ -121,7 +121,7 @@ std::string listening_advice(const boost::system::error_code& why, std::uint16_t
                number + ", or a port from 1024 on";
     }
     if (why == errc::address_in_use)
-        return "another program listens there: ss -ltnp 'sport = :" + number + "' tells which";
+        return "another program listens there: ss -ltnp 'sport = :" + number + "' shows which";
     if (why == errc::address_family_not_supported) return "IPv6 is off on this machine";
     return {};
 }

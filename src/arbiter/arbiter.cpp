@@ -398,20 +398,20 @@ void Arbiter::check_invariants() const {
     must(up_ || backlog.empty(), "a line that is down has nothing waiting");
     must(up_ || !resetting_, "a line that is down is not to be reset");
     backlog.each_retry([&](const Group& group) {
-        must(!group.abandoned(), "somebody waits for each retry");
+        must(!group.abandoned(), "a request waits for each retry");
         must(group.attempts > 0, "what is repeated was sent before");
         must(stations_.find(group.station) != nullptr, "its station is known");
     });
     if (active_) {
         const Group& group = active_->group();
         must(group.attempts > 0, "what is on the wire was sent");
-        must(active_->deadline() >= active_->timing().started, "an attempt ends behind its start");
-        must(!group.probe || group.jobs.empty(), "nobody waits for a probe");
+        must(active_->deadline() >= active_->timing().started, "an attempt ends after its start");
+        must(!group.probe || group.jobs.empty(), "no request waits for a probe");
         for (const Job& job : group.jobs) must(job.attempts > 0, "its jobs are on the wire");
         for (const Job& job : group.jobs) must(job.station == group.station, "of one station");
     }
     must(!next_deadline() || !active_ || *next_deadline() <= active_->deadline(),
-         "somebody looks at the attempt when its time is over");
+         "the next deadline is not after the attempt's");
 }
 
 }  // namespace panelgate::arbiter

@@ -82,11 +82,11 @@ std::string shed(const Job& job, const ClientNames& names) {
 
 std::string doubted(const Job& job, const ClientNames& names) {
     return describe(job, names) +
-           " asked once more: its answer repeats an earlier one and may be a copy of that";
+           " asked once more: its answer repeats an earlier one and may be a duplicate of it";
 }
 
 std::string line_rests(Duration rest, const Group& group) {
-    return "nobody but this request for " + ms(rest) + ": station " +
+    return "only this request is sent for " + ms(rest) + ": station " +
            std::to_string(group.station) + " did not answer and may do so late";
 }
 
@@ -105,7 +105,7 @@ std::string text_of(const Reason& reason) {
         case Reason::Kind::none:
             return "";
         case Reason::Kind::learns_echo:
-            return "a write is next and nobody knows whether this line has an echo";
+            return "a write is next and it is unknown whether this line has an echo";
         case Reason::Kind::probe:
             return "the station is offline and its probe is due";
         case Reason::Kind::again:

@@ -48,7 +48,7 @@ Duration Stations::gap(std::uint8_t id) const {
 Duration Stations::patience(TimePoint now, const Group& group) {
     const Station& station = of(group.station);
     const bool is_over_budget = station.over_budget(now) && others_active(now, station);
-    const bool urgent = now < urgent_until_ || is_over_budget;
+    const bool urgent = (now < urgent_until_ && station.is_slowest_known()) || is_over_budget;
     Duration wait = station.patience(group, slowest(), urgent, flaky_beside_others(now, station));
     const Duration whole = settings(group.station).response_timeout;
     for (const Job& job : group.jobs) wait = std::max(wait, std::min(job.patience, whole));

@@ -51,8 +51,8 @@ void refuse(std::string_view text, yaml::Mark mark, const std::string& variable,
     const std::string in = variable.empty() ? " in a text" : " in the value of ${" + variable + '}';
     if (*control == '\n' && is_yaml(text)) {
         problems.add(mark,
-                     "a text, by the '|' or '>' behind the key; remove that sign for what "
-                     "stands below to be a list, or keys");
+                     "a text, because of the '|' or '>' after the key; remove that sign to have a "
+                     "list, or keys, below");
         return;
     }
     if (*control == '\n') {
@@ -158,9 +158,9 @@ void warn_of_open_listener(Loading& loading, const Node& node,
     if (!is_any_address(listener.address) || !allows_all(listener.allow)) return;
     if (!can_write(loading.config, listener)) return;
     loading.warn(mark_of(node, "listen"),
-                 "whoever reaches port " + std::to_string(listener.port) +
-                     " of any address may write to the panels; name who may, such as allow: "
-                     "[192.168.10.0/24], or say access: read_only, or listen on 127.0.0.1:" +
+                 "any client that reaches port " + std::to_string(listener.port) +
+                     " of any address may write to the panels; list the networks that may, such as "
+                     "allow: [192.168.10.0/24], or set access: read_only, or listen on 127.0.0.1:" +
                      std::to_string(listener.port));
 }
 
@@ -168,8 +168,8 @@ void warn_of_open_listener(Loading& loading, const Node& node,
 void warn_of_open_udp(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
     if (!listener.udp || !is_any_address(listener.address) || !allows_all(listener.allow)) return;
     loading.warn(mark_of(node, "udp"),
-                 "udp: true on all addresses answers datagrams whose sender may be forged, with "
-                 "up to twenty times what was sent; name who may ask, such as allow: "
+                 "udp: true on all addresses answers datagrams whose sender may be forged, with up "
+                 "to twenty times what was sent; list the networks that may ask, such as allow: "
                  "[192.168.10.0/24], or listen on 127.0.0.1:" +
                      std::to_string(listener.port));
 }
@@ -231,7 +231,7 @@ void warn_of_token(Loading& loading, const Node& node, const web::Token& token) 
                                      " or more, such as of `openssl rand -hex 16`");
     if (is_container_secret(file->scalar)) return;
     if (loading.files.is_readable_by_all(file->scalar))
-        loading.warn(file->mark, "everybody on this machine can read the token file " +
+        loading.warn(file->mark, "every user of this machine can read the token file " +
                                      file->scalar + "; `chmod o-r " + file->scalar +
                                      "`, or a secret of the container platform in /run/secrets");
 }
@@ -257,7 +257,7 @@ void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Setting
         return;
     loading.warn(mark_of(node, "tokens"),
                  "tokens are sent in plain text to " + http.name() +
-                     ": whoever is on the way can read and use them; listen on 127.0.0.1:" +
+                     ": anyone on the network path can read and use them; listen on 127.0.0.1:" +
                      std::to_string(http.port) + " behind a proxy with TLS, or a VPN");
 }
 
@@ -267,25 +267,25 @@ void warn_of_http(Loading& loading, const Node& node, const web::Settings& http)
     warn_of_plain_tokens(loading, node, http);
     if (open && http.anonymous == web::Role::viewer) {
         loading.warn(mark_of(node, "anonymous"),
-                     "whoever reaches port " + std::to_string(http.port) +
+                     "any client that reaches port " + std::to_string(http.port) +
                          " of any address may see the configuration, all values and every frame, "
-                         "and read on the bus, without a token; say anonymous: none and give "
-                         "readers a token, or name who may, such as allow: [192.168.10.0/24], or "
-                         "listen on 127.0.0.1:" +
+                         "and read on the bus, without a token; set anonymous: none and give "
+                         "readers a token, or list the networks that may, such as allow: "
+                         "[192.168.10.0/24], or listen on 127.0.0.1:" +
                          std::to_string(http.port));
     }
     if (open && http.anonymous == web::Role::operator_) {
         loading.warn(mark_of(node, "anonymous"),
-                     "whoever reaches port " + std::to_string(http.port) +
-                         " of any address may write to the panels without a token; say anonymous: "
-                         "viewer and give writers a token, or name who may, such as allow: "
-                         "[192.168.10.0/24], or listen on 127.0.0.1:" +
+                     "any client that reaches port " + std::to_string(http.port) +
+                         " of any address may write to the panels without a token; set anonymous: "
+                         "viewer and give writers a token, or list the networks that may, such as "
+                         "allow: [192.168.10.0/24], or listen on 127.0.0.1:" +
                          std::to_string(http.port));
     }
     if (http.anonymous == web::Role::none && http.tokens.empty())
         loading.warn(mark_of(node, "anonymous"),
-                     "nobody can use this but /healthz and /readyz: anonymous is none and there is "
-                     "no token; add tokens, or say anonymous: viewer");
+                     "clients can use only /healthz and /readyz: anonymous is none and there is no "
+                     "token; add tokens, or set anonymous: viewer");
     const Node* tokens = find(node, "tokens");
     for (std::size_t i = 0; i < http.tokens.size(); ++i)
         warn_of_token(loading, tokens->items[i], http.tokens[i]);

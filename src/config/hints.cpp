@@ -133,8 +133,8 @@ std::string network_hint(std::string_view typed) {
             return write(host + '/' + std::to_string(*prefix));
         if (host.find('.') != host.npos && is_ipv6(host))
             return "; an IPv4 network is written as such: 10.0.0.0/24";
-        return is_ipv6(host) ? "; behind the '/' stands a number from 0 to 128"
-                             : "; behind the '/' stands a number from 0 to 32";
+        return is_ipv6(host) ? "; after the '/' comes a number from 0 to 128"
+                             : "; after the '/' comes a number from 0 to 32";
     }
     if (const std::string network = open_ended(host); !network.empty()) return network;
     if (const auto endpoint = parse_endpoint(text))
@@ -188,8 +188,8 @@ std::string host_hint(std::string_view host) {
     if (line::is_broken_address(host))
         return "; " + yaml::quote(host) +
                " is no IP address: four numbers from 0 to 255, with dots between them";
-    if (host.find('@') != host.npos) return "; leave out what stands before the '@'";
-    if (host.starts_with('[')) return "; in brackets stands an IPv6 address, and nothing else";
+    if (host.find('@') != host.npos) return "; leave out what is before the '@'";
+    if (host.starts_with('[')) return "; only an IPv6 address goes in brackets";
     return "; HOST is a name of letters, digits, '-', '_' and '.', or an address";
 }
 
@@ -213,7 +213,7 @@ std::string tcp_hint(std::string_view typed) {
     const std::string_view host = rest.substr(0, colon);
     if (host.empty() || line::parse_tcp_device("tcp://" + std::string(host) + ":1")) return "";
     if (host.find(':') != host.npos && !host.starts_with('['))
-        return "; an IPv6 address stands in brackets: write \"tcp://[" + std::string(host) +
+        return "; an IPv6 address goes in brackets: write \"tcp://[" + std::string(host) +
                "]:" + std::string(rest.substr(colon + 1)) + '"';
     return host_hint(host);
 }

@@ -113,7 +113,7 @@ std::string load_secret(Loading& loading, MapReader& in, bool elsewhere) {
 constexpr std::string_view kTokenExample = "{name: ops, role: operator, file: /run/secrets/ops}";
 
 constexpr std::string_view kInFile =
-    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "a secret does not belong in the configuration: write it to a file that only this program may "
     "read, and here file: with its path";
 constexpr std::array<yaml::Elsewhere, 4> kTokenKeysElsewhere{{{"token", {}, {}, kInFile},
                                                               {"secret", {}, {}, kInFile},
@@ -151,9 +151,10 @@ void load_tokens(Loading& loading, MapReader& in, std::vector<web::Token>& token
             loading.problems.add(node.mark, "there are two tokens '" + token.name + '\'');
         const auto same = std::ranges::find(tokens, token.secret, &web::Token::secret);
         if (!token.secret.empty() && same != tokens.end() && same->name != token.name)
-            loading.problems.add(node.mark, "the tokens '" + same->name + "' and '" + token.name +
-                                                "' are the same text: nobody could tell them "
-                                                "apart; give each its own");
+            loading.problems.add(
+                node.mark,
+                "the tokens '" + same->name + "' and '" + token.name +
+                    "' are the same text and cannot be distinguished; give each its own");
         tokens.push_back(std::move(token));
     }
 }

@@ -181,8 +181,8 @@ void load_mode(MapReader& in, Line& line) {
     line.device.listen_only = line.listens;
     if (line.listens && line.kind == Line::Kind::simulated) {
         in.problem("mode",
-                   "mode listen needs a line with a master; nobody asks on a simulated one: name "
-                   "the device of an adapter that hears the line");
+                   "mode listen needs a line with a master; a simulated one has no other master: "
+                   "name the device of an adapter that hears the line");
     }
 }
 
@@ -205,7 +205,7 @@ constexpr std::string_view kLineExample = "{name: floor1, device: /dev/ttyUSB0}"
 constexpr std::string_view kLineListExample = "[{name: floor1, device: /dev/ttyUSB0}]";
 
 constexpr std::string_view kAtTheTop =
-    "it stands at the top of the file, in the column of 'lines', not inside a line";
+    "it belongs at the top level of the file, in the column of 'lines', not inside a line";
 
 /// Keys that users write beside `device`.
 constexpr std::array<std::string_view, 3> kParities{"none", "even", "odd"};

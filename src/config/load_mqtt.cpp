@@ -19,10 +19,10 @@ using yaml::MapReader;
 constexpr std::string_view kMqttExample = "{broker: mqtt://HOST:1883, topic: plant/panelgate}";
 constexpr std::string_view kBroker = "write it into the broker, such as broker: mqtt://HOST:1883";
 constexpr std::string_view kSecret =
-    "a secret never stands in the configuration: write it to a file that this program alone may "
+    "a secret does not belong in the configuration: write it to a file that only this program may "
     "read, and here password_file: with its path";
 constexpr std::string_view kTls =
-    "write broker: mqtts://HOST:8883; ca, certificate and key stand beside it";
+    "write broker: mqtts://HOST:8883; ca, certificate and key are keys beside it";
 constexpr std::array<yaml::Elsewhere, 9> kMqttKeysElsewhere{{{"host", {}, {}, kBroker},
                                                              {"port", {}, {}, kBroker},
                                                              {"url", {}, {}, kBroker},
@@ -173,10 +173,10 @@ void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& setti
                      "it; write broker: mqtts://" +
                          settings.host + ":8883");
     if (settings.write && settings.username.empty() && settings.certificate.empty())
-        loading.warn(
-            in.mark("write"),
-            "whoever may publish at this broker may write to the panels, and the gateway "
-            "shows it no name; give it a username, and rights at the broker for TOPIC/+/+/set");
+        loading.warn(in.mark("write"),
+                     "any client that may publish at this broker may write to the panels, and the "
+                     "gateway connects without a username; give it a username, and rights at the "
+                     "broker for TOPIC/+/+/set");
 }
 
 }  // namespace

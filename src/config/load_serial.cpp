@@ -196,8 +196,8 @@ void warn_of_no_stations(Loading& loading, MapReader& in, const Settings& settin
     if (reaches_any) return;
     const std::vector<std::string>& lines = settings.access.lines;
     loading.warn(in.mark(), "serial master '" + settings.name +
-                                "' reaches nobody: it is answered for listed stations and units "
-                                "only; add stations to the line, or units: {31: " +
+                                "' reaches no station: it is answered for listed stations and "
+                                "units only; add stations to the line, or units: {31: " +
                                 (lines.empty() ? "LINE" : lines.front()) + "/31}");
 }
 

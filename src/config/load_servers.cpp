@@ -51,7 +51,7 @@ std::string framing_is(Framing framing) {
 void refuse_in_serial_modes(MapReader& in, const tcp_server::Settings& settings) {
     const std::string here = " with " + framing_is(settings.framing);
     if (in.has("broadcast") && settings.broadcast == BroadcastMode::reply)
-        in.problem("broadcast", "nobody is answered at unit 0" + here +
+        in.problem("broadcast", "no request to unit 0 is answered" + here +
                                     "; write silent or deny, or leave it out for silent");
     if (settings.retransmissions == Retransmissions::join)
         in.problem("retransmissions", "requests have no transaction id" + here +
@@ -334,8 +334,8 @@ void refuse_tls(MapReader& in) {
 
 /// Keys that users write as for the serial lines of other programs.
 constexpr std::array<yaml::Elsewhere, 5> kServerKeysElsewhere{
-    {{"type", {}, {}, "remove it: serial lines stand in 'lines'"},
-     {"method", {}, {}, "remove it: serial lines stand in 'lines'"},
+    {{"type", {}, {}, "remove it: serial lines are listed in 'lines'"},
+     {"method", {}, {}, "remove it: serial lines are listed in 'lines'"},
      {"device", {}, "a line, one of 'lines'"},
      {"serial", {}, "a line, one of 'lines'"},
      {"stations", {}, "a line, one of 'lines'"}}};

@@ -160,7 +160,7 @@ class Templates {
                 kept.push_back(std::move(entry));
                 continue;
             }
-            loading_.problems.add(entry.mark, "'" + entry.key + "' must stand deeper than '" +
+            loading_.problems.add(entry.mark, "'" + entry.key + "' must be indented deeper than '" +
                                                   name->key + "' (line " +
                                                   std::to_string(name->mark.line) +
                                                   "), whose body it is: type 2 blanks before it");
@@ -185,9 +185,9 @@ class Templates {
         for (const std::string_view own : {"id", "name", "template"}) {
             const auto key = std::ranges::find(body.entries, own, &Entry::key);
             if (key == body.entries.end()) continue;
-            loading_.problems.add(key->mark, "'" + std::string(own) +
-                                                 "' is a station's own: it cannot stand in a "
-                                                 "template");
+            loading_.problems.add(
+                key->mark,
+                "'" + std::string(own) + "' is a station's own: it cannot be in a template");
             body.entries.erase(key);
         }
         const Size size = size_of(body);

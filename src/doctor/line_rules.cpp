@@ -33,8 +33,8 @@ namespace {
 
 std::string silence_advice(const LineFacts& facts) {
     if (facts.over_tcp)
-        return "The connection stands. Check whether the server reaches its serial port and "
-               "nobody else holds that, its baud and parity, the power of the panels and the "
+        return "The TCP connection is up. Check whether the server can open its serial port and no "
+               "other program uses it, its baud and parity, the power of the panels and the "
                "stations' addresses.";
     return "Check the power of the panels, the wires A and B (swapped?) and their bias, `serial` "
            "(now " +
@@ -77,7 +77,7 @@ void find_no_answer(Case& c) {
             "Swap the wires A and B, or give the line a bias: the receiver sees breaks. " + advice;
         evidence += "; the driver counted " + std::to_string(c.window.uart->breaks) + " breaks";
     }
-    c.add(Cause::no_answer_at_all, {}, "Nobody answers on this line.", std::move(advice),
+    c.add(Cause::no_answer_at_all, {}, "No station answers on this line.", std::move(advice),
           std::move(evidence), {{"stations", stations}, {"requests", mute}});
 }
 
@@ -87,14 +87,14 @@ void find_other_master(Case& c) {
     if (c.all.requests + frames < bar.enough(3)) return;
     const bool heard = c.all.requests > 0;
     c.add(Cause::other_master, {},
-          heard ? "Somebody else asks on this line."
+          heard ? "Another master sends requests on this line."
                 : "Stations answer that this gateway did not ask.",
           heard ? "Take the other master (a PLC, a PC, a second gateway) off the line."
                 : "Take the other master (a PLC, a PC, a second gateway) off the line; if there is "
-                  "none, a panel speaks unasked or with an address that is not its own.",
-          std::to_string(c.all.requests) + " requests of somebody else, " + std::to_string(frames) +
-              " frames of stations that were not asked, and " + std::to_string(c.all.attempts()) +
-              " requests of this gateway",
+                  "none, a panel transmits unasked or with an address that is not its own.",
+          std::to_string(c.all.requests) + " requests of another master, " +
+              std::to_string(frames) + " frames of stations that were not asked, and " +
+              std::to_string(c.all.attempts()) + " requests of this gateway",
           {{"foreign_requests", c.all.requests},
            {"foreign_frames", frames},
            {"requests", c.all.attempts()}});
@@ -103,7 +103,7 @@ void find_other_master(Case& c) {
 void find_collision(Case& c) {
     const Bar bar{c, Cause::collision};
     if (c.all.collided < bar.enough(3) || c.has(Cause::echo)) return;
-    c.add(Cause::collision, {}, "Somebody speaks while the gateway does.",
+    c.add(Cause::collision, {}, "Another device transmits while the gateway does.",
           "Look for another master, for a panel that answers very late, and for a transceiver that "
           "does not release the line.",
           share_text(c.all.collided, c.all.attempts(), "requests") + " came back changed",
@@ -138,7 +138,7 @@ void add_trailing(Case& c, std::optional<std::uint8_t> station, const std::strin
           "Look at when the transceiver stops sending and at the line's bias; if that cannot be "
           "changed, set `timing.frame_gap` so long that they have passed: 10ms, or more if this "
           "finding stays.",
-          share_text(s.trailed, s.answered, "replies") + " had bytes behind them",
+          share_text(s.trailed, s.answered, "replies") + " were followed by more bytes",
           {{"trailed", s.trailed}, {"replies", s.answered}});
 }
 
@@ -295,13 +295,14 @@ void find_all_damaged(Case& c) {
                   now + ").",
               evidence, damage_figures(s));
     } else if (cause == Cause::wrong_baud && c.facts.serial.mode == SerialMode::ascii) {
-        c.add(cause, {}, "What comes is no Modbus ASCII: baud, data bits or parity differ.",
+        c.add(cause, {},
+              "The bytes received are not Modbus ASCII: baud, data bits or parity differ.",
               "Set `serial` as in the panels' communication settings (now " + now +
                   "); panels that are set to RTU need `mode: rtu`.",
               evidence, damage_figures(s));
     } else if (cause == Cause::wrong_baud) {
         const bool breaks = c.window.uart && c.window.uart->breaks * 2 > c.window.uart->framing;
-        c.add(cause, {}, "What comes is no Modbus at this speed: the baud differs.",
+        c.add(cause, {}, "The bytes received are not Modbus at this speed: the baud differs.",
               std::string(breaks ? "A and B may be swapped. " : "") +
                   "Set `serial.baud` as in the panels' communication settings (now " + now + ").",
               evidence, damage_figures(s));
@@ -331,12 +332,12 @@ void find_noise(Case& c) {
                                       "replies of 32 bytes and more damaged");
     }
     if (strays) {
-        advice = "Bytes come when nobody speaks: look at the bias first. " + advice;
+        advice = "Bytes arrive while no device is transmitting: look at the bias first. " + advice;
         evidence += "; " + std::to_string(s.strays) + " times bytes around or between replies";
     }
     Figures figures = damage_figures(s);
     if (strays) figures["strays"] = s.strays;
-    c.add(Cause::noise, {}, "Some of what comes is damaged.", std::move(advice),
+    c.add(Cause::noise, {}, "Some received frames are damaged.", std::move(advice),
           std::move(evidence), std::move(figures));
 }
 

@@ -42,7 +42,7 @@ void add_duplicate(Case& c, std::uint8_t station, const Symptoms& s) {
     figures["doubled"] = s.doubled;
     c.add(Cause::duplicate_address, station, "Two panels seem to have the address " + address + ".",
           std::string("Take the panel off the line: when the address still answers, find the other "
-                      "one and change it. If nobody answers, ") +
+                      "one and change it. If no panel answers, ") +
               (twice ? "this panel or a repeater sends everything twice: set its "
                        "`timing.frame_gap` so long that the second reply has passed."
                      : "look at this panel's cable and communication settings."),
@@ -68,7 +68,7 @@ void add_damage(Case& c, std::uint8_t station, const Symptoms& s) {
         return c.add(cause, station, "All replies of " + name + " have wrong bytes.",
                      "Set this panel's parity and data bits" + line, evidence, damage_figures(s));
     if (!c.facts.over_tcp && cause == Cause::wrong_baud)
-        return c.add(cause, station, "All that " + name + " sends is no Modbus at this speed.",
+        return c.add(cause, station, "All that " + name + " sends is not Modbus at this speed.",
                      "Set this panel's baud" + line, evidence, damage_figures(s));
     c.add(
         Cause::damaged_replies, station, "Only the replies of " + name + " are damaged.",
@@ -193,7 +193,7 @@ void find_short_gap(Case& c, std::uint8_t station, const Symptoms& s) {
     // Users of slow panels report 10 to 40 ms; if that is not enough, it is doubled.
     const Duration advised = std::max<Duration>(10ms, 2 * split->below);
     c.add(Cause::gap_too_short, named(station),
-          "Requests right behind another frame are lost on " + station_text(c, station) + ".",
+          "Requests right after another frame are lost on " + station_text(c, station) + ".",
           "Set its `timing.frame_gap` to " + duration_text(advised) + ".",
           share_text(
               split->silent_below, split->silent_below + split->answered_below,
@@ -216,9 +216,9 @@ void find_wrong_exception(Case& c, std::uint8_t station, const Symptoms& s) {
     c.add(Cause::wrong_exception, named(station),
           "What " + station_text(c, station) +
               " refuses, it refuses with the number of another function.",
-          "No such exception can be told from a stray frame, so clients are answered 0B. Ask it "
-          "only for what it has; with its profile, `guard: true` refuses the rest here, with the "
-          "right code. Newer firmware may answer as the standard says.",
+          "Such an exception cannot be distinguished from an unsolicited frame, so clients get "
+          "exception 0B. Ask it only for what it has; with its profile, `guard: true` refuses the "
+          "rest here, with the right code. Newer firmware may answer as the standard says.",
           share_text(s.wrong_exceptions, s.attempts(), "requests") +
               " were answered with an exception that names another function; " +
               std::to_string(s.answered) + " replies were right",
@@ -231,7 +231,7 @@ void find_broadcast_replies(Case& c, std::uint8_t station, const Symptoms& s) {
         return;
     const std::string name = station_text(c, station, true);
     c.add(Cause::answers_broadcasts, named(station),
-          name + " answers broadcasts, which nobody may (serial line V1.02, 2.1).",
+          name + " answers broadcasts, which no station may (serial line V1.02, 2.1).",
           "Its replies run into those of other panels that do the same, and into the next request "
           "where they take longer than `timing.broadcast_turnaround`: make that long enough, or "
           "write to each station by itself.",
@@ -264,7 +264,7 @@ void find_unasked_frames(Case& c, std::uint8_t station, const Symptoms& s) {
     const std::uint64_t frames = s.unasked - std::min(s.unasked, s.wrong);
     if (frames < bar.enough(5) || frames * (bar.low ? 40 : 20) < s.attempts()) return;
     c.add(Cause::unasked_frames, station,
-          station_text(c, station, true) + " sends frames that nobody asked for.",
+          station_text(c, station, true) + " sends unsolicited frames.",
           c.window.broadcasts > 0
               ? "It may answer broadcasts, which no panel should (serial line V1.02, 2.1), or send "
                 "by itself: look for that in its settings."

@@ -250,7 +250,7 @@ void TcpLine::begin_open() {
 }
 
 void TcpLine::give_up() {
-    failed(lookup_.waits() ? "no name server tells its address (5 s)" : "no answer within 5 s");
+    failed(lookup_.waits() ? "no name server resolves its address (5 s)" : "no answer within 5 s");
 }
 
 void TcpLine::resolve() {

@@ -118,13 +118,13 @@ struct WireCounter {
 };
 constexpr std::array kWireCounters = {
     WireCounter{"panelgate_retries_total",
-                "Reads sent once more after silence, damage, or what may be a copy.",
+                "Reads sent once more after silence, damage, or a possible duplicate.",
                 &arbiter::StationCounters::retries},
     WireCounter{"panelgate_late_frames_total",
                 "Good frames that answer a request already given up; thrown away.",
                 &arbiter::StationCounters::late_frames},
     WireCounter{"panelgate_foreign_frames_total",
-                "Good frames of another station or nobody's reply; thrown away.",
+                "Good frames of another station, or that answer no request; discarded.",
                 &arbiter::StationCounters::foreign_frames},
     WireCounter{"panelgate_damaged_frames_total",
                 "Bytes that never became a good frame, counted once a frame.",
@@ -164,7 +164,7 @@ void add_line_counters(Families& out, const Snapshot& snapshot) {
     Family reopens = make_counter("panelgate_line_reopens_total",
                                   "Successful opens of the line's device after the first.");
     Family busy = make_counter("panelgate_bus_busy_seconds_total",
-                               "Time nobody else could use: request, gaps, think time and reply.");
+                               "Time the line was in use: request, gaps, think time and reply.");
     for (const LineReport& line : snapshot.lines) {
         broadcasts.counter(of_line(line), line.wire.broadcasts);
         reopens.counter(of_line(line), line.device.reopens);
@@ -240,7 +240,7 @@ void add_findings(Families& out, const Snapshot& snapshot) {
 void add_station_state(Families& out, const Snapshot& snapshot) {
     Family up =
         make_gauge("panelgate_station_up",
-                   "1 while a configured station answers; absent while nobody has asked it.");
+                   "1 while a configured station answers; absent while it has not been asked.");
     Family success =
         make_gauge("panelgate_station_last_success_timestamp_seconds",
                    "When a configured station last answered; absent while it never did.");
@@ -286,7 +286,7 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
 
 void add_loop(Families& out, const Snapshot& snapshot) {
     Family lag = make_histogram("panelgate_loop_lag_seconds",
-                                "How late the one loop comes to a timer, sampled each 100 ms.");
+                                "How late the event loop serves a timer, sampled every 100 ms.");
     lag.histogram({}, snapshot.runtime.loop_lag);
     out.push_back(lag.take());
 }
@@ -294,8 +294,8 @@ void add_loop(Families& out, const Snapshot& snapshot) {
 void add_reloads(Families& out, const Snapshot& snapshot) {
     if (!snapshot.reloads) return;
     const config::ReloadCounters& reloads = *snapshot.reloads;
-    Family total = make_counter("panelgate_config_reloads_total",
-                                "Times the configuration was read again, by what came of it.");
+    Family total =
+        make_counter("panelgate_config_reloads_total", "Reloads of the configuration, by outcome.");
     for (const ReloadOutcome outcome : kReloadOutcomes)
         total.counter({{"outcome", std::string(label(outcome))}},
                       reloads.reloads[static_cast<std::size_t>(outcome)]);
@@ -320,7 +320,7 @@ void add_process(Families& out, const Snapshot& snapshot) {
     out.push_back(build.take());
 
     Family dropped = make_counter("panelgate_log_lines_dropped_total",
-                                  "Log lines lost because stderr's reader stood still.");
+                                  "Log lines lost because stderr was not read.");
     dropped.counter({}, snapshot.runtime.log_lines_dropped);
     out.push_back(dropped.take());
 

@@ -65,8 +65,8 @@ void add_http(Families& out, const Snapshot& snapshot) {
     for (const auto& [code, count] : snapshot.http->requests) {
         requests.counter({{"code", std::to_string(code)}}, count);
     }
-    Family failures = make_counter("panelgate_login_failures_total",
-                                   "HTTP requests with a token that nobody has.");
+    Family failures =
+        make_counter("panelgate_login_failures_total", "HTTP requests with an unknown token.");
     failures.counter({}, snapshot.http->login_failures);
     out.push_back(requests.take());
     out.push_back(failures.take());
@@ -137,8 +137,9 @@ void add_relays(Families& out, const Snapshot& snapshot) {
     Family up = make_gauge("panelgate_relay_up", "1 when the last transfer of a relay succeeded.");
     Family reads = make_counter("panelgate_relay_reads_total", "Reads of a relay's source.");
     Family writes = make_counter("panelgate_relay_writes_total", "Writes of a relay's target.");
-    Family repairs = make_counter("panelgate_relay_repairs_total",
-                                  "Writes of a relay's target that somebody else had written.");
+    Family repairs =
+        make_counter("panelgate_relay_repairs_total",
+                     "Writes of a relay's target because another client had written to it.");
     Family failures =
         make_counter("panelgate_relay_failures_total", "Reads and writes of a relay that failed.");
     for (const points::RelaySample& relay : snapshot.relays) {
@@ -181,7 +182,7 @@ constexpr MasterCounter kCounters[] = {
      &Counters::replies},
     {"panelgate_serial_master_exceptions_total", "Exceptions among the replies.",
      &Counters::exceptions},
-    {"panelgate_serial_master_silent_total", "Failures that a serial master was told by silence.",
+    {"panelgate_serial_master_silent_total", "Failures answered to a serial master by silence.",
      &Counters::silent},
     {"panelgate_serial_master_superseded_total",
      "Requests given up because the serial master had begun to talk again.", &Counters::superseded},

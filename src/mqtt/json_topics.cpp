@@ -119,8 +119,7 @@ std::vector<Command> JsonTopics::commands(std::string_view topic, std::string_vi
     const std::size_t slash = rest.find('/');
     if (slash == rest.npos) return {};
     const std::string name(topic);
-    if (retained)
-        return {BadCommand{name, "a write must not be retained: nobody knows how old it is"}};
+    if (retained) return {BadCommand{name, "a write must not be retained: its age is unknown"}};
     if (payload.size() > settings_.payload)
         return {BadCommand{name,
                            "a write has at most " + std::to_string(settings_.payload) + " bytes"}};

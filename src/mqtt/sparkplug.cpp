@@ -205,8 +205,7 @@ std::vector<Command> Sparkplug::commands(std::string_view topic, std::string_vie
     const bool to_node = name == this->topic("NCMD");
     const std::string devices = this->topic("DCMD") + '/';
     if (!to_node && (!settings_.write || !name.starts_with(devices))) return {};
-    if (retained)
-        return {BadCommand{name, "a command must not be retained: nobody knows how old it is"}};
+    if (retained) return {BadCommand{name, "a command must not be retained: its age is unknown"}};
     const auto metrics = payload.size() <= settings_.payload
                              ? parse_sparkplug(payload, settings_.metrics)
                              : std::nullopt;

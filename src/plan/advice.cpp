@@ -390,7 +390,7 @@ void warn_of_deadline(const Line& line, const LinePlan& plan, std::vector<std::s
                           format_milliseconds(longest[0].wire) + " at " + to_string(line.serial);
     if (longest.size() > 1)
         warning += ", and " + longest[1].what + ' ' + format_milliseconds(before);
-    warning += longest.size() > 1 ? ": one behind the other they miss" : ": it misses";
+    warning += longest.size() > 1 ? ": one after the other they miss" : ": it misses";
     warning += " the queue's deadline of " + yaml::format_duration(line.deadline) +
                "; set queue: {deadline: " + yaml::format_duration(rounded_up(both)) + '}';
     const Poll* poll = longest[0].poll;

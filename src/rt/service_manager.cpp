@@ -72,7 +72,7 @@ ServiceManager::ServiceManager(Clock& clock, const ServiceEnvironment& environme
     if (environment.notify_socket.empty()) return;
     if (!address_.empty()) socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
     if (socket_ < 0) {
-        log(LogLevel::warn, "service manager not told",
+        log(LogLevel::warn, "service manager not notified",
             {{"socket", environment.notify_socket}, {"why", "no socket that can be sent to"}});
         return;
     }
@@ -89,7 +89,7 @@ ServiceManager::Sent ServiceManager::send(std::string_view message) {
                                static_cast<socklen_t>(address_.size()));
     if (sent >= 0) return Sent::taken;
     if (errno == EAGAIN || errno == EINTR || errno == ENOBUFS) return Sent::not_now;
-    log(LogLevel::warn, "service manager not told", {{"why", std::strerror(errno)}});
+    log(LogLevel::warn, "service manager not notified", {{"why", std::strerror(errno)}});
     return Sent::never;
 }
 

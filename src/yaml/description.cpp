@@ -208,7 +208,7 @@ std::string MapReader::unknown(std::size_t entry) const {
     if (const Entry* parent = shallow_parent(entry))
         return message + "; below " + quote(parent->key) + " (line " +
                std::to_string(parent->mark.line) +
-               ") it must stand deeper: type 2 blanks before it";
+               ") it must be indented deeper: type 2 blanks before it";
     const Entry& typed = node_->entries[entry];
     if (const std::string place = place_of(typed, true); !place.empty()) return message + place;
     const std::string near = nearest(key, known);

@@ -82,7 +82,7 @@ class Builder final : public YAML::EventHandler {
     void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
         const auto found = anchors_.find(anchor);
         if (found == anchors_.end()) {
-            problems_.add(mark_of(mark), "an alias must not stand inside what it repeats");
+            problems_.add(mark_of(mark), "an alias must not be inside what it repeats");
             OnNull(mark, YAML::NullAnchor);
             return;
         }
@@ -377,12 +377,12 @@ struct Words {
 };
 
 constexpr std::string_view kIndentation =
-    "the indentation is wrong here or above: keys of one map, and the '-' of one list, stand in "
-    "one column";
+    "the indentation is wrong here or above: keys of one map, and the '-' of one list, are in one "
+    "column";
 constexpr std::string_view kBracket =
     "a bracket or a comma is missing before this: write {key: value, key: value} or [a, b]";
 constexpr std::string_view kColon =
-    "a key cannot stand here: write each 'key: value' on a line of its own, in the column of its "
+    "a key cannot be here: write each 'key: value' on a line of its own, in the column of its "
     "neighbours";
 constexpr std::string_view kName = "a name of letters and digits must follow & or *";
 constexpr std::string_view kTag = "a tag (!...) has no meaning here; leave it out";
@@ -399,8 +399,8 @@ constexpr std::array<Words, 30> kLibraryMessages{{
     {"illegal map", kColon},
     {"unexpected end", kIndentation},
     {"illegal block entry",
-     "a '-' cannot stand here: write each item of a list on a line of its own, below a key without "
-     "a value"},
+     "a '-' cannot be here: write each item of a list on a line of its own, below a key without a "
+     "value"},
     {"illegal tab", "a tab in the indentation; type blanks in its place"},
     {"unknown token", "this character cannot begin a text; put the text in quotes"},
     {"the referenced anchor", "'*' repeats a name that no '&' gives; put a text in quotes"},
@@ -418,7 +418,7 @@ constexpr std::array<Words, 30> kLibraryMessages{{
     {"tag handle", kTag},
     {"end of verbatim tag", kTag},
     {"cannot assign multiple", "more than one & or ! before one value; leave one out"},
-    {"aliases can't", "nothing may stand between * and what it repeats; leave it out"},
+    {"aliases can't", "nothing may be between * and what it repeats; leave it out"},
     {"cannot set zero", "0 cannot follow | or >; leave it out"},
     {"unexpected character in block", "only a comment may follow | or > on its line"},
     {"bad YAML version", kDirective},

@@ -334,13 +334,13 @@ std::string second_colon(const Scanned& text, std::size_t key, std::size_t value
     const std::string all(clip(text.rest(value), 60));
     if (const std::string address = address_hint(word, all); !address.empty()) return address;
     const std::string_view last = word.substr(word.find_last_of(" \t") + 1);
-    const std::string quotes = "; one text that holds ': ' must stand in quotes: \"" + all + '"';
+    const std::string quotes = "; one text that holds ': ' must be in quotes: \"" + all + '"';
     if (is_word(word))
         return "two keys on one line; begin a deeper line for '" + std::string(word) +
                "', or write " + name + ": {" + all + '}' + quotes;
     if (is_word(last))
         return "two keys on one line; begin a new line for '" + std::string(last) + '\'' + quotes;
-    return "a text that holds ': ' must stand in quotes; write \"" + all +
+    return "a text that holds ': ' must be in quotes; write \"" + all +
            "\", or begin a new line for a second key";
 }
 

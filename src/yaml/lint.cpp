@@ -90,9 +90,9 @@ std::size_t find_invisible(std::string_view word) {
 
 std::string wrong_blank(char32_t c, std::string_view where) {
     const bool is_no_break = c == 0xA0;
-    if (is_invisible(c) && !where.starts_with("behind '"))
-        return name_of(c) + " (which nobody sees) stands " + std::string(where) + "; remove it";
-    return name_of(c) + (is_no_break ? " (a no-break space)" : " (an odd blank)") + " stands " +
+    if (is_invisible(c) && !where.starts_with("after '"))
+        return name_of(c) + " (which is invisible) is " + std::string(where) + "; remove it";
+    return name_of(c) + (is_no_break ? " (a no-break space)" : " (an unusual blank)") + " is " +
            std::string(where) + "; type an ordinary blank in its place";
 }
 
@@ -136,7 +136,7 @@ void find_tab_after_dash(const Scanned& text, std::size_t dash, Findings& findin
     const bool has_key = text.follows(dash + 1) && text.follows(dash + 2) &&
                          text.tokens[dash + 2].kind == Token::Kind::colon;
     if (has_key && text.source.text().substr(end).starts_with('\t'))
-        findings.push_back({end, "a tab behind '-'; type a blank in its place"});
+        findings.push_back({end, "a tab after '-'; type a blank in its place"});
 }
 
 /// True inside quotes or a block of lines.
@@ -148,9 +148,9 @@ bool is_text(const Scanned& text, std::size_t offset) {
 /// Describes the place `at` in `word`, which is the first token of its line or not.
 std::string_view place_of(std::string_view word, std::size_t at, bool first) {
     if (at == 0) return first ? "in the indentation" : "before this text";
-    if (word[at - 1] == ':') return "behind ':'";
-    if (word[at - 1] == '-' && at == 1) return "behind '-'";
-    return at + character_at(word, at).size() < word.size() ? "in this text" : "behind this text";
+    if (word[at - 1] == ':') return "after ':'";
+    if (word[at - 1] == '-' && at == 1) return "after '-'";
+    return at + character_at(word, at).size() < word.size() ? "in this text" : "after this text";
 }
 
 }  // namespace
@@ -228,7 +228,7 @@ void find_unopened(const Scanned& text, const Token& token, Findings& findings) 
     const std::size_t end = lone_quote(word);
     if (end == word.npos) return;
     const std::string mark(1, word[end]);
-    findings.push_back({token.begin, "the quote " + mark + " behind " + quote(word.substr(0, end)) +
+    findings.push_back({token.begin, "the quote " + mark + " after " + quote(word.substr(0, end)) +
                                          " is not opened; " +
                                          closed(word[end], word.substr(0, end))});
 }
@@ -256,10 +256,11 @@ void find_text_after_quote(const Scanned& text, std::size_t i, Findings& finding
     const char mark = text.text(text.tokens[i]).front();
     std::string inside = mark == '\'' ? "a ' inside single quotes is written ''"
                                       : "a \" inside double quotes is written \\\"";
-    findings.push_back({next.begin, quote(text.text(next)) +
-                                        " stands behind the closing quote; remove it, or put all "
-                                        "of the text in quotes (" +
-                                        inside + ')'});
+    findings.push_back(
+        {next.begin,
+         quote(text.text(next)) +
+             " is after the closing quote; remove it, or put all of the text in quotes (" + inside +
+             ')'});
 }
 
 }  // namespace
@@ -302,13 +303,13 @@ void find_alias(const Token& token, std::string_view name, const std::set<std::s
                                              " for all addresses of this machine"});
     } else if (name.empty()) {
         findings.push_back(
-            {token.begin, "a text that begins with '*' must stand in quotes; write \"*\""});
+            {token.begin, "a text that begins with '*' must be in quotes; write \"*\""});
     } else {
         const std::string text = '*' + std::string(name);
         findings.push_back({token.begin, quote(text) + " repeats what '&" +
                                              std::string(clip(name, 60)) +
-                                             "' names, and no such name stands before it; a text "
-                                             "that begins with '*' must stand in quotes"});
+                                             "' names, and there is no such name before it; a text "
+                                             "that begins with '*' must be in quotes"});
     }
 }
 
@@ -348,7 +349,7 @@ void find_wrong(const Scanned& text, std::size_t i, Findings& findings) {
         return;
     }
     findings.push_back({token.begin, "a text that begins with '" + std::string(1, word.front()) +
-                                         "' must stand in quotes; write \"" +
+                                         "' must be in quotes; write \"" +
                                          std::string(clip(word, 60)) + '"'});
 }
 
@@ -371,9 +372,10 @@ bool find_copied(const Token& token, std::string_view word, Findings& findings) 
                begins("sudo ") || word == "EOF") {
         findings.push_back({token.begin, "this line is no part of the file; remove it"});
     } else if ((word == "..." || word == "\u2026") && token.kind == Kind::plain) {
-        findings.push_back({token.begin, quote(word) +
-                                             " stands for something that was left out; write what "
-                                             "is meant, or remove the line"});
+        findings.push_back(
+            {token.begin,
+             quote(word) +
+                 " means that something was left out; write what is meant, or remove the line"});
     } else {
         return false;
     }
@@ -395,7 +397,7 @@ bool is_typeset_quote(std::string_view character) {
 }  // namespace
 
 std::string alias_and_more(std::string_view alias, std::string_view more) {
-    return "no key may stand beside or below " + quote(alias) +
+    return "no key may be beside or below " + quote(alias) +
            "; write {<<: " + std::string(clip(alias, 40)) + ", " + std::string(clip(more, 60)) +
            '}';
 }

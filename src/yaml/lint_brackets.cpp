@@ -27,9 +27,9 @@ void find_address(const Scanned& text, std::size_t close, std::size_t open, Find
     if (next.kind == Kind::plain && word.starts_with(':') && next.begin == text.tokens[close].end) {
         const auto all = text.source.text().substr(first.begin, next.end - first.begin);
         findings.push_back(
-            {first.begin, "an address in [ ] must stand in quotes; write " + in_quotes(all)});
+            {first.begin, "an address in [ ] must be in quotes; write " + in_quotes(all)});
     } else if (next.depth == 0 && next.kind != Kind::colon && next.state != State::stray) {
-        findings.push_back({next.begin, quote(word) + " stands behind the closing " +
+        findings.push_back({next.begin, quote(word) + " is after the closing " +
                                             std::string(text.text(text.tokens[close])) +
                                             "; remove it, or put it on a line of its own"});
     }
@@ -83,10 +83,11 @@ void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
         token.state == State::unclosed ? hiding_comment(text, i) : std::string_view::npos;
     if (comment != std::string_view::npos) {
         const std::string end = text.text(token) == "[" ? "']'" : "'}'";
-        findings.push_back({comment, "this '#' begins a comment, which hides the " + end +
-                                         " behind it; put a text that begins with '#' in quotes, "
-                                         "or a comment behind the " +
-                                         end});
+        findings.push_back(
+            {comment,
+             "this '#' begins a comment, which hides the " + end +
+                 " after it; put a text that begins with '#' in quotes, or a comment after the " +
+                 end});
         return;
     }
     const std::size_t dollar =
@@ -105,7 +106,7 @@ void find_unclosed(const Scanned& text, std::size_t i, Findings& findings) {
     } else if (token.state == State::unclosed) {
         findings.push_back({token.begin, std::string(list ? "'['" : "'{'") +
                                              " is never closed; a '" + (list ? ']' : '}') +
-                                             "' is missing behind it"});
+                                             "' is missing after it"});
     }
     if (token.state == State::stray) {
         const bool closes_list = text.text(token) == "]";
@@ -128,9 +129,9 @@ bool find_comma_of_line(const Scanned& text, const Token& key, const Token& valu
         value.kind == Kind::plain || value.kind == Kind::quoted || value.kind == Kind::close;
     if (!key.first || !ends) return false;
     findings.push_back(
-        {value.end, "a ',' is missing behind " + (value.kind == Kind::close
-                                                      ? '\'' + std::string(text.text(value)) + '\''
-                                                      : quote(text.text(value)))});
+        {value.end, "a ',' is missing after " + (value.kind == Kind::close
+                                                     ? '\'' + std::string(text.text(value)) + '\''
+                                                     : quote(text.text(value)))});
     return true;
 }
 
@@ -146,8 +147,7 @@ void find_comma(const Scanned& text, std::size_t colon, Findings& findings) {
         const std::string address = address_hint(word, all);
         findings.push_back({before.begin, !address.empty()
                                               ? address
-                                              : "a text that holds ': ' must stand in quotes; "
-                                                "write " +
+                                              : "a text that holds ': ' must be in quotes; write " +
                                                     in_quotes(all)});
         return;
     }
@@ -182,7 +182,7 @@ std::string address_hint(std::string_view word, std::string_view all) {
     if (!is_host || port == all.npos || word.find_first_of(" \t") != word.npos ||
         all.find_first_not_of("0123456789/", port) != all.npos)
         return "";
-    return "a blank behind the ':' of an address; write " + std::string(word) + ':' +
+    return "a blank after the ':' of an address; write " + std::string(word) + ':' +
            std::string(all.substr(port));
 }
 
@@ -326,7 +326,7 @@ void find_margins(const Scanned& text, Findings& findings) {
         if (first == 0 || line_number(lines[i]) < first + i) return;
     findings.push_back({offset(lines[0][lines[0].find_first_not_of(' ')]),
                         "the number of a line in a listing; remove it, and those below, with what "
-                        "stands between them and the text"});
+                        "is between them and the text"});
 }
 
 }  // namespace

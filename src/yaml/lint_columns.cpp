@@ -203,7 +203,7 @@ class Columns {
             findings_.push_back(*finding);
         } else {
             tell(token, "a key and ': ' are missing before " + quote(text_.rest(token)) +
-                            "; a text of several lines must stand deeper than its key");
+                            "; a text of several lines must be indented deeper than its key");
         }
         level.waits = true;  // deeper lines belong to this one
     }
@@ -251,14 +251,14 @@ class Columns {
         } else if (item.list && level->waits) {
             levels_.push_back(item);
         } else if (item.list) {
-            tell(item.first, "indentation: this '-' stands in the column of " + name(level->last) +
+            tell(item.first, "indentation: this '-' is in the column of " + name(level->last) +
                                  " on line " + std::to_string(line(level->last)) +
-                                 ", which has a value; a list stands below a key without one");
+                                 ", which has a value; a list goes below a key without one");
         } else {
             const bool deeper = left && !left->list;
-            tell(item.first,
-                 "a '- ' is missing before " + name(item.first) + " (a new item of the list)" +
-                     (deeper ? ", or blanks, until it stands below " + like(*left) : ""));
+            tell(item.first, "a '- ' is missing before " + name(item.first) +
+                                 " (a new item of the list)" +
+                                 (deeper ? ", or blanks, until it is below " + like(*left) : ""));
             if (deeper) levels_.push_back(*left);
         }
     }
@@ -305,7 +305,7 @@ class Columns {
         }
         const std::size_t by = item.column - level.column;
         shift_ = level.column - item.column;
-        tell(item.first, "indentation: " + name(item.first) + " stands " + blanks(by) +
+        tell(item.first, "indentation: " + name(item.first) + " is " + blanks(by) +
                              " deeper than " + name(level.last) + " on line " +
                              std::to_string(line(level.last)) +
                              ", which has a value already; take away " + blanks(by));
@@ -341,12 +341,11 @@ class Columns {
         const bool left = map.column < item.column;
         const bool wide = !left && map.column - list.column > 2;
         tell(list.first,
-             wide ? "indentation: more than 1 blank behind this '-'; take away 1, so that " +
-                        name(map.first) + " stands above " + name(item.first)
-                  : std::string("indentation: this '-' stands 1 blank too far ") +
+             wide ? "indentation: more than 1 blank after this '-'; take away 1, so that " +
+                        name(map.first) + " is above " + name(item.first)
+                  : std::string("indentation: this '-' is 1 blank too far ") +
                         (left ? "left" : "right") + "; " + (left ? "add" : "take away") +
-                        " 1 blank, so that " + name(map.first) + " stands above " +
-                        name(item.first));
+                        " 1 blank, so that " + name(map.first) + " is above " + name(item.first));
     }
 
     static std::string blanks(std::size_t count) {
@@ -356,7 +355,7 @@ class Columns {
         const bool left = item.column < sibling.column;
         shift_ = sibling.column - item.column;
         const std::size_t by = left ? sibling.column - item.column : item.column - sibling.column;
-        tell(item.first, "indentation: " + name(item.first) + " stands " + blanks(by) +
+        tell(item.first, "indentation: " + name(item.first) + " is " + blanks(by) +
                              (left ? " left of " : " right of ") + like(sibling) + "; " +
                              (left ? "add " : "take away ") + blanks(by));
     }

@@ -50,7 +50,7 @@ test('a request without a reply is silence until the next', () => {
 
 test('a quarantine is drawn for as long as it was decided', () => {
     const made = timeline([request(1, 10)], [{sequence: 2, at: 10.6, time: '2026-01-01T00:00:00Z',
-        text: 'nobody but this request for 512.0 ms: station 31 did not answer and may do so late'}]);
+        text: 'only this request is sent for 512.0 ms: station 31 did not answer and may do so late'}]);
     const rest = made.between(10, 12).find((span) => span.kind === 'rest');
     near(rest.to - rest.from, 0.512);
     assert.equal(rest.station, 31);

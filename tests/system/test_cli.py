@@ -64,13 +64,13 @@ class CommandLine(unittest.TestCase):
 
     def test_what_a_command_lacks_is_told_by_name(self):
         for typed, told in (("check --format xml", "--format must be text or json, not 'xml'"),
-                            ("check --format", "--format needs a value behind it"),
+                            ("check --format", "--format needs a value after it"),
                             ("check -c a -c b", "--config may be given once"),
                             ("scan", "DEVICE is missing"),
                             ("reload --weaker", "--weaker requires --rollback"),
                             ("address autonics-gplp-s", "NOTATION is missing"),
                             ("run --simulate=x", "an option that takes no value was given one"),
-                            ("run -- x", "nothing is to stand behind '--'")):
+                            ("run -- x", "nothing may follow '--'")):
             command = typed.split()[0]
             self.assertEqual(self.expect(USAGE, *typed.split()).stderr,
                              f"panelgate: {command}: {told}; `panelgate help {command}` says what "

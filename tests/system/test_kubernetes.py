@@ -129,7 +129,7 @@ class Manifests(unittest.TestCase):
             checked = harness.run("check", "-c", str(file))
             # That of the open viewer alone: what networkpolicy.yaml keeps out, no file shows.
             self.assertEqual(checked.returncode, 0, file)
-            self.assertRegex(checked.stderr, r"^\S+: warning: whoever reaches port 8080 of any "
+            self.assertRegex(checked.stderr, r"^\S+: warning: any client that reaches port 8080 of any "
                              r"address may see the configuration, .*\n$", file)
             self.assertEqual(listens(file.read_text()), ports, file)
         [generator] = load("kustomization.yaml")[0]["configMapGenerator"]

@@ -117,8 +117,11 @@ class Slowest {
         const Duration longest = std::max(older_, newer_);
         return longest == Duration::min() ? std::nullopt : std::optional(longest);
     }
+    /// Enough values were seen that a longer one is an exception.
+    bool is_significant() const { return older_ != Duration::min() || count_ >= kEnough; }
 
   private:
+    static constexpr int kEnough = 16;
     Duration older_ = Duration::min();
     Duration newer_ = Duration::min();
     int count_ = 0;

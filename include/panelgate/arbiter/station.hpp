@@ -265,6 +265,8 @@ class Station {
         return std::max(trail_.until(), duplicates ? duplicates_.rest_until() : TimePoint{});
     }
     std::optional<Duration> slowest() const { return slowest_.value(); }
+    /// Enough replies have shown how long it may need.
+    bool is_slowest_known() const { return slowest_.is_significant(); }
 
     /// End of its last failed attempt.
     TimePoint failed() const { return failed_; }

@@ -69,8 +69,8 @@ const char* detail_of(Fault fault, bool transmitted) {
             return "the line was lost while the request was on its way";
         case Fault::timeout:
             return transmitted ? "the station did not answer in time"
-                               : "nothing was sent: its time was over while the station owed an "
-                                 "answer";
+                               : "nothing was sent: its deadline passed while a reply of the "
+                                 "station was outstanding";
         case Fault::damaged:
             return transmitted ? "only damaged replies came back"
                                : "nothing was sent: the station's replies come damaged";

@@ -80,7 +80,7 @@ Handling costed(HttpRequest request, const Api* api, Handler handler) {
 namespace {
 
 constexpr const char* kLost =
-    "the gateway failed after something was sent: what came of the write is not known";
+    "the gateway failed after something was sent: the outcome of the write is unknown";
 
 /// The key without its quotes; a key without quotes means the same.
 Parsed<std::string> key_of(std::string_view text, std::size_t most) {

@@ -150,7 +150,7 @@ std::string detail_of(const bus::Refusal& refusal) {
             return "a broadcast would write to " + station + ", which is read-only";
         case bus::Rule::listening:
             return "line '" + refusal.why +
-                   "' has another master: it is only listened to (mode: listen); its points tell "
+                   "' has another master: it is only listened to (mode: listen); its points show "
                    "what passed by";
         case bus::Rule::function:
         case bus::Rule::quantity:

@@ -351,7 +351,7 @@ Parsed<TracePage> page_of(const HttpRequest& request, const bus::BusClient& bus)
     if (!most) return most.error();
     if (!follows) return last_of_trace(bus, *most);
     const auto number = to_number<std::uint64_t>(since->second);
-    if (!number) return problem(400, "since must be a sequence number: what `next` said, or 0");
+    if (!number) return problem(400, "since must be a sequence number: the value of `next`, or 0");
     return trace_since(bus, *number, *most);
 }
 

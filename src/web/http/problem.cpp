@@ -11,7 +11,7 @@ namespace {
 
 constexpr ProblemKind kKinds[] = {
     {"malformed", "The request cannot be understood, or a member or query has no such value.", 400},
-    {"unknown-member", "A member or query that nobody knows here.", 0},
+    {"unknown-member", "An unknown member or query parameter.", 0},
     {"unauthorized", "There is no token, or none that the gateway knows.", 401},
     {"forbidden", "The token's role may not do this.", 403},
     {"foreign-page", "A page of another site asks.", 0},
@@ -43,7 +43,7 @@ constexpr ProblemKind kKinds[] = {
     {"offline", "The panel is silent and was not asked.", 0},
     {"busy", "The line's queue is full.", 0},
     {"expired", "The line could not take the request before its deadline.", 0},
-    {"cancelled", "Who asked had gone, or the gateway is stopping.", 0},
+    {"cancelled", "The client had disconnected, or the gateway is stopping.", 0},
     {"denied", "It is not allowed.", 0},
     {"not_routed", "No line has this station.", 0},
     {"line_lost", "The line was lost while the request was under way.", 0},

@@ -1,4 +1,4 @@
-// The configuration in force, and what is open to whom.
+// The configuration in force, and who may access what.
 import {gateway, offers} from './api.js';
 import {h, table} from './dom.js';
 import {duration, t, word} from './language.js';

@@ -11,7 +11,7 @@ export const bytesOf = (hex) => hex === '' ? [] : hex.split(' ').map((pair) => p
 const LONGEST_GAP = 0.02;    // seconds: beyond, the line had nothing to do
 const LONGEST_WAIT = 1;      // seconds: nobody is drawn as waited for longer
 const OF_STATION = 600;      // exchanges that are remembered of each
-const RESTS = /^nobody but this request for ([\d.]+) ms: station (\d+)/;
+const RESTS = /^only this request is sent for ([\d.]+) ms: station (\d+)/;
 
 /** A frame of the trace with its begin and end: `at` is its first bit out, or its last byte in. */
 function segment(frame, character) {

@@ -150,8 +150,8 @@ TEST(MovedUnits, TellsThatUnitsOfARemovedLineNowReachTheOneThatIsLeft) {
     const config::Config both = load(two_lines("", "lines: [a, b]"));
     EXPECT_THAT(moved_units(both, load(two_lines("", "lines: [a]"))),
                 ElementsAre("unit 2 of 127.0.0.1:1502 was 'two' of line b and now goes to line a: "
-                            "a write to it may reach another panel; say unlisted_stations: refuse "
-                            "there, or tell its clients first"));
+                            "a write to it may reach another panel; set unlisted_stations: refuse "
+                            "there, or inform its clients first"));
     const std::string one =
         "lines: [{name: a, device: sim, stations: [{id: 1, name: one}]}]\n"
         "modbus_tcp: [{listen: '127.0.0.1:1502'}]\n";

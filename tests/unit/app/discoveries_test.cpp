@@ -116,7 +116,7 @@ TEST_F(DiscoveriesTest, SomebodyEndsItAndWhatWasFoundStays) {
     run();
     EXPECT_EQ(report().state, State::stopped);
     EXPECT_EQ(report().stations.size(), 1u);
-    EXPECT_EQ(report().why, "somebody has ended it");
+    EXPECT_EQ(report().why, "it was ended by a request");
     const std::size_t asked = bus.requests.size();
     clock.advance(60s);
     EXPECT_EQ(bus.requests.size(), asked);

@@ -124,8 +124,9 @@ TEST(Explain, ExplainsWhyEachRequestGoesNowAndWhyOneIsRefused) {
         "most 1 of one client");
     bus.run_for(3s);
     ASSERT_GE(bus.decisions.size(), 2u);
-    EXPECT_EQ(bus.decisions[1].text,
-              "nobody but this request for 500.0 ms: station 17 did not answer and may do so late");
+    EXPECT_EQ(
+        bus.decisions[1].text,
+        "only this request is sent for 500.0 ms: station 17 did not answer and may do so late");
 }
 
 TEST(Explain, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
@@ -140,10 +141,9 @@ TEST(Explain, ExplainsWhyAReadThatWasAnsweredIsAskedOnceMore) {
     }
     ASSERT_TRUE(bus.next_sent(100ms));
     ASSERT_EQ(bus.decisions.size(), 1u);
-    EXPECT_EQ(
-        bus.decisions[0].text,
-        "read of a client without a name to station 17 asked once more: its answer repeats an "
-        "earlier one and may be a copy of that");
+    EXPECT_EQ(bus.decisions[0].text,
+              "read of a client without a name to station 17 asked once more: its answer repeats "
+              "an earlier one and may be a duplicate of it");
 }
 
 TEST(Shares, P9TheTimeOfASharedTransactionIsSharedOut) {

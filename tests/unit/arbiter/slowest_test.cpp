@@ -13,6 +13,16 @@ TEST(Slowest, IsTheLongest) {
     EXPECT_EQ(slowest.value(), 9ms);
 }
 
+TEST(Slowest, IsSignificantAfterSixteenValues) {
+    Slowest slowest;
+    for (int i = 0; i < 15; ++i) slowest.add(2ms);
+    EXPECT_FALSE(slowest.is_significant());
+    for (int i = 0; i < 2 * Slowest::kWindow; ++i) {
+        slowest.add(2ms);
+        ASSERT_TRUE(slowest.is_significant()) << i;
+    }
+}
+
 TEST(Slowest, RemembersForAWindowAndForgetsAfterTwo) {
     Slowest slowest;
     slowest.add(400ms);

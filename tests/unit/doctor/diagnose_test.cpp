@@ -79,7 +79,7 @@ TEST_F(Diagnose, WhereAllOfAsciiIsDamagedTheFormatDiffersAndPerhapsTheMode) {
     const auto found = findings({{1, Mix().garbage(9)}, {2, Mix().strange(9)}});
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].cause, Cause::wrong_baud);
-    EXPECT_NE(found[0].text.find("no Modbus ASCII"), std::string::npos);
+    EXPECT_NE(found[0].text.find("not Modbus ASCII"), std::string::npos);
     EXPECT_NE(found[0].advice.find("9600 7E1 ASCII"), std::string::npos);
 }
 
@@ -209,7 +209,7 @@ TEST_F(Diagnose, LateRepliesAreATimeoutTooShortAndNoGap) {
 TEST_F(Diagnose, ForeignRequestsAreAnotherMaster) {
     const Symptoms disturbed = Mix().answered(50).with(&Symptoms::requests, 3);
     EXPECT_THAT(causes({{1, disturbed}}), ElementsAre("other-master"));
-    EXPECT_THAT(findings({{1, disturbed}})[0].evidence, HasSubstr("3 requests of somebody else"));
+    EXPECT_THAT(findings({{1, disturbed}})[0].evidence, HasSubstr("3 requests of another master"));
     EXPECT_THAT(causes({{1, Mix().answered(50).with(&Symptoms::requests, 2)}}), IsEmpty());
     EXPECT_THAT(causes({{1, Mix().answered(50).damaged(5).with(&Symptoms::requests, 9)}}),
                 ElementsAre("other-master"))

@@ -104,7 +104,7 @@ TEST(Resolver, ASilentNameServerIsReportedAndQueriedOnce) {
     asked.wait(0);
     for (int attempt = 0; attempt < 5; ++attempt) clock.advance(6s);
     ASSERT_EQ(heard.downs.size(), 1u);
-    EXPECT_NE(heard.downs[0].find("no name server tells its address"), std::string::npos);
+    EXPECT_NE(heard.downs[0].find("no name server resolves its address"), std::string::npos);
     EXPECT_EQ(asked, 1);
     line->stop();
 }

@@ -150,10 +150,10 @@ TEST_F(ServiceManagerTest, AnUnusableSocketIsReportedAndNotFatal) {
         ServiceManager manager(clock, {.notify_socket = name});
         manager.ready([] { return "fine"; });
     }
-    EXPECT_EQ(log.count("warn service manager not told socket="), 2u);
+    EXPECT_EQ(log.count("warn service manager not notified socket="), 2u);
     ServiceManager manager(clock, {.notify_socket = folder.path() / "nobody"});
     manager.ready([] { return "fine"; });
-    EXPECT_EQ(log.count("warn service manager not told why=\"No such file"), 1u);
+    EXPECT_EQ(log.count("warn service manager not notified why=\"No such file"), 1u);
 }
 
 TEST(WatchdogInterval, IgnoresAnotherProcessAndInvalidNumbers) {

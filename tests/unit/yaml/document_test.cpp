@@ -121,11 +121,11 @@ TEST(Document, RefusesASecondDocument) {
 TEST(Document, TurnsASyntaxErrorIntoOneProblemAtItsCause) {
     EXPECT_EQ(read("a: b: c\n").problems,
               "f.yaml:1:4: two keys on one line; begin a deeper line for 'b', or write a: {b: c}; "
-              "one text that holds ': ' must stand in quotes: \"b: c\"\n"
+              "one text that holds ': ' must be in quotes: \"b: c\"\n"
               "  a: b: c\n"
               "     ^\n");
     EXPECT_EQ(read("lines: [\nb: 1\n").problems,
-              "f.yaml:1:8: '[' is never closed; a ']' is missing behind it\n"
+              "f.yaml:1:8: '[' is never closed; a ']' is missing after it\n"
               "  lines: [\n"
               "         ^\n");
     EXPECT_EQ(read("a:\tb\n\tc: d\n").problems,
@@ -191,7 +191,7 @@ TEST(Document, AnAliasRepeatsItsAnchorAtItsOwnPlace) {
 
 TEST(Document, RefusesAnAliasInsideItsAnchor) {
     EXPECT_EQ(read("a: &x [1, *x]\n").problems,
-              "f.yaml:1:11: an alias must not stand inside what it repeats\n");
+              "f.yaml:1:11: an alias must not be inside what it repeats\n");
 }
 
 TEST(Document, StopsAtNestingBombs) {

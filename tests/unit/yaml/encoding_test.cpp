@@ -98,7 +98,7 @@ TEST(Encoding, ColumnsCountCharacters) {
 
 TEST(Encoding, TheCaretStandsBelowWideCharacters) {
     EXPECT_EQ(problems_of("\uD55C\uAD6D: %\n"),
-              "f.yaml:1:5: a text that begins with '%' must stand in quotes; write \"%\"\n" +
+              "f.yaml:1:5: a text that begins with '%' must be in quotes; write \"%\"\n" +
                   std::string("  \uD55C\uAD6D: %\n") + "        ^\n");
 }
 

@@ -66,9 +66,8 @@ TEST(Body, SaysWhatAHandTypesThatIsNoJson) {
         return text.substr(std::string_view("the body is not JSON: line 1, ").size());
     };
     EXPECT_EQ(told(""), "column 1: it is empty; send an object, such as {\"value\": 1}");
-    EXPECT_EQ(
-        told("\xEF\xBB\xBF{\"value\": 1}"),
-        "column 1: a byte order mark (U+FEFF) stands before the value; send the body without");
+    EXPECT_EQ(told("\xEF\xBB\xBF{\"value\": 1}"),
+              "column 1: a byte order mark (U+FEFF) precedes the value; send the body without");
     EXPECT_EQ(told("{\"value\": \"\xFF\"}"), "column 12: this is not UTF-8");
     EXPECT_EQ(told("{\"value\": +21}"), "column 11: a number of JSON has no '+'; remove it");
     EXPECT_EQ(told("{\"value\": .5}"),
