@@ -199,7 +199,7 @@ Station::Replied Station::on_reply(TimePoint now, const Attempt& attempt, Durati
         result.drift = turnaround_.quantile(0.95);
     result.trailed = trail_.seen();
     trail_.on_reply(now);
-    reconnect_.on_replied();
+    reconnect_.on_replied(2 * waited <= settings_.response_timeout);
     learn_of_duplicates(now, attempt);
     if (trail_.settle_time() > Duration::zero() && !std::exchange(trail_reported_, true))
         result.trail = trail_.settle_time();

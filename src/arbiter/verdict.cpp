@@ -123,6 +123,7 @@ void Arbiter::settle(TimePoint now) {
     const TimePoint proved = station.surely_answered(attempt.timing().started, reply);
     const Station::Replied replied = station.on_reply(now, attempt, needed, think);
     stations_.on_reply(now, group.shows_pace() ? std::optional(needed) : std::nullopt);
+    stations_.on_answered(group.station);
     if (replied.back) stations_.on_recovery();
     if (settings_.may_stall) stations_.on_proved(now, proved);
     schedule_.on_transport_proved(proved);

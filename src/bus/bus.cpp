@@ -166,7 +166,10 @@ void Bus::State::on_down(const std::string& why) {
     rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
     observe(settings, LineEvent{false, why});
     drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
-    if (was_up) book.on_line_down(clock.now());
+    if (was_up) {
+        book.on_line_down(clock.now());
+        doctor.on_line_down();
+    }
 }
 
 void Bus::State::on_bytes(ByteView bytes) {

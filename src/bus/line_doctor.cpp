@@ -54,6 +54,10 @@ void LineDoctor::look_on_demand(TimePoint now, const LineCounts& counts) {
     if (doctor_.rested(now)) judge(now, counts);
 }
 
+void LineDoctor::on_line_down() {
+    for (const doctor::Finding& finding : doctor_.withdraw_silence()) report_change(finding, false);
+}
+
 void LineDoctor::judge(TimePoint now, const LineCounts& counts) {
     const doctor::Doctor::Change change = doctor_.look(now, sample_of(counts));
     for (const doctor::Finding& finding : change.gone) report_change(finding, false);

@@ -28,6 +28,8 @@ class LineDoctor {
     void apply();
 
     void begin(TimePoint now, const LineCounts& counts);
+    /// Withdraws what depends on a line that is up.
+    void on_line_down();
     /// Call on line activity: judges at most once per step.
     void look(TimePoint now, const LineCounts& counts);
     /// Call before reading findings: judges unless it has just done so.

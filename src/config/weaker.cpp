@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "panelgate/base/decimal.hpp"
 #include "panelgate/config/endpoint.hpp"
 
 namespace panelgate::config {
@@ -105,6 +106,33 @@ const Line* find_line(const Config& config, const Line& like) {
     return found == config.lines.end() ? nullptr : &*found;
 }
 
+/// A limit that is missing is the widest.
+bool is_above(const std::optional<Decimal>& next, const std::optional<Decimal>& running) {
+    return running && (!next || *running < *next);
+}
+bool is_below(const std::optional<Decimal>& next, const std::optional<Decimal>& running) {
+    return running && (!next || *next < *running);
+}
+
+/// Compares what may be written to points.
+void compare_points(Lines& all, const Station& running, const Station& next) {
+    for (const points::Point& point : next.points) {
+        if (!point.writable) continue;
+        const std::string what = "point " + running.name + '/' + point.name;
+        const auto was = std::ranges::find(running.points, point.name, &points::Point::name);
+        if (was == running.points.end() || !was->writable) {
+            all.push_back(what + ": is writable");
+            continue;
+        }
+        if (is_above(point.max, was->max))
+            all.push_back(what + ": max " + was->max->text() + " -> " +
+                          (point.max ? point.max->text() : "none"));
+        if (is_below(point.min, was->min))
+            all.push_back(what + ": min " + was->min->text() + " -> " +
+                          (point.min ? point.min->text() : "none"));
+    }
+}
+
 void compare_stations(Lines& all, const Line& running, const Line& next) {
     for (const Station& was : running.stations) {
         const std::string what = "station " + was.name;
@@ -117,6 +145,7 @@ void compare_stations(Lines& all, const Line& running, const Line& next) {
         }
         compare_access(all, what, was.read_only, is->read_only);
         if (was.guard && !is->guard) all.push_back(what + ": guard true -> false");
+        compare_points(all, was, *is);
     }
 }
 

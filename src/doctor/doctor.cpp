@@ -154,6 +154,16 @@ Doctor::Change Doctor::look(TimePoint now, const Sample& counted) {
     return change;
 }
 
+std::vector<Finding> Doctor::withdraw_silence() {
+    std::vector<Finding> withdrawn;
+    std::erase_if(findings_, [&](const Finding& finding) {
+        const bool silent = finding.cause == Cause::station_silent;
+        if (silent) withdrawn.push_back(finding);
+        return silent;
+    });
+    return withdrawn;
+}
+
 void Doctor::move_window(TimePoint now, const Sample& counted) {
     marks_.push_back({now, counted});
     while (marks_.size() > 2) {

@@ -89,7 +89,9 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
     if (station == 0 || line || masters || explained_by_frames(c, station)) return;
     const Bar bar{c, Cause::duplicate_address, station};
     const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_damaged_more(c, s);
-    if (s.doubled >= bar.enough(3) || mixed) return add_duplicate(c, station, s);
+    // A reply that comes after its timeout is taken for the retry's, and the retry's own follows.
+    const bool from_retries = s.silent >= s.doubled && s.doubled * 4 < s.answered;
+    if ((s.doubled >= bar.enough(3) && !from_retries) || mixed) return add_duplicate(c, station, s);
     // A connection that stalls truncates replies without a second panel.
     if (c.facts.over_tcp && s.damaged_short * 2 > s.damaged()) return;
     if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s)) return;

@@ -89,13 +89,17 @@ class ReconnectState {
     }
     /// A request to it has ended without its own reply.
     void on_outstanding() { opened_ = answered_ = false; }
-    void on_replied() {
+    /// `quick`: within half of its timeout. A slow one is not asked for another length again: that
+    /// takes as long as waiting.
+    void on_replied(bool quick) {
         answered_ = opened_;
         unanswered_ = 0;
+        if (only_known_reads_ && quick && ++replies_ >= kEnough) only_known_reads_ = false;
     }
     /// `distinct_length`: a read sent only because its reply's length is distinct.
     void on_probe_unanswered(bool distinct_length) {
         only_known_reads_ = distinct_length;
+        replies_ = 0;
         unanswered_ = std::min(unanswered_ + 1, kMost);
     }
 
@@ -109,7 +113,10 @@ class ReconnectState {
 
   private:
     static constexpr int kMost = 3;
+    static constexpr int kEnough =
+        16;  ///< replies after which the other length may just have been lost
 
+    int replies_ = 0;     ///< since it did not answer a read of another length
     int unanswered_ = 0;  ///< in a row
     bool opened_ = false;
     bool answered_ = false;

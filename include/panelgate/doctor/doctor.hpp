@@ -76,6 +76,9 @@ class Doctor {
     /// Evaluates the window that ends now. `counted`: totals since the start.
     Change look(TimePoint now, const Sample& counted);
 
+    /// The line is down: withdraws and returns what a panel's silence said of the panel (P10).
+    std::vector<Finding> withdraw_silence();
+
     /// Findings of the last look, the likeliest first.
     const std::vector<Finding>& findings() const { return findings_; }
 

@@ -99,5 +99,20 @@ TEST(OutstandingReplies, ForgetsTheOldestOfTooMany) {
     EXPECT_EQ(outstanding.oldest(kReplyOfThree)->sent, at(2s));
 }
 
+TEST(ReconnectState, P4TriesAnotherLengthAgainAfterSixteenReplies) {
+    ReconnectState state;
+    state.on_probe_unanswered(true);
+    for (int i = 0; i < 99; ++i) state.on_replied(false);
+    for (int i = 0; i < 15; ++i) {
+        state.on_replied(true);
+        EXPECT_TRUE(state.only_known_reads()) << i;
+    }
+    state.on_replied(true);
+    EXPECT_FALSE(state.only_known_reads()) << "it may just have been lost";
+    state.on_probe_unanswered(true);
+    state.on_replied(true);
+    EXPECT_TRUE(state.only_known_reads());
+}
+
 }  // namespace
 }  // namespace panelgate::arbiter::debt_test

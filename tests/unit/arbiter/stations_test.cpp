@@ -96,6 +96,23 @@ TEST_F(StationsTest, P4AFlakyStationHasAShortWaitOnlyWhereAnotherHasAnsweredSinc
     EXPECT_FALSE(stations_.flaky_beside_others(now_ + 1min, flaky)) << "nobody else is there";
 }
 
+TEST_F(StationsTest, P4WhatOneLosesShortensNoWaitOnceItHasAnswered) {
+    for (int i = 0; i < 20; ++i) {
+        answer(1);
+        answer(2);
+    }
+    const auto wait = [&](std::uint8_t id) {
+        return stations_.patience(now_, test::group_of(id, kRead));
+    };
+    const Duration whole = wait(1);
+    stations_.on_failed(now_, test::group_of(2, kRead), Verdict::silent, 500ms);
+    EXPECT_LT(wait(1), whole / 2) << "several may have failed together";
+    stations_.on_answered(1);
+    EXPECT_LT(wait(1), whole / 2);
+    stations_.on_answered(2);
+    EXPECT_EQ(wait(1), whole);
+}
+
 TEST_F(StationsTest, P4UnheardStationsDoNotUseUpTheProbeBudgetOfOthers) {
     constexpr std::uint8_t kStranger = 200;
     answer(1);

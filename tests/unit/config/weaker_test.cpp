@@ -54,6 +54,21 @@ TEST(Weaker, AccessAndGuardOfAStation) {
                 ElementsAre("station press: guard true -> false"));
 }
 
+TEST(Weaker, WhatMayBeWrittenToPoints) {
+    const auto point = [](const std::string& keys) {
+        return plant("serial: {baud: 38400, parity: none}, ",
+                     ", profile: autonics-gplp-s, points: [{name: set, at: UW100" + keys + "}]",
+                     kListener);
+    };
+    EXPECT_THAT(told(point(""), point(", writable: true")),
+                ElementsAre("point press/set: is writable"));
+    EXPECT_THAT(told(point(", writable: true, max: 50"), point(", writable: true, max: 400")),
+                ElementsAre("point press/set: max 50 -> 400"));
+    EXPECT_THAT(told(point(", writable: true, min: 5, max: 50"), point(", writable: true")),
+                ElementsAre("point press/set: max 50 -> none", "point press/set: min 5 -> none"));
+    EXPECT_THAT(told(point(", max: 50"), point(", max: 400")), IsEmpty()) << "never written";
+}
+
 TEST(Weaker, AStationThatIsNoLongerListedWhereUnlistedOnesPass) {
     const std::string without =
         "lines: [{name: floor1, device: sim, stations: [{id: 5}]}]\n" + kListener;

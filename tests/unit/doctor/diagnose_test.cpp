@@ -161,6 +161,9 @@ TEST_F(Diagnose, DamageOrDuplicatesOfOneAddressOnly) {
     EXPECT_THAT(causes({{1, fine}, {2, Mix().zeroed(6)}}), ElementsAre("wrong-parity 2"));
     EXPECT_THAT(causes({{1, fine}, {2, Mix().answered(30).with(&Symptoms::doubled, 3)}}),
                 ElementsAre("duplicate-address 2"));
+    EXPECT_THAT(causes({{1, fine}, {2, Mix().lost(3).answered(60).with(&Symptoms::doubled, 3)}}),
+                IsEmpty())
+        << "late now and then: each repetition is the reply to a retry";
     EXPECT_THAT(causes({{2, Mix().answered(30).damaged(3).with(&Symptoms::doubled, 1)}}),
                 ElementsAre("duplicate-address 2"))
         << "alone on its line";

@@ -127,5 +127,15 @@ TEST_F(DoctorTest, TheLikeliestAndWidestCauseIsFirst) {
     EXPECT_EQ(causes(doctor.findings()), (std::vector{Cause::other_master, Cause::station_silent}));
 }
 
+TEST_F(DoctorTest, P10WhatASilenceSaidOfAPanelIsWithdrawnWithTheLine) {
+    one.answered(20).with(&Symptoms::requests, 5);
+    counted.stations[1] = one;
+    counted.stations[2] = Mix().silent(9);
+    doctor.look(now + 5s, counted);
+    EXPECT_EQ(causes(doctor.withdraw_silence()), std::vector{Cause::station_silent});
+    EXPECT_EQ(causes(doctor.findings()), std::vector{Cause::other_master});
+    EXPECT_TRUE(doctor.withdraw_silence().empty());
+}
+
 }  // namespace
 }  // namespace panelgate::doctor::doctor_test
