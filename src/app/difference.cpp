@@ -120,58 +120,6 @@ std::vector<Change> differences(const config::Config& before, const config::Conf
     return changes;
 }
 
-namespace {
-
-const config::Line* line_of(const config::Config& config, const std::string& name) {
-    const auto found = std::ranges::find(config.lines, name, &config::Line::name);
-    return found == config.lines.end() ? nullptr : &*found;
-}
-
-/// Which line a unit reaches without an alias; nullptr: none.
-const config::Line* line_reached(const config::Config& config, const tcp_server::Settings& listener,
-                                 std::uint8_t unit) {
-    for (const std::string& name : listener.lines) {
-        const config::Line* line = line_of(config, name);
-        if (line != nullptr &&
-            std::ranges::find(line->stations, unit, &config::Station::id) != line->stations.end())
-            return line;
-    }
-    if (listener.lines.size() != 1) return nullptr;
-    const config::Line* only = line_of(config, listener.lines.front());
-    return only != nullptr && !only->refuse_unlisted ? only : nullptr;
-}
-
-void add_moved(const config::Config& after, const tcp_server::Settings& listener,
-               const config::Line& lost, std::vector<std::string>& all) {
-    for (const config::Station& station : lost.stations) {
-        if (listener.units.contains(station.id)) continue;
-        const config::Line* other = line_reached(after, listener, station.id);
-        if (other == nullptr) continue;
-        all.push_back("unit " + std::to_string(station.id) + " of " + listener.name() + " was '" +
-                      station.name + "' of line " + lost.name + " and now goes to line " +
-                      other->name +
-                      ": a write to it may reach another panel; set unlisted_stations: refuse "
-                      "there, or inform its clients first");
-    }
-}
-
-}  // namespace
-
-std::vector<std::string> moved_units(const config::Config& before, const config::Config& after) {
-    std::vector<std::string> all;
-    for (const tcp_server::Settings& listener : after.modbus_tcp) {
-        const auto was = std::ranges::find_if(
-            before.modbus_tcp, [&](const auto& one) { return one.name() == listener.name(); });
-        if (was == before.modbus_tcp.end()) continue;
-        for (const std::string& name : was->lines) {
-            const bool stays = std::ranges::find(listener.lines, name) != listener.lines.end();
-            const config::Line* lost = stays ? nullptr : line_of(before, name);
-            if (lost != nullptr) add_moved(after, listener, *lost, all);
-        }
-    }
-    return all;
-}
-
 std::string to_string(const Change& change) {
     const std::string word(label(change.kind));
     if (change.before.empty() && change.after.empty() && change.kind != Kind::changed)

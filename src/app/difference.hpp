@@ -28,10 +28,6 @@ std::string_view label(Change::Kind kind);
 /// for a large plant.
 std::vector<Change> differences(const config::Config& before, const config::Config& after);
 
-/// Units of a listener that now reach another line, because their former line is no longer one of
-/// the listener's: a write to them would reach another panel. One sentence each. Pure.
-std::vector<std::string> moved_units(const config::Config& before, const config::Config& after);
-
 /// "lines/floor1/stations/press/poll/UW0: every 1s -> 2s", "lines/floor2: added"
 std::string to_string(const Change& change);
 /// {"path", "kind", "before", "after"} each; the last two unless they are empty.

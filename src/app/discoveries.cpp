@@ -141,6 +141,8 @@ web::DiscoveryReport LineDiscovery::report() const {
     report.asked = discovery_.asked();
     report.refused = discovery_.refused();
     report.of = discovery_.of();
+    report.asked_stations = scan::station_ranges(discovery_.asked_stations());
+    report.silent_stations = scan::station_ranges(discovery_.silent());
     if (state_ == State::running) report.remaining = discovery_.remaining(clock_.now());
     for (const scan::StationFinding& finding : discovery_.findings()) {
         web::DiscoveredStation& station = report.stations.emplace_back();

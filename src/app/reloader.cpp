@@ -10,6 +10,7 @@
 #include "difference.hpp"
 #include "gateway.hpp"
 #include "load.hpp"
+#include "moved_units.hpp"
 #include "panelgate/config/weaker.hpp"
 #include "panelgate/rt/log.hpp"
 #include "prepare.hpp"
@@ -63,7 +64,7 @@ namespace {
 using rt::LogLevel;
 
 constexpr const char* kStopping = "the gateway is stopping";
-constexpr std::size_t kLogged = 100;   ///< changes logged; the verdict has all of them
+constexpr std::size_t kLogged = 100;   ///< of each list; the verdict has all of them
 constexpr std::size_t kWaiting = 256;  ///< requests that may wait for a reload
 
 double unix_now() {
@@ -82,7 +83,7 @@ void log_verdict(const web::ReloadVerdict& verdict) {
     }
     for (const std::string& change : verdict.changes | std::views::take(kLogged))
         rt::log(LogLevel::info, "configuration changed", {{"change", change}});
-    for (const std::string& warning : verdict.warnings)
+    for (const std::string& warning : verdict.warnings | std::views::take(kLogged))
         rt::log(LogLevel::warn, "configuration", {{"warning", warning}});
     for (const std::string& weaker : verdict.weaker | std::views::take(kLogged))
         rt::log(LogLevel::warn, "configuration weaker", {{"what", weaker}});
@@ -182,6 +183,8 @@ void Reloader::Job::compare() {
     for (const Change& change :
          differences(but_equal_lines(*running, *next), but_equal_lines(*next, *running)))
         verdict.changes.push_back(to_string(change));
+    for (std::string& moved : moved_units(*running, *next))
+        verdict.warnings.push_back(std::move(moved));
     if (next->realtime != running->realtime) verdict.later.emplace_back("realtime");
     verdict.outcome = verdict.changes.empty() ? ReloadOutcome::unchanged : ReloadOutcome::applied;
     shown = shown_text(*next);

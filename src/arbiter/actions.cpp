@@ -10,6 +10,12 @@ std::string_view label(StationEvent::Kind kind) {
             return "offline";
         case StationEvent::Kind::online:
             return "online";
+        case StationEvent::Kind::suspect:
+            return "suspect";
+        case StationEvent::Kind::heard:
+            return "heard";
+        case StationEvent::Kind::unknown:
+            return "unknown";
         case StationEvent::Kind::late:
             return "late";
         case StationEvent::Kind::drift:

@@ -163,6 +163,7 @@ void Arbiter::on_line_left() {
     suspended_ = true;
     up_ = false;
     resetting_ = false;
+    stations_.on_line_down();
     unsolicited_.forget();
     admission_.memory().clear();
 }

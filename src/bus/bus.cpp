@@ -19,6 +19,7 @@
 #include "panelgate/modbus/function.hpp"
 #include "panelgate/modbus/response.hpp"
 #include "panelgate/rt/log.hpp"
+#include "health_events.hpp"
 #include "trace_book.hpp"
 #include "write_log.hpp"
 
@@ -47,6 +48,7 @@ struct Bus::State final : public line::Line::Events {
           account(settings),
           departed(settings.clients),
           doctor(settings),
+          health_events(settings),
           load(c.now()),
           refusals(executor, clock),
           wall(clock),
@@ -73,9 +75,13 @@ struct Bus::State final : public line::Line::Events {
     }
     void act(arbiter::Finish& finish);
     void act(arbiter::Note& note) { book.note(std::move(note)); }
-    void act(const arbiter::Exchange& exchange) { book.end(exchange); }
+    void act(const arbiter::Exchange& exchange) {
+        book.end(exchange);
+        tell_health(exchange.station);
+    }
     void act(arbiter::Decision& decision) { book.decide(decision.at, std::move(decision.text)); }
     void act(arbiter::StationEvent& event);
+    void tell_health(std::uint8_t station);
     void act(const arbiter::Written& written) {
         observe(settings,
                 WriteEvent{written.station, written.items, written.ended, written.client});
@@ -114,6 +120,7 @@ struct Bus::State final : public line::Line::Events {
     ClientAccounts clients;
     DepartedClients departed;
     LineDoctor doctor;
+    HealthEvents health_events;
     LoadMeter load;
     Refusals refusals;
     Wall wall;
@@ -161,15 +168,7 @@ void Bus::State::on_up() {
 }
 
 void Bus::State::on_down(const std::string& why) {
-    const bool was_up = std::exchange(up, false);
-    why_down = why;
-    rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe(settings, LineEvent{false, why});
-    drive.hear([this](TimePoint now) { arbiter.on_line_down(now); });
-    if (was_up) {
-        book.on_line_down(clock.now());
-        doctor.on_line_down();
-    }
+    take_down(*this, why, [this](TimePoint now) { arbiter.on_line_down(now); });
 }
 
 void Bus::State::on_bytes(ByteView bytes) {
@@ -229,6 +228,7 @@ void Bus::State::act(arbiter::Finish& finish) {
     pending.erase(found);
     Answer result;
     result.pdu = std::move(finish.pdu);
+    if (!result.pdu) tell_health(entry.station);  // a retry that expires has no Exchange
     if (!result.pdu && result.pdu.error() == Fault::denied)
         result.refusal = rights.judge_write(entry.station);
     if (entry.sent_as != 0) {
@@ -248,8 +248,17 @@ void Bus::State::act(arbiter::Finish& finish) {
 }
 
 void Bus::State::act(arbiter::StationEvent& event) {
-    observe(settings, event);
+    using Kind = arbiter::StationEvent::Kind;
     log_event(settings, event);
+    if (event.kind != Kind::offline && event.kind != Kind::online) observe(settings, event);
+    tell_health(event.station);
+}
+
+/// While the line is down take_down() has told all. Addresses of a search have no health.
+void Bus::State::tell_health(std::uint8_t station) {
+    const arbiter::StationHealth health = arbiter.health(station);
+    const bool is_known = settings.stations.contains(station) || health.last_heard();
+    if (up && is_known) health_events.tell(station, health.state());
 }
 
 void Bus::State::on_deadline(TimePoint now) {
@@ -471,13 +480,12 @@ void Bus::State::change_line() {
     change.reset();
     call([&] {
         line->stop();
-        if (std::exchange(up, false)) book.on_line_down(clock.now());
-        why_down = "its settings have changed, and it is being opened";
+        take_down(*this, "its settings have changed, and it is being opened",
+                  [this](TimePoint) { arbiter.on_line_left(); });
         adopt(std::move(made.settings));
         line = std::move(made.line);
         drive.use(*line);
         drive.hear([this](TimePoint now) {
-            arbiter.on_line_left();
             arbiter.apply(settings.arbiter);
             deny_forbidden_writes(now);
         });

@@ -23,6 +23,7 @@
 #include "panelgate/rt/log.hpp"
 #include "panelgate/tap/heard.hpp"
 #include "panelgate/tap/matcher.hpp"
+#include "health_events.hpp"
 #include "trace_book.hpp"
 
 namespace panelgate::bus {
@@ -257,6 +258,7 @@ struct ListeningBus::State final : public line::Line::Events {
           heard(settings.stations, settings.arbiter.offline.after),
           account(settings),
           doctor(settings),
+          health_events(settings),
           load(c.now()),
           refusals(executor, clock),
           wall(clock),
@@ -275,6 +277,9 @@ struct ListeningBus::State final : public line::Line::Events {
     }
     void act(tap::Frame& frame);
     void act(const tap::Transaction& made);
+    void tell_health(std::uint8_t station) {
+        if (up && settings.stations.contains(station)) health_events.tell(station, heard.health(station));
+    }
     void refuse(Request request, AnswerHandler handler);
     Refusal refusal(std::uint8_t station) const;
     LineCounts counts() const { return {heard.wire(), heard.line().broadcasts, *line}; }
@@ -287,6 +292,7 @@ struct ListeningBus::State final : public line::Line::Events {
     Account account;
     arbiter::ClientNames names;
     mutable LineDoctor doctor;
+    HealthEvents health_events;
     LoadMeter load;
     Refusals refusals;
     Wall wall;
@@ -302,15 +308,11 @@ void ListeningBus::State::on_up() {
             {{"line", settings.name}, {"device", settings.device}, {"mode", "listen"}});
     observe(settings, LineEvent{true, {}});
     drive.hear([this](TimePoint now) { doctor.begin(now, counts()); });
+    for (const auto& [id, station] : settings.stations) tell_health(id);
 }
 
 void ListeningBus::State::on_down(const std::string& why) {
-    const bool was_up = std::exchange(up, false);
-    why_down = why;
-    rt::log(rt::LogLevel::warn, "line down", {{"line", settings.name}, {"why", why}});
-    observe(settings, LineEvent{false, why});
-    drive.hear([this](TimePoint now) { matcher.on_line_down(now); });
-    if (was_up) book.on_line_down(clock.now());
+    take_down(*this, why, [this](TimePoint now) { matcher.on_line_down(now); });
 }
 
 void ListeningBus::State::act(tap::Frame& frame) {
@@ -322,6 +324,7 @@ void ListeningBus::State::act(tap::Frame& frame) {
 void ListeningBus::State::act(const tap::Transaction& made) {
     heard.count(made);
     book.end(exchange_of(made));
+    tell_health(made.station);
     if (made.doubtful) book.decide(made.ended, doubt_text(made));
     if (made.end == tap::End::answered || !made.doubtful) {
         const Outcome outcome = outcome_of(made);

@@ -28,6 +28,10 @@ void log_event(const Settings& settings, const arbiter::StationEvent& event) {
             return say(rt::LogLevel::warn, "station offline", "");
         case arbiter::StationEvent::Kind::online:
             return say(rt::LogLevel::info, "station online", "");
+        case arbiter::StationEvent::Kind::suspect:
+        case arbiter::StationEvent::Kind::heard:
+        case arbiter::StationEvent::Kind::unknown:
+            return;
         case arbiter::StationEvent::Kind::late:
             // After a shortened wait the settings are not at fault.
             if (event.by <= Duration::zero()) return say(rt::LogLevel::info, "late reply", "");

@@ -149,28 +149,48 @@ void warn_of_ports(Loading& loading, const std::vector<ListenAddress>& listeners
     }
 }
 
-bool allows_all(const std::vector<Network>& allow) {
-    return allow.empty() || std::ranges::count(allow, 0u, &Network::prefix) > 0;
+/// Returns " in 0.0.0.0/1, 128.0.0.0/1"; "" for an empty list.
+std::string in_networks(const std::vector<Network>& allow) {
+    constexpr std::size_t kNamed = 4;
+    if (allow.size() > kNamed)
+        return " in the " + std::to_string(allow.size()) + " networks of allow";
+    std::string text;
+    for (const Network& network : allow)
+        text += (text.empty() ? " in " : ", ") + network.address + '/' +
+                std::to_string(network.prefix);
+    return text;
+}
+
+/// Returns "any client that reaches port 502 of any address".
+template <class Listener>
+std::string whoever_reaches(const Listener& listener) {
+    const std::string port = "port " + std::to_string(listener.port) + " of any address";
+    return "any client" + in_networks(listener.allow) + " that reaches " +
+           (is_any_address(listener.address) ? port : listener.name());
 }
 
 void warn_of_open_listener(Loading& loading, const Node& node,
                            const tcp_server::Settings& listener) {
-    if (!is_any_address(listener.address) || !allows_all(listener.allow)) return;
+    if (!is_reachable_from_outside(listener.address, listener.allow)) return;
     if (!can_write(loading.config, listener)) return;
     loading.warn(mark_of(node, "listen"),
-                 "any client that reaches port " + std::to_string(listener.port) +
-                     " of any address may write to the panels; list the networks that may, such as "
+                 whoever_reaches(listener) +
+                     " may write to the panels; list the networks that may, such as "
                      "allow: [192.168.10.0/24], or set access: read_only, or listen on 127.0.0.1:" +
                      std::to_string(listener.port));
 }
 
 /// A UDP sender address can be forged: the answers go to the forged address.
 void warn_of_open_udp(Loading& loading, const Node& node, const tcp_server::Settings& listener) {
-    if (!listener.udp || !is_any_address(listener.address) || !allows_all(listener.allow)) return;
+    if (!listener.udp || !is_reachable_from_outside(listener.address, listener.allow)) return;
+    const std::string place = is_any_address(listener.address) ? "all addresses" : listener.name();
+    const std::string whom =
+        listener.allow.empty() ? "" : " for clients" + in_networks(listener.allow);
     loading.warn(mark_of(node, "udp"),
-                 "udp: true on all addresses answers datagrams whose sender may be forged, with up "
-                 "to twenty times what was sent; list the networks that may ask, such as allow: "
-                 "[192.168.10.0/24], or listen on 127.0.0.1:" +
+                 "udp: true on " + place + whom +
+                     " answers datagrams whose sender may be forged, with up to twenty times what "
+                     "was sent; list the networks that may ask, such as allow: [192.168.10.0/24], "
+                     "or listen on 127.0.0.1:" +
                      std::to_string(listener.port));
 }
 
@@ -252,36 +272,40 @@ void warn_of_health(Loading& loading, const Node& node, const web::Settings& htt
 }
 
 void warn_of_plain_tokens(Loading& loading, const Node& node, const web::Settings& http) {
-    if (http.tokens.empty() || is_in(http.address, "127.0.0.0", 8) ||
-        is_in(http.address, "::1", 128))
-        return;
+    if (http.tokens.empty() || is_loopback(http.address)) return;
     loading.warn(mark_of(node, "tokens"),
                  "tokens are sent in plain text to " + http.name() +
                      ": anyone on the network path can read and use them; listen on 127.0.0.1:" +
                      std::to_string(http.port) + " behind a proxy with TLS, or a VPN");
 }
 
+/// Warns of what anybody may do without a token.
+void warn_of_anonymous(Loading& loading, const Node& node, const web::Settings& http) {
+    if (!is_reachable_from_outside(http.address, http.allow)) return;
+    // Anybody is a viewer by default: then the address is what was typed.
+    const bool typed = find(node, "anonymous") != nullptr;
+    const Mark mark = mark_of(node, typed ? "anonymous" : "listen");
+    const std::string instead =
+        ", or list the networks that may, such as allow: [192.168.10.0/24], or listen on "
+        "127.0.0.1:" +
+        std::to_string(http.port);
+    if (http.anonymous == web::Role::viewer)
+        loading.warn(mark, whoever_reaches(http) +
+                               " may see the configuration, all values and every frame, and read "
+                               "on the bus, without a token; set anonymous: none and give readers "
+                               "a token" +
+                               instead);
+    if (http.anonymous == web::Role::operator_)
+        loading.warn(mark, whoever_reaches(http) +
+                               " may write to the panels without a token; set anonymous: viewer "
+                               "and give writers a token" +
+                               instead);
+}
+
 void warn_of_http(Loading& loading, const Node& node, const web::Settings& http) {
     warn_of_health(loading, node, http);
-    const bool open = is_any_address(http.address) && allows_all(http.allow);
     warn_of_plain_tokens(loading, node, http);
-    if (open && http.anonymous == web::Role::viewer) {
-        loading.warn(mark_of(node, "anonymous"),
-                     "any client that reaches port " + std::to_string(http.port) +
-                         " of any address may see the configuration, all values and every frame, "
-                         "and read on the bus, without a token; set anonymous: none and give "
-                         "readers a token, or list the networks that may, such as allow: "
-                         "[192.168.10.0/24], or listen on 127.0.0.1:" +
-                         std::to_string(http.port));
-    }
-    if (open && http.anonymous == web::Role::operator_) {
-        loading.warn(mark_of(node, "anonymous"),
-                     "any client that reaches port " + std::to_string(http.port) +
-                         " of any address may write to the panels without a token; set anonymous: "
-                         "viewer and give writers a token, or list the networks that may, such as "
-                         "allow: [192.168.10.0/24], or listen on 127.0.0.1:" +
-                         std::to_string(http.port));
-    }
+    warn_of_anonymous(loading, node, http);
     if (http.anonymous == web::Role::none && http.tokens.empty())
         loading.warn(mark_of(node, "anonymous"),
                      "clients can use only /healthz and /readyz: anonymous is none and there is no "

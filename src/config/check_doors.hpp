@@ -10,9 +10,10 @@ namespace panelgate::config {
 /// configuration needs one.
 void refuse_control_characters(const yaml::Node& tree, yaml::Problems& problems);
 
-/// Warns about listeners in what was loaded from `tree` without a problem: writable by all on all
-/// addresses, sharing a port, units that hide the stations with these ids, tokens that others can
-/// read or guess, UDP open to all, and what anonymous clients may see.
+/// Warns about listeners in what was loaded from `tree` without a problem: writable from outside
+/// (is_reachable_from_outside()), sharing a port, units that hide the stations with these ids,
+/// tokens that others can read or guess, UDP open to the outside, and what anonymous clients from
+/// there may see.
 void warn_of_listeners(Loading& loading, const yaml::Node& tree);
 
 }  // namespace panelgate::config

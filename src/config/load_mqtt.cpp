@@ -8,6 +8,7 @@
 
 #include "loader.hpp"
 #include "panelgate/base/text.hpp"
+#include "panelgate/config/endpoint.hpp"
 #include "panelgate/line/settings.hpp"
 #include "panelgate/yaml/document.hpp"
 
@@ -161,12 +162,8 @@ void load_session(Loading& loading, MapReader& in, mqtt::Settings& settings) {
         settings.store = static_cast<std::size_t>(*store);
 }
 
-bool is_loopback(std::string_view host) {
-    return host == "localhost" || host == "::1" || host.starts_with("127.");
-}
-
 void warn_of_broker(Loading& loading, MapReader& in, const mqtt::Settings& settings) {
-    if (is_loopback(settings.host)) return;
+    if (settings.host == "localhost" || is_loopback(settings.host)) return;
     if (!settings.tls && !settings.password.empty())
         loading.warn(in.mark("broker"),
                      "the password crosses the network where everybody can read "

@@ -1,6 +1,8 @@
 #include "panelgate/config/weaker.hpp"
 
 #include <algorithm>
+#include <compare>
+#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -106,12 +108,11 @@ const Line* find_line(const Config& config, const Line& like) {
     return found == config.lines.end() ? nullptr : &*found;
 }
 
-/// A limit that is missing is the widest.
-bool is_above(const std::optional<Decimal>& next, const std::optional<Decimal>& running) {
-    return running && (!next || *running < *next);
-}
-bool is_below(const std::optional<Decimal>& next, const std::optional<Decimal>& running) {
-    return running && (!next || *next < *running);
+/// Lists a limit that has moved outwards; one that is missing is the widest.
+void compare_limit(Lines& all, const std::string& what, const std::optional<Decimal>& running,
+                   const std::optional<Decimal>& next, std::strong_ordering outwards) {
+    if (!running || (next && (*next <=> *running) != outwards)) return;
+    all.push_back(what + ' ' + running->text() + " -> " + (next ? next->text() : "none"));
 }
 
 /// Compares what may be written to points.
@@ -124,12 +125,29 @@ void compare_points(Lines& all, const Station& running, const Station& next) {
             all.push_back(what + ": is writable");
             continue;
         }
-        if (is_above(point.max, was->max))
-            all.push_back(what + ": max " + was->max->text() + " -> " +
-                          (point.max ? point.max->text() : "none"));
-        if (is_below(point.min, was->min))
-            all.push_back(what + ": min " + was->min->text() + " -> " +
-                          (point.min ? point.min->text() : "none"));
+        compare_limit(all, what + ": max", was->max, point.max, std::strong_ordering::greater);
+        compare_limit(all, what + ": min", was->min, point.min, std::strong_ordering::less);
+    }
+}
+
+const arbiter::StationSettings& settings_at(const Line& line, std::uint8_t station) {
+    const auto found =
+        std::ranges::find(line.arbiter.stations, station, &arbiter::StationSettings::id);
+    return found == line.arbiter.stations.end() ? line.arbiter.unlisted : *found;
+}
+
+/// Compares how often a write that the station has not answered is repeated.
+void compare_repeated_writes(Lines& all, const Line& running, const Line& next) {
+    for (const Station& station : next.stations) {
+        const arbiter::StationSettings& was = settings_at(running, station.id);
+        const arbiter::StationSettings& is = settings_at(next, station.id);
+        const int repeated_before = was.retry_writes ? was.retries : 0;
+        if (!is.retry_writes || is.retries <= repeated_before) continue;
+        std::string change = "retry_writes false -> true";
+        if (was.retry_writes)
+            change = "retries " + std::to_string(was.retries) + " -> " +
+                     std::to_string(is.retries) + ", of writes too";
+        all.push_back("station " + station.name + ": " + change);
     }
 }
 
@@ -158,6 +176,26 @@ void compare_lines(Lines& all, const Config& running, const Config& next) {
         if (was->refuse_unlisted && !line.refuse_unlisted)
             all.push_back("line " + line.name + ": unlisted_stations refuse -> pass");
         compare_stations(all, *was, line);
+        compare_repeated_writes(all, *was, line);
+    }
+}
+
+bool is_same_place(const points::RelayEnd& one, const points::RelayEnd& other) {
+    return one.station == other.station && one.table == other.table && one.address == other.address;
+}
+
+/// Compares what relays write, and from where.
+void compare_relays(Lines& all, const Config& running, const Config& next) {
+    for (const points::Relay& relay : next.relays) {
+        const auto was = std::ranges::find_if(running.relays, [&](const points::Relay& before) {
+            return is_same_place(before.from, relay.from) && is_same_place(before.to, relay.to);
+        });
+        if (was == running.relays.end()) {
+            all.push_back("relay " + relay.name() + ": is added");
+        } else if (was->count < relay.count) {
+            all.push_back("relay " + relay.name() + ": count " + std::to_string(was->count) +
+                          " -> " + std::to_string(relay.count));
+        }
     }
 }
 
@@ -208,6 +246,7 @@ void compare_mqtt(Lines& all, const Config& running, const Config& next) {
 std::vector<std::string> weaker(const Config& running, const Config& next) {
     Lines all;
     compare_lines(all, running, next);
+    compare_relays(all, running, next);
     compare_listeners(all, running, next);
     compare_serial_masters(all, running, next);
     compare_http(all, running, next);

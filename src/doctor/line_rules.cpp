@@ -223,6 +223,19 @@ bool has_better_explanation(const Case& c) {
 
 }  // namespace
 
+/// A panel that is never late is off, and none of its replies comes. At least one late reply in
+/// kOneIn is heard, also on a busy line: what is unanswered beyond that has another cause.
+std::uint64_t unheard_late_replies(const Case& c, std::optional<std::uint8_t> except) {
+    constexpr std::uint64_t kOneIn = 20;
+    std::uint64_t unheard = 0;
+    for (const auto& [id, symptoms] : c.window.stations) {
+        if (id == except) continue;
+        const std::uint64_t unanswered = symptoms.silent + symptoms.disturbed;
+        unheard += std::min(beyond(unanswered, symptoms.late), kOneIn * symptoms.late);
+    }
+    return unheard;
+}
+
 /// The length indicates the rate, and zeros indicate bytes that the parity check has dropped.
 Cause cause_of_damage(const Case& c, const Symptoms& s) {
     const bool same_pace = s.damaged_exact * 5 >= s.damaged() * 4;
@@ -315,11 +328,12 @@ void find_noise(Case& c) {
     const Symptoms s = unexplained(c);
     const bool overrun =
         c.window.uart && c.has(Cause::overrun) && c.window.uart->overruns * 2 >= s.damaged();
+    const std::uint64_t late = unheard_late_replies(c);
     // Over TCP replies are cut where the connection stalls, and the rest arrives alone.
-    const std::uint64_t damaged = c.facts.over_tcp ? s.damaged_exact : s.damaged();
+    const std::uint64_t damaged = beyond(c.facts.over_tcp ? s.damaged_exact : s.damaged(), late);
     const bool damage = is_too_often(c, bar, s, damaged);
-    const bool strays =
-        !c.facts.over_tcp && s.strays >= bar.enough(5) && s.strays * 20 >= s.answered;
+    const std::uint64_t around = beyond(s.strays, late);
+    const bool strays = !c.facts.over_tcp && around >= bar.enough(5) && around * 20 >= s.answered;
     if (overrun || (!damage && !strays)) return;
     std::string advice =
         "Check the 120 ohm termination at both ends (and nowhere else), the bias, the shield and "
@@ -350,7 +364,8 @@ void find_tcp_framing(Case& c) {
     const Symptoms s = unexplained(c);
     const bool never_right = is_all_damaged(c, s) && s.damaged_exact * 2 < s.damaged() &&
                              s.silent + s.disturbed <= s.damaged();
-    const std::uint64_t changed = never_right ? s.damaged() : s.damaged_long;
+    const std::uint64_t changed =
+        beyond(never_right ? s.damaged() : s.damaged_long, unheard_late_replies(c));
     if (!is_too_often(c, bar, s, changed)) return;
     c.add(Cause::tcp_framing, {}, "Bytes are changed on the way from the server.",
           "Make sure that its port is raw TCP without telnet negotiation (ser2net: no "

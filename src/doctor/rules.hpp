@@ -63,6 +63,15 @@ inline bool explained_by_frames(const Case& c, std::uint8_t station) {
     return c.has(Cause::wrong_crc_order, station) || c.has(Cause::ascii_lower_case, station);
 }
 
+/// Returns what of `count` is beyond `explained`.
+inline std::uint64_t beyond(std::uint64_t count, std::uint64_t explained) {
+    return count - std::min(count, explained);
+}
+
+/// Returns how many late replies of stations other than `except` were not heard as such: each may
+/// have damaged another station's reply, or have come as stray bytes.
+std::uint64_t unheard_late_replies(const Case& c, std::optional<std::uint8_t> except = {});
+
 /// Returns the cause of damage in all replies: Cause::wrong_parity, wrong_baud or noise.
 Cause cause_of_damage(const Case& c, const arbiter::Symptoms& symptoms);
 

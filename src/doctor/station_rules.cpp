@@ -13,12 +13,13 @@ namespace {
 /// True if only this station's replies are damaged: at its rate of damage the others would have had
 /// at least five (0.7 % chance of none), but have had a fifth of the expected number, or less.
 /// False if only long replies are damaged and no other station has any: that may be the line.
-bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s) {
+/// `left`: its damaged replies that no late reply of another station explains.
+bool only_this_is_damaged(const Case& c, const Bar& bar, const Symptoms& s, std::uint64_t left) {
     const std::uint64_t others_answered = c.all.answered - s.answered;
     const std::uint64_t others_damaged = c.all.damaged() - s.damaged();
     const std::uint64_t own = s.answered + s.damaged();
     const std::uint64_t expected = others_answered * s.damaged();  // in parts of `own`
-    const bool hit = s.damaged() >= bar.enough(3) && s.damaged() * 100 >= s.answered;
+    const bool hit = left >= bar.enough(3) && left * 100 >= s.answered;
     const bool others_fine =
         expected >= bar.enough(5) * own && others_damaged * 5 * own <= expected;
     const bool only_long =
@@ -88,13 +89,14 @@ void find_duplicate_address(Case& c, std::uint8_t station, const Symptoms& s) {
         c.has(Cause::other_master) && (s.unasked + c.all.requests) * 2 >= s.doubled;
     if (station == 0 || line || masters || explained_by_frames(c, station)) return;
     const Bar bar{c, Cause::duplicate_address, station};
-    const bool mixed = s.doubled >= 1 && s.damaged() >= bar.enough(3) && is_damaged_more(c, s);
+    const std::uint64_t left = beyond(s.damaged(), unheard_late_replies(c, station));
+    const bool mixed = s.doubled >= 1 && left >= bar.enough(3) && is_damaged_more(c, s);
     // A reply that comes after its timeout is taken for the retry's, and the retry's own follows.
     const bool from_retries = s.silent >= s.doubled && s.doubled * 4 < s.answered;
     if ((s.doubled >= bar.enough(3) && !from_retries) || mixed) return add_duplicate(c, station, s);
     // A connection that stalls truncates replies without a second panel.
     if (c.facts.over_tcp && s.damaged_short * 2 > s.damaged()) return;
-    if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s)) return;
+    if (!only_this_is_damaged(c, {c, Cause::damaged_replies, station}, s, left)) return;
     has_second_sender(bar, s) ? add_duplicate(c, station, s) : add_damage(c, station, s);
 }
 

@@ -260,9 +260,9 @@ void add_listeners(Families& out, const Snapshot& snapshot) {
     Family total =
         make_counter("panelgate_tcp_connections_total", "Modbus/TCP connections accepted.");
     Family refused = make_counter("panelgate_tcp_connections_refused_total",
-                                  "Connections refused: no place, and no idle one to give way.");
+                                  "Connections refused: no place, and none that gives way.");
     Family evicted = make_counter("panelgate_tcp_connections_evicted_total",
-                                  "Idle connections that gave way to newer ones.");
+                                  "Connections that gave way to newer ones, idle ones first.");
     Family errors = make_counter("panelgate_tcp_protocol_errors_total",
                                  "Modbus/TCP frames that broke the protocol.");
     Family joined = make_counter("panelgate_tcp_retransmissions_joined_total",

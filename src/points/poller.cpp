@@ -17,7 +17,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     };
     using StationPtr = std::shared_ptr<Station>;  ///< shared with outstanding requests
 
-    State(rt::Clock& c, bus::BusClient& b) : clock(c), bus(b), alarm(c.make_alarm()) {}
+    State(rt::Clock& c, bus::RequestPort& b) : clock(c), bus(b), alarm(c.make_alarm()) {}
 
     void send_due();
     StationPtr make(PolledStation wanted) const;
@@ -29,7 +29,7 @@ struct Poller::State : std::enable_shared_from_this<Poller::State> {
     void arm();
 
     rt::Clock& clock;
-    bus::BusClient& bus;
+    bus::RequestPort& bus;
     std::unique_ptr<rt::Alarm> alarm;
     std::vector<StationPtr> stations;
     Update update;
@@ -133,7 +133,7 @@ void Poller::State::arm() {
     }
 }
 
-Poller::Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations)
+Poller::Poller(rt::Clock& clock, bus::RequestPort& bus, std::vector<PolledStation> stations)
     : state_(std::make_shared<State>(clock, bus)) {
     state_->apply(std::move(stations));
 }

@@ -51,6 +51,10 @@ PointReading StationPoints::read(const Point& point, TimePoint now) const {
     return made;
 }
 
+bool StationPoints::is_outdated(const Point& point) const {
+    return (*readings_)[static_cast<std::size_t>(&point - points_->data())].outdated();
+}
+
 namespace {
 
 /// Slot value where the point was bad; real values are finite.

@@ -160,12 +160,18 @@ void write_throttled_line(LogLevel level, std::string_view event, std::string_vi
     g_throttle.hold(event, subject, level, std::move(line));
 }
 
+/// "256+": not all were counted.
+std::string number_of_clients(std::size_t clients) {
+    return std::to_string(clients) + (clients < LogThrottle::kMostClients ? "" : "+");
+}
+
 void write_throttled(TimePoint now) {
     for (LogThrottle::Held& held : g_throttle.take_kept(now))
         put(held.level, std::move(held.line), held.left_out);
     for (const LogThrottle::LeftOut& one : g_throttle.take_left_out(now)) {
         std::vector<LogField> fields{{"of", one.event}};
         if (!one.client.empty()) fields.emplace_back("client", one.client);
+        if (one.clients > 0) fields.emplace_back("clients", number_of_clients(one.clients));
         fields.emplace_back("count", std::to_string(one.count));
         put(LogLevel::warn, line_of(LogLevel::warn, "log lines left out", fields), 0);
     }

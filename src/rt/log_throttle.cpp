@@ -1,6 +1,7 @@
 #include "panelgate/rt/log_throttle.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace panelgate::rt {
@@ -62,12 +63,26 @@ std::string key_of(std::string_view event, std::string_view subject) {
     return key;
 }
 
-void count(std::uint64_t& left_out, TimePoint& since, TimePoint now, std::uint64_t more) {
-    if (left_out == 0) since = now;
-    left_out += more;
-}
+/// Returns the event of a key_of() it.
+std::string_view event_in(std::string_view key) { return key.substr(0, key.find('\0')); }
 
 }  // namespace
+
+bool LogThrottle::Budget::take() {
+    if (credit <= 0) return false;
+    --credit;
+    return true;
+}
+
+void LogThrottle::Budget::leave_out(TimePoint at, std::uint64_t lines, std::string_view of) {
+    since = left_out == 0 ? at : std::min(since, at);
+    left_out += lines;
+    if (!of.empty() && clients.size() < kMostClients && !clients.contains(of)) clients.emplace(of);
+}
+
+bool LogThrottle::Budget::is_due(TimePoint now) const {
+    return left_out > 0 && (now == TimePoint::max() || now - since >= kLeftOutPause);
+}
 
 std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view event,
                                                std::string_view subject, const Pace& pace,
@@ -88,35 +103,43 @@ std::optional<std::uint64_t> LogThrottle::pass(TimePoint now, std::string_view e
     }
     // A subject beyond the budget is not even stored: there may be any number of them.
     if (!is_within_budget(now, event, client)) return std::nullopt;
-    Seen& seen = found != seen_.end() ? found->second : new_subject(now, std::move(key), pace);
+    Seen& seen =
+        found != seen_.end() ? found->second : new_subject(now, std::move(key), pace, client);
     --seen.credit;
     seen.last = now;
     seen.held.reset();
     return std::exchange(seen.left_out, 0);
 }
 
-LogThrottle::Seen& LogThrottle::new_subject(TimePoint now, std::string key, const Pace& pace) {
+LogThrottle::Seen& LogThrottle::new_subject(TimePoint now, std::string key, const Pace& pace,
+                                            std::string_view client) {
     make_room(now);
-    return seen_.emplace(std::move(key), Seen{now, pace.interval, pace.burst}).first->second;
+    Seen fresh{now, pace.interval, pace.burst};
+    fresh.client = client;
+    return seen_.emplace(std::move(key), std::move(fresh)).first->second;
 }
 
 bool LogThrottle::is_within_budget(TimePoint now, std::string_view event, std::string_view client) {
-    if (!client.empty()) {
-        Budget& own = budget(client_budgets_, now, event, client, kByClient);
-        if (own.credit == 0) {
-            count(own.left_out, own.since, now, 1);
-            return false;
-        }
-        --own.credit;
-        make_room_for_client(now);
-    }
-    Budget& all = budget(event_budgets_, now, event, {}, kByEvent);
-    if (all.credit == 0) {
-        count(all.left_out, all.since, now, 1);
+    if (client.empty()) {
+        Budget& all = budget(event_budgets_, now, event, {}, kByEvent);
+        if (all.take()) return true;
+        all.leave_out(now, 1);
         return false;
     }
-    --all.credit;
-    return true;
+    Budget& own = budget(client_budgets_, now, event, client, kByClient);
+    if (own.credit <= 0) {
+        own.leave_out(now, 1);
+        return false;
+    }
+    Budget& all = all_clients(now, event);
+    const bool passes = all.take();
+    if (passes) {
+        --own.credit;
+    } else {
+        all.leave_out(now, 1, client);
+    }
+    make_room_for_client(now);
+    return passes;
 }
 
 LogThrottle::Budget& LogThrottle::budget(Budgets& budgets, TimePoint now, std::string_view event,
@@ -128,40 +151,60 @@ LogThrottle::Budget& LogThrottle::budget(Budgets& budgets, TimePoint now, std::s
         found = budgets.emplace(std::move(key), std::move(fresh)).first;
     }
     Budget& one = found->second;
-    const auto earned = (now - one.filled) / pace.interval;
+    const auto earned = std::max<std::int64_t>(0, (now - one.filled) / pace.interval);
     one.credit = static_cast<int>(std::min<std::int64_t>(pace.burst, one.credit + earned));
     one.filled += earned * pace.interval;
     return one;
 }
 
-/// Evicts the client that was quiet longest; its count moves to the event's budget.
+LogThrottle::Budget& LogThrottle::all_clients(TimePoint now, std::string_view event) {
+    return budget(all_clients_budgets_, now, event, {}, kByClients);
+}
+
+/// Evicts the client that was quiet longest; its count moves to that of all clients.
 void LogThrottle::make_room_for_client(TimePoint now) {
     if (client_budgets_.size() <= kMostClients) return;
     const auto oldest = std::ranges::min_element(
         client_budgets_, {}, [](const auto& entry) { return entry.second.filled; });
     const Budget& gone = oldest->second;
-    if (gone.left_out > 0) {
-        Budget& all = budget(event_budgets_, now, gone.event, {}, kByEvent);
-        count(all.left_out, all.since, now, gone.left_out);
-    }
+    if (gone.left_out > 0) all_clients(now, gone.event).leave_out(now, gone.left_out, gone.client);
     client_budgets_.erase(oldest);
 }
 
-std::vector<LogThrottle::LeftOut> LogThrottle::take_left_out(TimePoint now) {
-    std::vector<LeftOut> all;
-    for (Budgets* budgets : {&client_budgets_, &event_budgets_}) {
-        for (auto& [key, one] : *budgets) {
-            if (one.left_out == 0 || now - one.since < kLeftOutPause) continue;
-            all.push_back({one.event, one.client, std::exchange(one.left_out, 0)});
-        }
+/// Moves all due counts of clients but the highest to those of all clients.
+void LogThrottle::gather_low_counts(TimePoint now) {
+    std::vector<Budget*> due;
+    for (auto& [key, one] : client_budgets_) {
+        if (one.is_due(now)) due.push_back(&one);
     }
-    return all;
+    if (due.size() <= kMostTold) return;
+    std::ranges::sort(due, std::greater<>(), &Budget::left_out);
+    for (std::size_t i = kMostTold; i < due.size(); ++i) {
+        Budget& low = *due[i];
+        const auto all = all_clients_budgets_.find(key_of(low.event, {}));
+        if (all == all_clients_budgets_.end()) continue;
+        all->second.leave_out(low.since, std::exchange(low.left_out, 0), low.client);
+    }
 }
 
+std::vector<LogThrottle::LeftOut> LogThrottle::take_left_out(TimePoint now) {
+    gather_low_counts(now);
+    std::vector<LeftOut> told;
+    for (Budgets* budgets : {&client_budgets_, &all_clients_budgets_, &event_budgets_}) {
+        for (auto& [key, one] : *budgets) {
+            if (!one.is_due(now)) continue;
+            told.push_back({one.event, one.client, std::exchange(one.left_out, 0),
+                            std::exchange(one.clients, {}).size()});
+        }
+    }
+    return told;
+}
+
+/// A line that its budget has left out is counted there, not by its subject.
 void LogThrottle::hold(std::string_view event, std::string_view subject, LogLevel level,
                        LogLine line) {
     const auto found = seen_.find(key_of(event, subject));
-    if (found == seen_.end()) return;
+    if (found == seen_.end() || found->second.left_out == 0) return;
     found->second.level = level;
     found->second.held = std::move(line);
 }
@@ -170,12 +213,23 @@ std::vector<LogThrottle::Held> LogThrottle::take_kept(TimePoint now) {
     std::vector<Held> all;
     for (auto& [key, seen] : seen_) {
         if (!seen.held || now - seen.last < seen.interval) continue;
-        all.push_back({seen.level, std::move(*seen.held), seen.left_out - 1});
+        if (may_be_told(now, key, seen)) {
+            all.push_back({seen.level, std::move(*seen.held), seen.left_out - 1});
+            seen.last = now;
+        }
         seen.held.reset();
         seen.left_out = 0;
-        seen.last = now;
     }
     return all;
+}
+
+/// Of any number of subjects, kept lines would fill the log, too.
+bool LogThrottle::may_be_told(TimePoint now, const std::string& key, const Seen& seen) {
+    if (seen.client.empty()) return true;
+    Budget& all = all_clients(now, event_in(key));
+    if (all.take()) return true;
+    all.leave_out(now, seen.left_out, seen.client);
+    return false;
 }
 
 /// Evicts the subjects that were quiet for an interval, or else the one quiet longest.

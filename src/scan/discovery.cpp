@@ -54,18 +54,18 @@ void Discovery::on_first(const Answer& answer) {
     const std::uint8_t station = waiting_.front();
     if (answer.reply == Reply::damaged && ++damaged_ < kDamagedTries) return;
     waiting_.pop_front();
-    const bool again = asked_ + refused_ == of();  // a station that was late
-    if (!again) ++asked_;
+    asked_.insert(station);
     if (answer.reply == Reply::silent) {
         damaged_ = 0;  // earlier damage was noise
-        if (!again) silent_.insert(station);
+        silent_.insert(station);
         return;
     }
+    silent_.erase(station);
     examined_ = {};
     examined_.station = station;
     examined_.evidence.asked = damaged_ + (answer.reply == Reply::answered ? 1 : 0);
     examined_.evidence.damaged = std::exchange(damaged_, 0);
-    examined_.evidence.late = again ? 1 : 0;
+    examined_.evidence.late = late_.contains(station) ? 1 : 0;
     if (answer.reply != Reply::answered) {
         found_.push_back(std::exchange(examined_, {}));
         return;
@@ -82,13 +82,13 @@ void Discovery::on_refused(TimePoint now) {
     const std::uint8_t station = waiting_.front();
     waiting_.pop_front();
     if (++refusals_[station] < kMaxRefused) return waiting_.push_back(station);
-    if (asked_ + refused_ < of()) ++refused_;
+    if (!asked_.contains(station)) ++refused_;
 }
 
 std::optional<Duration> Discovery::remaining(TimePoint now) const {
     if (done()) return Duration::zero();
-    if (asked_ == 0) return std::nullopt;
-    return (now - began_) / static_cast<std::int64_t>(asked_) *
+    if (asked_.empty()) return std::nullopt;
+    return (now - began_) / static_cast<std::int64_t>(asked_.size()) *
            static_cast<std::int64_t>(waiting_.size());
 }
 
@@ -125,7 +125,8 @@ void Discovery::end_examination() {
 }
 
 void Discovery::ask_late(std::uint8_t station) {
-    if (silent_.erase(station) > 0 && !gave_up()) waiting_.push_back(station);
+    if (gave_up() || !silent_.contains(station) || !late_.insert(station).second) return;
+    waiting_.push_back(station);
 }
 
 std::vector<StationFinding> Discovery::findings() const {

@@ -85,6 +85,19 @@ std::optional<std::vector<std::uint8_t>> station_list(std::string_view text) {
     return std::vector<std::uint8_t>(stations.begin(), stations.end());
 }
 
+std::string station_ranges(const std::set<std::uint8_t>& stations) {
+    std::string text;
+    for (auto at = stations.begin(); at != stations.end();) {
+        const int first = *at;
+        int last = first;
+        while (++at != stations.end() && *at == last + 1) ++last;
+        if (!text.empty()) text += ',';
+        text += std::to_string(first);
+        if (last > first) text += '-' + std::to_string(last);
+    }
+    return text;
+}
+
 std::optional<std::string> parse_stations(std::string_view text, Settings& settings) {
     auto stations = station_list(text);
     if (!stations) return "--stations " + quoted(text) + " is not " + kStationListForm;

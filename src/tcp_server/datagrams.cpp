@@ -128,6 +128,14 @@ using boost::system::error_code;
 
 constexpr int kDatagramsAtOnce = 64;  // per wake-up
 
+/// Returns how many peers an address may have. Half of all is left to others even where
+/// max_connections is small: a busy peer is not dropped for a newcomer, as a connection is
+/// (find_place()), because its requests have been accepted (P3) and the newcomer's address may be
+/// forged.
+std::size_t peers_of_address(const Settings& settings) {
+    return std::min(settings.udp_peers_per_address, (settings.max_connections + 1) / 2);
+}
+
 /// Returns the datagram's ADU; nullopt unless it is exactly one.
 std::optional<modbus::Adu> adu_of(ByteView datagram) {
     modbus::MbapFramer framer;
@@ -269,7 +277,7 @@ bool Datagrams::make_room(const Endpoint& from) {
         peers_, [&](const auto& peer) { return peer.first.address() == address; });
     evict_idle(shared_->clock.now());
     const Settings& settings = shared_->settings;
-    if (static_cast<std::size_t>(of_address) >= settings.udp_peers_per_address &&
+    if (static_cast<std::size_t>(of_address) >= peers_of_address(settings) &&
         !evict_longest_idle(&address))
         return false;
     return peers_.size() < settings.max_connections || evict_longest_idle(nullptr);

@@ -71,7 +71,7 @@ std::vector<bus::BusClient*> UnitMap::broadcast_lines(std::uint8_t unit) const {
 Caller::Caller(std::string name, bus::Host host, std::string protocol)
     : name_(std::move(name)), protocol_(std::move(protocol)), host_(host) {}
 
-void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
+void Caller::transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                       bus::AnswerHandler handler) {
     use(bus);
     bus->transact(
@@ -79,20 +79,20 @@ void Caller::transact(bus::BusClient* bus, std::uint8_t station, modbus::Request
         std::move(handler));
 }
 
-void Caller::tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu) {
+void Caller::tell_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu) {
     use(bus);
     bus->tell_refused(station, pdu, client_);
 }
 
 /// Names the client on the bus before its first request.
-void Caller::use(bus::BusClient* bus) {
+void Caller::use(bus::RequestPort* bus) {
     if (used_.insert(bus).second) bus->name_client(client_, protocol_ + ' ' + name_);
 }
 
 void Caller::withdraw() {
     // A cancelled answer may close the connection.
-    const std::set<bus::BusClient*> buses = std::exchange(used_, {});
-    for (bus::BusClient* bus : buses) bus->cancel(client_);
+    const std::set<bus::RequestPort*> buses = std::exchange(used_, {});
+    for (bus::RequestPort* bus : buses) bus->cancel(client_);
 }
 
 namespace {

@@ -4,21 +4,23 @@
 #include <netinet/tcp.h>
 #include <sys/socket.h>
 
-#include <algorithm>
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <map>
+#include <cstddef>
+#include <iterator>
 #include <set>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "datagrams.hpp"
 #include "panelgate/base/network.hpp"
 #include "panelgate/bus/bus_client.hpp"
 #include "panelgate/rt/acceptor.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
+#include "places.hpp"
 #include "session.hpp"
 #include "shared.hpp"
 
@@ -94,8 +96,8 @@ class Listener::Core : public std::enable_shared_from_this<Core> {
     void on_accepted(tcp::socket socket);
     void admit(tcp::socket socket, const tcp::endpoint& peer);
     bool make_room(const tcp::endpoint& peer);
-    std::shared_ptr<Session> longest_idle(bus::Host host) const;
-    void tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own);
+    void evict(std::size_t index, bool idle, const tcp::endpoint& peer);
+    void tell_refused(const tcp::endpoint& peer, const Place& place);
     void on_closed(const std::shared_ptr<Session>& session);
     void notify_when_empty();
 
@@ -150,52 +152,45 @@ void Listener::Core::on_accepted(tcp::socket socket) {
     }
 }
 
-/// P9: an address at its limit, or with the most connections when the listener is full, loses its
-/// longest-idle one. An address that leaks connections locks out only itself.
+/// Beyond a limit a connection gives way to the newcomer, or the newcomer is refused (P9).
 bool Listener::Core::make_room(const tcp::endpoint& peer) {
-    const bus::Host host = bus::host_of(peer.address().to_string());
-    std::map<bus::Host, std::size_t> counts;
-    for (const auto& session : sessions_) ++counts[session->host()];
-    const std::size_t own = counts[host];
-    const bool share_used = own >= shared_->settings.max_connections_per_address;
-    const bool full = sessions_.size() >= shared_->settings.max_connections;
-    if (!share_used && !full) return true;
-    const auto greediest =
-        std::ranges::max_element(counts, {}, [](auto& one) { return one.second; });
-    const bool other = !share_used && greediest->second > own;
-    const auto victim = longest_idle(other ? greediest->first : host);
-    if (!victim) {
+    std::vector<Guest> guests;
+    guests.reserve(sessions_.size());
+    for (const auto& session : sessions_) guests.push_back(session->guest());
+    const Settings& settings = shared_->settings;
+    const PlaceLimits limits{settings.max_connections, settings.max_connections_per_address};
+    const Place place = find_place(guests, bus::host_of(peer.address().to_string()), limits);
+    if (!place.found) {
         ++shared_->counters.refused;
-        const char* key = share_used ? "max_connections_per_address" : "max_connections";
-        tell_refused(peer, key, own);
-        return false;
+        tell_refused(peer, place);
+    } else if (place.taken_from) {
+        evict(*place.taken_from, guests[*place.taken_from].idle, peer);
     }
-    ++shared_->counters.evicted;
-    shared_->log(
-        rt::LogLevel::info, "connection gives way",
-        {{"client", victim->client()}, {"reason", "the longest idle one"}, {"to", text(peer)}});
-    victim->close();
-    return true;
+    return place.found;
 }
 
-std::shared_ptr<Session> Listener::Core::longest_idle(bus::Host host) const {
-    std::shared_ptr<Session> longest;
-    for (const auto& session : sessions_) {
-        const auto since = session->idle_since();
-        if (session->host() != host || !since) continue;
-        if (!longest || *since < *longest->idle_since()) longest = session;
-    }
-    return longest;
+/// Closes one of sessions_ for a newcomer. A busy one leaves requests without an answer, which an
+/// operator should know.
+void Listener::Core::evict(std::size_t index, bool idle, const tcp::endpoint& peer) {
+    const std::shared_ptr<Session> victim =
+        *std::next(sessions_.begin(), static_cast<std::ptrdiff_t>(index));
+    const rt::LogLevel level = idle ? rt::LogLevel::info : rt::LogLevel::warn;
+    const char* reason = idle ? "the longest idle one" : "its address has the most, all busy";
+    ++shared_->counters.evicted;
+    shared_->log(level, "connection gives way",
+                 {{"client", victim->client()}, {"reason", reason}, {"to", text(peer)}});
+    victim->close();
 }
 
 /// Logs once until a connection closes.
-void Listener::Core::tell_refused(const tcp::endpoint& peer, const char* key, std::size_t own) {
+void Listener::Core::tell_refused(const tcp::endpoint& peer, const Place& place) {
     if (std::exchange(full_, true)) return;
+    const std::string key = place.share_used ? "max_connections_per_address" : "max_connections";
     shared_->log(rt::LogLevel::warn, "connections refused",
                  {{"client", text(peer)},
-                  {"reason", std::string(key) + " reached"},
+                  {"reason", key + " reached"},
                   {"open", std::to_string(sessions_.size())},
-                  {"of_its_address", std::to_string(own)}});
+                  {"of_its_address", std::to_string(place.own)}});
 }
 
 void Listener::Core::admit(tcp::socket socket, const tcp::endpoint& peer) {

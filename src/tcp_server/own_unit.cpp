@@ -251,7 +251,7 @@ Diagnostics own_state(const Shared& shared) {
     state.version = shared.version;
     state.url = shared.settings.url;
     state.host = shared.settings.host;
-    for (const bus::BusClient* line : shared.units.lines()) {
+    for (const bus::LineView* line : shared.units.lines()) {
         const bus::LineStatus status = line->status();
         state.lines.push_back({status.name, status.up, status.queue_depth, status.load_percent});
     }

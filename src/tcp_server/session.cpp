@@ -42,9 +42,10 @@ void Session::start(Caller caller) {
     read();
 }
 
-std::optional<TimePoint> Session::idle_since() const {
-    if (!pipeline_->empty() || writing_ || due_) return std::nullopt;
-    return active_;
+Guest Session::guest() const {
+    const bool half_sent =
+        due_ && shared_->clock.now() - active_ < shared_->settings.half_sent_pause;
+    return {host_, pipeline_->empty() && !writing_ && !half_sent, active_};
 }
 
 asio::ip::address Session::peer() const {

@@ -15,6 +15,7 @@
 #include "panelgate/rt/settings.hpp"
 #include "panelgate/tcp_server/dispatch.hpp"
 #include "pipeline.hpp"
+#include "places.hpp"
 #include "request_reader.hpp"
 #include "shared.hpp"
 
@@ -36,10 +37,9 @@ class Session : public std::enable_shared_from_this<Session> {
     boost::asio::ip::address peer() const;
     /// Returns its name in logs.
     const std::string& client() const { return pipeline_->client(); }
-    /// Returns the host it is counted under: bus::host_of() its address.
-    bus::Host host() const { return host_; }
-    /// Returns when it was last active; nullopt while requests or replies are outstanding.
-    std::optional<TimePoint> idle_since() const;
+    /// Returns what its place depends on. It is idle unless requests or replies are outstanding, or
+    /// a half-sent ADU still goes on.
+    Guest guest() const;
     /// Takes no more requests, answers those in flight, refuses queued ones, then closes.
     void finish();
     /// Closes at once and cancels its queued requests on the buses. Idempotent.
@@ -73,8 +73,8 @@ class Session : public std::enable_shared_from_this<Session> {
     std::shared_ptr<Shared> shared_;
     ClosedHandler on_closed_;
     std::shared_ptr<Pipeline> pipeline_;
-    bus::Host host_{};
-    TimePoint active_;
+    bus::Host host_{};  ///< bus::host_of() its address
+    TimePoint active_;  ///< its last input
 
     Input input_state_ = Input::served;
     std::array<std::uint8_t, 4096> input_{};

@@ -140,7 +140,9 @@ class Simulated(unittest.TestCase):
         stations = (f"{{id: 31, name: press, profile: autonics-gplp-s, {faults}}},"
                     f" {{id: 5, name: mixer, profile: autonics-gp-2005, {faults}}}")
         line = config.line(stations=stations, serial="{mode: ascii, baud: 115200}",
-                           timing="{response_timeout: 300ms, reply_hole: 200ms}")
+                           timing="{response_timeout: 300ms, reply_hole: 200ms}",
+                           # Offline, each question of these clients that never pause fails at once.
+                           offline="{after: 100}")
         with harness.configured(config.gateway(line)) as program:
             readers = [Reader(program, unit, 110 + i, 40) for unit in (31, 5) for i in range(3)]
             for reader in readers:

@@ -56,6 +56,7 @@ class Rest(unittest.TestCase):
             self.assertEqual((ended["asked"], ended["of"], ended["found"]), (6, 6, 0))
         report = state(self.program)
         self.assertEqual((report["state"], report["stations"], report["yaml"]), ("done", [], ""))
+        self.assertEqual((report["asked_stations"], report["silent_stations"]), ("20-25", "20-25"))
 
     def test_it_is_ended_by_whoever_may_begin_it(self):
         self.program.rest("POST", PATH.format("floor1"), {"share_percent": 1})
@@ -128,6 +129,8 @@ class Again(unittest.TestCase):
                 self.assertEqual((second["asked"], second["refused"]), (10, 0))
                 self.assertEqual(set(asked), addresses)
                 self.assertEqual([one["id"] for one in second["stations"]], [5, 9])
+                self.assertEqual((second["asked_stations"], second["silent_stations"]),
+                                 ("3-12", "3-4,6-8,10-12"))
                 incidents = program.get("/api/v1/lines/floor1/incidents")[1]["incidents"]
                 self.assertEqual(incidents, [])
                 self.assertEqual(program.get("/api/v1/lines/floor1")[1]["findings"], [])

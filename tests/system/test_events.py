@@ -2,8 +2,10 @@
 import contextlib
 import http.client
 import json
+import pathlib
 import socket
 import struct
+import tempfile
 import threading
 import unittest
 
@@ -11,6 +13,7 @@ import config
 import harness
 from browser import Browser
 from harness import read_registers, write_register
+from rtu_bus import RtuBus, echo_address
 from test_points import POINT, PRESS, SELDOM, quality, until
 
 
@@ -150,6 +153,22 @@ class ServerSentEvents(unittest.TestCase):
                 self.assertEqual(events.next("point", name="level")["quality"], "stale")
                 level = events.next("point", name="level")
                 self.assertEqual((level["value"], level["quality"]), (333, "good"))
+
+    def test_P10_a_line_that_is_pulled_takes_what_is_known_of_its_stations_along(self):
+        with tempfile.TemporaryDirectory() as folder:
+            link = pathlib.Path(folder) / "tty"
+            text = config.gateway(config.line("shaky", link, "{id: 1, name: one}", baud=115200))
+            with harness.configured(text) as program, program.client() as client, \
+                    Events(program, "?types=station,line") as events:
+                for times in (1, 2):
+                    with RtuBus(link, {1: echo_address}):
+                        program.log.wait_for("line up", times)
+                        self.assertEqual(client.ask(1, read_registers(5))[0], 3)
+                        events.next("station", station="one", event="online")
+                        self.assertEqual(program.get("/api/v1/stations/one")[1]["state"], "online")
+                    events.next("line", state="down")
+                    events.next("station", station="one", event="unknown")
+                    self.assertEqual(program.get("/api/v1/stations/one")[1]["state"], "unknown")
 
     def test_only_what_was_asked_for(self):
         with harness.configured(PRESS) as program:

@@ -173,8 +173,10 @@ class Mqtt(unittest.TestCase):
             end = (last, "good")
             told, read = told[:told.index(end) + 1], read[:read.index(end) + 1]
             told = told[told.index(read[0]):]  # the events were listened to later
-            gap = next(i for i, state in enumerate(told) if state != read[i])
-            self.assertEqual(told[gap:], read[gap - len(told):])
+            # What is on its way to the broker stays when the store is full; what is next goes.
+            rest = iter(read)
+            self.assertTrue(all(state in rest for state in told), (told, read))
+            self.assertEqual(told[-30:], read[-30:])
             self.assertEqual(len(read) - len(told), dropped)
 
 

@@ -265,6 +265,7 @@ class Discovery(Browser):
     def test_it_looks_beside_everybody_else_and_says_how_far_it_is(self):
         self.look("20-24")
         self.wait(lambda: "4 of 4" in self.text('[role="status"].muted'))  # 20 is listed
+        self.wait(lambda: self.text(".addresses") == "Asked: 21-24 · No answer: 21-24")
         self.wait(lambda: self.text(".empty") == "No unlisted station has answered.")
         self.open("discovery")
         self.wait(lambda: self.text(".empty") == "No unlisted station has answered.")

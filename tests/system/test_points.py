@@ -65,10 +65,10 @@ class Points(unittest.TestCase):
             # The same words, read as they lie: UW102 holds the low one.
             self.assertEqual(program.values("/api/v1/stations/press/devices/UW102?count=2"),
                              [0x0304, 0x0102])
-            metrics = program.get("/metrics")[1]
-            self.assertRegex(metrics, r'panelgate_point_value\{line="floor1",station="press",'
-                                      r'point="level",unit="celsius"\} 21\.5')
-            self.assertIn('panelgate_point_age_seconds{', metrics)
+            metric = (r'panelgate_point_value\{line="floor1",station="press",'
+                      r'point="level",unit="celsius"\} 21\.5')
+            until(lambda: re.search(metric, program.get("/metrics")[1]))  # a poll's, of its own time
+            self.assertIn('panelgate_point_age_seconds{', program.get("/metrics")[1])
 
     def test_what_cannot_be_written_says_why(self):
         with harness.configured(PRESS) as program:
@@ -170,6 +170,14 @@ class Written(unittest.TestCase):
             self.follows(program, lambda: self.assertEqual(
                 program.rest("PUT", "/api/v1/stations/press/devices/UB1000",
                              {"values": [1]})[0], 200), 1)
+
+    def test_P6_a_get_behind_a_write_gives_what_the_panel_has(self):
+        with harness.configured(SELDOM) as program:
+            until(lambda: quality(program, "level") == "good")
+            for value in range(1, 21):  # more than the polls read again at once
+                self.assertEqual(program.rest("PUT", POINT + "level", {"value": value})[0], 200)
+                level = program.get(POINT + "level")[1]
+                self.assertEqual((level["value"], level["quality"]), (value, "good"))
 
 
 class Forgetful:

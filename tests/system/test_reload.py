@@ -164,6 +164,32 @@ class Reload(unittest.TestCase):
             self.assertEqual((done.returncode, done.stdout.split()[0]), (0, "applied"))
             running.program.log.wait_for("warn configuration weaker what=.station mixer: access")
 
+    def test_units_that_lead_to_another_panel_are_warned_of_as_check_does(self):
+        def served(first, second):
+            units = f", units: {{101: other/{first}, 102: other/{second}}}"
+            return plant(other(f"{MIXER}, {IO}"), modbus=config.FREE_PORT + units)
+
+        def moved(lines):
+            return [line[line.index("unit "):] for line in lines if "unit 10" in line]
+        with Running(served("mixer", "io")) as running:
+            old = running.file.with_name("old.yaml")
+            old.write_text(served("mixer", "io"))
+            status, verdict = running.reload(served("io", "mixer"))
+            self.assertEqual((status, verdict["outcome"]), (200, "applied"))
+            told = moved(verdict["warnings"])
+            self.assertEqual(len(told), 2, verdict["warnings"])
+            self.assertIn("unit 101 of 127.0.0.1:0 was 'mixer' of line other and is now 'io' of "
+                          "line other: a write to it may reach another panel; ", told[0])
+            checked = harness.run("check", "-c", str(running.file), "--diff", str(old))
+            self.assertEqual(moved(checked.stderr.splitlines()), told)
+            running.program.log.wait_for(
+                "warn configuration warning=.unit 102 of 127.0.0.1:0 was .io. of line other")
+            self.assertEqual(moved(running.reload()[1]["warnings"]), [])
+            running.file.write_text(served("mixer", "io"))
+            running.program.process.send_signal(signal.SIGHUP)
+            running.program.log.wait_for(
+                "warn configuration warning=.unit 102 of 127.0.0.1:0 was .mixer. of line other")
+
     def test_by_signal_and_by_a_file_that_is_replaced(self):
         with Running(plant(other()), "--watch") as running:
             running.file.write_text(plant(other(f"{MIXER}, {IO}")))

@@ -28,9 +28,11 @@ def text_of(program, path):
 
 
 def polled(program, point, as_wanted=lambda value: True):
-    """Waits until a poll has brought a good value like this; each look is a request to the program."""
+    """Waits until a poll has brought a good value like this; each look is a request to the program,
+    for the list: a single point is read behind a write."""
     for _ in range(5000):
-        shown = program.get(PRESS + "points/" + point)[1]
+        points = program.get(PRESS + "points")[1]["points"]
+        shown = next(one for one in points if one["name"] == point)
         value = shown["value"]
         if shown["quality"] == "good" and as_wanted(value):
             return

@@ -79,6 +79,9 @@ struct StationEvent {
     enum class Kind : std::uint8_t {
         offline,
         online,
+        suspect,    ///< this and the next two are told by the bus, not by the arbiter
+        heard,      ///< on a line in listen mode
+        unknown,    ///< its line is down
         late,       ///< it answered `by` after the response timeout
         drift,      ///< 95 of 100 replies take up to `by`: near the response timeout
         collision,  ///< the echo of a request to it differed from what was sent

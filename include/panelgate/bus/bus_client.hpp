@@ -160,11 +160,10 @@ struct StationStatus {
     std::optional<HeardCounts> heard{};    ///< in listen mode only
 };
 
-/// A line as seen by servers, REST and the poller. Single-threaded. A bus lives as long as the
-/// program's io_context runs, and outlives its clients.
-class BusClient {
+/// A line as its clients ask it: servers, REST, the poller, relays, a discovery. Single-threaded.
+class RequestPort {
   public:
-    virtual ~BusClient() = default;
+    virtual ~RequestPort() = default;
 
     /// Submits a request. The handler is called exactly once, never from inside transact(), and at
     /// the latest at the line's queue deadline. Refuses what cannot be answered at this address
@@ -187,6 +186,17 @@ class BusClient {
     /// Removes a client: its waiting requests are answered Fault::cancelled and never transmitted;
     /// a request on the wire completes and is answered normally.
     virtual void cancel(ClientId client) = 0;
+    /// Sets the client's name for clients() and the trace, until cancel(). The last name applies.
+    virtual void name_client(ClientId client, std::string name) {
+        static_cast<void>(client);
+        static_cast<void>(name);
+    }
+};
+
+/// What is known of a line: for REST, metrics and the diagnostics unit. Nothing is sent.
+class LineView {
+  public:
+    virtual ~LineView() = default;
 
     virtual LineStatus status() const = 0;
     /// Returns each client's use of the line, largest first, at most 100 rows, then a row for the
@@ -214,12 +224,10 @@ class BusClient {
         static_cast<void>(id);
         return std::nullopt;
     }
-    /// Sets the client's name for clients() and the trace, until cancel(). The last name applies.
-    virtual void name_client(ClientId client, std::string name) {
-        static_cast<void>(client);
-        static_cast<void>(name);
-    }
 };
+
+/// Both. A bus lives as long as the program's io_context runs, and outlives its clients.
+class BusClient : public RequestPort, public LineView {};
 
 struct Settings;
 

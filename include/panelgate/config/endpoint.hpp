@@ -4,6 +4,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "panelgate/base/network.hpp"
 
 namespace panelgate::config {
 
@@ -20,6 +23,8 @@ std::optional<Endpoint> parse_endpoint(std::string_view text);
 bool is_ipv6(const std::string& address);
 /// True for 0.0.0.0 and :: in any spelling: all addresses of the machine.
 bool is_any_address(const std::string& address);
+/// True for an address that only programs on this machine reach: 127.0.0.0/8 and ::1.
+bool is_loopback(const std::string& address);
 
 /// A network: "10.0.0.0/8", or a bare address. parse_cidr() returns nothing for anything else, nor
 /// for a prefix below 96 of an IPv4 address written as IPv6 (::ffff:10.0.0.1), which would let all
@@ -34,6 +39,11 @@ std::string network_of(const Cidr& cidr);
 /// True if the network contains the address; IPv4 also matches its IPv6 form. False for invalid
 /// text.
 bool is_in(const std::string& address, const std::string& network, unsigned prefix);
+
+/// True if more than known networks reach a listener on this address: it is not on loopback, and
+/// `allow` is empty or has more public addresses than one /8 of IPv4 or one /16 of IPv6, its
+/// networks taken together.
+bool is_reachable_from_outside(const std::string& address, const std::vector<Network>& allow);
 
 /// Returns the address at which a program on this machine reaches a listener: loopback if it
 /// listens on all addresses.

@@ -31,7 +31,7 @@ class Poller {
     /// after a write, with the wants that became outdated.
     using Update = std::function<void(std::uint8_t station, const std::vector<std::size_t>& wants)>;
 
-    Poller(rt::Clock& clock, bus::BusClient& bus, std::vector<PolledStation> stations);
+    Poller(rt::Clock& clock, bus::RequestPort& bus, std::vector<PolledStation> stations);
     ~Poller();
     Poller(const Poller&) = delete;
     Poller& operator=(const Poller&) = delete;

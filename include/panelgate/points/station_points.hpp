@@ -52,6 +52,8 @@ class StationPoints {
     /// Returns the point of this want; null if it belongs to a poll block.
     const Point* point_of(std::size_t want) const;
     PointReading read(const Point& point, TimePoint now) const;
+    /// True if a write came after the value was read: the panel may hold another one now.
+    bool is_outdated(const Point& point) const;
     /// Returns the raw items: registers, or bits as 0 and 1; empty until the first success.
     const std::vector<std::uint16_t>& items(const Point& point) const;
     const std::vector<Poll>& blocks() const { return *blocks_; }

@@ -39,7 +39,7 @@ class LogDrain {
 /// blanks or quotes are quoted; control characters are escaped. The first two fields name the
 /// subject: from error to info, repeats of an event of one subject are throttled (LogThrottle), and
 /// the next line gives their number in the field `left_out`. A field `client`, without its port,
-/// has a budget besides, across all subjects.
+/// has a budget besides, across all subjects, and all clients together have one for each event.
 void log(LogLevel level, std::string_view event, std::span<const LogField> fields);
 void log(LogLevel level, std::string_view event, std::initializer_list<LogField> fields = {});
 /// Like log(), but throttled by an explicit subject, however the fields differ.

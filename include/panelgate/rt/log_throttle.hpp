@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -60,8 +61,10 @@ class LogRepeats {
 };
 
 /// Throttles repeats: an event of one subject passes a few times, then once per interval with the
-/// number left out. As clients may choose subjects (addresses, topics), each client and each event
-/// has a budget besides; lines beyond it are left out and counted. Bounded. Pure.
+/// number left out. As clients may choose subjects (addresses, topics), each client has a budget
+/// for an event besides, and as they may choose their own addresses, too, all clients together have
+/// one. Events without a client (lines, reloads) have a wide one of their own. Lines beyond a
+/// budget are left out and counted. Bounded. Pure.
 class LogThrottle {
   public:
     /// `burst` lines at once, then one per interval.
@@ -72,10 +75,18 @@ class LogThrottle {
     static constexpr Pace kIncidents{3, 10min};  ///< nine lines an hour for an endless repeat
     static constexpr Pace kActions{30, 1min};    ///< actions of users, and of programs without end
     static constexpr Pace kByClient{60, 1s};     ///< an event of one client, for all subjects
-    static constexpr Pace kByEvent{600, 100ms};  ///< an event of all clients
+    /// An event of all clients together: 120 lines a minute are 20 MB a day. Twice as much as one
+    /// client may use, so that it alone hides no other's.
+    static constexpr Pace kByClients{120, 500ms};
+    /// An event without a client. The configuration bounds its subjects: hundreds of stations may
+    /// go offline at once, and each is to be seen.
+    static constexpr Pace kByEvent{600, 100ms};
     static constexpr Duration kLeftOutPause = 1min;
     static constexpr std::size_t kMostSubjects = 1024;
     static constexpr std::size_t kMostClients = 256;
+    /// Clients whose counts are reported one by one, those with the highest; the others' belong to
+    /// their event's count, or the reports themselves would fill the log.
+    static constexpr std::size_t kMostTold = 16;
 
     /// std::nullopt: this line is left out. Otherwise the number left out since the last one
     /// passed. `client` has no port; empty: the event has no client.
@@ -89,18 +100,21 @@ class LogThrottle {
         LogLine line;
         std::uint64_t left_out = 0;
     };
-    /// Keeps the line that pass() has just left out: it is logged later if nothing follows.
+    /// Keeps the line that pass() has just left out: it is logged later if nothing follows. What a
+    /// budget has left out is not kept.
     void hold(std::string_view event, std::string_view subject, LogLevel level, LogLine line);
-    /// Returns the kept lines whose interval is over; each represents all before it.
+    /// Returns the kept lines whose interval is over; each represents all before it. Those of
+    /// clients need room in the budget of all clients, or are only counted.
     std::vector<Held> take_kept(TimePoint now);
 
-    /// Number of lines beyond a budget; `client` is empty for the event's budget.
+    /// Number of lines beyond a budget; `client` is empty if it is not one client's.
     struct LeftOut {
         std::string event;
         std::string client;
         std::uint64_t count = 0;
+        std::size_t clients = 0;  ///< whose lines they were, up to kMostClients; 0: nobody's
     };
-    /// Returns the counts that have waited for kLeftOutPause; each is reported once.
+    /// Returns the counts that have waited for kLeftOutPause, each once; TimePoint::max(): all.
     std::vector<LeftOut> take_left_out(TimePoint now);
 
   private:
@@ -111,6 +125,7 @@ class LogThrottle {
         std::uint64_t left_out = 0;
         LogLevel level = LogLevel::info;
         std::optional<LogLine> held{};  ///< the last line left out
+        std::string client{};
     };
     struct Budget {
         std::string event;
@@ -119,19 +134,29 @@ class LogThrottle {
         int credit = 0;
         std::uint64_t left_out = 0;
         TimePoint since;  ///< first line left out and not yet reported
+        /// Those whose lines were left out, if it is the budget of all clients.
+        std::set<std::string, std::less<>> clients{};
+
+        bool take();
+        void leave_out(TimePoint at, std::uint64_t lines, std::string_view of = {});
+        bool is_due(TimePoint now) const;
     };
     using Budgets = std::map<std::string, Budget, std::less<>>;
 
-    Seen& new_subject(TimePoint now, std::string key, const Pace& pace);
+    Seen& new_subject(TimePoint now, std::string key, const Pace& pace, std::string_view client);
     void make_room(TimePoint now);
     bool is_within_budget(TimePoint now, std::string_view event, std::string_view client);
+    bool may_be_told(TimePoint now, const std::string& key, const Seen& seen);
     static Budget& budget(Budgets& budgets, TimePoint now, std::string_view event,
                           std::string_view client, const Pace& pace);
+    Budget& all_clients(TimePoint now, std::string_view event);
     void make_room_for_client(TimePoint now);
+    void gather_low_counts(TimePoint now);
 
     std::map<std::string, Seen, std::less<>> seen_;
     Budgets client_budgets_;
-    Budgets event_budgets_;
+    Budgets all_clients_budgets_;  ///< of events with a client
+    Budgets event_budgets_;        ///< of events without
 };
 
 }  // namespace panelgate::rt

@@ -60,13 +60,16 @@ class Discovery {
     /// True if no question is left, or the line was unable to send too often.
     bool done() const;
     bool gave_up() const { return unsent_ >= kMaxUnsent; }
-    /// Addresses that were silent. The caller asks those that were heard meanwhile again by
-    /// ask_late().
+    /// Addresses that were asked and silent. The caller asks those that were heard meanwhile again
+    /// by ask_late().
     const std::set<std::uint8_t>& silent() const { return silent_; }
+    /// Asks a silent address again, once.
     void ask_late(std::uint8_t station);
 
     /// Returns the number of addresses asked.
-    std::size_t asked() const { return asked_; }
+    std::size_t asked() const { return asked_.size(); }
+    /// Addresses whose request was on the wire. What the line refused is not among them.
+    const std::set<std::uint8_t>& asked_stations() const { return asked_; }
     /// Returns the number of addresses given up because the line always refused them.
     std::size_t refused() const { return refused_; }
     /// Returns the time left for the first questions at the pace so far; nullopt before the first.
@@ -92,14 +95,15 @@ class Discovery {
     const profile::Catalogue& profiles_;
     DiscoverySettings settings_;
     std::deque<std::uint8_t> waiting_;
-    std::set<std::uint8_t> silent_;
+    std::set<std::uint8_t> asked_;
+    std::set<std::uint8_t> silent_;  ///< of asked_
+    std::set<std::uint8_t> late_;    ///< those asked again
     std::vector<StationFinding> found_;
     std::unique_ptr<Recogniser> recogniser_;  ///< null: no station is being recognised
     StationFinding examined_;
     std::optional<Bytes> probe_;
     TimePoint due_;
     TimePoint began_;
-    std::size_t asked_ = 0;
     std::size_t refused_ = 0;
     std::map<std::uint8_t, unsigned> refusals_;  ///< of waiting addresses
     unsigned unsent_ = 0;                        ///< in a row

@@ -72,22 +72,22 @@ class Caller {
     const std::string& name() const { return name_; }
     bus::Host host() const { return host_; }
     /// Passes the request to a bus for one of its stations; station 0: broadcast.
-    void transact(bus::BusClient* bus, std::uint8_t station, modbus::Request request,
+    void transact(bus::RequestPort* bus, std::uint8_t station, modbus::Request request,
                   bus::AnswerHandler handler);
     /// Makes the bus count a request refused before it reached the bus.
-    void tell_refused(bus::BusClient* bus, std::uint8_t station, ByteView pdu);
+    void tell_refused(bus::RequestPort* bus, std::uint8_t station, ByteView pdu);
     /// Cancels its requests still queued on the buses (answered Fault::cancelled). Further requests
     /// are allowed.
     void withdraw();
 
   private:
-    void use(bus::BusClient* bus);
+    void use(bus::RequestPort* bus);
 
     std::string name_;
     std::string protocol_;
     bus::Host host_;
     bus::ClientId client_ = bus::next_client_id();
-    std::set<bus::BusClient*> used_;
+    std::set<bus::RequestPort*> used_;
 };
 
 /// What to do with a request.

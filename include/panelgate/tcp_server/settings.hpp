@@ -41,15 +41,17 @@ struct Settings {
     /// Also serve UDP on the same port (framing tcp only); there every retransmission is joined
     /// unless `retransmissions` is pass.
     bool udp = false;
-    std::size_t udp_peers_per_address = 16;  ///< ports with outstanding requests
-    Duration udp_idle = 1min;                ///< then a UDP peer is dropped
+    /// Ports with outstanding requests; at most half of max_connections, whatever this says.
+    std::size_t udp_peers_per_address = 16;
+    Duration udp_idle = 1min;  ///< then a UDP peer is dropped
     /// Datagrams over the limit queued for an exception 06 (own_answers); more are dropped.
     std::size_t udp_busy_answers = 256;
     std::optional<std::uint8_t> diagnostics_unit = 255;
     bool read_only = false;
     std::vector<Network> allow;  ///< empty: all
     std::size_t max_connections = 1024;
-    /// Per address (IPv6: per /64 network); beyond it the longest-idle connection is evicted.
+    /// Beyond it an address's longest-idle connection is evicted. IPv6 addresses are counted one by
+    /// one: all clients of a plant may share a /64 network.
     std::size_t max_connections_per_address = 64;
     /// Requests of one connection on the buses, or with replies the client has not taken yet.
     std::size_t in_flight = 16;
@@ -58,7 +60,10 @@ struct Settings {
     std::size_t own_answers = 16;  ///< per period; more wait for the next
     Duration own_answers_period = 1ms;
     Duration partial_adu_timeout = 5s;  ///< an ADU not completed in time closes its connection
-    int bad_protocol_ids = 3;           ///< consecutive ones that close the connection
+    /// Without a further byte for this long a connection with a half-sent ADU counts as idle and
+    /// may give way. TCP has sent a lost segment three times by then (after 0.2, 0.6 and 1.4 s).
+    Duration half_sent_pause = 2s;
+    int bad_protocol_ids = 3;  ///< consecutive ones that close the connection
     // RTU and ASCII only.
     Duration rtu_silence = 50ms;       ///< ends a request whose function implies no length
     Duration ascii_pause = 1s;         ///< between two characters of a frame (SL 2.5.2.1)

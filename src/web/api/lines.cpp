@@ -141,6 +141,8 @@ json::object describe(const std::string& line, const DiscoveryReport& report) {
     object["asked"] = report.asked;
     object["refused"] = report.refused;
     object["of"] = report.of;
+    object["asked_stations"] = report.asked_stations;
+    object["silent_stations"] = report.silent_stations;
     object["found"] = report.stations.size();
     object["bus_ms"] = whole_ms(report.bus);
     object["took_ms"] = whole_ms(report.took);
@@ -244,7 +246,8 @@ Parsed<std::map<std::string, double>> numbers_of(const json::object& body) {
     std::map<std::string, double> numbers;
     for (const auto& [key, value] : body) {
         if (!value.is_number() && !value.is_bool())
-            return problem(400, std::string(key) + " must be a number, true or false");
+            return problem(400, "the fault '" + excerpt(std::string(key)) +
+                                    "' must be a number, true or false");
         numbers[key] = value.is_bool() ? (value.get_bool() ? 1 : 0) : value.to_number<double>();
     }
     return numbers;

@@ -27,7 +27,7 @@ Problem problem_of(const points::WriteRefusal& refusal, const char* more) {
     return problem(422, refusal.message + (refusal.inexact ? more : ""), "outside-limits");
 }
 
-Parsed<PointOrder> order_of(const bus::BusClient& bus, std::uint8_t station,
+Parsed<PointOrder> order_of(const bus::RequestPort& bus, std::uint8_t station,
                             const profile::PanelProfile& profile, const points::Point& point,
                             const points::Value& value) {
     return unless_refused(plan(station, profile, point, value), bus, station);

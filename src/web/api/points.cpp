@@ -2,6 +2,7 @@
 
 #include <boost/json/array.hpp>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -51,6 +52,15 @@ json::object point_json(const points::Point& point, const points::PointReading& 
     return object;
 }
 
+points::PointReading point_reading(const points::Point& point, const Reading& reading) {
+    points::PointReading made;
+    made.value = points::decode(point, reading.items);
+    made.label = points::label_of(point, reading.items);
+    made.quality = made.value ? points::Quality::good : points::Quality::bad;
+    made.age = reading.age;
+    return made;
+}
+
 namespace {
 
 using points::Point;
@@ -74,25 +84,31 @@ void describe_settings(json::object& object, const Point& point) {
     object["every_ms"] = whole_ms(point.every);
 }
 
-json::object describe(const Api& api, const points::StationPoints& station, const Point& point,
-                      bool raw) {
-    const TimePoint now = api.providers.now();
-    const points::PointReading reading = station.read(point, now);
+/// `items`: shown as "raw"; null: not wanted.
+json::object describe(const Api& api, TimePoint now, const Point& point,
+                      const points::PointReading& reading,
+                      const std::vector<std::uint16_t>* items) {
     json::object object = point_json(point, reading);
     object["time"] = nullptr;
     if (reading.age)
         object["time"] = rfc3339(wall_time_of(now - *reading.age, now, api.providers.wall()));
-    if (raw) {
+    if (items != nullptr) {
         object["raw"] = nullptr;
-        const auto& items = station.items(point);
         if (reading.quality != points::Quality::bad)
-            object["raw"] = json::array(items.begin(), items.end());
+            object["raw"] = json::array(items->begin(), items->end());
     }
     object["at"] = point.at;
     object["type"] = label(point.type);
     object["writable"] = point.writable;
     describe_settings(object, point);
     return object;
+}
+
+json::object describe(const Api& api, const points::StationPoints& station, const Point& point,
+                      bool raw) {
+    const TimePoint now = api.providers.now();
+    return describe(api, now, point, station.read(point, now),
+                    raw ? &station.items(point) : nullptr);
 }
 
 /// A point and its station.
@@ -162,12 +178,37 @@ Handling get_all_points(HttpRequest request, const Api* api) {
     co_return co_await std::move(answering);
 }
 
+namespace {
+
+/// True behind a write: then the panel's own value is asked for, where the line has no other
+/// master.
+bool may_differ(const PointOfStation& of) {
+    return of.station.points->is_outdated(*of.point) && !of.station.bus->status().listens;
+}
+
+json::object describe(const Api& api, const Point& point, const Reading& reading, bool raw) {
+    return describe(api, api.providers.now(), point, point_reading(point, reading),
+                    raw ? &reading.items : nullptr);
+}
+
+}  // namespace
+
 Handling get_point(HttpRequest request, const Api* api) {
     const auto found = find_point(*api->directory, request.arguments[0], request.arguments[1]);
     if (!found) co_return to_response(found.error());
     const auto raw = query_flag(request, "raw");
     if (!raw) co_return to_response(raw.error());
-    co_return json_response(200, describe(*api, *found->station.points, *found->point, *raw));
+    const points::Point& point = *found->point;
+    if (may_differ(*found)) {
+        const Duration deadline = api->directory->line_of(found->station).deadline;
+        const Patience patience(request, deadline, api->providers.now);
+        const modbus::Span span{point.table, point.address, point.count()};
+        boost::asio::awaitable<Parsed<Reading>> reads =
+            read_all(request.caller, &found->station, span, patience);
+        const Parsed<Reading> reading = co_await std::move(reads);
+        if (reading) co_return json_response(200, describe(*api, point, *reading, *raw));
+    }
+    co_return json_response(200, describe(*api, *found->station.points, point, *raw));
 }
 
 Handling get_interpretations(HttpRequest request, const Api* api) {

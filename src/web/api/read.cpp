@@ -7,7 +7,6 @@
 #include "key_book.hpp"
 #include "lists.hpp"
 #include "panelgate/points/station_points.hpp"
-#include "panelgate/points/value.hpp"
 #include "points.hpp"
 #include "reading.hpp"
 #include "routes.hpp"
@@ -108,11 +107,7 @@ Parsed<std::vector<BatchRead>> reads_of(std::string_view body, const Api& api) {
 
 json::object point_result(const BatchRead& read) {
     const points::Point& point = *read.point->point;
-    points::PointReading reading;
-    reading.value = points::decode(point, read.reading.items);
-    reading.label = points::label_of(point, read.reading.items);
-    reading.quality = reading.value ? points::Quality::good : points::Quality::bad;
-    reading.age = read.reading.age;
+    const points::PointReading reading = point_reading(point, read.reading);
     json::object result;
     result["station"] = read.items.station.name;
     for (const auto& [name, value] : point_json(point, reading)) result[name] = value;

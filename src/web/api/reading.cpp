@@ -39,7 +39,7 @@ namespace {
 /// inside its own completion.
 struct StartTransact {
     template <class Handler>
-    void operator()(Handler handler, bus::BusClient* bus, bus::Request request) const {
+    void operator()(Handler handler, bus::RequestPort* bus, bus::Request request) const {
         auto shared = std::make_shared<Handler>(std::move(handler));
         bus->transact(std::move(request), [shared](bus::Answer answer) {
             const auto executor = asio::get_associated_executor(*shared);
@@ -50,7 +50,7 @@ struct StartTransact {
     }
 };
 
-asio::awaitable<bus::Answer> start_transact(bus::BusClient* bus, bus::Request request) {
+asio::awaitable<bus::Answer> start_transact(bus::RequestPort* bus, bus::Request request) {
     return asio::async_initiate<const asio::use_awaitable_t<>, void(bus::Answer)>(
         StartTransact{}, asio::use_awaitable, bus, std::move(request));
 }
@@ -63,13 +63,13 @@ Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu) {
     return bus::Request{.station = station, .request = std::move(*request)};
 }
 
-void introduce(Caller& caller, bus::BusClient* bus) {
+void introduce(Caller& caller, bus::RequestPort* bus) {
     const bus::ClientId client = caller.id();
     caller.at_leaving(bus, [bus, client] { bus->cancel(client); });
     bus->name_client(client, caller.name());
 }
 
-asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
+asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::RequestPort* bus,
                                  bus::Request request) {
     if (caller->has_hung_up() && !caller->has_left()) co_return bus::Answer{};  // cancelled
     if (!caller->has_left()) {

@@ -30,11 +30,11 @@ Parsed<bus::Request> request_to(std::uint8_t station, Bytes pdu);
 /// queued is never transmitted, and later ones are cancelled. Throws
 /// boost::system::system_error(operation_aborted) if the caller has left meanwhile: there is no
 /// client to answer, and what the handler points to may be gone.
-boost::asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::BusClient* bus,
+boost::asio::awaitable<bus::Answer> ask(std::shared_ptr<Caller> caller, bus::RequestPort* bus,
                                         bus::Request request);
 
 /// Registers the client's name with the bus until the client leaves.
-void introduce(Caller& caller, bus::BusClient* bus);
+void introduce(Caller& caller, bus::RequestPort* bus);
 
 /// How a client wants values rendered, as given: from queries, or from the members of a list entry.
 struct Wording {

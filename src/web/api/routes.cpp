@@ -23,6 +23,7 @@ constexpr bool kProbe = true;
 constexpr RoutePolicy kPlain{};
 constexpr RoutePolicy kTagged{.tagged = true};
 constexpr RoutePolicy kAsks{.asks = true};
+constexpr RoutePolicy kMayAsk{.asks = true, .tagged = true};
 constexpr RoutePolicy kOnce{.once = true};
 constexpr RoutePolicy kWrites{.asks = true, .once = true};
 
@@ -69,7 +70,7 @@ constexpr Row kRows[] = {
     {"GET", "/api/v1/relays", get_relays, kSee, kTagged},
     {"GET", "/api/v1/points", get_all_points, kSee, kTagged},
     {"GET", "/api/v1/stations/{}/points", get_points, kSee, kTagged, "raw"},
-    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kTagged, "raw"},
+    {"GET", "/api/v1/stations/{}/points/{}", get_point, kSee, kMayAsk, "raw"},
     {"PUT", "/api/v1/stations/{}/points/{}", put_point, kChange, kWrites, "round"},
     {"GET", "/api/v1/stations/{}/points/{}/history", get_point_history, kSee},
     {"GET", "/api/v1/stations/{}/{}/{}/interpretations", get_interpretations, kSee, kAsks, "count"},

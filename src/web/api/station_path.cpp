@@ -187,7 +187,7 @@ Problem ruled_out(bus::Rule rule, std::string detail) {
     return refused(422, rule, std::move(detail));
 }
 
-Parsed<void> check_may_write(const bus::BusClient& bus, std::uint8_t station) {
+Parsed<void> check_may_write(const bus::RequestPort& bus, std::uint8_t station) {
     if (const auto refusal = bus.refusal_of_write(station)) return problem_of(*refusal);
     return {};
 }

@@ -62,11 +62,11 @@ Problem problem_of(const bus::Refusal& refusal);
 /// 422 for what the profile rules out before a request is made: nothing was sent.
 Problem ruled_out(bus::Rule rule, std::string detail);
 /// Checks that the bus takes a write to this station, or (0) a broadcast; else 403 or 409.
-Parsed<void> check_may_write(const bus::BusClient& bus, std::uint8_t station);
+Parsed<void> check_may_write(const bus::RequestPort& bus, std::uint8_t station);
 /// Reports a lack of write access before any other problem of a planned write. A valid request
 /// passes: the bus itself refuses, counts and logs it.
 template <class T>
-Parsed<T> unless_refused(Parsed<T> planned, const bus::BusClient& bus, std::uint8_t station) {
+Parsed<T> unless_refused(Parsed<T> planned, const bus::RequestPort& bus, std::uint8_t station) {
     if (planned) return planned;
     if (const auto allowed = check_may_write(bus, station); !allowed) return allowed.error();
     return planned;

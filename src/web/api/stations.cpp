@@ -247,7 +247,7 @@ Parsed<bus::Request> raw_request(const Directory& directory, const LineEntry& li
 
 /// Reports a request that is invalid or refused before the bus is asked: the bus counts and logs
 /// it.
-void tell_refused(Caller& caller, bus::BusClient& bus, const json::object& body) {
+void tell_refused(Caller& caller, bus::RequestPort& bus, const json::object& body) {
     const auto station = number_member(body, "station", 0, modbus::kMaxStation);
     const auto hex = string_member(body, "pdu");
     const auto pdu = hex ? from_hex(*hex) : std::nullopt;

@@ -31,11 +31,11 @@ struct TracePage {
 };
 
 /// The last frames, decisions and transactions, at most `most` of each.
-TracePage last_of_trace(const bus::BusClient& bus, std::size_t most);
+TracePage last_of_trace(const bus::LineView& bus, std::size_t most);
 /// The first entries after this sequence number, at most `most` in total; a transaction counts by
 /// the number of its end. If there are none, `next` is the newest number, so that a client recovers
 /// after a restart.
-TracePage trace_since(const bus::BusClient& bus, std::uint64_t since, std::size_t most);
+TracePage trace_since(const bus::LineView& bus, std::uint64_t since, std::size_t most);
 
 /// Trace entries as JSON. Instants are seconds of the gateway's monotonic clock; `time` is
 /// wall-clock time.
@@ -92,14 +92,14 @@ void cut(bus::TracePart& part, std::size_t most) {
 
 }  // namespace
 
-TracePage last_of_trace(const bus::BusClient& bus, std::size_t most) {
+TracePage last_of_trace(const bus::LineView& bus, std::size_t most) {
     TracePage page;
     page.part = bus.trace(most);
     page.next = last_number(page.part);
     return page;
 }
 
-TracePage trace_since(const bus::BusClient& bus, std::uint64_t since, std::size_t most) {
+TracePage trace_since(const bus::LineView& bus, std::uint64_t since, std::size_t most) {
     TracePage page;
     page.part = bus.trace_since(since, most);
     cut(page.part, most);
@@ -319,7 +319,7 @@ Handling get_trace_pcapng(HttpRequest request, const Api* api) {
     const auto line = find_line(*api->directory, request.arguments[0]);
     if (!line) co_return to_response(line.error());
     const std::string name = (*line)->name;
-    const bus::BusClient* const bus = (*line)->bus;
+    const bus::LineView* const bus = (*line)->bus;
     TracePcapng file(api->providers.version, name);
     std::string body;
     const std::uint64_t newest = last_of_trace(*bus, 1).next;
@@ -343,7 +343,7 @@ constexpr unsigned kDefaultTrace = 100;  ///< entries of each kind
 constexpr unsigned kMaxTrace = 500;
 
 /// The page that the queries ask for.
-Parsed<TracePage> page_of(const HttpRequest& request, const bus::BusClient& bus) {
+Parsed<TracePage> page_of(const HttpRequest& request, const bus::LineView& bus) {
     const auto since = request.query.find("since");
     const bool follows = since != request.query.end();
     const auto most =

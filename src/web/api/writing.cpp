@@ -178,6 +178,12 @@ Parsed<Writing> writing_of(const StationEntry& station, Bytes pdu, const json::o
     return made;
 }
 
+/// How messages call a value of the body: "value", or "values[2]".
+std::string place_in(const json::object& body, std::size_t index) {
+    if (body.contains("value")) return "value";
+    return "values[" + std::to_string(index) + ']';
+}
+
 /// Encodes typed values ("f32", "i32", ...) as registers. A string takes `length` characters, or as
 /// many as it needs.
 Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus::Table table) {
@@ -188,9 +194,10 @@ Parsed<std::vector<std::uint16_t>> typed_cells(const json::object& body, modbus:
     const auto values = values_member(body);
     if (!values) return values.error();
     std::vector<std::uint16_t> cells;
-    for (const json::value& one : *values) {
-        const auto value = value_of(one);
+    for (std::size_t i = 0; i < values->size(); ++i) {
+        const auto value = value_of((*values)[i]);
         if (!value) return value.error();
+        view->value.name = place_in(body, i);
         const auto* text = std::get_if<std::string>(&*value);
         if (text != nullptr && !wording->length)
             view->value.length = static_cast<unsigned>(text->size() + text->size() % 2);

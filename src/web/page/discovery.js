@@ -8,6 +8,9 @@ import {askToken} from './token.js';
 
 const FRESH = 2000;  // ms: how long the time left is shown before it is asked anew
 
+/** A list of addresses that may wrap: "5, 17, 20-31". */
+const spaced = (stations) => stations.replaceAll(',', ', ');
+
 class Discovery {
     constructor(line) {
         this.line = line;
@@ -17,8 +20,9 @@ class Discovery {
         this.end = h('button', {type: 'button', hidden: true, onclick: () => this.#stop()}, t('discovery.stop'));
         this.progress = h('progress', {hidden: true, 'aria-label': t('nav.discovery')});
         this.said = h('p', {class: 'muted', role: 'status'});
+        this.addresses = h('p', {class: 'muted addresses'});
         this.result = h('div');
-        this.node = h('div', null, h('section', {class: 'card'}, h('p', {class: 'muted'}, t('discovery.hint')), this.#form(), this.progress, this.said), this.result);
+        this.node = h('div', null, h('section', {class: 'card'}, h('p', {class: 'muted'}, t('discovery.hint')), this.#form(), this.progress, this.said, this.addresses), this.result);
         this.told = ({detail}) => {
             if (detail.line !== line) return;
             this.#goes(detail);
@@ -55,6 +59,14 @@ class Discovery {
         text(this.said, parts.join(', '));
     }
 
+    /** Who was really asked, and who of these was silent. */
+    #names({asked_stations, silent_stations}) {
+        const parts = [];
+        if (asked_stations) parts.push(t('discovery.asked', {stations: spaced(asked_stations)}));
+        if (silent_stations) parts.push(t('discovery.silent', {stations: spaced(silent_stations)}));
+        text(this.addresses, parts.join(' · '));
+    }
+
     #stop() { remove(path('lines', this.line, 'discover')).then((report) => this.#show(report), (error) => replace(this.result, refusal(error))); }
 
     async #look() {
@@ -72,6 +84,7 @@ class Discovery {
     #show(report) {
         if (report.state === 'never') return text(this.said, t('discovery.never'));
         this.#goes(report);
+        this.#names(report);
         if (report.state === 'running') return null;
         this.progress.hidden = true;
         if (report.stations.length === 0) return replace(this.result, h('p', {class: 'empty'}, t('discovery.none')));

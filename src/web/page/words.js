@@ -227,6 +227,8 @@ export const words = {
 "discovery.refused": ["{refused} not asked: the line refused them", "{refused} nicht gefragt: die Linie hat sie abgelehnt", "{refused}개는 라인이 거부하여 요청하지 않음", "{refused} 件は回線が拒否し未照会"],
 "discovery.left": ["about {time} left", "noch etwa {time}", "약 {time} 남음", "残り約 {time}"],
 "discovery.progress": ["{asked} of {of} asked, {found} found", "{asked} von {of} gefragt, {found} gefunden", "{of} 중 {asked} 확인, {found} 발견", "{of} 中 {asked} 照会、{found} 発見"],
+"discovery.asked": ["Asked: {stations}", "Gefragt: {stations}", "요청함: {stations}", "照会済み: {stations}"],
+"discovery.silent": ["No answer: {stations}", "Ohne Antwort: {stations}", "무응답: {stations}", "無応答: {stations}"],
 "discovery.none": ["No unlisted station has answered.", "Keine nicht gelistete Station hat geantwortet.", "응답한 미등록 국이 없습니다.", "応答した未登録局はありません。"],
 "discovery.never": ["No search has run yet.", "Es hat noch niemand gesucht.", "아직 검색하지 않았습니다.", "まだ探索していません。"],
 "discovery.evidence": ["Why", "Warum", "근거", "根拠"],

@@ -21,7 +21,7 @@ struct PointOrder {
 
 /// Plans a write. 400 or 422 for a value that the point cannot take, 403 or 409 where writing is
 /// not allowed.
-Parsed<PointOrder> order_of(const bus::BusClient& bus, std::uint8_t station,
+Parsed<PointOrder> order_of(const bus::RequestPort& bus, std::uint8_t station,
                             const profile::PanelProfile& profile, const points::Point& point,
                             const points::Value& value);
 /// The result of a finished write: {"transmitted","confirmed","value"}, or why it failed.

@@ -30,6 +30,8 @@ struct DiscoveryReport {
     std::size_t asked = 0;       ///< addresses
     std::size_t refused = 0;     ///< addresses that the line refused to ask
     std::size_t of = 0;
+    std::string asked_stations;               ///< those asked: "1-4,6-31"
+    std::string silent_stations;              ///< of these, those that did not answer
     std::optional<Duration> remaining;        ///< estimated from the pace so far; nothing: unknown
     std::vector<DiscoveredStation> stations;  ///< so far
     std::string yaml;                         ///< to paste below `stations:`; "" without any
